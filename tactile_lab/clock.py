@@ -1,0 +1,42 @@
+"""Time as a parameter: nothing in the program asks the operating system for the time itself."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+NANOSECONDS = 1_000_000_000
+
+
+class Clock(Protocol):
+    """A monotonic clock that can also wait."""
+
+    def now_ns(self) -> int:
+        """Nanoseconds since an arbitrary origin, never decreasing."""
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        """Return once ``now_ns() >= deadline_ns``."""
+
+
+class MonotonicClock:
+    """CLOCK_MONOTONIC, the clock of the laboratory."""
+
+    def now_ns(self) -> int:
+        return time.monotonic_ns()
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        while (left := deadline_ns - time.monotonic_ns()) > 0:
+            time.sleep(left / NANOSECONDS)
+
+
+class VirtualClock:
+    """A clock that jumps: waiting costs nothing. Subclasses move a simulated world along."""
+
+    def __init__(self, start_ns: int = 0) -> None:
+        self._now_ns = start_ns
+
+    def now_ns(self) -> int:
+        return self._now_ns
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        self._now_ns = max(self._now_ns, deadline_ns)

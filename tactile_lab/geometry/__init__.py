@@ -1,0 +1,1 @@
+"""Frames, transforms, contacts and grasps: the words the rest of the program speaks in."""

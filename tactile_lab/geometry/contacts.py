@@ -1,0 +1,67 @@
+"""A contact is a point with a normal; a grasp is the contacts of one closing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from gtsam import Pose3
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+
+FINGERS = ("FF", "MF", "RF", "LF", "TH")
+"""Fingers of the Shadow hand in the palm's own order: first, middle, ring, little finger, thumb."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One fingertip's touch.
+
+    Attributes:
+        finger: one of :data:`FINGERS`.
+        point_world_m: contact point, shape (3,), world frame, metres.
+        normal_world: unit surface normal, shape (3,), world frame, pointing out of the object.
+        point_covariance_m2: covariance of the point, shape (3, 3), world frame, square metres.
+        normal_sigma_rad: standard deviation of the normal's direction, per axis, radians.
+        force_N: magnitude of the contact force.
+    """
+
+    finger: str
+    point_world_m: Array
+    normal_world: Array
+    point_covariance_m2: Array
+    normal_sigma_rad: float
+    force_N: float
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """The contacts of one closing, and how the hand carried the object since the last one.
+
+    Attributes:
+        index: number of the grasp in the session, from 0.
+        stamp_ns: time in the middle of the capture, session clock.
+        contacts: at most one contact a finger.
+        world_T_palm: the palm's pose at capture.
+        hand_motion_world: how the hand moved while it held the object since the previous grasp, so that
+            predicted ``world_T_object = hand_motion_world * previous world_T_object`` (eq. 3.8); identity
+            in the first grasp.
+    """
+
+    index: int
+    stamp_ns: int
+    contacts: tuple[Contact, ...]
+    world_T_palm: Pose3
+    hand_motion_world: Pose3 = field(default_factory=Pose3)
+
+    @property
+    def points_world_m(self) -> Array:
+        """Contact points, shape (n, 3), world frame, metres."""
+        return np.array([contact.point_world_m for contact in self.contacts]).reshape(-1, 3)
+
+    @property
+    def normals_world(self) -> Array:
+        """Outward unit normals, shape (n, 3), world frame."""
+        return np.array([contact.normal_world for contact in self.contacts]).reshape(-1, 3)

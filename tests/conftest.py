@@ -1,0 +1,30 @@
+"""Shared fixtures: where the recorded real data lie, and a guard against leaks."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def lab_data() -> Path:
+    """Folder of real recordings; tests that need it skip, with the reason, where it is absent."""
+    folder = Path(os.environ.get("TACTILE_LAB_DATA", REPOSITORY.parent / "shared" / "data"))
+    if not (folder / "golden_vectors.json").is_file():
+        pytest.skip(f"no recorded data at {folder} (set TACTILE_LAB_DATA)")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def no_leaked_threads() -> Iterator[None]:
+    """A test that leaves a thread behind fails."""
+    before = set(threading.enumerate())
+    yield
+    left = [thread.name for thread in threading.enumerate() if thread not in before and thread.is_alive()]
+    assert not left, f"threads left running: {left}"
