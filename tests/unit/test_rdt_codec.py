@@ -1,0 +1,112 @@
+"""RDT codec: bytes of protocols section C.1."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.ati import rdt_codec
+from drivers.ati.rdt_codec import Command, Severity
+from tactile_lab.errors import CodecError
+
+WORD = st.integers(0, 2**32 - 1)
+COUNT = st.integers(-(2**31) + 1, 2**31 - 1)
+
+
+def test_requests_match_the_golden_vectors(lab_data: Path) -> None:
+    golden = json.loads((lab_data / "golden_vectors.json").read_text())["rdt"]
+    requests = {
+        "start_rt_inf": (Command.START, 0),
+        "stop": (Command.STOP, 0),
+        "one": (Command.START, 1),
+        "buffered": (Command.START_BUFFERED, 0),
+        "latch": (Command.CLEAR_CONDITION_LATCH, 0),
+        "bias": (Command.SET_SOFTWARE_BIAS, 0),
+    }
+    assert {name: rdt_codec.encode_request(*request).hex() for name, request in requests.items()} == golden
+
+
+def test_a_record_matches_the_golden_vector(lab_data: Path) -> None:
+    golden = json.loads((lab_data / "golden_vectors.json").read_text())["rdt_record_example"]
+    payload = bytes.fromhex(golden["hex"])
+    (record,) = rdt_codec.decode_records(payload)
+    fields = [int(record[name]) for name in ("rdt_sequence", "ft_sequence", "status")]
+    assert [*fields, *record["counts"].tolist()] == golden["fields"]
+    wrench = rdt_codec.wrenches(rdt_codec.decode_records(payload), 1e6, 1e6)
+    np.testing.assert_allclose(wrench, [[1.5, -0.25, 3.0, 0.012, -0.0005, 0.0]])
+
+
+@settings(max_examples=40, derandomize=True)
+@given(st.lists(st.tuples(WORD, WORD, WORD, st.tuples(*[COUNT] * 6)), min_size=1, max_size=40))
+def test_records_survive_encoding_and_decoding(rows: list[tuple[int, int, int, tuple[int, ...]]]) -> None:
+    rdt, ft, status, counts = (np.array(column) for column in zip(*rows, strict=True))
+    records = rdt_codec.decode_records(rdt_codec.encode_records(rdt, ft, status, counts))
+    np.testing.assert_array_equal(records["rdt_sequence"], rdt)
+    np.testing.assert_array_equal(records["ft_sequence"], ft)
+    np.testing.assert_array_equal(records["status"], status)
+    np.testing.assert_array_equal(records["counts"], counts)
+
+
+@settings(max_examples=60, derandomize=True)
+@given(st.binary(max_size=120))
+def test_any_bytes_decode_or_raise_a_codec_error(payload: bytes) -> None:
+    if payload and len(payload) % 36 == 0:
+        assert len(rdt_codec.decode_records(payload)) == len(payload) // 36
+    else:
+        with pytest.raises(CodecError, match="whole number"):
+            rdt_codec.decode_records(payload)
+    if len(payload) != 8:
+        with pytest.raises(CodecError):
+            rdt_codec.decode_request(payload)
+
+
+def test_a_request_is_read_back_by_an_emulator() -> None:
+    request = rdt_codec.decode_request(rdt_codec.encode_request(Command.START_BUFFERED, 12))
+    assert (request.command, request.count) == (Command.START_BUFFERED, 12)
+
+
+@pytest.mark.parametrize("payload", ["1235000200000000", "1234009900000000"])
+def test_a_foreign_request_is_refused(payload: str) -> None:
+    with pytest.raises(CodecError, match=r"header|command"):
+        rdt_codec.decode_request(bytes.fromhex(payload))
+
+
+def test_sequences_wrap_at_32_bits() -> None:
+    one, row = np.array([2**32 + 5]), np.zeros((1, 6), int)
+    assert rdt_codec.decode_records(rdt_codec.encode_records(one, one, one * 0, row))["rdt_sequence"][0] == 5
+
+
+@pytest.mark.parametrize("counts", [np.zeros((2, 5), int), np.full((1, 6), 2**31), np.zeros((3, 6), int)])
+def test_counts_that_do_not_fit_are_refused(counts: np.ndarray) -> None:
+    with pytest.raises(CodecError):
+        rdt_codec.encode_records(np.zeros(1), np.zeros(1), np.zeros(1), counts)
+
+
+@pytest.mark.parametrize("count", [-1, 2**32])
+def test_a_sample_count_beyond_32_bits_is_refused(count: int) -> None:
+    with pytest.raises(CodecError, match="32 bits"):
+        rdt_codec.encode_request(Command.START, count)
+
+
+@pytest.mark.parametrize(
+    ("status", "severity", "word"),
+    [
+        (0, Severity.OK, ""),
+        (0x80010000, Severity.WARNING, "monitor"),
+        (0x80020000, Severity.FAULT, "saturated"),
+        (0x80000004, Severity.WARNING, "temperature"),
+        (0x80000000, Severity.FAULT, "without naming"),
+        (0x00008000, Severity.WARNING, "undocumented"),
+        (0x82020002, Severity.FAULT, "halted"),
+    ],
+)
+def test_status_words_are_told_in_english_with_their_severity(status: int, severity: Severity, word: str) -> None:
+    report = rdt_codec.describe_status(status)
+    assert report.severity is severity
+    assert word in "; ".join(report.messages)
+    assert bool(report.messages) == (severity is not Severity.OK)
