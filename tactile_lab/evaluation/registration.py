@@ -1,0 +1,53 @@
+"""Registration error: how well the contacts of all grasps fit together in the object's frame.
+
+It judges the tracking alone, without any shape model: contacts are placed in the object frame once
+with the estimated and once with the true poses, and compared after one best rigid fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from gtsam import Pose3
+
+from tactile_lab.evaluation.trajectory import Poses, compared_grasps
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.geometry.poses import transform_points
+
+FAILURE_LIMIT_MM = 5.0
+"""A run whose registration error is above this limit counts as failed."""
+
+
+def registration_rms_mm(contacts_world_m: Sequence[Array], estimate: Poses, truth: Poses, dimension: int) -> float | None:
+    """RMS distance between contacts placed with estimated and with true poses, after one best rigid fit.
+
+    Args:
+        contacts_world_m: contact points of each grasp, shape (n, 3), world frame.
+        estimate: estimated ``world_T_object`` of each grasp.
+        truth: true ``world_T_object`` of each grasp.
+        dimension: 2 compares in the table plane only, 3 in space.
+
+    Returns:
+        Millimetres, or None when fewer than two grasps with contacts have both poses.
+    """
+    used = [pair for pair in compared_grasps(estimate, truth) if len(contacts_world_m[pair.index])]
+    if len(used) < 2:
+        return None
+    placed = _placed([(contacts_world_m[pair.index], pair.estimate) for pair in used])[:, :dimension]
+    true = _placed([(contacts_world_m[pair.index], pair.truth) for pair in used])[:, :dimension]
+    residuals = _rigid_fit(placed, true) - true
+    return 1e3 * float(np.sqrt(np.mean(np.sum(residuals**2, axis=1))))
+
+
+def _placed(grasps: Sequence[tuple[Array, Pose3]]) -> Array:
+    return np.concatenate([transform_points(pose.inverse(), points) for points, pose in grasps])
+
+
+def _rigid_fit(source: Array, target: Array) -> Array:
+    """``source`` moved rigidly onto ``target`` by least squares (Kabsch), no reflection."""
+    source_centre, target_centre = source.mean(axis=0), target.mean(axis=0)
+    left, _, right = np.linalg.svd((source - source_centre).T @ (target - target_centre))
+    mirror = np.ones(source.shape[1])
+    mirror[-1] = np.sign(np.linalg.det(left @ right))
+    return np.asarray((source - source_centre) @ (left * mirror) @ right + target_centre)
