@@ -1,0 +1,302 @@
+"""Process image of the 0220 palm: 70 command bytes, 232 status bytes, little-endian and packed.
+
+Layouts follow Shadow's ``0220_palm_edc`` headers; each image ends with the 12 bytes of the palm's CAN bridge. Every
+byte string of the right length decodes; what the values mean is for the device to judge. A status answers the
+*previous* command: its data types and motor parity echo the command before the one in flight.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.errors import CodecError
+
+MOTORS = 20
+MOTORS_PER_STATUS = 10
+
+SENSORS: tuple[str, ...] = (
+    *(f"{finger}J{number}" for finger in ("FF", "MF", "RF") for number in (1, 2, 3, 4)),
+    *(f"LFJ{number}" for number in (1, 2, 3, 4, 5)),
+    *("THJ1", "THJ2", "THJ3", "THJ4", "THJ5A", "THJ5B", "WRJ1A", "WRJ1B", "WRJ2"),
+    *("ACCX", "ACCY", "ACCZ", "GYRX", "GYRY", "GYRZ", "AN0", "AN1", "AN2", "AN3", "UNUSED"),
+)
+"""The 37 analogue channels in the palm's order."""
+
+OPTIONAL_CHANNELS = range(26, 32)
+"""Accelerometer and gyroscope: a channel without hardware keeps its own index as its value."""
+
+CAN_BRIDGE = np.dtype([("bus", "u1"), ("length", "u1"), ("id", "<u2"), ("data", "u1", 8)])
+
+COMMAND_0220 = np.dtype(
+    [
+        ("edc_command", "<u4"),
+        ("from_motor_data_type", "<u4"),
+        ("which_motors", "<i2"),
+        ("to_motor_data_type", "<u4"),
+        ("motor_data", "<i2", MOTORS),
+        ("tactile_data_type", "<u4"),
+        ("can", CAN_BRIDGE),
+    ]
+)
+"""Host to palm, 58 + 12 bytes."""
+
+STATUS_0220 = np.dtype(
+    [
+        ("edc_command", "<u4"),
+        ("sensors", "<u2", len(SENSORS)),
+        ("motor_data_type", "<u4"),
+        ("which_motors", "<i2"),
+        ("which_motor_data_arrived", "<u4"),
+        ("which_motor_data_had_errors", "<u4"),
+        ("motor_data_packet", [("torque", "<i2"), ("misc", "<u2")], MOTORS_PER_STATUS),
+        ("tactile_data_type", "<u4"),
+        ("tactile_data_valid", "<u2"),
+        ("tactile", "u1", (5, 16)),
+        ("idle_time_us", "<u2"),
+        ("can", CAN_BRIDGE),
+    ]
+)
+"""Palm to host, 220 + 12 bytes."""
+
+
+_COMMAND_FORMAT = struct.Struct("<IIhI20hI BBH8s")
+_STATUS_FORMAT = struct.Struct(f"<I37HIhII {'hH' * MOTORS_PER_STATUS} IH80sH BBH8s")
+
+
+class EdcCommand(IntEnum):
+    """What the palm is asked for, and in a status what it did."""
+
+    INVALID = 0  # in a status: the palm did not write in time
+    SENSOR_DATA = 1
+    CHANNEL_NUMBERS = 2
+    CHIP_SELECTS = 3
+    CAN_DIRECT = 4
+
+
+@dataclass(frozen=True)
+class CanFrame:
+    """One frame of the palm's CAN bridge.
+
+    Attributes:
+        bus: 1 or 2 (0: no frame).
+        length: bytes of ``data`` that count.
+        identifier: 11-bit message identifier.
+        data: always eight bytes.
+    """
+
+    bus: int = 0
+    length: int = 0
+    identifier: int = 0
+    data: bytes = bytes(8)
+
+
+@dataclass(frozen=True, eq=False)
+class PalmCommand:
+    """One command to the palm; the default is the all-zero image, with which nothing moves.
+
+    Attributes:
+        edc_command: see :class:`EdcCommand`.
+        from_motor_data_type: what the motors shall answer.
+        which_motors: 0 asks the even motors, 1 the odd ones.
+        to_motor_data_type: what ``motor_data`` means.
+        motor_data: one word a motor, shape (20,), by motor number.
+        tactile_data_type: what the fingertips shall answer.
+        can: frame for the CAN bridge.
+    """
+
+    edc_command: int = EdcCommand.INVALID
+    from_motor_data_type: int = 0
+    which_motors: int = 0
+    to_motor_data_type: int = 0
+    motor_data: Sequence[int] | NDArray[np.integer[Any]] = (0,) * MOTORS
+    tactile_data_type: int = 0
+    can: CanFrame = field(default_factory=CanFrame)
+
+
+@dataclass(frozen=True, eq=False)
+class PalmStatus:
+    """One status of the palm.
+
+    Attributes:
+        edc_command: 1 for a valid status; 0 when the palm did not write in time.
+        sensors: ADC counts, shape (37,), channels of :data:`SENSORS`.
+        motor_data_type: type of the values in ``misc``.
+        which_motors: 0 the even motors answered, 1 the odd ones.
+        arrived: bit N set when motor N answered.
+        had_errors: bit N set when motor N answered with another type.
+        torque: strain-gauge difference of each packet, shape (10,); motor N is in packet N // 2.
+        misc: the requested value of each packet, shape (10,), unsigned 16 bits.
+        tactile_data_type: type of the fingertips' answer.
+        tactile_valid: bit 0 FF, 1 MF, 2 RF, 3 LF, 4 TH.
+        tactile: raw fingertip slots, shape (5, 16), bytes.
+        idle_time_us: spare time in the palm's cycle; healthy above 50.
+        can: frame from the CAN bridge.
+    """
+
+    edc_command: int
+    sensors: NDArray[np.uint16]
+    motor_data_type: int
+    which_motors: int
+    arrived: int
+    had_errors: int
+    torque: NDArray[np.int16]
+    misc: NDArray[np.uint16]
+    tactile_data_type: int
+    tactile_valid: int
+    tactile: NDArray[np.uint8]
+    idle_time_us: int
+    can: CanFrame = field(default_factory=CanFrame)
+
+    @property
+    def written(self) -> bool:
+        """Whether the palm wrote this status in time."""
+        return self.edc_command == EdcCommand.SENSOR_DATA
+
+    @property
+    def heard_motors(self) -> NDArray[np.intp]:
+        """Numbers of the motors that answered with the stated type, ascending."""
+        if self.which_motors not in (0, 1):
+            return _NO_MOTORS
+        asked = _ASKED_MOTORS[self.which_motors]
+        return np.asarray(asked[((self.arrived & ~self.had_errors) >> asked) & 1 == 1])
+
+    @property
+    def silent_motors(self) -> NDArray[np.intp]:
+        """Numbers of the asked motors that did not answer, or not with the stated type."""
+        if self.which_motors not in (0, 1):
+            return _NO_MOTORS
+        return np.setdiff1d(_ASKED_MOTORS[self.which_motors], self.heard_motors, assume_unique=True)
+
+    @property
+    def not_fitted(self) -> tuple[int, ...]:
+        """Optional channels without hardware: their value is their own index."""
+        return tuple(channel for channel in OPTIONAL_CHANNELS if self.sensors[channel] == channel)
+
+
+_NO_MOTORS = np.arange(0)
+_ASKED_MOTORS = (np.arange(0, MOTORS, 2), np.arange(1, MOTORS, 2))
+
+
+def encode_command(command: PalmCommand) -> bytes:
+    """The 70 bytes of a command.
+
+    Raises:
+        CodecError: a value does not fit its field.
+    """
+    return _pack(
+        _COMMAND_FORMAT,
+        command.edc_command,
+        command.from_motor_data_type,
+        command.which_motors,
+        command.to_motor_data_type,
+        *_integers(command.motor_data),
+        command.tactile_data_type,
+        *_can_fields(command.can),
+    )
+
+
+def decode_command(payload: bytes) -> PalmCommand:
+    """Read the 70 bytes of a command, as an emulated palm does.
+
+    Raises:
+        CodecError: wrong length.
+    """
+    record = _record(payload, COMMAND_0220, "command")
+    edc_command, from_type, which_motors, to_type, motor_data, tactile_type, can = record.item()
+    return PalmCommand(edc_command, from_type, which_motors, to_type, motor_data, tactile_type, _can_frame(can))
+
+
+def encode_status(status: PalmStatus) -> bytes:
+    """The 232 bytes of a status, as an emulated palm sends them.
+
+    Raises:
+        CodecError: a value does not fit its field.
+    """
+    return _pack(
+        _STATUS_FORMAT,
+        status.edc_command,
+        *_integers(status.sensors),
+        status.motor_data_type,
+        status.which_motors,
+        status.arrived,
+        status.had_errors,
+        *_interleaved(_integers(status.torque), _integers(status.misc)),
+        status.tactile_data_type,
+        status.tactile_valid,
+        _exactly(80, np.asarray(status.tactile, np.uint8).tobytes(), "tactile slots"),
+        status.idle_time_us,
+        *_can_fields(status.can),
+    )
+
+
+def decode_status(payload: bytes) -> PalmStatus:
+    """Read the 232 bytes of a status.
+
+    Raises:
+        CodecError: wrong length.
+    """
+    record = _record(payload, STATUS_0220, "status")
+    packets = record["motor_data_packet"]
+    return PalmStatus(
+        edc_command=int(record["edc_command"]),
+        sensors=record["sensors"],
+        motor_data_type=int(record["motor_data_type"]),
+        which_motors=int(record["which_motors"]),
+        arrived=int(record["which_motor_data_arrived"]),
+        had_errors=int(record["which_motor_data_had_errors"]),
+        torque=packets["torque"],
+        misc=packets["misc"],
+        tactile_data_type=int(record["tactile_data_type"]),
+        tactile_valid=int(record["tactile_data_valid"]),
+        tactile=record["tactile"],
+        idle_time_us=int(record["idle_time_us"]),
+        can=_can_frame(record["can"].item()),
+    )
+
+
+def _record(payload: bytes, layout: np.dtype[np.void], what: str) -> Any:
+    if len(payload) != layout.itemsize:
+        raise CodecError(
+            f"a palm {what} of {len(payload)} bytes instead of {layout.itemsize}",
+            where="palm 0220",
+            hint="Check that the palm is a 0220 (product code 6)",
+        )
+    return np.frombuffer(payload, layout)[0]
+
+
+def _can_frame(fields: tuple[int, int, int, Sequence[int]]) -> CanFrame:
+    bus, length, identifier, data = fields
+    return CanFrame(bus, length, identifier, bytes(data))
+
+
+def _can_fields(can: CanFrame) -> tuple[int, int, int, bytes]:
+    return can.bus, can.length, can.identifier, _exactly(8, can.data, "CAN bridge data")
+
+
+def _integers(values: Sequence[int] | NDArray[np.integer[Any]]) -> list[int]:
+    return np.asarray(values).ravel().tolist()
+
+
+def _interleaved(torque: list[int], misc: list[int]) -> list[int]:
+    return [word for packet in zip(torque, misc, strict=False) for word in packet]
+
+
+def _exactly(length: int, data: bytes, what: str) -> bytes:
+    if len(data) != length:
+        raise CodecError(f"{what} of {len(data)} bytes instead of {length}", where="palm 0220")
+    return data
+
+
+def _pack(image: struct.Struct, *fields: int | bytes) -> bytes:
+    """Pack with :mod:`struct`, which refuses what numpy would wrap around in silence."""
+    try:
+        return image.pack(*fields)
+    except struct.error as error:
+        raise CodecError(f"a value does not fit its field ({error})", where="palm 0220") from error
