@@ -1,0 +1,254 @@
+"""Gaussian process implicit surface: the shape of an object from contacts and their normals (chapter 2).
+
+The surface is the zero level of a field f, positive outside (2.3). With the normals as observed
+gradients f is nearly a signed distance in metres: ``f / |grad f|`` is a distance and
+``sqrt(variance) / |grad f|`` its standard deviation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from scipy.linalg import lapack
+from scipy.optimize import Bounds, minimize
+from scipy.spatial.distance import cdist
+
+from tactile_lab.errors import ShapeError
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.kernels import Kernel, covariance, cross_covariance, log_parameter_traces
+from tactile_lab.shape.observations import Observations, check_contacts
+from tactile_lab.shape.priors import PriorMean
+from tactile_lab.shape.settings import GpisSettings, initial_kernel, observe, prior_mean
+
+_BLOCK_ENTRIES = 1 << 21
+"""Entries of the largest temporary matrix in a prediction: 16 MiB."""
+
+_JITTERS = (1e-10, 1e-8, 1e-6, 1e-4)
+"""Added to the diagonal relative to its entries, the first that makes it positive definite."""
+
+_AMPLITUDE_BOUNDS_m = (1e-3, 0.3)
+_LENGTH_BOUNDS_m = (0.010, 0.300)
+_NOISE_SCALE_BOUNDS = (0.3, 10.0)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The field at q places.
+
+    Attributes:
+        mean_m: shape (q,), positive outside.
+        gradient: shape (q, d), or None if not asked for.
+        variance_m2: shape (q,), or None if not asked for.
+    """
+
+    mean_m: Array
+    gradient: Array | None
+    variance_m2: Array | None
+
+
+class Gpis:
+    """A fitted field; immutable. Made by :meth:`fit`.
+
+    Attributes:
+        contacts_m: the contacts, shape (n, d), metres, in the frame of the caller (usually the object's).
+        normals: their outward unit normals, shape (n, d).
+        settings: as given to :meth:`fit`.
+        kernel: the covariance function with its current parameters.
+        prior: the prior mean.
+        noise_scale: factor on all observation standard deviations, 1 unless optimised.
+    """
+
+    def __init__(
+        self,
+        contacts_m: Array,
+        normals: Array,
+        settings: GpisSettings,
+        observations: Observations,
+        kernel: Kernel,
+        prior: PriorMean,
+        noise_scale: float = 1.0,
+    ) -> None:
+        self.contacts_m, self.normals, self.settings = contacts_m, normals, settings
+        self.observations, self.kernel, self.prior, self.noise_scale = observations, kernel, prior, noise_scale
+        self._gradient_count = len(observations.gradients)
+        self._residual = self._observed_minus_prior()
+        self._factor = self._factorise()
+        self._weights = _solve(self._factor, self._residual)
+
+    @classmethod
+    def fit(
+        cls,
+        points_m: Array,
+        normals: Array,
+        point_sigma_m: Array | float = 0.001,
+        normal_sigma_rad: Array | float = 0.1,
+        settings: GpisSettings | None = None,
+    ) -> Self:
+        """Fit the field to contacts (algorithm 2.1).
+
+        Args:
+            points_m: contact points, shape (n, 2) or (n, 3), metres.
+            normals: unit normals out of the object, shape (n, d).
+            point_sigma_m: standard deviation of the points along their normals, shape (n,) or one for all.
+            normal_sigma_rad: standard deviation of the normals, shape (n,) or one for all.
+            settings: the defaults if None.
+
+        Raises:
+            ShapeError: contacts that can not be used (see :func:`check_contacts`), or a covariance that is
+                not positive definite even with jitter.
+        """
+        settings = settings or GpisSettings()
+        points_m, normals = np.array(points_m, dtype=float), np.array(normals, dtype=float)
+        point_sigma_m, normal_sigma_rad = _one_each(point_sigma_m, points_m), _one_each(normal_sigma_rad, points_m)
+        check_contacts(points_m, normals, point_sigma_m, normal_sigma_rad)
+        observations = observe(points_m, normals, point_sigma_m, normal_sigma_rad, settings)
+        kernel, prior = initial_kernel(observations, settings), prior_mean(points_m, settings)
+        return cls(points_m, normals, settings, observations, kernel, prior)
+
+    def optimise(self, *, noise: bool = False, max_iterations: int = 30) -> Self:
+        """The field with the kernel's parameters (and the noise scale) at a maximum of the marginal likelihood.
+
+        L-BFGS on the logarithms of the parameters with the analytic gradient, from the present values and
+        within bounds that keep the covariance well-conditioned. A present value outside them is moved in.
+        """
+        bounds = np.log(self._bounds(noise))
+        start = np.append(self.kernel.log_parameters, np.log(self.noise_scale))[: len(bounds)]
+
+        def objective(log_parameters: Array) -> tuple[float, Array]:
+            candidate = self._with_log_parameters(log_parameters)
+            return -candidate.log_marginal_likelihood(), -candidate.log_marginal_likelihood_gradient()[: len(bounds)]
+
+        found = minimize(
+            objective,
+            np.clip(start, bounds[:, 0], bounds[:, 1]),
+            jac=True,
+            method="L-BFGS-B",
+            bounds=Bounds(bounds[:, 0], bounds[:, 1]),
+            options={"maxiter": max_iterations, "ftol": 1e-6},
+        )
+        return self._with_log_parameters(found.x)
+
+    def log_marginal_likelihood(self) -> float:
+        """``log p(observations | parameters)``.
+
+        This is (2.16) with its sign: the thesis prints the negative logarithm, without its constant, under
+        the name L, and maximises L.
+        """
+        log_determinant = 2 * np.log(np.diag(self._factor)).sum()
+        misfit = self._residual @ self._weights
+        return float(-0.5 * (misfit + log_determinant + len(self._residual) * np.log(2 * np.pi)))
+
+    def log_marginal_likelihood_gradient(self) -> Array:
+        """Its derivatives by the kernel's ``log_parameters`` and, last, by ``log(noise_scale)``."""
+        outer = np.outer(self._weights, self._weights) - _inverse(self._factor)
+        by_kernel = log_parameter_traces(self.kernel, self.observations.points_m, self._gradient_count, outer)
+        by_noise = 2 * self.noise_scale**2 * (np.diag(outer) @ self.observations.noise_variance)
+        return 0.5 * np.append(by_kernel, by_noise)
+
+    def mean(self, points_m: Array) -> Array:
+        """Posterior mean (2.13, 2.18) at points of shape (q, d); shape (q,), metres."""
+        return self.predict(points_m).mean_m
+
+    def gradient(self, points_m: Array) -> Array:
+        """Gradient of the posterior mean at points of shape (q, d); shape (q, d)."""
+        gradient = self.predict(points_m, gradient=True).gradient
+        assert gradient is not None
+        return gradient
+
+    def variance(self, points_m: Array) -> Array:
+        """Posterior variance (2.14) at points of shape (q, d); shape (q,), square metres."""
+        points_m = np.asarray(points_m, dtype=float)
+        return np.concatenate([self._variance(points_m[block]) for block in self._blocks(len(points_m))])
+
+    def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
+        """The field at points of shape (q, d), in blocks, so that memory stays bounded for any q.
+
+        Equation 2.18 as usual, ``m + k (K + noise)^-1 (y - m)``; the thesis prints a minus sign there.
+        """
+        points_m = np.asarray(points_m, dtype=float)
+        mean, slope = np.empty(len(points_m)), np.empty(points_m.shape)
+        for block in self._blocks(len(points_m)):
+            mean[block], slope[block] = self._mean_and_gradient(points_m[block], gradient)
+        return Prediction(mean, slope if gradient else None, self.variance(points_m) if variance else None)
+
+    def _observed_minus_prior(self) -> Array:
+        seen, count = self.observations, self._gradient_count
+        values = seen.values_m - self.prior.value(seen.points_m)
+        gradients = seen.gradients - self.prior.gradient(seen.points_m[:count])
+        return np.concatenate([values, gradients.T.ravel()])
+
+    def _factorise(self) -> Array:
+        """Lower Cholesky factor of ``K + noise``, with the least jitter that it needs."""
+        matrix = covariance(self.kernel, self.observations.points_m, self._gradient_count)
+        diagonal = np.diag(matrix) + self.noise_scale**2 * self.observations.noise_variance
+        for jitter in _JITTERS:
+            np.fill_diagonal(matrix, diagonal * (1 + jitter))
+            factor, problem = lapack.dpotrf(matrix.T, lower=1, clean=1)
+            if problem == 0:
+                return np.asarray(factor)
+        raise ShapeError(
+            "the covariance of the contacts is not positive definite",
+            where=f"{len(self.contacts_m)} contacts, {self.kernel}",
+            hint="Use a shorter kernel length, or larger standard deviations of the contacts",
+        )
+
+    def _mean_and_gradient(self, queries: Array, gradient: bool) -> tuple[Array, Array]:
+        """Mean and its gradient (left zero unless asked for) without forming the covariance with all rows."""
+        points = self.observations.points_m
+        count = self._gradient_count
+        on_values = self._weights[: len(points)]
+        on_gradients = self._weights[len(points) :].reshape(queries.shape[1], count).T
+        touched = points[:count]
+        phi = self.kernel.profile(cdist(queries, points, "sqeuclidean"))
+        along = queries @ on_gradients.T - np.sum(touched * on_gradients, axis=1)
+        slope = phi.first[:, :count]
+        mean = self.prior.value(queries) + phi.value @ on_values - 2 * np.einsum("qn,qn->q", slope, along)
+        if not gradient:
+            return mean, np.zeros_like(queries)
+        pull = 2 * phi.first * on_values
+        pull[:, :count] -= 4 * phi.second[:, :count] * along
+        change = queries * pull.sum(axis=1)[:, None] - pull @ points - 2 * slope @ on_gradients
+        return mean, self.prior.gradient(queries) + change
+
+    def _variance(self, queries: Array) -> Array:
+        rows = cross_covariance(self.kernel, queries, self.observations.points_m, self._gradient_count)
+        explained, _ = lapack.dtrtrs(self._factor, rows.T, lower=1, overwrite_b=1)
+        floor = np.finfo(float).eps * self.kernel.amplitude
+        return np.asarray(np.maximum(self.kernel.amplitude - np.einsum("nq,nq->q", explained, explained), floor))
+
+    def _blocks(self, count: int) -> Iterator[slice]:
+        size = max(1, _BLOCK_ENTRIES // len(self._residual))
+        for first in range(0, max(count, 1), size):
+            yield slice(first, min(first + size, count))
+
+    def _with_log_parameters(self, log_parameters: Array) -> Self:
+        count = len(self.kernel.log_parameters)
+        kernel = self.kernel.with_log_parameters(log_parameters[:count])
+        noise_scale = float(np.exp(log_parameters[count])) if len(log_parameters) > count else self.noise_scale
+        return type(self)(
+            self.contacts_m, self.normals, self.settings, self.observations, kernel, self.prior, noise_scale
+        )
+
+    def _bounds(self, noise: bool) -> Array:
+        amplitude = np.square(_AMPLITUDE_BOUNDS_m)
+        kernel = [amplitude, _LENGTH_BOUNDS_m][: len(self.kernel.log_parameters)]
+        return np.array([*kernel, _NOISE_SCALE_BOUNDS] if noise else kernel)
+
+
+def _one_each(sigma: Array | float, points_m: Array) -> Array:
+    """A standard deviation for every contact, where one is given for all."""
+    return np.full(len(points_m), float(sigma)) if np.ndim(sigma) == 0 else np.array(sigma, dtype=float)
+
+
+def _solve(factor: Array, right: Array) -> Array:
+    solution, _ = lapack.dpotrs(factor, right, lower=1)
+    return np.asarray(solution)
+
+
+def _inverse(factor: Array) -> Array:
+    """Inverse of the matrix whose lower Cholesky factor is given."""
+    lower, _ = lapack.dpotri(factor, lower=1)
+    return np.asarray(np.tril(lower) + np.tril(lower, -1).T)
