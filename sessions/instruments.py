@@ -1,0 +1,114 @@
+"""What the session layer asks of devices, samples and fingertips: structural types, met by the drivers.
+
+An *instrument* is a live device with a link. A *decoder* is the half of a device that turns one received datagram
+into a sample and does nothing else; live and in replay the session's understanding comes from decoders alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol, TypeVar
+
+from drivers.fingertip import FingertipSensor
+from drivers.links import Datagram
+from tactile_lab.geometry.contacts import Array
+
+Sample_co = TypeVar("Sample_co", covariant=True)
+
+
+class HandReading(Protocol):
+    """Joint angles of the hand, shape (24,), radians, and when they arrived."""
+
+    @property
+    def stamp_ns(self) -> int: ...
+    @property
+    def joints_rad(self) -> Array: ...
+    @property
+    def fresh(self) -> bool: ...
+
+
+class BaseReading(Protocol):
+    """Joint positions of the positioner, shape (6,), metres and radians."""
+
+    @property
+    def stamp_ns(self) -> int: ...
+    @property
+    def q(self) -> Array: ...
+
+
+class FrameReading(Protocol):
+    """One camera image."""
+
+    @property
+    def stamp_ns(self) -> int: ...
+    @property
+    def image(self) -> Any: ...
+
+
+class Decoder(Protocol[Sample_co]):
+    """The receiving half of a device.
+
+    ``receive`` may keep state of its own link (sequence numbers, the newest motor readings) and may ask its clock;
+    it must use nothing else, or a replay differs from the session.
+    """
+
+    def receive(self, datagram: Datagram) -> Sample_co | None:
+        """The sample in a datagram; None when it holds none. Raises CodecError for bytes of another protocol."""
+
+
+class WrenchFingertip(FingertipSensor, Protocol):
+    """A fingertip fed by a link of its own."""
+
+    def update(self, samples: Sequence[Any], /) -> None:
+        """Take the samples of one datagram."""
+
+
+class SlotFingertip(FingertipSensor, Protocol):
+    """A fingertip whose data come inside the hand's samples."""
+
+    def update(self, sample: Any, /) -> None:
+        """Take one sample of the hand."""
+
+
+class Instrument(Protocol):
+    """Something that is connected and closed."""
+
+    def connect(self) -> None:
+        """All or nothing, repeatable. Raises DeviceError."""
+
+    def close(self) -> None:
+        """Idempotent."""
+
+
+class HandInstrument(Instrument, Protocol):
+    """The live hand."""
+
+    def exchange(self) -> object:
+        """One cycle: send demands, receive and decode."""
+
+    def stop(self) -> None:
+        """No demand from now on; never raises."""
+
+
+class BaseInstrument(Instrument, Protocol):
+    """The live positioner."""
+
+    def exchange(self) -> object:
+        """One cycle: send targets, receive and decode."""
+
+    def stop(self) -> None:
+        """Stay here; never raises."""
+
+
+class PolledInstrument(Instrument, Protocol):
+    """A device that sends by itself and is emptied once a cycle."""
+
+    def poll(self) -> object:
+        """Take everything that has arrived."""
+
+
+class CameraInstrument(Instrument, Protocol):
+    """The live camera."""
+
+    def capture(self) -> FrameReading:
+        """Take one picture. Raises DeviceError."""

@@ -1,0 +1,302 @@
+"""From decoded samples and marks to grasps.
+
+Perception has no clock, no link and no chance: what it knows depends on the samples and marks it was given and on
+their order, nothing else. So the live session and a replay of its bytes build the same grasps, bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from gtsam import Pose3
+from pydantic import Field
+
+from drivers.fingertip import FingertipSensor, TipContact
+from drivers.shadow.kinematics import forearm_T_palm_matrix
+from sessions.contact_world import HandGeometry, MountUncertainty
+from sessions.instruments import BaseReading, FrameReading, HandReading, SlotFingertip, WrenchFingertip
+from sessions.marks import Mark, MarkKind
+from tactile_lab.errors import DeviceError, SessionError
+from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
+from tactile_lab.strict_yaml import StrictModel
+
+
+class PerceptionSettings(StrictModel):
+    """What turns a touch into a contact.
+
+    Attributes:
+        joint_sigma_rad: standard deviation of each joint angle that averaging does not remove (0.6 deg).
+        minimum_force_N: a lighter touch is not a contact.
+    """
+
+    joint_sigma_rad: float = Field(default=float(np.radians(0.6)), ge=0.0)
+    minimum_force_N: float = Field(default=0.1, ge=0.0)
+
+
+@dataclass(frozen=True)
+class TruthFrame:
+    """A camera frame that shows the object at rest.
+
+    Attributes:
+        grasp_index: the grasp whose capture is open, else the last one; None before the first.
+        frame: the picture.
+    """
+
+    grasp_index: int | None
+    frame: FrameReading
+
+
+@dataclass(frozen=True)
+class TareReport:
+    """What came of a tare: the fingers that could not be zeroed, and why."""
+
+    stamp_ns: int
+    refused: Mapping[str, str]
+
+
+Outcome: TypeAlias = Grasp | TruthFrame | TareReport
+
+
+class Perception:
+    """State of the hand in the world, and the grasps made of it.
+
+    Args:
+        wrench_fingertips: fingertips with a link of their own, by finger.
+        slot_fingertips: fingertips whose data come with the hand's samples, by finger.
+        mount_T_forearm: the positioner's kinematics, from its joint vector (6,).
+        world_T_mount: the forearm-to-world calibration.
+        mount_covariance: its covariance, see :class:`MountUncertainty`; None when not known.
+    """
+
+    def __init__(
+        self,
+        *,
+        wrench_fingertips: Mapping[str, WrenchFingertip] | None = None,
+        slot_fingertips: Mapping[str, SlotFingertip] | None = None,
+        mount_T_forearm: Callable[[Array], Pose3],
+        world_T_mount: Pose3,
+        mount_covariance: Array | None = None,
+        settings: PerceptionSettings | None = None,
+    ) -> None:
+        self._wrench = dict(wrench_fingertips or {})
+        self._slots = dict(slot_fingertips or {})
+        everyone: dict[str, FingertipSensor] = {**self._wrench, **self._slots}
+        self.fingertips: dict[str, FingertipSensor] = {f: everyone[f] for f in FINGERS if f in everyone}
+        self.world_T_mount, self.settings = world_T_mount, settings or PerceptionSettings()
+        self._mount_T_forearm = mount_T_forearm
+        self._mount = (
+            None if mount_covariance is None else MountUncertainty(world_T_mount.matrix(), np.asarray(mount_covariance))
+        )
+        self._joints_rad: Array | None = None
+        self._base_q: Array | None = None
+        self._geometry: HandGeometry | None = None
+        self._frame: FrameReading | None = None
+        self._capture: _Capture | None = None
+        self._hold_start: Pose3 | None = None
+        self._hand_motion_world = Pose3()
+        self._grasp_count = 0
+        self.dropped: dict[str, str] = {}
+        """Fingers without a contact in the last grasp, and why."""
+        self.drop_counts: Counter[str] = Counter()
+        """The reasons over the whole session."""
+
+    # --- samples -----------------------------------------------------------------------------------------------
+
+    def on_hand(self, sample: HandReading) -> None:
+        """Joint angles, and the slots of fingertips that come with them."""
+        for fingertip in self._slots.values():
+            fingertip.update(sample)
+        if not sample.fresh:
+            return
+        self._joints_rad, self._geometry = np.asarray(sample.joints_rad, dtype=float), None
+        if self._capture is not None:
+            self._capture.joints_rad.append(self._joints_rad)
+
+    def on_base(self, sample: BaseReading) -> None:
+        """The positioner's joints."""
+        self._base_q, self._geometry = np.asarray(sample.q, dtype=float), None
+        if self._capture is not None:
+            self._capture.base_q.append(self._base_q)
+
+    def on_wrench(self, finger: str, samples: Sequence[Any]) -> None:
+        """Samples of one fingertip's own link."""
+        self._wrench[finger].update(samples)
+
+    def on_frame(self, frame: FrameReading) -> None:
+        """A camera frame; kept until the next one."""
+        self._frame = frame
+
+    # --- state -------------------------------------------------------------------------------------------------
+
+    @property
+    def ready(self) -> bool:
+        """The hand and the positioner have both been heard."""
+        return self._joints_rad is not None and self._base_q is not None
+
+    @property
+    def grasp_count(self) -> int:
+        """Grasps made so far."""
+        return self._grasp_count
+
+    @property
+    def joints_rad(self) -> Array:
+        """Newest joint angles, shape (24,), radians. Raises DeviceError before the first."""
+        return self._latest()[0]
+
+    @property
+    def base_q(self) -> Array:
+        """Newest positioner joints, shape (6,), metres and radians. Raises DeviceError before the first."""
+        return self._latest()[1]
+
+    @property
+    def world_T_palm(self) -> Pose3:
+        """The palm, from the newest samples. Raises DeviceError before the first."""
+        return Pose3(self._current().world_T_palm)
+
+    @property
+    def world_T_distal(self) -> dict[str, Pose3]:
+        """The distal frame of each finger, from the newest samples. Raises DeviceError before the first."""
+        return {finger: Pose3(self._current().world_T_distal[i]) for i, finger in enumerate(FINGERS)}
+
+    def world_R_distal(self, finger: str) -> Array:
+        """Orientation of one distal frame, shape (3, 3). Raises DeviceError before the first sample."""
+        return np.asarray(self._current().world_T_distal[FINGERS.index(finger), :3, :3])
+
+    def load_N(self, finger: str) -> float:
+        """Contact force on one fingertip, the tip's own weight taken off, newest sample."""
+        return self.fingertips[finger].load_N(self.world_R_distal(finger))
+
+    def loads_N(self) -> dict[str, float]:
+        """Contact force on each fingertip of the rig."""
+        return {finger: self.load_N(finger) for finger in self.fingertips}
+
+    def problems(self) -> tuple[str, ...]:
+        """What is wrong with fingertips, in words, each beginning with the finger's name."""
+        return tuple(f"{finger}: {text}" for finger, tip in self.fingertips.items() for text in tip.health())
+
+    # --- marks -------------------------------------------------------------------------------------------------
+
+    def mark(self, mark: Mark) -> Outcome | None:
+        """Take a mark; gives the grasp, frame or report it completes.
+
+        Raises:
+            SessionError: the mark has no meaning here (an end without a beginning).
+            DeviceError: the hand or the positioner has not been heard yet.
+        """
+        match mark.kind:
+            case MarkKind.TARE:
+                return self._tare(mark)
+            case MarkKind.CAPTURE_BEGIN:
+                self._begin_capture(mark)
+                return None
+            case MarkKind.CAPTURE_END:
+                return self._grasp(mark)
+            case MarkKind.HOLD_BEGIN:
+                self._hold_start = self.world_T_palm
+                return None
+            case MarkKind.HOLD_END:
+                self._carry(None)
+                return None
+            case MarkKind.TRUTH_FRAME:
+                return self._truth_frame()
+
+    def _tare(self, mark: Mark) -> TareReport:
+        refused = {}
+        for finger in mark.fingers:
+            if finger not in self.fingertips:
+                continue
+            try:
+                self.fingertips[finger].tare(self.world_R_distal(finger))
+            except DeviceError as error:
+                refused[finger] = error.what
+        return TareReport(mark.stamp_ns, refused)
+
+    def _begin_capture(self, mark: Mark) -> None:
+        self._latest()
+        for fingertip in self.fingertips.values():
+            fingertip.begin_capture()
+        self._capture = _Capture(mark.stamp_ns, [], [])
+
+    def _grasp(self, mark: Mark) -> Grasp:
+        capture, self._capture = self._capture, None
+        if capture is None:
+            raise SessionError("capture_end without capture_begin", where="/marks", hint="The marks are out of order")
+        joints_rad, base_q = self._latest()
+        geometry = self._place(_mean(capture.joints_rad, joints_rad), _mean(capture.base_q, base_q))
+        tips = self._touches(geometry, heard=bool(capture.joints_rad))
+        if self._hold_start is not None:
+            self._carry(self.world_T_palm)
+        motion, self._hand_motion_world = self._hand_motion_world, Pose3()
+        index, self._grasp_count = self._grasp_count, self._grasp_count + 1
+        return Grasp(
+            index=index,
+            stamp_ns=(capture.stamp_ns + mark.stamp_ns) // 2,
+            contacts=geometry.contacts(tips, self.settings.joint_sigma_rad, self._mount),
+            world_T_palm=Pose3(geometry.world_T_palm),
+            hand_motion_world=motion if index else Pose3(),
+        )
+
+    def _touches(self, geometry: HandGeometry, *, heard: bool) -> dict[str, TipContact]:
+        """The touches that count; the reasons why others do not go to :attr:`dropped`."""
+        tips, self.dropped = {}, {}
+        for finger, fingertip in self.fingertips.items():
+            tip = fingertip.contact(geometry.world_T_distal[FINGERS.index(finger), :3, :3])
+            if tip is None:
+                self.dropped[finger] = next(iter(fingertip.health()), "no contact")
+            elif not heard:
+                self.dropped[finger] = "no joint angles during the capture"
+            elif tip.force_N < self.settings.minimum_force_N:
+                self.dropped[finger] = "force below the minimum"
+            else:
+                tips[finger] = tip
+        self.drop_counts.update(self.dropped.values())
+        return tips
+
+    def _carry(self, restart: Pose3 | None) -> None:
+        """Add the palm's motion since the hold began; it goes on from ``restart`` when that is given."""
+        if self._hold_start is None:
+            raise SessionError("hold_end without hold_begin", where="/marks", hint="The marks are out of order")
+        self._hand_motion_world = self.world_T_palm * self._hold_start.inverse() * self._hand_motion_world
+        self._hold_start = restart
+
+    def _truth_frame(self) -> TruthFrame | None:
+        frame, self._frame = self._frame, None
+        if frame is None:
+            return None
+        current = self._grasp_count if self._capture is not None else self._grasp_count - 1
+        return TruthFrame(current if current >= 0 else None, frame)
+
+    # --- geometry ----------------------------------------------------------------------------------------------
+
+    def _latest(self) -> tuple[Array, Array]:
+        if self._joints_rad is None:
+            raise DeviceError("no joint angles have arrived yet", where="hand", hint="Check that the palm answers")
+        if self._base_q is None:
+            raise DeviceError("no position has arrived yet", where="base", hint="Check that the positioner answers")
+        return self._joints_rad, self._base_q
+
+    def _current(self) -> HandGeometry:
+        if self._geometry is None:
+            self._geometry = self._place(*self._latest())
+        return self._geometry
+
+    def _place(self, joints_rad: Array, base_q: Array) -> HandGeometry:
+        world_T_forearm = self.world_T_mount * self._mount_T_forearm(base_q)
+        return HandGeometry(joints_rad, world_T_forearm.matrix() @ forearm_T_palm_matrix(joints_rad))
+
+
+@dataclass(frozen=True)
+class _Capture:
+    """What arrived since a capture began."""
+
+    stamp_ns: int
+    joints_rad: list[Array]
+    base_q: list[Array]
+
+
+def _mean(samples: list[Array], otherwise: Array) -> Array:
+    return np.asarray(np.mean(samples, axis=0)) if samples else otherwise
