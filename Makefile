@@ -1,0 +1,43 @@
+# Every target sets up what it needs: a virtual environment from the locked, hashed requirements.
+# Needs python3 (3.11 or later), pip and make.
+
+PYTHON ?= python3
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+READY  := $(VENV)/ready
+
+# Small matrices get slower with several BLAS threads, and results must not depend on their number.
+export OPENBLAS_NUM_THREADS := 1
+export OMP_NUM_THREADS := 1
+export MPLBACKEND := Agg
+
+.PHONY: demo test check bench lock clean
+
+demo: $(READY)  ## A whole autonomous session on the simulated rig, evaluated, with its report
+	$(BIN)/tactile-lab run --rig sim --object box-10x6x4 --grasps 16 --seed 1 --out runs
+
+test: check  ## Linters, types, layers, then all tests
+	$(BIN)/python -m pytest -n auto --dist loadfile
+
+check: $(READY)  ## Linters, types and the layer contract
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(READY)  ## Speed and memory, printed beside the reference
+	$(BIN)/tactile-lab bench
+
+lock:  ## Resolve the dependencies again, with hashes
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-config \
+		--no-emit-index-url --no-header --no-annotate --extra dev -o requirements.lock pyproject.toml
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+
+# pip of the system installs into the environment, so that a Python without ensurepip will do.
+$(READY): requirements.lock pyproject.toml
+	$(PYTHON) -m venv --without-pip $(VENV)
+	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check --require-hashes --no-deps -r requirements.lock
+	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	touch $(READY)
