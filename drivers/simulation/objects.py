@@ -212,7 +212,7 @@ def _largest_marker(foot_m: Array, height_m: float) -> UndersideMarker:
     sides = np.asarray(ConvexHull(foot_m).equations)  # inside: normal . x + offset <= 0
     constraints = np.column_stack([sides[:, :2], np.ones(len(sides))])
     best = linprog([0, 0, -1], A_ub=constraints, b_ub=-sides[:, 2], bounds=[(None, None), (None, None), (0, None)])
-    x, y, radius = best.x
+    x, y, radius = np.asarray(best.x)
     side = float(np.clip(radius * np.sqrt(2) / QUIET_ZONE, _SMALLEST_MARKER_m, MARKER_SIDE_m))
     return UndersideMarker(side, (float(x), float(y), float(height_m)))
 
