@@ -1,0 +1,167 @@
+"""The zero level of a field as a contour (in the plane) or a mesh (in space), with its uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from tactile_lab.errors import ShapeError
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.field_grid import FieldGrid
+from tactile_lab.shape.gpis import Gpis
+
+Indices: TypeAlias = NDArray[np.int64]
+Mask: TypeAlias = NDArray[np.bool_]
+
+FIRST_MARGIN_m = 0.015
+_NEWTON_STEPS = 2
+_FLATTEST_SLOPE = 1e-3
+"""Below this slope the field says nothing about where its surface is; sigma is computed as if it were this."""
+
+
+@dataclass(frozen=True)
+class Contour:
+    """A simple closed polygon, counter-clockwise; the last point joins the first.
+
+    Attributes:
+        points_m: shape (n, 2), metres.
+        sigma_m: shape (n,), standard deviation of the contour along its normal.
+        is_closed: False where the field had no outline of its own and was cut at the largest margin.
+    """
+
+    points_m: Array
+    sigma_m: Array
+    is_closed: bool
+
+
+@dataclass(frozen=True)
+class SurfaceMesh:
+    """A watertight triangle mesh, faces counter-clockwise seen from outside.
+
+    Attributes:
+        vertices: shape (n, 3), metres.
+        faces: shape (m, 3), vertex indices.
+        sigma_m: shape (n,), standard deviation of the surface along its normal.
+        normals: shape (n, 3), outward unit normals at the vertices.
+        is_closed: False where the field had no surface of its own and was cut at the largest margin.
+    """
+
+    vertices: Array
+    faces: Indices
+    sigma_m: Array
+    normals: Array
+    is_closed: bool
+
+
+def extract_contour(gpis: Gpis, *, resolution_m: float = 0.001, largest_margin_m: float = 0.060) -> Contour:
+    """The outline of the object in a planar field.
+
+    Args:
+        gpis: a field fitted in two dimensions.
+        resolution_m: spacing of the grid on which the outline is found, before it is refined to the zero level.
+        largest_margin_m: the grid grows around the contacts until the outline closes, at most by this.
+
+    Raises:
+        ShapeError: no point near the contacts is inside, or the grid would be too large.
+    """
+    from skimage.measure import find_contours  # here, so that importing this module stays quick
+
+    solid = _solid(gpis, resolution_m, largest_margin_m)
+    loops = find_contours(solid.values_m, 0.0, fully_connected="high")
+    places = max(loops, key=lambda loop: abs(_signed_area(loop)))[:-1]
+    points, _, sigma = _refined(gpis, solid.lower_m + resolution_m * places, resolution_m)
+    return _counter_clockwise(Contour(points, sigma, solid.is_closed))
+
+
+def extract_mesh(gpis: Gpis, *, resolution_m: float = 0.003, largest_margin_m: float = 0.060) -> SurfaceMesh:
+    """The surface of the object in a spatial field, by marching cubes; arguments and errors as :func:`extract_contour`."""
+    from skimage.measure import marching_cubes  # here, so that importing this module stays quick
+
+    solid = _solid(gpis, resolution_m, largest_margin_m)
+    places, faces, _, _ = marching_cubes(solid.values_m, 0.0, gradient_direction="ascent", allow_degenerate=False)
+    vertices, normals, sigma = _refined(gpis, solid.lower_m + resolution_m * places.astype(float), resolution_m)
+    return SurfaceMesh(vertices, faces.astype(np.int64), sigma, normals, solid.is_closed)
+
+
+@dataclass(frozen=True)
+class _Solid:
+    """Node values of one body without cavities, surrounded by positive nodes on all sides."""
+
+    lower_m: Array
+    values_m: Array
+    is_closed: bool
+
+
+def _solid(gpis: Gpis, resolution_m: float, largest_margin_m: float) -> _Solid:
+    """Tabulate the field around the contacts, farther on those sides where the object goes on."""
+    contacts = gpis.contacts_m
+    margins = np.full((2, contacts.shape[1]), min(FIRST_MARGIN_m, largest_margin_m))
+    while True:
+        lower, upper = contacts.min(axis=0) - margins[0], contacts.max(axis=0) + margins[1]
+        grid = FieldGrid.tabulate(gpis, lower, upper, resolution_m)
+        body = _body(grid, contacts)
+        open_sides = _touched_sides(body)
+        growing = open_sides & (margins < largest_margin_m)
+        if not growing.any():
+            return _padded(grid, body, is_closed=not open_sides.any())
+        margins = np.where(growing, np.minimum(2 * margins, largest_margin_m), margins)
+
+
+def _body(grid: FieldGrid, contacts_m: Array) -> Mask:
+    """The connected inside region that most contacts are nearest to, its cavities filled."""
+    labels, _ = ndimage.label(grid.values_m < 0)
+    inside = np.argwhere(labels)
+    if len(inside) == 0:
+        raise ShapeError("the field has no inside near the contacts", hint="Choose a finer resolution or more contacts")
+    _, nearest = cKDTree(inside).query((contacts_m - grid.lower_m) / grid.spacing_m)
+    votes = np.bincount(labels[tuple(inside[nearest].T)])
+    return np.asarray(ndimage.binary_fill_holes(labels == votes.argmax()))
+
+
+def _touched_sides(body: Mask) -> Mask:
+    """Whether the body reaches the first and the last layer of nodes along each axis, shape (2, d)."""
+    axes = range(body.ndim)
+    return np.array([[np.take(body, layer, axis=axis).any() for axis in axes] for layer in (0, -1)])
+
+
+def _padded(grid: FieldGrid, body: Mask, *, is_closed: bool) -> _Solid:
+    """Values whose sign says body or not, with a positive layer around them."""
+    size = np.maximum(np.abs(grid.values_m), 1e-6 * grid.spacing_m)
+    values = np.pad(np.where(body, -size, size), 1, constant_values=grid.spacing_m)
+    return _Solid(grid.lower_m - grid.spacing_m, values, is_closed)
+
+
+def _refined(gpis: Gpis, points_m: Array, reach_m: float) -> tuple[Array, Array, Array]:
+    """Points moved onto the zero level by Newton steps, their outward normals and standard deviations.
+
+    A point that would have to go farther than ``reach_m`` stays: it lies on a cut or on a filled cavity.
+    """
+    for _ in range(_NEWTON_STEPS):
+        found = gpis.predict(points_m, gradient=True)
+        slope = _slope(found.gradient)
+        steps = (found.mean_m / slope**2)[:, None] * found.gradient
+        is_near = np.linalg.norm(steps, axis=1) < reach_m
+        points_m = points_m - np.where(is_near[:, None], steps, 0.0)
+    found = gpis.predict(points_m, gradient=True, variance=True)
+    slope = _slope(found.gradient)
+    return points_m, found.gradient / slope[:, None], np.sqrt(found.variance_m2) / slope
+
+
+def _slope(gradient: Array) -> Array:
+    return np.maximum(np.linalg.norm(gradient, axis=1), _FLATTEST_SLOPE)
+
+
+def _signed_area(polygon: Array) -> float:
+    following = np.roll(polygon, -1, axis=0)
+    return 0.5 * float(np.sum(polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]))
+
+
+def _counter_clockwise(contour: Contour) -> Contour:
+    if _signed_area(contour.points_m) > 0:
+        return contour
+    return Contour(contour.points_m[::-1].copy(), contour.sigma_m[::-1].copy(), contour.is_closed)
