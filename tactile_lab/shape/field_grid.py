@@ -74,7 +74,10 @@ class FieldGrid:
             )
         nodes = lower_m + spacing_m * np.moveaxis(np.indices(shape), 0, -1).reshape(-1, len(shape))
         found = field.predict(nodes, gradient=gradient, variance=variance)
-        return cls(lower_m, spacing_m, found.mean_m.reshape(shape), found.gradient, found.variance_m2)
+        values = found.mean_m.reshape(shape)
+        return cls(
+            lower_m, spacing_m, values, found.gradient if gradient else None, found.variance_m2 if variance else None
+        )
 
     @classmethod
     def around(
@@ -98,7 +101,7 @@ class FieldGrid:
         """
         corners, beyond_m = self._locate(np.asarray(points_m, dtype=float))
         mean = _interpolate(self.values_m.ravel(), corners) + beyond_m
-        slope = spread = None
+        slope, spread = np.empty((0, self.values_m.ndim)), np.empty(0)
         if gradient:
             columns = _tabulated(self._gradient_columns, "gradients")
             slope = np.stack([_interpolate(column, corners) for column in columns], axis=1)

@@ -40,13 +40,13 @@ class Prediction:
 
     Attributes:
         mean_m: shape (q,), positive outside.
-        gradient: shape (q, d), or None if not asked for.
-        variance_m2: shape (q,), or None if not asked for.
+        gradient: shape (q, d); empty if not asked for.
+        variance_m2: shape (q,); empty if not asked for.
     """
 
     mean_m: Array
-    gradient: Array | None
-    variance_m2: Array | None
+    gradient: Array
+    variance_m2: Array
 
 
 class Gpis:
@@ -154,9 +154,7 @@ class Gpis:
 
     def gradient(self, points_m: Array) -> Array:
         """Gradient of the posterior mean at points of shape (q, d); shape (q, d)."""
-        gradient = self.predict(points_m, gradient=True).gradient
-        assert gradient is not None
-        return gradient
+        return self.predict(points_m, gradient=True).gradient
 
     def variance(self, points_m: Array) -> Array:
         """Posterior variance (2.14) at points of shape (q, d); shape (q,), square metres."""
@@ -172,7 +170,7 @@ class Gpis:
         mean, slope = np.empty(len(points_m)), np.empty(points_m.shape)
         for block in self._blocks(len(points_m)):
             mean[block], slope[block] = self._mean_and_gradient(points_m[block], gradient)
-        return Prediction(mean, slope if gradient else None, self.variance(points_m) if variance else None)
+        return Prediction(mean, slope if gradient else slope[:0], self.variance(points_m) if variance else mean[:0])
 
     def _observed_minus_prior(self) -> Array:
         seen, count = self.observations, self._gradient_count

@@ -79,7 +79,7 @@ def extract_contour(gpis: Gpis, *, resolution_m: float = 0.001, largest_margin_m
 
 
 def extract_mesh(gpis: Gpis, *, resolution_m: float = 0.003, largest_margin_m: float = 0.060) -> SurfaceMesh:
-    """The surface of the object in a spatial field, by marching cubes; arguments and errors as :func:`extract_contour`."""
+    """The object's surface in a spatial field, by marching cubes; arguments and errors as :func:`extract_contour`."""
     from skimage.measure import marching_cubes  # here, so that importing this module stays quick
 
     solid = _solid(gpis, resolution_m, largest_margin_m)
@@ -153,7 +153,7 @@ def _refined(gpis: Gpis, points_m: Array, reach_m: float) -> tuple[Array, Array,
 
 
 def _slope(gradient: Array) -> Array:
-    return np.maximum(np.linalg.norm(gradient, axis=1), _FLATTEST_SLOPE)
+    return np.asarray(np.maximum(np.linalg.norm(gradient, axis=1), _FLATTEST_SLOPE))
 
 
 def _signed_area(polygon: Array) -> float:
