@@ -52,6 +52,10 @@ class CodecError(DeviceError):
     """Bytes that do not follow the device's protocol."""
 
 
+class SafetyError(TactileLabError):
+    """A limit of the hand or the workspace was passed; the rig has to stop."""
+
+
 class SessionError(TactileLabError):
     """A session folder or traffic file that can not be read or written."""
 

@@ -1,0 +1,217 @@
+"""What may not happen to the hand, and what happens when it does.
+
+The supervisor looks at every cycle. A limit that is passed raises :class:`SafetyError`; whoever runs the session then
+calls :meth:`SafetySupervisor.stop`, which is also the way out of every other failure: zero demands to the hand, the
+positioner held where it is, for several cycles (the hand's own motors halt 20 ms after the last demand).
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import FrameType, TracebackType
+from typing import Any, Protocol
+
+from gtsam import Pose3
+from pydantic import Field
+
+from tactile_lab.clock import NANOSECONDS
+from tactile_lab.errors import SafetyError, TactileLabError
+from tactile_lab.strict_yaml import StrictModel
+
+
+class SafetySettings(StrictModel):
+    """The limits.
+
+    Attributes:
+        force_limit_N: largest contact force on one fingertip.
+        stale_s: without a fresh hand status for this long the rig stops; never less than ``stale_cycles`` cycles.
+        stale_cycles: see ``stale_s``.
+        palm_minimum_height_m: lowest height of the palm's origin above the table.
+        workspace_radius_m: largest horizontal distance of the palm's origin from the workspace centre.
+        workspace_centre_m: centre of the workspace on the table, world x, y.
+        object_radius_m: an object estimated farther than this from the workspace centre is lost.
+        empty_grasps: this many grasps in a row without any contact mean that the object is gone.
+        session_limit_s: the longest session, on the session's clock.
+        first_moves_scale: speed of the first approach as a share of the ordinary one.
+    """
+
+    force_limit_N: float = Field(default=6.0, gt=0.0)
+    stale_s: float = Field(default=0.010, gt=0.0)
+    stale_cycles: int = Field(default=5, ge=1)
+    palm_minimum_height_m: float = Field(default=0.08, ge=0.0)
+    workspace_radius_m: float = Field(default=0.45, gt=0.0)
+    workspace_centre_m: tuple[float, float] = (0.0, 0.0)
+    object_radius_m: float = Field(default=0.25, gt=0.0)
+    empty_grasps: int = Field(default=3, ge=1)
+    session_limit_s: float = Field(default=3600.0, gt=0.0)
+    first_moves_scale: float = Field(default=0.4, gt=0.0, le=1.0)
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What one cycle looks like to the supervisor.
+
+    Attributes:
+        stamp_ns: session clock.
+        hand_stamp_ns: arrival of the newest fresh hand status; None before the first.
+        loads_N: contact force on each fingertip.
+        world_T_palm: the palm; None before the first status.
+    """
+
+    stamp_ns: int
+    hand_stamp_ns: int | None
+    loads_N: Mapping[str, float]
+    world_T_palm: Pose3 | None
+
+
+class Stoppable(Protocol):
+    """What the supervisor can stop: the bench."""
+
+    def stop(self) -> None:
+        """Zero hand demands, hold the base."""
+
+    def cycle(self) -> object:
+        """One cycle over all devices."""
+
+
+_STOP_CYCLES = 5
+
+
+class SafetySupervisor:
+    """Checks each cycle against the limits and knows how to stop.
+
+    Args:
+        bench: what to stop.
+        settings: the limits.
+        cycle_ns: length of a cycle.
+    """
+
+    def __init__(self, bench: Stoppable, settings: SafetySettings, cycle_ns: int) -> None:
+        self._bench, self.settings = bench, settings
+        self._stale_ns = max(round(settings.stale_s * NANOSECONDS), settings.stale_cycles * cycle_ns)
+        self._start_ns: int | None = None
+        self._empty_grasps = 0
+        self._approached = False
+
+    # --- every cycle -------------------------------------------------------------------------------------------
+
+    def check(self, situation: Situation) -> None:
+        """Compare one cycle with the limits.
+
+        Raises:
+            SafetyError: a limit is passed.
+        """
+        if self._start_ns is None:
+            self._start_ns = situation.stamp_ns
+        self._check_freshness(situation)
+        self._check_forces(situation.loads_N)
+        if situation.world_T_palm is not None:
+            self._check_workspace(situation.world_T_palm)
+
+    def _check_freshness(self, situation: Situation) -> None:
+        last_ns = self._start_ns if situation.hand_stamp_ns is None else situation.hand_stamp_ns
+        if last_ns is not None and (silent_ns := situation.stamp_ns - last_ns) > self._stale_ns:
+            raise SafetyError(
+                f"no fresh status for {silent_ns / 1e6:.0f} ms", where="hand", hint="Check cable, power and the bus"
+            )
+
+    def _check_forces(self, loads_N: Mapping[str, float]) -> None:
+        for finger, load_N in loads_N.items():
+            if not load_N <= self.settings.force_limit_N:
+                raise SafetyError(
+                    f"fingertip force {load_N:.1f} N is over the limit of {self.settings.force_limit_N:.1f} N",
+                    where=finger,
+                    hint="Look at the hand and the object before going on",
+                )
+
+    def _check_workspace(self, world_T_palm: Pose3) -> None:
+        if (height_m := float(world_T_palm.z())) < self.settings.palm_minimum_height_m:
+            raise SafetyError(f"palm only {height_m * 1e3:.0f} mm above the table", where="base", hint="Lift the arm")
+        if (out_m := self._from_centre_m(float(world_T_palm.x()), float(world_T_palm.y()))) > (
+            self.settings.workspace_radius_m
+        ):
+            raise SafetyError(f"palm {out_m * 1e3:.0f} mm from the workspace centre", where="base", hint="Move it back")
+
+    # --- between cycles ----------------------------------------------------------------------------------------
+
+    def reason_to_end(self, stamp_ns: int) -> str | None:
+        """Why no further grasp should start, or None."""
+        if self._start_ns is not None and stamp_ns - self._start_ns > self.settings.session_limit_s * NANOSECONDS:
+            return f"the session limit of {self.settings.session_limit_s:.0f} s is reached"
+        if self._empty_grasps >= self.settings.empty_grasps:
+            return f"object lost: no contact in {self._empty_grasps} grasps in a row"
+        return None
+
+    def object_lost(self, x_m: float, y_m: float) -> str | None:
+        """Why an object estimated at world x, y counts as lost, or None."""
+        out_m = self._from_centre_m(x_m, y_m)
+        if out_m <= self.settings.object_radius_m:
+            return None
+        return f"object lost: estimated {out_m * 100:.0f} cm from the workspace centre"
+
+    def count_contacts(self, contacts: int) -> None:
+        """Take note of how many contacts a grasp had."""
+        self._empty_grasps = 0 if contacts else self._empty_grasps + 1
+
+    @property
+    def speed_scale(self) -> float:
+        """Factor on all speeds: slow until the first approach has ended well."""
+        return 1.0 if self._approached else self.settings.first_moves_scale
+
+    def approached(self) -> None:
+        """The first approach has ended well: ordinary speed from here on."""
+        self._approached = True
+
+    # --- stopping ----------------------------------------------------------------------------------------------
+
+    def stop(self) -> tuple[str, ...]:
+        """Zero demands and hold the base, for several cycles. Never raises.
+
+        Returns:
+            What went wrong while stopping, in words; a dead device can not be exchanged with any more.
+        """
+        self._bench.stop()
+        for _ in range(_STOP_CYCLES):
+            try:
+                self._bench.cycle()
+            except TactileLabError as error:
+                return (str(error),)
+        return ()
+
+    def _from_centre_m(self, x_m: float, y_m: float) -> float:
+        centre_x_m, centre_y_m = self.settings.workspace_centre_m
+        return float(((x_m - centre_x_m) ** 2 + (y_m - centre_y_m) ** 2) ** 0.5)
+
+
+class InterruptGuard:
+    """Ctrl+C once: finish the step and close the session. Twice: now.
+
+    A context; while it is open the first SIGINT only sets :attr:`requested`, every later one raises
+    KeyboardInterrupt in the main thread. Signals belong to the main thread: elsewhere the guard does nothing.
+    """
+
+    def __init__(self) -> None:
+        self.requested = False
+        self._previous: Callable[[int, FrameType | None], Any] | int | None = None
+        self._active = False
+
+    def __enter__(self) -> InterruptGuard:
+        if threading.current_thread() is threading.main_thread():
+            self._previous = signal.signal(signal.SIGINT, self._interrupted)
+            self._active = True
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._active:
+            signal.signal(signal.SIGINT, self._previous)
+            self._active = False
+
+    def _interrupted(self, number: int, frame: FrameType | None) -> None:
+        if self.requested:
+            raise KeyboardInterrupt
+        self.requested = True
