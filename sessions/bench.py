@@ -1,0 +1,264 @@
+"""The bench: the connected devices of a rig, run in one common cycle.
+
+A cycle exchanges with the hand and the positioner, empties the fingertips' links and waits for the next deadline.
+Deadlines lie on a fixed grid, so that a slow cycle does not move the later ones. What the devices received reaches
+:class:`Perception` through the taps of their links (see :mod:`sessions.interpreter`), before the devices decode it
+for their own control.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from gtsam import Pose3
+
+from drivers.fingertip import FingertipCalibration, FingertipSensor
+from drivers.shadow.kinematics import JOINTS
+from sessions.instruments import BaseInstrument, CameraInstrument, HandInstrument, Instrument, PolledInstrument
+from sessions.interpreter import Observer
+from sessions.marks import Mark, MarkKind
+from sessions.perception import Outcome, Perception, TareReport, TruthFrame
+from sessions.recorder import Level, Recorder
+from tactile_lab.clock import NANOSECONDS, Clock
+from tactile_lab.errors import DeviceError, SessionError
+from tactile_lab.geometry.contacts import FINGERS, Contact, Grasp
+
+READY_TIMEOUT_ns = 2 * NANOSECONDS
+"""How long the hand and the positioner may take to answer after connecting."""
+
+BASE_JOINTS = ("x_m", "y_m", "z_m", "yaw_rad", "pitch_rad", "roll_rad")
+
+
+class TruthReading(Protocol):
+    """What the truth channel of a simulated rig says."""
+
+    @property
+    def world_T_object(self) -> Pose3: ...
+    @property
+    def contacts(self) -> Iterable[Contact] | None: ...
+
+
+@dataclass
+class CycleCounts:
+    """Cycles run, cycles that ended after their deadline, deadlines left out because of that."""
+
+    cycles: int = 0
+    overruns: int = 0
+    skipped: int = 0
+
+
+class Bench:
+    """The devices of a rig.
+
+    Args:
+        clock: the session's clock.
+        cycle_ns: period of the common cycle.
+        hand, base, camera: live devices on tapped links.
+        wrench_devices: live devices of the fingertips' own links, by finger.
+        observer: the tap of all those links; its Perception and its recorder are the bench's.
+        fingertip_calibrations: by finger.
+        truth: the truth channel of a simulated rig; goes to the recorder and nowhere else.
+    """
+
+    def __init__(
+        self,
+        *,
+        clock: Clock,
+        cycle_ns: int,
+        hand: HandInstrument,
+        base: BaseInstrument,
+        observer: Observer,
+        wrench_devices: Mapping[str, PolledInstrument] | None = None,
+        camera: CameraInstrument | None = None,
+        fingertip_calibrations: Mapping[str, FingertipCalibration] | None = None,
+        truth: Callable[[], TruthReading] | None = None,
+    ) -> None:
+        self.clock, self.cycle_ns = clock, cycle_ns
+        self.hand, self.base, self.camera = hand, base, camera
+        self.wrench_devices = dict(wrench_devices or {})
+        self.fingertip_calibrations = dict(fingertip_calibrations or {})
+        self.counts = CycleCounts()
+        self._observer = observer
+        self._truth = truth
+        self._deadline_ns: int | None = None
+
+    @property
+    def perception(self) -> Perception:
+        """What is known of the hand."""
+        return self._observer.interpreter.perception
+
+    @property
+    def recorder(self) -> Recorder:
+        """Where everything is recorded."""
+        return self._observer.recorder
+
+    @property
+    def fingertips(self) -> dict[str, FingertipSensor]:
+        """The fingertip sensors, by finger."""
+        return self.perception.fingertips
+
+    @property
+    def world_T_mount(self) -> Pose3:
+        """The forearm-to-world calibration."""
+        return self.perception.world_T_mount
+
+    # --- lifecycle ---------------------------------------------------------------------------------------------
+
+    def connect(self) -> None:
+        """Connect every device and run cycles until the hand and the positioner have answered.
+
+        All or nothing: when anything fails, everything is closed again.
+
+        Raises:
+            DeviceError: a device could not be connected or stays silent.
+        """
+        try:
+            for instrument in self._instruments():
+                instrument.connect()
+            self._await_first_samples()
+        except BaseException as error:
+            for problem in self._close_all():
+                error.add_note(f"while closing again: {problem}")
+            raise
+
+    def close(self) -> None:
+        """Stop and close every device, each even if another fails; idempotent.
+
+        Raises:
+            DeviceError: the first device that did not close.
+        """
+        if problems := self._close_all():
+            raise problems[0]
+
+    def stop(self) -> None:
+        """No motion from now on: zero demands on the hand, the positioner stays. Never raises."""
+        self.hand.stop()
+        self.base.stop()
+
+    def _instruments(self) -> list[Instrument]:
+        camera = [] if self.camera is None else [self.camera]
+        return [self.hand, self.base, *self.wrench_devices.values(), *camera]
+
+    def _await_first_samples(self) -> None:
+        give_up_ns = self.clock.now_ns() + READY_TIMEOUT_ns
+        while not self.perception.ready:
+            if self.clock.now_ns() > give_up_ns:
+                raise DeviceError(
+                    f"no sample from the hand or the positioner within {READY_TIMEOUT_ns / NANOSECONDS:g} s",
+                    where="bench",
+                    hint="Check power and cables, then try again",
+                )
+            self.cycle()
+
+    def _close_all(self) -> list[DeviceError]:
+        problems: list[DeviceError] = []
+        self.stop()
+        for instrument in reversed(self._instruments()):
+            try:
+                instrument.close()
+            except DeviceError as error:
+                problems.append(error)
+        self._deadline_ns = None
+        return problems
+
+    # --- the cycle ---------------------------------------------------------------------------------------------
+
+    def cycle(self) -> None:
+        """Run one cycle over all devices and wait for the next deadline. Raises DeviceError."""
+        if self._deadline_ns is None:
+            self._deadline_ns = self.clock.now_ns()
+        self.hand.exchange()
+        self.base.exchange()
+        for device in self.wrench_devices.values():
+            device.poll()
+        self._record_state()
+        self._wait(self._deadline_ns + self.cycle_ns)
+
+    def run(self, duration_ns: int) -> None:
+        """Run cycles for a time, at least one."""
+        end_ns = self.clock.now_ns() + duration_ns
+        self.cycle()
+        while self.clock.now_ns() < end_ns:
+            self.cycle()
+
+    def _wait(self, deadline_ns: int) -> None:
+        late_ns = self.clock.now_ns() - deadline_ns
+        self.counts.cycles += 1
+        if late_ns > 0:
+            missed = -(-late_ns // self.cycle_ns)
+            self.counts.overruns += 1
+            self.counts.skipped += missed
+            deadline_ns += missed * self.cycle_ns
+        self.clock.sleep_until_ns(deadline_ns)
+        self._deadline_ns = deadline_ns
+
+    def _record_state(self) -> None:
+        now_ns, seen = self.clock.now_ns(), self.perception
+        if not (seen.ready and self.recorder.state_due(now_ns)):
+            return
+        joints = dict(zip(JOINTS, seen.joints_rad.tolist(), strict=True))
+        self.recorder.joints(now_ns, joints, dict(zip(BASE_JOINTS, seen.base_q.tolist(), strict=True)))
+        self.recorder.loads(now_ns, seen.loads_N())
+        self.recorder.frames(now_ns, {"palm": seen.world_T_palm, **seen.world_T_distal})
+        self._record_truth()
+
+    def _record_truth(self) -> None:
+        if self._truth is not None:
+            reading = self._truth()
+            self.recorder.truth(self.clock.now_ns(), reading.world_T_object, reading.contacts)
+
+    # --- marks -------------------------------------------------------------------------------------------------
+
+    def tare(self, fingers: Iterable[str] = FINGERS) -> TareReport:
+        """Take the named, idle fingertips as untouched; refusals are reported and recorded as warnings."""
+        report = self._mark(MarkKind.TARE, tuple(fingers))
+        assert isinstance(report, TareReport)
+        for finger, reason in report.refused.items():
+            self.event(Level.WARNING, finger, f"tare refused: {reason}")
+        return report
+
+    def begin_capture(self) -> None:
+        """Gather samples from here on."""
+        self._mark(MarkKind.CAPTURE_BEGIN)
+
+    def end_capture(self) -> Grasp:
+        """Make a grasp of the samples since :meth:`begin_capture`."""
+        grasp = self._mark(MarkKind.CAPTURE_END)
+        assert isinstance(grasp, Grasp)
+        self.recorder.grasp(self.clock.now_ns(), grasp, self.perception.dropped)
+        self._record_truth()
+        return grasp
+
+    def begin_hold(self) -> None:
+        """From here on the object moves with the palm."""
+        self._mark(MarkKind.HOLD_BEGIN)
+
+    def end_hold(self) -> None:
+        """From here on the object stays where it is."""
+        self._mark(MarkKind.HOLD_END)
+
+    def truth_frame(self) -> TruthFrame | None:
+        """Take a picture that shows the object of the current grasp at rest; None without a camera.
+
+        Raises:
+            DeviceError: the camera gave no picture.
+        """
+        if self.camera is None:
+            return None
+        self.camera.capture()
+        outcome = self._mark(MarkKind.TRUTH_FRAME)
+        if not isinstance(outcome, TruthFrame):
+            raise DeviceError("the picture can not be read", where="camera", hint="Check the camera's link")
+        self._record_truth()
+        return outcome
+
+    def event(self, level: Level, source: str, message: str) -> None:
+        """Record something a person should be able to read later."""
+        self.recorder.event(self.clock.now_ns(), level, source, message)
+
+    def _mark(self, kind: MarkKind, fingers: tuple[str, ...] = FINGERS) -> Outcome | None:
+        if unknown := set(fingers) - set(FINGERS):
+            raise SessionError(f"no finger called {', '.join(sorted(unknown))}", hint=f"Fingers: {', '.join(FINGERS)}")
+        return self._observer.mark(Mark(kind, self.clock.now_ns(), fingers))

@@ -1,0 +1,116 @@
+"""One path from received bytes to understanding, walked by the live session and by a replay alike.
+
+Live, every link is tapped. The tap (:class:`Observer`) first records a datagram and then, still before the device
+that asked for it sees it, hands the same bytes to the :class:`Interpreter`, whose decoders and :class:`Perception`
+are objects apart from the live devices. A replay hands the recorded bytes to an equal Interpreter. The order of
+recording *is* the order of processing, for marks too, and the Interpreter's clock shows the stamp of the message
+in hand, in both cases. So nothing can be understood live that the recording does not say.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from drivers.links import Datagram
+from sessions.instruments import BaseReading, Decoder, FrameReading, HandReading
+from sessions.marks import Mark
+from sessions.perception import Outcome, Perception
+from sessions.recorder import Recorder
+from tactile_lab.clock import VirtualClock
+from tactile_lab.errors import CodecError
+
+HAND_LINK, BASE_LINK, CAMERA_LINK = "hand", "base", "camera"
+
+
+def fingertip_link(finger: str) -> str:
+    """Name of the link of a fingertip's own sensor."""
+    return f"ft/{finger}"
+
+
+class Interpreter:
+    """Decodes received datagrams and feeds Perception.
+
+    Args:
+        perception: a fresh one.
+        hand, base: decoders of those links.
+        wrenches: decoders of the fingertips' own links, by finger; empty when the hand carries their data.
+        camera: decoder of camera frames, if the rig has a camera.
+        clock: the clock the decoders were built with; it is set to the stamp of each message.
+    """
+
+    def __init__(
+        self,
+        perception: Perception,
+        *,
+        hand: Decoder[HandReading],
+        base: Decoder[BaseReading],
+        wrenches: Mapping[str, Decoder[Sequence[Any]]] | None = None,
+        camera: Decoder[FrameReading] | None = None,
+        clock: VirtualClock | None = None,
+    ) -> None:
+        self.perception = perception
+        self.clock = clock or VirtualClock()
+        self.undecodable: Counter[str] = Counter()
+        """Datagrams that broke their protocol, by link."""
+        self._routes: dict[str, Callable[[Datagram], None]] = {
+            HAND_LINK: _route(hand, perception.on_hand),
+            BASE_LINK: _route(base, perception.on_base),
+        }
+        for finger, decoder in (wrenches or {}).items():
+            self._routes[fingertip_link(finger)] = _route(decoder, _for_finger(perception, finger))
+        if camera is not None:
+            self._routes[CAMERA_LINK] = _route(camera, perception.on_frame)
+
+    def received(self, link: str, payload: bytes, stamp_ns: int) -> None:
+        """Take one received datagram. Bytes that break the protocol are counted; links not known are left alone."""
+        self.clock.sleep_until_ns(stamp_ns)
+        route = self._routes.get(link)
+        if route is None:
+            return
+        try:
+            route(Datagram(payload, stamp_ns))
+        except CodecError:
+            self.undecodable[link] += 1
+
+    def mark(self, mark: Mark) -> Outcome | None:
+        """Take one mark; see :meth:`Perception.mark`."""
+        self.clock.sleep_until_ns(mark.stamp_ns)
+        return self.perception.mark(mark)
+
+
+def _route(decoder: Decoder[Any], take: Callable[[Any], None]) -> Callable[[Datagram], None]:
+    def route(datagram: Datagram) -> None:
+        if (sample := decoder.receive(datagram)) is not None:
+            take(sample)
+
+    return route
+
+
+def _for_finger(perception: Perception, finger: str) -> Callable[[Sequence[Any]], None]:
+    def take(samples: Sequence[Any]) -> None:
+        perception.on_wrench(finger, samples)
+
+    return take
+
+
+class Observer:
+    """The tap of a live session: record first, then interpret."""
+
+    def __init__(self, recorder: Recorder, interpreter: Interpreter) -> None:
+        self.recorder, self.interpreter = recorder, interpreter
+
+    def transmitted(self, link: str, payload: bytes, stamp_ns: int) -> None:
+        """The program sends; recorded only."""
+        self.recorder.transmitted(link, payload, stamp_ns)
+
+    def received(self, link: str, payload: bytes, stamp_ns: int) -> None:
+        """A device sent."""
+        self.recorder.received(link, payload, stamp_ns)
+        self.interpreter.received(link, payload, stamp_ns)
+
+    def mark(self, mark: Mark) -> Outcome | None:
+        """The conductor meant something."""
+        self.recorder.mark(mark)
+        return self.interpreter.mark(mark)
