@@ -6,7 +6,7 @@ into a sample and does nothing else; live and in replay the session's understand
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
 from drivers.fingertip import FingertipSensor
@@ -83,6 +83,9 @@ class Instrument(Protocol):
 class HandInstrument(Instrument, Protocol):
     """The live hand."""
 
+    def set_targets(self, targets_rad: Mapping[str, float], /) -> None:
+        """Joint targets by motor name, J0 for a coupled pair; motors not named keep theirs."""
+
     def exchange(self) -> object:
         """One cycle: send demands, receive and decode."""
 
@@ -92,6 +95,9 @@ class HandInstrument(Instrument, Protocol):
 
 class BaseInstrument(Instrument, Protocol):
     """The live positioner."""
+
+    def set_target(self, q: Array, /) -> None:
+        """Joint targets, shape (6,), metres and radians."""
 
     def exchange(self) -> object:
         """One cycle: send targets, receive and decode."""

@@ -4,6 +4,7 @@ TactileLabError                exit 1
  |- ConfigurationError         exit 2   a file the user wrote: rig, calibration, options
  |- DeviceError                exit 4   a device that does not answer, or answers wrongly
  |   `- CodecError                      bytes that are not what the protocol says
+ |- SafetyError                exit 1   a limit of the hand or the workspace was passed: the rig has stopped
  |- SessionError               exit 1   a session folder or its traffic file
  |- ShapeError                 exit 1   a mesh, contour or model that cannot be used
  `- TrackingError              exit 1   the object can not be followed any further
