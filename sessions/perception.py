@@ -94,8 +94,6 @@ class Perception:
         self.hand_stamp_ns: int | None = None
         """Arrival of the newest fresh joint angles; None before the first."""
         self._joints_rad: Array | None = None
-        self.hand_stamp_ns: int | None = None
-        """Arrival of the newest fresh hand status."""
         self._base_q: Array | None = None
         self._geometry: HandGeometry | None = None
         self._frame: FrameReading | None = None
@@ -117,7 +115,6 @@ class Perception:
         if not sample.fresh:
             return
         self._joints_rad, self._geometry = np.asarray(sample.joints_rad, dtype=float), None
-        self.hand_stamp_ns = sample.stamp_ns
         self.hand_stamp_ns = sample.stamp_ns
         if self._capture is not None:
             self._capture.joints_rad.append(self._joints_rad)
