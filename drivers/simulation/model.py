@@ -1,0 +1,304 @@
+"""The physics model of the simulated rig: positioner, Shadow right hand, fingertips, table and object.
+
+Built in code from primitives, no mesh files. Names inside the model: links are called after their joint (``FFJ3`` is
+the link behind joint FFJ3, ``WRJ1`` the palm), fingertips ``FF tip``, sensors ``FF force`` and ``FF moment``.
+Hand links collide with table and object but not with each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from gtsam import Pose3, Rot3
+
+from drivers.shadow.kinematics import JOINT_TABLE, Joint, JOINT_LIMITS_rad
+from drivers.simulation.links import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Ellipsoid, Shape
+from drivers.simulation.motors import DISTAL_COUPLING, MOTOR_CLASSES
+from drivers.simulation.objects import Hull, ObjectModel, Piece
+from tactile_lab.geometry.contacts import FINGERS, Array
+
+TIMESTEP_s = 0.002
+BASE_JOINTS = ("base x", "base y", "base z", "base yaw", "base pitch", "base roll")
+"""Joints of the positioner in the order of every base vector: metres, then radians."""
+
+_HAND, _TIP, _OBJECT, _TABLE = 1, 2, 4, 8  # collision classes
+_FOREARM_QUATERNION = (0.5, 0.5, 0.5, 0.5)  # R0 = [[0, 0, 1], [1, 0, 0], [0, 1, 0]], fingers along +x at zero
+
+
+class _Contact(NamedTuple):
+    """Friction (slide, twist, roll), stiffness and priority of one kind of surface."""
+
+    friction: tuple[float, float, float]
+    solref: tuple[float, float]
+    solimp: tuple[float, float, float, float, float]
+    priority: int = 0
+
+
+_RUBBER = _Contact((0.9, 0.003, 1e-4), (0.006, 1.0), (0.90, 0.97, 0.001, 0.5, 2.0), priority=2)
+_GLASS = _Contact((0.35, 0.005, 0.002), (0.004, 1.0), (0.95, 0.99, 0.0005, 0.5, 2.0), priority=1)
+_WOOD = _Contact((0.5, 0.003, 1e-4), (0.004, 1.0), (0.95, 0.99, 0.0005, 0.5, 2.0))
+
+
+class _Axis(NamedTuple):
+    """One positioner joint: kind, direction, range, driven inertia."""
+
+    slides: bool
+    direction: tuple[float, float, float]
+    lower: float
+    upper: float
+    armature: float
+
+
+_BASE_AXES = (
+    _Axis(True, (1, 0, 0), -1.0, 1.0, 5.0),
+    _Axis(True, (0, 1, 0), -1.0, 1.0, 5.0),
+    _Axis(True, (0, 0, 1), -0.3, 1.3, 5.0),
+    _Axis(False, (0, 0, 1), -4 * np.pi, 4 * np.pi, 0.5),
+    _Axis(False, (0, 1, 0), -1.0, 1.9, 0.5),
+    _Axis(False, (1, 0, 0), -2.2, 2.2, 0.5),
+)
+BASE_LIMITS = np.array([[axis.lower, axis.upper] for axis in _BASE_AXES])
+"""Range of each positioner joint, shape (6, 2), metres and radians."""
+
+_BASE_BANDWIDTH_rad_s = 60.0  # stiff compared with the hand: it follows a path 33 ms late
+_CARRIED_kg, _CARRIED_kg_m2 = 4.0, 0.15
+_BASE_FORCE_N, _BASE_TORQUE_Nm = 400.0, 60.0
+_TRAIL_Nm_rad, _TRAIL_Nms_rad = 0.25, 0.01  # elastic coupling of J1 to J2
+
+
+@dataclass(frozen=True)
+class TipBody:
+    """One fingertip beyond its force sensor.
+
+    Attributes:
+        distal_T_sensor: the sensor's measuring frame in the distal frame.
+        shape: the skin, in the distal frame.
+        com_distal_m: centre of mass in the distal frame.
+    """
+
+    distal_T_sensor: Pose3
+    shape: Ellipsoid | Capsule
+    com_distal_m: tuple[float, float, float]
+
+
+def build_model(
+    target: ObjectModel, object_mass_kg: float, tips: Mapping[str, TipBody], world_T_mount: Pose3
+) -> mujoco.MjModel:
+    """Compile the rig with one object lying at the world's origin.
+
+    Args:
+        target: the object on the table.
+        object_mass_kg: its mass, spread evenly over its volume.
+        tips: the fingertip of each of the five fingers.
+        world_T_mount: where the positioner stands (zero of its six joints).
+    """
+    spec = mujoco.MjSpec()
+    _set_options(spec)
+    _add_table(spec, rolling=target.rolls)
+    forearm = _add_positioner(spec, world_T_mount)
+    links = _add_links(forearm)
+    for finger in FINGERS:
+        _add_tip(spec, links[f"{finger}J1"], finger, tips[finger])
+    _add_motors(spec)
+    _add_object(spec, target, object_mass_kg)
+    return spec.compile()
+
+
+def _set_options(spec: Any) -> None:
+    spec.compiler.degree = False
+    spec.compiler.autolimits = True
+    spec.option.timestep = TIMESTEP_s
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 10
+
+
+def _surface(contact: _Contact, kind: int, touches: int) -> dict[str, Any]:
+    return {
+        "friction": contact.friction,
+        "solref": contact.solref,
+        "solimp": contact.solimp,
+        "priority": contact.priority,
+        "contype": kind,
+        "conaffinity": touches,
+    }
+
+
+def _add_table(spec: Any, *, rolling: bool) -> None:
+    spec.worldbody.add_geom(
+        name="table",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[0.5, 0.5, 0.01],
+        pos=[0, 0, -0.01],
+        condim=6 if rolling else 3,  # rolling friction halves the speed, so only for objects that roll
+        **_surface(_GLASS, _TABLE, _HAND | _TIP | _OBJECT),
+    )
+
+
+def _add_positioner(spec: Any, world_T_mount: Pose3) -> Any:
+    """The six-axis positioner; returns the forearm it carries."""
+    base = _add_link(spec.worldbody, "base", world_T_mount.translation(), _quaternion(world_T_mount.rotation()))
+    for name, axis in zip(BASE_JOINTS, _BASE_AXES, strict=True):
+        kind = mujoco.mjtJoint.mjJNT_SLIDE if axis.slides else mujoco.mjtJoint.mjJNT_HINGE
+        limits = [axis.lower, axis.upper]
+        base.add_joint(name=name, type=kind, axis=axis.direction, range=limits, armature=axis.armature)
+        _add_servo(spec, name, axis)
+    base.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.03, 0, 0], mass=1.0, contype=0, conaffinity=0)
+    forearm = _add_link(base, "forearm", (0, 0, 0), _FOREARM_QUATERNION)
+    _add_shapes(forearm, FOREARM)
+    return forearm
+
+
+def _add_servo(spec: Any, joint: str, axis: _Axis) -> None:
+    inertia = axis.armature + (_CARRIED_kg if axis.slides else _CARRIED_kg_m2)
+    limit = _BASE_FORCE_N if axis.slides else _BASE_TORQUE_Nm
+    servo = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    servo.set_to_position(kp=inertia * _BASE_BANDWIDTH_rad_s**2, kv=2 * inertia * _BASE_BANDWIDTH_rad_s)
+    servo.forcerange = [-limit, limit]
+    servo.ctrlrange = [axis.lower, axis.upper]
+
+
+def _add_links(forearm: Any) -> dict[str, Any]:
+    """The hand's links by the name of their joint, parents before children."""
+    links = {"forearm": forearm}
+    limits_rad = {joint.name: limits for joint, limits in zip(JOINT_TABLE, JOINT_LIMITS_rad, strict=True)}
+    for joint in sorted(JOINT_TABLE, key=_depth):
+        links[joint.name] = _add_hand_link(links[_parent(joint)], joint, limits_rad[joint.name])
+    return links
+
+
+def _parent(joint: Joint) -> str:
+    return "WRJ1" if joint.parent == "palm" else joint.parent
+
+
+def _depth(joint: Joint) -> int:
+    parents = {other.name: other for other in JOINT_TABLE}
+    return 1 + (_depth(parents[_parent(joint)]) if _parent(joint) in parents else 0)
+
+
+def _add_hand_link(parent: Any, joint: Joint, limits_rad: Any) -> Any:
+    roll, pitch, yaw = joint.rpy_rad
+    link = _add_link(parent, joint.name, joint.origin_m, _quaternion(Rot3.Ypr(yaw, pitch, roll)))
+    wrist = joint.name.startswith("WR")
+    link.add_joint(
+        name=joint.name,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=joint.axis,
+        range=limits_rad,
+        damping=0.5 if wrist else 0.01,
+        armature=0.002 if wrist else 0.0004,
+        frictionloss=0.0 if wrist else 0.005,
+    )
+    _add_shapes(link, LINK_SHAPES[joint.name])
+    return link
+
+
+def _add_link(parent: Any, name: str, position_m: Any, quaternion: Any) -> Any:
+    """A body without weight of its own: the real hand's controller holds it up, and only tips weigh on the sensors."""
+    link = parent.add_body(name=name, pos=position_m, quat=quaternion)
+    link.gravcomp = 1
+    return link
+
+
+def _add_shapes(body: Any, shapes: tuple[Shape, ...]) -> None:
+    for shape in shapes:
+        body.add_geom(mass=shape.mass_kg, contype=_HAND, conaffinity=_OBJECT | _TABLE, **_geometry(shape))
+
+
+def _geometry(shape: Shape) -> dict[str, Any]:
+    match shape:
+        case Capsule():
+            ends = [*shape.start_m, *shape.end_m]
+            return {"type": mujoco.mjtGeom.mjGEOM_CAPSULE, "fromto": ends, "size": [shape.radius_m, 0, 0]}
+        case Ball():
+            return {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "pos": shape.centre_m, "size": [shape.radius_m, 0, 0]}
+        case Block():
+            return {"type": mujoco.mjtGeom.mjGEOM_BOX, "pos": shape.centre_m, "size": shape.half_size_m}
+        case Ellipsoid():
+            return {"type": mujoco.mjtGeom.mjGEOM_ELLIPSOID, "pos": shape.centre_m, "size": shape.semi_axes_m}
+
+
+def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody) -> None:
+    """The fingertip as a body of its own, welded to the distal link through the force sensor."""
+    name = f"{finger} tip"
+    body = distal.add_body(name=name)
+    body.explicitinertial = True
+    body.mass = tip.shape.mass_kg
+    body.ipos = tip.com_distal_m
+    body.inertia = [0.4 * tip.shape.mass_kg * 0.01**2] * 3  # a ball of 10 mm: nothing depends on it
+    body.add_geom(name=name, **_geometry(tip.shape), **_surface(_RUBBER, _TIP, _OBJECT | _TABLE))
+    rotation = _quaternion(tip.distal_T_sensor.rotation())
+    body.add_site(name=name, pos=tip.distal_T_sensor.translation(), quat=rotation)
+    body.add_site(name=f"{finger} distal")
+    for quantity, kind in (("force", mujoco.mjtSensor.mjSENS_FORCE), ("moment", mujoco.mjtSensor.mjSENS_TORQUE)):
+        spec.add_sensor(name=f"{finger} {quantity}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=name)
+
+
+def _add_motors(spec: Any) -> None:
+    for finger in FINGERS[:4]:
+        _add_distal_tendons(spec, finger)
+    for joint, motor in MOTOR_CLASSES.items():
+        coupled = joint.endswith("J0")
+        kind = mujoco.mjtTrn.mjTRN_TENDON if coupled else mujoco.mjtTrn.mjTRN_JOINT
+        actuator = spec.add_actuator(name=joint, target=joint, trntype=kind)
+        actuator.gaintype = mujoco.mjtGain.mjGAIN_FIXED
+        actuator.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+        actuator.gainprm[0] = motor.stall_Nm
+        actuator.biasprm[2] = -motor.damping_Nms
+        actuator.ctrlrange = [-1, 1]
+
+
+def _add_distal_tendons(spec: Any, finger: str) -> None:
+    """The tendon of J0 pulls J1 and J2 alike; an elastic one lets J1 trail J2; a stop keeps J1 below J2."""
+    drive = spec.add_tendon(name=f"{finger}J0")
+    trail = spec.add_tendon(name=f"{finger} trail")
+    trail.stiffness = [_TRAIL_Nm_rad, 0, 0]
+    trail.damping = [_TRAIL_Nms_rad, 0, 0]
+    trail.springlength = [0, 0]
+    stop = spec.add_tendon(name=f"{finger} stop", limited=True, range=[0, np.pi / 2])
+    for tendon, share_of_j1 in ((drive, 1.0), (trail, 1.0), (stop, -1.0)):
+        tendon.wrap_joint(f"{finger}J1", share_of_j1)
+    for tendon, share_of_j2 in ((drive, 1.0), (trail, -DISTAL_COUPLING), (stop, 1.0)):
+        tendon.wrap_joint(f"{finger}J2", share_of_j2)
+
+
+def _add_object(spec: Any, target: ObjectModel, mass_kg: float) -> None:
+    body = spec.worldbody.add_body(name="object", pos=[0, 0, target.rest_height_m])
+    body.add_freejoint(name="object")
+    _set_inertia(body, target, mass_kg)
+    for index, piece in enumerate(target.pieces):
+        shape = _piece_geometry(spec, piece, f"object piece {index}")
+        body.add_geom(name=f"object {index}", **shape, **_surface(_WOOD, _OBJECT, _HAND | _TIP | _TABLE))
+
+
+def _set_inertia(body: Any, target: ObjectModel, mass_kg: float) -> None:
+    """Mass and inertia of the truth mesh, filled evenly: its pieces may overlap."""
+    inertia = np.array(target.mesh.moment_inertia) * mass_kg / target.mesh.volume
+    body.explicitinertial = True
+    body.mass = mass_kg
+    body.ipos = (0, 0, 0)
+    body.fullinertia = [inertia[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+
+
+def _piece_geometry(spec: Any, piece: Piece, mesh_name: str) -> dict[str, Any]:
+    if isinstance(piece, Hull):
+        spec.add_mesh(name=mesh_name, uservert=piece.vertices_object_m.ravel())
+        return {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": mesh_name}
+    kinds = {
+        "box": mujoco.mjtGeom.mjGEOM_BOX,
+        "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+        "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+    }
+    size = [*piece.size_m, 0.0, 0.0][:3]
+    return {"type": kinds[piece.kind], "size": size, "pos": piece.position_object_m}
+
+
+def _quaternion(rotation: Rot3) -> Array:
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, rotation.matrix().ravel())
+    return quaternion

@@ -1,0 +1,161 @@
+"""The moving part of the simulated rig: steps the physics, takes duties and base targets, gives true quantities."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import mujoco
+import numpy as np
+from gtsam import Pose2, Pose3, Rot3
+from numpy.typing import NDArray
+
+from drivers.shadow.kinematics import JOINTS
+from drivers.simulation.model import BASE_JOINTS, BASE_LIMITS, TIMESTEP_s
+from drivers.simulation.motors import DRIVEN_JOINTS
+from tactile_lab.clock import NANOSECONDS
+from tactile_lab.geometry.contacts import FINGERS, Array
+
+STEP_ns = round(TIMESTEP_s * NANOSECONDS)
+START_BASE = np.array([-0.32, 0.0, 0.36, 0.0, 0.0, 0.0])
+"""Where the positioner starts: the hand open, flat and well above the middle of the table."""
+
+_START_HAND_rad = {"THJ5": 0.9, "THJ4": 1.0}  # thumb turned to the palm's side, fingers straight
+
+
+@dataclass(frozen=True)
+class TrueContact:
+    """One touch of a fingertip in the physics.
+
+    Attributes:
+        finger: whose tip.
+        touched: what it touches.
+        point_world_m: point, shape (3,).
+        normal_world: unit normal out of what is touched, shape (3,).
+        force_on_tip_world_N: force on the fingertip, shape (3,).
+    """
+
+    finger: str
+    touched: Literal["object", "table"]
+    point_world_m: Array
+    normal_world: Array
+    force_on_tip_world_N: Array
+
+
+class Plant:
+    """The physics with its clock.
+
+    Args:
+        model: from :func:`drivers.simulation.model.build_model`.
+        start: where the object lies at the beginning: position of its frame's origin and its turn on the table.
+    """
+
+    def __init__(self, model: mujoco.MjModel, start: Pose2) -> None:
+        self._model, self._data = model, mujoco.MjData(model)
+        self._steps = 0
+        self._joints = _addresses(model, JOINTS)
+        self._base = _addresses(model, BASE_JOINTS)
+        self._motors = [model.actuator(name).id for name in DRIVEN_JOINTS]
+        self._servos = [model.actuator(name).id for name in BASE_JOINTS]
+        self._wrench = _sensor_addresses(model)
+        self._distal = [model.site(f"{finger} distal").id for finger in FINGERS]
+        self._tips = {model.geom(f"{finger} tip").id: finger for finger in FINGERS}
+        self._table = model.geom("table").id
+        self._object = model.body("object").id
+        self._place(start)
+
+    def _place(self, start: Pose2) -> None:
+        data, address = self._data, self._model.joint("object").qposadr[0]
+        data.qpos[address : address + 2] = start.x(), start.y()
+        data.qpos[address + 3 : address + 7] = np.cos(start.theta() / 2), 0, 0, np.sin(start.theta() / 2)
+        data.qpos[self._base] = START_BASE
+        data.ctrl[self._servos] = START_BASE
+        for joint, angle in _START_HAND_rad.items():
+            data.qpos[self._joints[JOINTS.index(joint)]] = angle
+        mujoco.mj_forward(self._model, data)
+
+    @property
+    def stamp_ns(self) -> int:
+        """Simulated time since the beginning."""
+        return self._steps * STEP_ns
+
+    def advance(self, steps: int) -> None:
+        """Move time on by a number of physics steps with the present duties and targets."""
+        if steps:
+            mujoco.mj_step(self._model, self._data, steps)
+            self._steps += steps
+
+    def drive(self, duty: Array) -> None:
+        """Set the duty of each motor, shape (20,), -1 to 1, order of :data:`DRIVEN_JOINTS`."""
+        self._data.ctrl[self._motors] = np.clip(duty, -1.0, 1.0)
+
+    def move_base(self, target: Array) -> None:
+        """Set the positioner's targets, shape (6,), metres and radians; clipped to its range."""
+        self._data.ctrl[self._servos] = np.clip(target, *BASE_LIMITS.T)
+
+    @property
+    def joints_rad(self) -> Array:
+        """True joint angles, shape (24,), order of :data:`~drivers.shadow.kinematics.JOINTS`."""
+        return np.asarray(self._data.qpos[self._joints])
+
+    @property
+    def base(self) -> Array:
+        """True positioner joints, shape (6,), metres and radians."""
+        return np.asarray(self._data.qpos[self._base])
+
+    @property
+    def motor_torque_Nm(self) -> Array:
+        """Torque each motor passes on to its joint, shape (20,), order of :data:`DRIVEN_JOINTS`."""
+        return np.asarray(self._data.actuator_force[self._motors])
+
+    @property
+    def wrenches(self) -> Array:
+        """Load on the five fingertips, shape (5, 6): force and moment about the sensor's origin, sensor frames.
+
+        Includes the tip's own weight and inertia. The engine reports what the tip does to the link, up to its sign.
+        """
+        return np.asarray(-self._data.sensordata[self._wrench])
+
+    def world_T_distal(self, finger: str) -> Pose3:
+        """True pose of a finger's distal frame."""
+        site = self._distal[FINGERS.index(finger)]
+        return Pose3(Rot3(self._data.site_xmat[site].reshape(3, 3)), self._data.site_xpos[site])
+
+    @property
+    def world_T_object(self) -> Pose3:
+        """True pose of the object frame."""
+        rotation = self._data.xmat[self._object].reshape(3, 3)
+        return Pose3(Rot3(rotation), self._data.xpos[self._object])
+
+    def contacts(self) -> tuple[TrueContact, ...]:
+        """Every touch of a fingertip now. One touch may be several of the engine's contact points."""
+        found = [self._contact(index) for index in range(self._data.ncon)]
+        return tuple(contact for contact in found if contact is not None)
+
+    def _contact(self, index: int) -> TrueContact | None:
+        contact = self._data.contact[index]
+        first, second = int(contact.geom[0]), int(contact.geom[1])
+        tip, other = (first, second) if first in self._tips else (second, first)
+        if tip not in self._tips:
+            return None
+        wrench = np.zeros(6)
+        mujoco.mj_contactForce(self._model, self._data, index, wrench)
+        frame = contact.frame.reshape(3, 3)  # rows: normal from the first to the second geometry, two tangents
+        towards_tip = 1.0 if tip == second else -1.0
+        return TrueContact(
+            finger=self._tips[tip],
+            touched="table" if other == self._table else "object",
+            point_world_m=contact.pos.copy(),
+            normal_world=towards_tip * frame[0],
+            force_on_tip_world_N=towards_tip * (wrench[:3] @ frame),
+        )
+
+
+def _addresses(model: mujoco.MjModel, joints: Sequence[str]) -> NDArray[np.intp]:
+    return np.array([model.joint(name).qposadr[0] for name in joints])
+
+
+def _sensor_addresses(model: mujoco.MjModel) -> NDArray[np.intp]:
+    starts = [[model.sensor(f"{finger} {kind}").adr[0] for kind in ("force", "moment")] for finger in FINGERS]
+    return np.array([[start + axis for start in pair for axis in range(3)] for pair in starts])
