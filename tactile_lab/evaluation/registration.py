@@ -19,7 +19,9 @@ FAILURE_LIMIT_MM = 5.0
 """A run whose registration error is above this limit counts as failed."""
 
 
-def registration_rms_mm(contacts_world_m: Sequence[Array], estimate: Poses, truth: Poses, dimension: int) -> float | None:
+def registration_rms_mm(
+    contacts_world_m: Sequence[Array], estimate: Poses, truth: Poses, dimension: int
+) -> float | None:
     """RMS distance between contacts placed with estimated and with true poses, after one best rigid fit.
 
     Args:

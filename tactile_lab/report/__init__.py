@@ -1,0 +1,1 @@
+"""One HTML file that shows a session: opens from disk, fetches nothing, prints."""

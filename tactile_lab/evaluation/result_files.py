@@ -1,0 +1,119 @@
+"""The files a session's SLAM leaves in ``results/``.
+
+==================  ===============================================================================
+``trajectory.csv``  stamp and 16 entries of ``world_T_object`` a grasp; empty where not placed
+``contacts.csv``    every contact in the world frame, with its grasp, finger, force and uncertainty
+``contour.csv``     dimension 2: the outer contour in the object frame, closed
+``mesh.ply/.glb``   the shape in the object frame with per-vertex ``sigma_m``; in dimension 2 the contour
+                    extruded from the table to the highest contact
+``slam.json``       method, seed, settings, what happened in each step, every loop with its verdict
+``timing.json``     seconds a step: the only file that two runs of one session do not share
+==================  ===============================================================================
+
+All but ``timing.json`` are functions of the result: the same result gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tactile_lab.errors import SessionError
+from tactile_lab.evaluation.plain import json_text
+from tactile_lab.evaluation.prism import open_ring, prism
+from tactile_lab.evaluation.tables import NANOSECOND_s, contacts_text, contour_text
+from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
+from tactile_lab.geometry.contacts import Array, Grasp
+from tactile_lab.shape.mesh_io import write_glb, write_ply
+from tactile_lab.shape.surface import Contour, SurfaceMesh
+from tactile_lab.slam import SlamResult
+
+SCHEMA_VERSION = 1
+
+
+def write_results(
+    folder: Path, result: SlamResult, grasps: Sequence[Grasp], settings: Mapping[str, Any] | None = None
+) -> list[Path]:
+    """Write all result files of one SLAM run; the files written, in the order of the table above.
+
+    Args:
+        folder: the session's ``results/`` folder, made when absent.
+        result: the finished run.
+        grasps: the grasps it was made from, in order.
+        settings: the SLAM settings, kept in ``slam.json``.
+
+    Raises:
+        SessionError: the folder cannot be written.
+    """
+    stamps_s = tuple(grasp.stamp_ns * NANOSECOND_s for grasp in grasps)
+    texts = {
+        "trajectory.csv": trajectory_text(Trajectory(stamps_s, tuple(result.world_T_object))),
+        "contacts.csv": contacts_text(grasps),
+        **({} if result.contour is None else {"contour.csv": contour_text(result.contour.points)}),
+        "slam.json": json_text(_slam_record(result, settings or {})),
+        "timing.json": json_text({"schema_version": SCHEMA_VERSION, "step_seconds": result.step_seconds}),
+    }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in texts.items():
+            (folder / name).write_text(text, encoding="utf-8", newline="\n")
+        return [*(folder / name for name in texts), *_write_mesh(folder, result, grasps)]
+    except OSError as error:
+        raise SessionError(f"results cannot be written ({error})", where=str(folder), hint="Check the disk") from error
+
+
+def _write_mesh(folder: Path, result: SlamResult, grasps: Sequence[Grasp]) -> list[Path]:
+    mesh = result.mesh if result.mesh is not None else upright_contour(result, grasps)
+    if mesh is None:
+        return []
+    paths = [folder / "mesh.ply", folder / "mesh.glb"]
+    write_ply(paths[0], mesh)
+    write_glb(paths[1], mesh)
+    return paths
+
+
+def upright_contour(result: SlamResult, grasps: Sequence[Grasp]) -> SurfaceMesh | None:
+    """The contour extruded from the table to the highest contact, in the object frame; None without a contour.
+
+    A planar session feels no top; the highest contact is the height the object is known to reach.
+    """
+    heights = np.concatenate([grasp.points_world_m[:, 2] for grasp in grasps] or [np.zeros(0)])
+    placed = next((pose for pose in result.world_T_object if pose is not None), None)
+    if result.contour is None or placed is None or not heights.size:
+        return None
+    ring, sigma_m = _ring_with_sigma(result.contour)
+    origin_m = float(placed.z())
+    vertices, faces = prism(ring, -origin_m, float(heights.max()) - origin_m)
+    return SurfaceMesh(vertices, faces, np.tile(sigma_m, 2), _vertex_normals(vertices, faces))
+
+
+def _ring_with_sigma(contour: Contour) -> tuple[Array, Array]:
+    ring = open_ring(contour.points)
+    nearest = np.argmin(np.sum((ring[:, None] - contour.points[None]) ** 2, axis=2), axis=1)
+    return ring, np.asarray(contour.sigma_m)[nearest]
+
+
+def _vertex_normals(vertices: Array, faces: Array) -> Array:
+    corners = vertices[faces]
+    area_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.zeros_like(vertices)
+    np.add.at(normals, faces.ravel(), np.repeat(area_normals, 3, axis=0))
+    return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True).clip(1e-30))
+
+
+def _slam_record(result: SlamResult, settings: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "method": result.method,
+        "seed": result.seed,
+        "dimension": result.dimension,
+        "status": result.status,
+        "settings": settings,
+        "steps": result.steps,
+        "covariances": result.covariances,
+        "loops": result.loops,
+        "contour_sigma_m": None if result.contour is None else _ring_with_sigma(result.contour)[1],
+    }

@@ -1,0 +1,148 @@
+"""Everything a report shows, gathered once: no file is read after this."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from gtsam import Pose3
+from numpy.typing import NDArray
+
+from tactile_lab.evaluation.results import ContactRows, Results
+from tactile_lab.evaluation.trajectory import estimate_T_truth
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.geometry.poses import rotate, transform_points
+
+Faces = NDArray[np.int64]
+FLAT_m = 1e-7
+
+
+@dataclass(frozen=True)
+class SessionFacts:
+    """What the session's own description says, as text for people.
+
+    Attributes:
+        object_name: the object's catalogue name or the operator's word for it.
+        rig: name of the rig.
+        started: date and time, ISO 8601, or "" where the clock was virtual.
+        status: open, closed or recovered.
+        notes: the operator's notes.
+        made_with: name and value of everything that made the session: command, versions, settings.
+        calibrations: file name and hash of each calibration copy.
+    """
+
+    object_name: str
+    rig: str
+    started: str = ""
+    status: str = "closed"
+    notes: str = ""
+    made_with: tuple[tuple[str, str], ...] = ()
+    calibrations: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A triangle mesh in the estimate's object frame with a standard deviation at each vertex."""
+
+    vertices_m: Array
+    faces: Faces
+    sigma_m: Array
+    normals: Array | None = None
+
+
+def with_plain_lids(surface: Surface) -> Surface:
+    """An upright prism whose flat ends have no uncertainty of their own: their corners are doubled, sigma NaN there.
+
+    The ends of a planar session's solid were never felt; colours drawn from their rims would say otherwise.
+    """
+    corners = surface.vertices_m[surface.faces]
+    lid = np.ptp(corners[:, :, 2], axis=1) < FLAT_m
+    count = len(surface.vertices_m)
+    return Surface(
+        np.concatenate([surface.vertices_m, surface.vertices_m]),
+        np.where(lid[:, None], surface.faces + count, surface.faces),
+        np.concatenate([surface.sigma_m, np.full(count, np.nan)]),
+    )
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the marker camera and the object's model say, model in the truth's own object frame.
+
+    Attributes:
+        world_T_object: true pose of each grasp or None.
+        mesh: vertices (n, 3) and faces (m, 3), or None.
+        outline_m: the model's horizontal section at the contacts, shape (n, 2), or None.
+    """
+
+    world_T_object: tuple[Pose3 | None, ...]
+    mesh: tuple[Array, Faces] | None = None
+    outline_m: Array | None = None
+
+
+@dataclass(frozen=True)
+class ReportContent:
+    """The material of one report.
+
+    Attributes:
+        facts: the session's description.
+        results: what SLAM left.
+        evaluation: ``evaluation.json``, or None when the session was not evaluated.
+        surface: the estimated surface, or None when there is none.
+        contour_m: the estimated contour or section, shape (n, 2), estimate's object frame, or None.
+        contour_sigma_m: standard deviation at each point of the contour, shape (n,).
+        truth: what is known of the truth, or None.
+    """
+
+    facts: SessionFacts
+    results: Results
+    evaluation: Mapping[str, Any] | None = None
+    surface: Surface | None = None
+    contour_m: Array | None = None
+    contour_sigma_m: Array = field(default_factory=lambda: np.zeros(0))
+    truth: Truth | None = None
+
+    @property
+    def estimate_T_truth(self) -> Pose3 | None:
+        """The truth's object frame in the estimate's, by the first grasp that has both."""
+        if self.truth is None:
+            return None
+        return estimate_T_truth(self.results.trajectory.world_T_object, self.truth.world_T_object)
+
+    def truth_outline_m(self) -> Array | None:
+        """The true outline in the estimate's object frame, shape (n, 2)."""
+        alignment = self.estimate_T_truth
+        if self.truth is None or self.truth.outline_m is None or alignment is None:
+            return None
+        flat = np.column_stack([self.truth.outline_m, np.zeros(len(self.truth.outline_m))])
+        return transform_points(alignment, flat)[:, :2]
+
+    def truth_mesh(self) -> tuple[Array, Faces] | None:
+        """The true mesh in the estimate's object frame."""
+        alignment = self.estimate_T_truth
+        if self.truth is None or self.truth.mesh is None or alignment is None:
+            return None
+        vertices, faces = self.truth.mesh
+        return transform_points(alignment, vertices), faces
+
+    def placed_contacts(self) -> list[PlacedContacts]:
+        """The contacts of every placed grasp in the estimate's object frame."""
+        poses = self.results.trajectory.world_T_object
+        placed = []
+        for index, (pose, rows) in enumerate(zip(poses, self.results.contacts, strict=True)):
+            if pose is not None:
+                points = transform_points(pose.inverse(), rows.points_world_m)
+                placed.append(PlacedContacts(index, rows, points, rotate(pose.inverse(), rows.normals_world)))
+        return placed
+
+
+@dataclass(frozen=True)
+class PlacedContacts:
+    """Contacts of one grasp in the estimate's object frame: points (n, 3) and outward normals (n, 3)."""
+
+    grasp: int
+    rows: ContactRows
+    points_m: Array
+    normals: Array

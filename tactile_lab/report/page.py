@@ -1,0 +1,35 @@
+"""The page as a whole."""
+
+from __future__ import annotations
+
+from tactile_lab.report import sections
+from tactile_lab.report.content import ReportContent
+from tactile_lab.report.markup import Markup, element, join
+
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+"""The browser is told to fetch nothing, whatever the page's content says."""
+
+
+def page(content: ReportContent) -> str:
+    """The report as one HTML document that needs nothing beside it."""
+    title = f"{content.facts.object_name} · tactile SLAM"
+    head = element(
+        "head",
+        Markup('<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'),
+        Markup(f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'),
+        element("title", title),
+        element("style", Markup(sections.resource("style.css"))),
+    )
+    body = element(
+        "main",
+        sections.head(content),
+        sections.key_figures(content),
+        sections.shape_section(content),
+        sections.tracking_section(content),
+        sections.grasp_section(content),
+        sections.evaluation_section(content),
+        sections.origin_section(content),
+        element("footer", "Lengths in millimetres, angles in degrees. Files beside this page: see results/."),
+    )
+    script = [] if content.surface is None else [element("script", Markup(sections.resource("viewer.js")))]
+    return f"<!doctype html>\n{element('html', head, element('body', join([body, *script])), lang='en')}\n"
