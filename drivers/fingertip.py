@@ -17,8 +17,8 @@ from pydantic import AfterValidator, Field
 from tactile_lab.geometry.contacts import FINGERS, Array
 from tactile_lab.strict_yaml import StrictModel, load_model
 
-GRAVITY_m_s2 = 9.80665
-"""Standard gravity."""
+GRAVITY = 9.80665
+"""Standard gravity, m/s^2."""
 
 Vector3 = tuple[float, float, float]
 PositiveFloat = Annotated[float, Field(gt=0.0)]
@@ -90,8 +90,8 @@ class FingertipCalibration(StrictModel):
         centre_distal_m: its centre in the distal frame.
         distal_T_sensor: pose of the sensor's measuring frame in the distal frame.
         mass_kg, com_distal_m: everything the sensor carries, and its centre of mass in the distal frame.
-        palmar_half_only: the shell covers the palm side only; contacts with y above ``palmar_limit_m`` are not valid.
-        palmar_limit_m: where the shell ends, distal y (5.1 mm on the ellipsoid shell of the Shadow hand).
+        shell_min_distal_m, shell_max_distal_m: the box in the distal frame outside which the tip has no shell, so that
+            no contact there is valid; the shell on the Shadow hand covers the palm side only, y up to 5.1 mm.
         force_sigma_N, moment_sigma_Nm: noise of one sample, per axis.
         force_drift_N, moment_drift_Nm: what may have crept in since the tare, per axis, one standard deviation.
         point_floor_m, normal_floor_rad: error that no averaging removes (joint angles, shape of the shell), per axis.
@@ -102,8 +102,8 @@ class FingertipCalibration(StrictModel):
     distal_T_sensor: RigidTransform
     mass_kg: float = Field(ge=0.0)
     com_distal_m: Vector3
-    palmar_half_only: bool = False
-    palmar_limit_m: float = 0.0051
+    shell_min_distal_m: Vector3 = (-1.0, -1.0, -1.0)
+    shell_max_distal_m: Vector3 = (1.0, 1.0, 1.0)
     force_sigma_N: PositiveFloat = 1 / 320
     moment_sigma_Nm: PositiveFloat = 1e-3 / 64
     force_drift_N: float = Field(default=0.01, ge=0.0)

@@ -1,0 +1,237 @@
+"""A fingertip on a six-axis force sensor: from wrench samples to load and contact.
+
+Driven by decoded samples only, so that a replayed session gives what the live one gave.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from drivers.ati.intrinsic_contact import (
+    EllipsoidContact,
+    contact_covariance,
+    contact_on_ellipsoid,
+    cross_matrix,
+    wrench_transform,
+)
+from drivers.ati.plausibility import PlausibilitySettings, WrenchJudge, objection
+from drivers.ati.rdt_codec import Severity, describe_status
+from drivers.ati.sequences import SequenceMonitor
+from drivers.fingertip import GRAVITY, FingertipCalibration, TipContact
+from tactile_lab.errors import DeviceError
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.strict_yaml import StrictModel
+
+CAPTURE_LIMIT = 1000
+"""Samples a capture keeps, the newest: a capture that nobody ends must not grow without bound."""
+
+
+@dataclass(frozen=True)
+class WrenchSample:
+    """One reading of a force sensor.
+
+    Attributes:
+        stamp_ns: arrival at the host.
+        wrench: what acts on the fingertip, its weight and the sensor's bias included: force (N) then torque (N m),
+            shape (6,), sensor frame.
+        rdt_sequence, ft_sequence: the box's counters of sent and of measured records.
+        status: the box's status word, 0 when healthy.
+    """
+
+    stamp_ns: int
+    wrench: Array
+    rdt_sequence: int
+    ft_sequence: int
+    status: int = 0
+
+
+@dataclass(frozen=True)
+class Tare:
+    """When and why the bias was taken. ``bias`` has shape (6,), N and N m, sensor frame, without the tip's weight."""
+
+    stamp_ns: int
+    reason: str
+    samples: int
+    bias: Array
+
+
+class ForceTipSettings(StrictModel):
+    """How a force fingertip judges its samples.
+
+    Attributes:
+        force_range_N, torque_range_Nm: the calibration's range per axis (Nano17 SI-12-0.12, protocols C.6); a reading
+            beyond it is void.
+        contact_force_N: below this force no contact is computed (several times the drift).
+        minimum_samples: samples a capture needs.
+        tare_samples: the newest samples that a tare averages.
+        tare_spread_N, tare_spread_Nm: how far they may lie apart, largest minus smallest on any axis.
+        lost_share: share of lost records that is reported as a problem.
+        plausibility: limits of what one contact can do.
+    """
+
+    force_range_N: tuple[float, float, float] = (12.0, 12.0, 17.0)
+    torque_range_Nm: tuple[float, float, float] = (0.12, 0.12, 0.12)
+    contact_force_N: float = Field(default=0.08, gt=0.0)
+    minimum_samples: int = Field(default=3, ge=1)
+    tare_samples: int = Field(default=20, ge=2)
+    tare_spread_N: float = Field(default=0.05, gt=0.0)
+    tare_spread_Nm: float = Field(default=5e-4, gt=0.0)
+    lost_share: float = Field(default=0.01, ge=0.0)
+    plausibility: PlausibilitySettings = PlausibilitySettings()
+
+
+class ForceTip:
+    """Bias, weight, load, contact and health of one force fingertip (a :class:`FingertipSensor`)."""
+
+    def __init__(self, finger: str, calibration: FingertipCalibration, settings: ForceTipSettings) -> None:
+        self.finger = finger
+        self.calibration = calibration
+        self.sequences = SequenceMonitor()
+        self.tare_record: Tare | None = None
+        self.newest: WrenchSample | None = None
+        self._settings = settings
+        self._bias = np.zeros(6)
+        self._recent: deque[Array] = deque(maxlen=settings.tare_samples)
+        self._capture: deque[Array] = deque(maxlen=CAPTURE_LIMIT)
+        self._void = 0
+        self._judge = WrenchJudge(settings.plausibility)
+        self._range = np.array([*settings.force_range_N, *settings.torque_range_Nm])
+        mounting = calibration.distal_T_sensor.pose()
+        centre = np.array(calibration.centre_distal_m)
+        self._to_centre = wrench_transform(mounting.rotation().matrix(), mounting.translation() - centre)
+        self._weight_from_down = self._weight_matrix()
+
+    def update(self, samples: Sequence[WrenchSample]) -> None:
+        """Take decoded samples, oldest first; those older than one already seen are counted and left out."""
+        for sample in samples:
+            if not self.sequences.is_new(sample.rdt_sequence, sample.ft_sequence):
+                continue
+            self.newest = sample
+            if self._usable(sample):
+                self._recent.append(sample.wrench)
+                self._capture.append(sample.wrench)
+            else:
+                self._void += 1
+                self._recent.clear()  # a tare must not reach back across a failure
+
+    def tare(self, world_R_distal: Array, *, reason: str = "") -> None:
+        """Take the newest samples as "only the tip's own weight acts"; the hand must be still and touch nothing.
+
+        Raises:
+            DeviceError: too few usable samples, or they lie too far apart; the bias stays as it was.
+        """
+        if self.newest is None or len(self._recent) < self._settings.tare_samples:
+            raise self._refusal(
+                f"{len(self._recent)} usable samples where {self._settings.tare_samples} are needed",
+                "Wait for samples; see the sensor's health",
+            )
+        window = np.array(self._recent)
+        spread = np.ptp(window, axis=0)
+        if spread[:3].max() > self._settings.tare_spread_N or spread[3:].max() > self._settings.tare_spread_Nm:
+            raise self._refusal(
+                f"samples differ by {spread[:3].max():.3f} N and {1e3 * spread[3:].max():.2f} N mm",
+                "Hold the hand still and free of contact",
+            )
+        self._bias = window.mean(axis=0) - self._weight(world_R_distal)
+        self.tare_record = Tare(self.newest.stamp_ns, reason, len(window), self._bias)
+
+    def load(self, wrench: Array, world_R_distal: Array) -> Array:
+        """What the object does to the tip: the measured wrench without bias and weight, shape (6,), sensor frame."""
+        return np.asarray(wrench - self._bias - self._weight(world_R_distal))
+
+    def load_N(self, world_R_distal: Array) -> float:
+        """Contact force of the newest sample; 0 before the first, infinite when it is void, so that motion stops."""
+        if self.newest is None:
+            return 0.0
+        if not self._usable(self.newest):
+            return math.inf
+        return float(np.linalg.norm(self.load(self.newest.wrench, world_R_distal)[:3]))
+
+    def begin_capture(self) -> None:
+        """From here on samples are gathered for :meth:`contact`."""
+        self._capture.clear()
+
+    def contact(self, world_R_distal: Array) -> TipContact | None:
+        """The contact of the mean wrench since :meth:`begin_capture`.
+
+        None when there are too few samples, too little force, no contact that could give this wrench, or a torque
+        that has not fitted the force for several captures (see :meth:`health`).
+        """
+        if len(self._capture) < self._settings.minimum_samples:
+            return None
+        window = np.array(self._capture)
+        wrench = self._to_centre @ self.load(window.mean(axis=0), world_R_distal)
+        force = wrench[:3]
+        if np.linalg.norm(force) < self._settings.contact_force_N:
+            return None
+        contact = contact_on_ellipsoid(force, wrench[3:], np.array(self.calibration.semi_axes_m))
+        verdict = objection(contact, force, self.calibration, self._settings.plausibility)
+        self._judge.note(verdict, force)
+        if verdict or self._judge.fault:
+            return None
+        return self._tip_contact(contact, force, self._mean_covariance(window))
+
+    def health(self) -> tuple[str, ...]:
+        """What is wrong with the sensor, in words; empty when all is well."""
+        problems = list(describe_status(self.newest.status).messages) if self.newest else ["no sample received yet"]
+        if self.newest and np.any(np.abs(self.newest.wrench) > self._range):
+            problems.append("reading beyond the calibration range")
+        if self._void:
+            problems.append(f"{self._void} void samples left out")
+        if self.tare_record is None:
+            problems.append("not tared")
+        return (*problems, *self._sequence_problems(), *filter(None, [self._judge.fault]))
+
+    def _sequence_problems(self) -> list[str]:
+        monitor, problems = self.sequences, []
+        if monitor.stuck:
+            problems.append("the sensor behind the box has stopped measuring (its counter does not move)")
+        if monitor.lost > self._settings.lost_share * (monitor.seen + monitor.lost):
+            problems.append(f"{monitor.lost} of {monitor.seen + monitor.lost} records lost")
+        return problems
+
+    def _usable(self, sample: WrenchSample) -> bool:
+        healthy = describe_status(sample.status).severity < Severity.FAULT if sample.status else True
+        return healthy and not self.sequences.stuck and bool(np.all(np.abs(sample.wrench) <= self._range))
+
+    def _weight(self, world_R_distal: Array) -> Array:
+        """The tip's own weight as the sensor feels it, shape (6,), sensor frame."""
+        return np.asarray(self._weight_from_down @ -world_R_distal[2])
+
+    def _weight_matrix(self) -> Array:
+        """Matrix (6, 3) from the direction down, in the distal frame, to the weight's wrench in the sensor frame."""
+        mounting = self.calibration.distal_T_sensor.pose()
+        sensor_R_distal = mounting.rotation().matrix().T
+        lever = sensor_R_distal @ (np.array(self.calibration.com_distal_m) - mounting.translation())
+        force = self.calibration.mass_kg * GRAVITY * sensor_R_distal
+        return np.vstack([force, cross_matrix(lever) @ force])
+
+    def _mean_covariance(self, window: Array) -> Array:
+        """Covariance (6, 6) of a capture's mean in the sensor frame: noise of the mean, and drift since the tare."""
+        model = self.calibration
+        noise = np.repeat([model.force_sigma_N, model.moment_sigma_Nm], 3)
+        drift = np.repeat([model.force_drift_N, model.moment_drift_Nm], 3)
+        spread = np.maximum(window.var(axis=0), noise**2)
+        return np.diag(spread / len(window) + drift**2)
+
+    def _tip_contact(self, contact: EllipsoidContact, force: Array, sensor_covariance: Array) -> TipContact:
+        model = self.calibration
+        covariance = self._to_centre @ sensor_covariance @ self._to_centre.T
+        point, normal = contact_covariance(contact, force, np.array(model.semi_axes_m), covariance)
+        return TipContact(
+            point_distal_m=contact.point_m + np.array(model.centre_distal_m),
+            normal_distal=-contact.normal,
+            point_covariance_m2=point + model.point_floor_m**2 * np.eye(3),
+            normal_sigma_rad=math.sqrt(float(np.trace(normal)) / 2.0 + model.normal_floor_rad**2),
+            force_N=float(np.linalg.norm(force)),
+            torsion_Nm=-float(contact.torsion_Nm),
+        )
+
+    def _refusal(self, what: str, hint: str) -> DeviceError:
+        return DeviceError(f"tare refused, {what}", where=f"force sensor {self.finger}", hint=hint)

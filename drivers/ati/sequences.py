@@ -1,0 +1,54 @@
+"""What the counters in RDT records tell: losses, disorder, a stuck sensor loop, a restarted stream."""
+
+from __future__ import annotations
+
+WORD = 1 << 32
+STUCK_AFTER = 3
+"""Records with the same ft_sequence in a row after which the sensor's loop counts as stuck (protocols F.4)."""
+
+
+def _step(newer: int, older: int) -> int:
+    """Signed difference of two 32-bit counters that wrap."""
+    return (newer - older + WORD // 2) % WORD - WORD // 2
+
+
+class SequenceMonitor:
+    """Follows the two counters of one sensor.
+
+    Attributes:
+        seen: records taken.
+        lost: records that the box sent and that never arrived.
+        disordered: records that came after a newer one, or twice.
+        restarts: times the box began a new stream.
+    """
+
+    def __init__(self) -> None:
+        self.seen = self.lost = self.disordered = self.restarts = 0
+        self._rdt: int | None = None
+        self._ft = 0
+        self._repeats = 0
+
+    def is_new(self, rdt_sequence: int, ft_sequence: int) -> bool:
+        """Note one record's counters; False for a record older than one already seen."""
+        if self._rdt is not None and not self._follows(rdt_sequence, ft_sequence, self._rdt):
+            self.disordered += 1
+            return False
+        self._repeats = self._repeats + 1 if self.seen and ft_sequence == self._ft else 0
+        self._rdt, self._ft = rdt_sequence, ft_sequence
+        self.seen += 1
+        return True
+
+    @property
+    def stuck(self) -> bool:
+        """The box sends records, but the sensor behind it has stopped measuring."""
+        return self._repeats >= STUCK_AFTER
+
+    def _follows(self, rdt_sequence: int, ft_sequence: int, previous: int) -> bool:
+        step = _step(rdt_sequence, previous)
+        if step > 0:
+            self.lost += step - 1
+            return True
+        if _step(ft_sequence, self._ft) > 0:  # sent from the beginning again, measured later: a new stream
+            self.restarts += 1
+            return True
+        return False
