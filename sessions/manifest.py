@@ -1,0 +1,136 @@
+"""``session.yaml``: what was done, with what, and how it ended."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import Field
+
+from tactile_lab.errors import ConfigurationError, SessionError
+from tactile_lab.strict_yaml import StrictModel, load_model
+
+Status = Literal["open", "closed", "interrupted", "failed", "recovered"]
+
+MANIFEST = "session.yaml"
+
+_DISTRIBUTIONS = {
+    "tactile-lab": "tactile-lab",
+    "numpy": "numpy",
+    "gtsam": "gtsam",
+    "mujoco": "mujoco-core",
+    "opencv": "opencv-contrib-python-headless",
+}
+
+
+class CalibrationCopy(StrictModel):
+    """A calibration file's copy inside the session folder and its SHA-256."""
+
+    file: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    sha256: str
+
+
+class Manifest(StrictModel):
+    """What ``session.yaml`` says.
+
+    Attributes:
+        status: open while it runs; closed when it ended well; interrupted by a person; failed by an error; recovered
+            when an open one was closed later.
+        rig, rig_description: the rig's name and its complete description.
+        object_name: what lay on the table.
+        calibration: copies of the files used, by their role.
+        versions, seeds, settings: what a repetition needs.
+        notes: the operator's.
+        started_utc, ended_utc: ISO 8601.
+        counts: messages by topic, grasps and the like.
+        data_loss: what was not recorded or dropped, by kind; empty when nothing was lost.
+        problem: why it failed.
+    """
+
+    format: Literal["tactile-session/1"] = "tactile-session/1"
+    name: str
+    status: Status
+    rig: str
+    rig_description: dict[str, Any]
+    object_name: str
+    calibration: dict[str, CalibrationCopy] = Field(default_factory=dict)
+    versions: dict[str, str] = Field(default_factory=dict)
+    seeds: dict[str, int] = Field(default_factory=dict)
+    settings: dict[str, Any] = Field(default_factory=dict)
+    notes: str = ""
+    started_utc: str
+    ended_utc: str | None = None
+    counts: dict[str, int] = Field(default_factory=dict)
+    data_loss: dict[str, int] = Field(default_factory=dict)
+    problem: str = ""
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Read ``session.yaml`` of a session folder.
+
+    Raises:
+        SessionError: there is none, or it is not a strict document of this form.
+    """
+    if not (folder / MANIFEST).is_file():
+        raise SessionError("not a session folder (no session.yaml)", where=str(folder), hint="Check the path")
+    try:
+        return load_model(folder / MANIFEST, Manifest)
+    except ConfigurationError as error:
+        raise SessionError(error.what, where=error.where, hint="The other files of the session are kept") from error
+
+
+def write_manifest(folder: Path, manifest: Manifest) -> None:
+    """Write ``session.yaml`` so that at any moment either the old or the new one is there, whole.
+
+    Raises:
+        SessionError: it can not be written, or holds something YAML has no word for.
+    """
+    try:
+        text = yaml.dump(manifest.model_dump(), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=120)
+    except yaml.YAMLError as error:
+        raise SessionError(f"can not be put into YAML ({error})", where=str(folder / MANIFEST)) from error
+    write_whole(folder / MANIFEST, text.encode())
+
+
+def installed_versions() -> dict[str, str]:
+    """Versions of Python and of the packages that results depend on."""
+    versions = {"python": platform.python_version()}
+    for name, distribution in _DISTRIBUTIONS.items():
+        try:
+            versions[name] = version(distribution)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
+    return versions
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes every text that a strict reader could take for a number; repeats instead of aliases."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    style = '"' if text[:1] in tuple("0123456789+-.") else "|" if "\n" in text else None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Dumper.add_representer(str, _text)
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that it is there whole or not at all. Raises SessionError."""
+    partial = path.with_name(path.name + ".part")
+    try:
+        with partial.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise SessionError(f"can not be written ({error.strerror})", where=str(path), hint="Check the disk") from error

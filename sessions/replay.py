@@ -1,0 +1,61 @@
+"""A recorded session, understood again from its raw bytes.
+
+Why a replay gives the same grasps, bit for bit:
+
+1. Live, the tap of each link records a datagram and in the same call hands it to the session's
+   :class:`~sessions.interpreter.Interpreter`, before any device decodes it. A mark is recorded and interpreted in
+   one call too. All of it happens in one thread, so the order in the file is the order of interpretation.
+2. The Interpreter knows nothing else: its decoders and its Perception are objects of its own, and its clock shows
+   the newest stamp it was given. What the live devices decode for their own control does not reach it.
+3. A replay hands the received bytes and the marks of the file, in the file's order, to an Interpreter built from the
+   same rig description and calibration copies.
+
+So live and replay run the same code on the same input. Transmitted bytes, samples and truth in the file are not
+read. A file that was cut off replays up to the cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from sessions import schemas
+from sessions.interpreter import Interpreter
+from sessions.marks import Mark
+from sessions.perception import Outcome
+from sessions.session import Session
+from sessions.traffic_reader import Loss, TrafficReader
+
+
+class Replay:
+    """One pass over a session's traffic.
+
+    Args:
+        source: the session, or its traffic file.
+        interpreter: a fresh one, as the session's own was.
+
+    Raises:
+        SessionError: the traffic file can not be used.
+    """
+
+    def __init__(self, source: Session | TrafficReader, interpreter: Interpreter) -> None:
+        self._reader = source.traffic() if isinstance(source, Session) else source
+        self._interpreter = interpreter
+
+    @property
+    def loss(self) -> Loss:
+        """What could not be read; complete after :meth:`outcomes` has ended."""
+        return self._reader.loss
+
+    def outcomes(self) -> Iterator[Outcome]:
+        """The grasps, camera frames and tare reports, in the order in which they came about.
+
+        Raises:
+            SessionError: a mark can not be understood.
+        """
+        for message in self._reader.messages():
+            if message.topic == schemas.MARKS_TOPIC:
+                mark = Mark.from_bytes(message.data, where=str(self._reader.path))
+                if (outcome := self._interpreter.mark(mark)) is not None:
+                    yield outcome
+            elif (link := schemas.received_link(message.topic)) is not None:
+                self._interpreter.received(link, message.data, message.stamp_ns)

@@ -1,0 +1,242 @@
+"""The session folder: what was done, with what, and everything that was recorded.
+
+::
+
+    20261121-093000-sim-box/
+        session.yaml        written first (status open), closed last
+        calibration/        copies of the calibration files used
+        traffic.mcap        bytes, marks, samples, truth
+        truth/object.ply    the object's true mesh, for evaluation only
+        results/            what was made of it
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from sessions.manifest import (
+    MANIFEST,
+    CalibrationCopy,
+    Manifest,
+    Status,
+    installed_versions,
+    read_manifest,
+    write_manifest,
+    write_whole,
+)
+from sessions.recorder import Recorder
+from sessions.traffic import TrafficWriter
+from sessions.traffic_reader import TrafficReader
+from tactile_lab.errors import SessionError
+
+TRAFFIC, CALIBRATION, RESULTS, TRUTH_MESH = "traffic.mcap", "calibration", "results", "truth/object.ply"
+
+
+class Session:
+    """A session folder, new or opened."""
+
+    def __init__(self, folder: Path, manifest: Manifest) -> None:
+        self.folder, self.manifest = folder, manifest
+
+    @classmethod
+    def open(cls, folder: Path) -> Session:
+        """Open an existing session.
+
+        Raises:
+            SessionError: not a session folder, or its ``session.yaml`` can not be used.
+        """
+        return cls(folder, read_manifest(folder))
+
+    @property
+    def results(self) -> Path:
+        """Folder of results; made when missing."""
+        folder = self.folder / RESULTS
+        folder.mkdir(exist_ok=True)
+        return folder
+
+    @property
+    def truth_mesh(self) -> Path | None:
+        """The object's true mesh, if the session has one; for evaluation only."""
+        path = self.folder / TRUTH_MESH
+        return path if path.is_file() else None
+
+    def calibration_file(self, role: str) -> Path:
+        """The copy of a calibration file, checked against its hash.
+
+        Raises:
+            SessionError: there is none for that role, or it was changed since.
+        """
+        if role not in self.manifest.calibration:
+            raise SessionError(f"no calibration called {role!r}", where=str(self.folder / MANIFEST))
+        copy = self.manifest.calibration[role]
+        path = self.folder / CALIBRATION / copy.file
+        if _sha256(_read(path)) != copy.sha256:
+            raise SessionError("changed since it was recorded", where=str(path), hint="Restore the recorded file")
+        return path
+
+    def traffic(self) -> TrafficReader:
+        """The recorded traffic. Raises SessionError."""
+        return TrafficReader(self.folder / TRAFFIC)
+
+
+class RunningSession(Session):
+    """A session that is being recorded; a context manager that closes it with the status that fits.
+
+    Leaving the ``with`` block well gives ``closed``, a keyboard interrupt ``interrupted``, another exception
+    ``failed``.
+    """
+
+    def __init__(self, folder: Path, manifest: Manifest) -> None:
+        super().__init__(folder, manifest)
+        self._traffic = TrafficWriter(folder / TRAFFIC, {"session": manifest.name, "rig": manifest.rig})
+        self.recorder = Recorder(self._traffic)
+
+    def close(
+        self,
+        status: Status = "closed",
+        *,
+        counts: Mapping[str, int] | None = None,
+        data_loss: Mapping[str, int] | None = None,
+        problem: str = "",
+        now: datetime | None = None,
+    ) -> None:
+        """Finish the traffic file and ``session.yaml``; idempotent, the first call counts.
+
+        Args:
+            counts: figures beside those of the messages (grasps, cycles, overruns).
+            data_loss: dropped messages and the like; zeros are left out.
+
+        Raises:
+            SessionError: the folder can not be written.
+        """
+        if self.manifest.status != "open":
+            return
+        try:
+            self._traffic.close()
+        except SessionError as error:
+            status, problem = "failed", problem or str(error)
+        self.manifest = self.manifest.model_copy(
+            update={
+                "status": status,
+                "ended_utc": _iso(now or datetime.now(UTC)),
+                "counts": {**dict(sorted(self._traffic.counts.items())), **(counts or {})},
+                "data_loss": {kind: number for kind, number in (data_loss or {}).items() if number},
+                "problem": problem,
+            }
+        )
+        write_manifest(self.folder, self.manifest)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        elif isinstance(error, KeyboardInterrupt):
+            self.close("interrupted")
+        else:
+            self.close("failed", problem=str(error) or type(error).__name__)
+
+
+def create_session(
+    root: Path,
+    *,
+    rig: str,
+    rig_description: Mapping[str, Any],
+    object_name: str,
+    calibration_files: Mapping[str, Path] | None = None,
+    seeds: Mapping[str, int] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    notes: str = "",
+    truth_mesh_ply: bytes | None = None,
+    started: datetime | None = None,
+) -> RunningSession:
+    """Make a new session folder under ``root`` and begin recording.
+
+    Args:
+        rig_description, settings: plain data (what a YAML file can hold).
+        calibration_files: role to file; copied with their hashes.
+        truth_mesh_ply: the true mesh as PLY bytes, where the rig knows it.
+        started: time of the start, UTC; now when not given.
+
+    Raises:
+        SessionError: the folder can not be made or a calibration file can not be read.
+    """
+    started = started or datetime.now(UTC)
+    folder = _new_folder(root, f"{started:%Y%m%d-%H%M%S}-{_slug(rig)}-{_slug(object_name)}")
+    manifest = Manifest(
+        name=folder.name,
+        status="open",
+        rig=rig,
+        rig_description=dict(rig_description),
+        object_name=object_name,
+        calibration=_copy_calibration(folder, calibration_files or {}),
+        versions=installed_versions(),
+        seeds=dict(seeds or {}),
+        settings=dict(settings or {}),
+        notes=notes,
+        started_utc=_iso(started),
+    )
+    write_manifest(folder, manifest)
+    (folder / RESULTS).mkdir()
+    if truth_mesh_ply is not None:
+        (folder / TRUTH_MESH).parent.mkdir()
+        write_whole(folder / TRUTH_MESH, truth_mesh_ply)
+    return RunningSession(folder, manifest)
+
+
+def _new_folder(root: Path, name: str) -> Path:
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        for attempt in range(1, 1000):
+            folder = root / (name if attempt == 1 else f"{name}-{attempt}")
+            try:
+                folder.mkdir()
+            except FileExistsError:
+                continue
+            return folder
+    except OSError as error:
+        raise SessionError(
+            f"can not be made ({error.strerror})", where=str(root), hint="Choose another folder"
+        ) from error
+    raise SessionError("a thousand sessions of this second exist already", where=str(root / name))
+
+
+def _copy_calibration(folder: Path, files: Mapping[str, Path]) -> dict[str, CalibrationCopy]:
+    (folder / CALIBRATION).mkdir()
+    copies = {}
+    for role, source in files.items():
+        content = _read(source)
+        name = re.sub(r"[^A-Za-z0-9]+", "-", role).strip("-") + source.suffix
+        write_whole(folder / CALIBRATION / name, content)
+        copies[role] = CalibrationCopy(file=name, sha256=_sha256(content))
+    return copies
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise SessionError(f"can not be read ({error.strerror})", where=str(path)) from error
+
+
+def _slug(text: str) -> str:
+    """A name that is safe in a folder's name; of a path (``mesh:some/part.stl``) its last part without suffix."""
+    last = re.split(r"[/\\:]", text.strip())[-1]
+    return re.sub(r"[^a-z0-9]+", "-", re.sub(r"\.[a-z0-9]+$", "", last.lower())).strip("-") or "unnamed"
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _iso(time: datetime) -> str:
+    return time.astimezone(UTC).isoformat(timespec="seconds")
