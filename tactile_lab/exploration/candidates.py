@@ -1,0 +1,129 @@
+"""Candidate grasps and where their fingers are expected to touch (thesis section 4.5.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from gtsam import Pose2
+
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.field_grid import Field
+from tactile_lab.tracking.contact_set import planar_rotation
+
+_STEP_m = 0.001
+
+
+@dataclass(frozen=True)
+class ClosingRays:
+    """Straight approximations of the fingertips' paths in the grasp frame.
+
+    Attributes:
+        fingers: name of each ray's finger.
+        starts_m: shape (n, 3), grasp frame: x along the fingers, z up, z = 0 the table.
+        directions: unit vectors, shape (n, 3).
+        lengths_m: how far each finger closes, shape (n,).
+    """
+
+    fingers: tuple[str, ...]
+    starts_m: Array
+    directions: Array
+    lengths_m: Array
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A grasp that could be done next.
+
+    Attributes:
+        world_T_grasp: grasp frame on the table.
+        closing: name of the closing ("pinch", "radial").
+        rays: its closing rays in the grasp frame.
+    """
+
+    world_T_grasp: Pose2
+    closing: str
+    rays: ClosingRays
+
+
+@dataclass(frozen=True)
+class PredictedContacts:
+    """Where the rays of a candidate first meet the modelled surface.
+
+    Attributes:
+        fingers: those expected to touch.
+        points_object_m: shape (m, d), object frame.
+        variances_m2: variance of the field there, shape (m,).
+    """
+
+    fingers: tuple[str, ...]
+    points_object_m: Array
+    variances_m2: Array
+
+
+@dataclass(frozen=True)
+class ModelledObject:
+    """The object as it is known now.
+
+    Attributes:
+        field: surface field in the object frame.
+        dimension: 2 (contour) or 3.
+        world_T_object: planar pose.
+        origin_height_m: height of the object frame's origin over the table.
+    """
+
+    field: Field
+    dimension: int
+    world_T_object: Pose2
+    origin_height_m: float
+
+
+def ring_of_candidates(
+    centre_world_m: Array, yaws_rad: Array, shifts_m: Array, closings: dict[str, ClosingRays]
+) -> tuple[Candidate, ...]:
+    """Grasps around a point on the table: every yaw, shift across the fingers and closing.
+
+    Args:
+        centre_world_m: shape (2,), usually the middle of the modelled object.
+        yaws_rad: directions of the fingers in the world.
+        shifts_m: offsets of the grasp frame along its own y axis.
+        closings: rays of each closing by name.
+    """
+    found = []
+    for yaw in yaws_rad:
+        across = planar_rotation(float(yaw)) @ np.array([0.0, 1.0])
+        for shift in shifts_m:
+            x, y = centre_world_m + shift * across
+            frame = Pose2(float(x), float(y), float(yaw))
+            found += [Candidate(frame, name, rays) for name, rays in closings.items()]
+    return tuple(found)
+
+
+def predict_contacts(candidate: Candidate, known: ModelledObject) -> PredictedContacts:
+    """First change of the field from outside to inside along each closing ray; rays that meet nothing are left out."""
+    starts, directions = _in_object_frame(candidate, known)
+    rays = candidate.rays
+    steps = np.arange(0.0, float(rays.lengths_m.max()) + _STEP_m, _STEP_m)
+    samples = starts[:, None] + steps[:, None] * directions[:, None]
+    values = known.field.predict(samples.reshape(-1, known.dimension)).mean_m.reshape(len(starts), -1)
+    crossing = (values[:, :-1] > 0) & (values[:, 1:] <= 0) & (steps[1:] <= rays.lengths_m[:, None])
+    touching = np.flatnonzero(crossing.any(axis=1))
+    before = crossing[touching].argmax(axis=1)
+    outside, inside = values[touching, before], values[touching, before + 1]
+    distances = steps[before] + _STEP_m * outside / (outside - inside)
+    points = starts[touching] + distances[:, None] * directions[touching]
+    variances = known.field.predict(points, variance=True).variance_m2 if len(points) else np.empty(0)
+    assert variances is not None
+    return PredictedContacts(tuple(rays.fingers[index] for index in touching), points, variances)
+
+
+def _in_object_frame(candidate: Candidate, known: ModelledObject) -> tuple[Array, Array]:
+    """Starts and unit directions of the rays, shape (n, d), projected for a contour."""
+    object_T_grasp = known.world_T_object.between(candidate.world_T_grasp).matrix()
+    starts, directions = candidate.rays.starts_m.copy(), candidate.rays.directions.copy()
+    starts[:, :2] = starts[:, :2] @ object_T_grasp[:2, :2].T + object_T_grasp[:2, 2]
+    directions[:, :2] = directions[:, :2] @ object_T_grasp[:2, :2].T
+    starts[:, 2] -= known.origin_height_m
+    directions = directions[:, : known.dimension]
+    lengths = np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-9)
+    return starts[:, : known.dimension], directions / lengths

@@ -1,0 +1,281 @@
+"""Tactile SLAM: follow an object through successive grasps and build its shape at the same time.
+
+:meth:`TactileSlam.step` is algorithm 3.1 of the thesis for one grasp, followed by the pose graph of its
+section 3.3.3. Frames: the object frame is born at the first grasp, its origin at the contacts' centre, its x
+axis along the palm's horizontal axis, z up (section 3.4). The object stays on the table: its pose is
+``(x, y, yaw)`` and its origin keeps the height it was born at, so that in the object frame a contact's z is its
+height over the table minus that height, in every grasp.
+
+What happens to grasps that can not be placed:
+
+- No particle explains the contacts (with the thesis's gate: fewer than four close and observable ones): the
+  predicted pose stays, with its grown covariance, the contacts are kept aside: "untracked".
+- The pose is corrected, but remains so uncertain that it moves the contacts along their normals by more than
+  ``placement_limit_m`` (few contacts, or a direction not observed): the contacts are kept aside: "uncertain".
+
+A session is lost when the last ``lost_after`` grasps were untracked, or more than half of all.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from gtsam import Pose3
+from pydantic import Field
+
+from tactile_lab.errors import ShapeError
+from tactile_lab.geometry.contacts import Array, Grasp
+from tactile_lab.graph.back_end import BackEnd, BackEndSettings
+from tactile_lab.graph.pose_graph import LoopReport
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.surface import Contour, SurfaceMesh, extract_contour, extract_mesh
+from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.motion import planar_motion, row_pose_in_space
+from tactile_lab.tracking.observability import planar_observability
+from tactile_lab.tracking.particle_filter import PoseEstimate
+from tactile_lab.tracking.trackers import FIRST_COVARIANCE, Tracker, TrackingSettings, make_tracker, palm_heading
+
+Verdict = Literal["first", "tracked", "uncertain", "untracked"]
+
+
+class SlamSettings(TrackingSettings):
+    """All parameters of the method.
+
+    Attributes:
+        back_end: the pose graph.
+        least_first_contacts: the object frame is born at the first grasp with so many contacts.
+        placement_limit_m: see the module's text.
+        lost_after: successive untracked grasps after which the object counts as lost.
+        contour_resolution_m, mesh_resolution_m: of the final shape.
+    """
+
+    back_end: BackEndSettings = BackEndSettings()
+    least_first_contacts: int = Field(default=3, ge=1)
+    placement_limit_m: float = Field(default=0.010, gt=0)
+    lost_after: int = Field(default=4, ge=1)
+    contour_resolution_m: float = Field(default=0.001, gt=0)
+    mesh_resolution_m: float = Field(default=0.003, gt=0)
+
+
+@dataclass(frozen=True)
+class SlamStep:
+    """What one grasp told.
+
+    Attributes:
+        index, stamp_ns: of the grasp.
+        world_T_object: pose after this grasp, None before the object frame is born.
+        covariance: of (x m, y m, yaw rad) in the world, shape (3, 3), None as the pose.
+        effective_count: effective number of particles or hypotheses.
+        observability: smallest eigenvalue of (3.18) of this grasp's contacts for motions on the table.
+        verdict: "first", "tracked", "uncertain" or "untracked".
+        reason: the verdict in words.
+        contacts: number of contacts of this dimension.
+        contacts_used: how many of them entered the shape.
+        seconds: computing time.
+    """
+
+    index: int
+    stamp_ns: int
+    world_T_object: Pose3 | None
+    covariance: Array | None
+    effective_count: float
+    observability: float
+    verdict: Verdict
+    reason: str
+    contacts: int
+    contacts_used: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class SlamResult:
+    """A finished session.
+
+    Attributes:
+        method, seed, dimension: as asked for.
+        world_T_object: the pose at each grasp, None where the object was not known.
+        covariances: of (x, y, yaw), None as the poses.
+        steps: what each grasp told when it was taken; later corrections are in ``world_T_object``.
+        loops: every loop of the pose graph with its verdict.
+        surface: the final field in the object frame, None if there was no usable grasp.
+        contour: the final outline (dimension 2), object frame.
+        mesh: the final surface (dimension 3), object frame.
+        status: "ok" or "lost".
+    """
+
+    method: str
+    seed: int
+    dimension: int
+    world_T_object: tuple[Pose3 | None, ...]
+    covariances: tuple[Array | None, ...]
+    steps: tuple[SlamStep, ...]
+    loops: tuple[LoopReport, ...]
+    surface: Gpis | None
+    contour: Contour | None
+    mesh: SurfaceMesh | None
+    status: Literal["ok", "lost"]
+
+    @property
+    def step_seconds(self) -> tuple[float, ...]:
+        """Computing time of each step."""
+        return tuple(step.seconds for step in self.steps)
+
+
+class TactileSlam:
+    """The method, grasp by grasp. The same settings, seed and grasps give the same result."""
+
+    def __init__(self, settings: SlamSettings | None = None, seed: int = 0) -> None:
+        self._settings = settings or SlamSettings()
+        self._seed = seed
+        self._rng = np.random.default_rng(seed)
+        self._back_end = BackEnd(self._settings.back_end)
+        self._tracker: Tracker | None = None
+        self._origin_height_m = 0.0
+        self._steps: list[SlamStep] = []
+        self._surface: tuple[ContactMap, Gpis] | None = None
+
+    def step(self, grasp: Grasp) -> SlamStep:
+        """Take one grasp into account (algorithm 3.1, then the graph).
+
+        Raises:
+            TrackingError: the grasp has entries that are not finite, or wrong units; nothing was changed.
+        """
+        started = time.perf_counter()
+        contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
+        if self._tracker is None:
+            return self._begin(grasp, contacts, started)
+        self._tracker.predict(planar_motion(grasp.hand_motion_world))
+        explained = self._tracker.weigh(contacts)
+        estimate = self._tracker.estimate()
+        verdict, reason = self._judge(contacts, estimate, explained)
+        self._tracker.update_shape(contacts, verdict == "tracked")
+        self._tracker.resample()
+        self._tracker.adopt(self._back_end.close_loops(self._tracker.map))
+        return self._record(grasp, contacts, verdict, reason, started)
+
+    def finish(self) -> SlamResult:
+        """Correct all poses a last time, and build the final shape with the best kernel parameters."""
+        if self._tracker is not None:
+            self._tracker.finish()
+            self._tracker.adopt(self._back_end.close_all_loops(self._tracker.map))
+            self._tracker.adopt(self._tracker.map.with_best_kernel(max_iterations=30))
+        contour, mesh = self._extract()
+        return SlamResult(
+            method=self._settings.method,
+            seed=self._seed,
+            dimension=self._settings.dimension,
+            world_T_object=self._trajectory(),
+            covariances=self._covariances(),
+            steps=tuple(self._steps),
+            loops=self._back_end.reports,
+            surface=self.surface,
+            contour=contour,
+            mesh=mesh,
+            status="lost" if self.is_lost else "ok",
+        )
+
+    @property
+    def world_T_object(self) -> Pose3 | None:
+        """The present pose; None before the object frame is born."""
+        return self._trajectory()[-1] if self._steps else None
+
+    @property
+    def pose_covariance(self) -> Array | None:
+        """Covariance of the present (x m, y m, yaw rad) in the world, shape (3, 3)."""
+        return self._covariances()[-1] if self._steps else None
+
+    @property
+    def origin_height_m(self) -> float:
+        """Height of the object frame's origin over the table."""
+        return self._origin_height_m
+
+    @property
+    def surface(self) -> Gpis | None:
+        """The present field in the object frame; None before there are contacts."""
+        if self._tracker is None:
+            return None
+        contact_map = self._tracker.map
+        if self._surface is None or self._surface[0] is not contact_map:
+            self._surface = (contact_map, contact_map.fit())
+        return self._surface[1]
+
+    @property
+    def is_lost(self) -> bool:
+        """The rule is in the module's text; a session without any object frame is lost as well."""
+        untracked = [step.verdict == "untracked" for step in self._steps]
+        recent = untracked[-self._settings.lost_after :]
+        all_recent = len(recent) == self._settings.lost_after and all(recent)
+        return self._tracker is None or all_recent or 2 * sum(untracked) > len(untracked)
+
+    def _begin(self, grasp: Grasp, contacts: ContactSet, started: float) -> SlamStep:
+        """The object frame is born: origin at the contacts' centre, x axis along the palm's (section 3.4)."""
+        least = self._settings.least_first_contacts
+        if len(contacts) < least:
+            reason = f"{len(contacts)} contacts, the object frame needs {least}"
+            return self._record(grasp, contacts, "untracked", reason, started)
+        self._origin_height_m = float(grasp.points_world_m[:, 2].mean())
+        contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
+        row = np.array([*contacts.points_m[:, :2].mean(axis=0), palm_heading(grasp.world_T_palm)])
+        first = PlacedGrasp(contacts, row, FIRST_COVARIANCE, np.zeros(3), used=True)
+        self._tracker = make_tracker(self._settings, first, self._rng)
+        return self._record(grasp, contacts, "first", "object frame born", started)
+
+    def _judge(self, contacts: ContactSet, estimate: PoseEstimate, explained: bool) -> tuple[Verdict, str]:
+        if not explained:
+            return "untracked", "no pose explains the contacts" if len(contacts) else "no contacts"
+        spread_m = placement_sigma_m(contacts, estimate)
+        if spread_m > self._settings.placement_limit_m:
+            return "uncertain", f"contacts uncertain to {1e3 * spread_m:.0f} mm"
+        return "tracked", f"contacts placed to {1e3 * spread_m:.1f} mm"
+
+    def _record(self, grasp: Grasp, contacts: ContactSet, verdict: Verdict, reason: str, started: float) -> SlamStep:
+        placed = self._tracker.map.placed[-1] if self._tracker else None
+        seen = planar_observability(contacts.points_m, contacts.normals).smallest if len(contacts) else 0.0
+        step = SlamStep(
+            index=grasp.index,
+            stamp_ns=grasp.stamp_ns,
+            world_T_object=row_pose_in_space(placed.row, self._origin_height_m) if placed else None,
+            covariance=placed.covariance if placed else None,
+            effective_count=self._tracker.effective_count if self._tracker else 0.0,
+            observability=seen,
+            verdict=verdict,
+            reason=reason,
+            contacts=len(contacts),
+            contacts_used=len(contacts) if placed and placed.used else 0,
+            seconds=time.perf_counter() - started,
+        )
+        self._steps.append(step)
+        return step
+
+    def _placed(self) -> list[PlacedGrasp | None]:
+        """One entry a grasp; grasps before the object frame was born have none."""
+        placed = list(self._tracker.map.placed) if self._tracker else []
+        return [None] * (len(self._steps) - len(placed)) + placed
+
+    def _trajectory(self) -> tuple[Pose3 | None, ...]:
+        return tuple(row_pose_in_space(grasp.row, self._origin_height_m) if grasp else None for grasp in self._placed())
+
+    def _covariances(self) -> tuple[Array | None, ...]:
+        return tuple(grasp.covariance if grasp else None for grasp in self._placed())
+
+    def _extract(self) -> tuple[Contour | None, SurfaceMesh | None]:
+        if self.surface is None:
+            return None, None
+        try:
+            if self._settings.dimension == 2:
+                return extract_contour(self.surface, resolution_m=self._settings.contour_resolution_m), None
+            return None, extract_mesh(self.surface, resolution_m=self._settings.mesh_resolution_m)
+        except ShapeError:  # contacts that enclose nothing: the trajectory is still a result
+            return None, None
+
+
+def placement_sigma_m(contacts: ContactSet, estimate: PoseEstimate) -> float:
+    """How far the pose's uncertainty moves the contacts along their normals, root mean square."""
+    arms = contacts.points_m[:, :2] - estimate.row[:2]
+    normals = contacts.normals[:, :2]
+    rows = np.column_stack([normals, arms[:, 0] * normals[:, 1] - arms[:, 1] * normals[:, 0]])
+    return float(np.sqrt(np.mean(np.einsum("ni,ij,nj->n", rows, estimate.covariance, rows))))

@@ -1,0 +1,117 @@
+"""Contacts as arrays in the dimension that is tracked, checked once at the border."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.errors import TrackingError
+from tactile_lab.geometry.contacts import Array, Grasp
+
+LARGEST_GRASP_m = 0.6
+"""No hand spans more; contacts farther apart are in wrong units."""
+
+LARGEST_SLOPE = 0.5
+"""Smallest horizontal part of a normal that still tells about a horizontal contour (60 degrees of slope)."""
+
+
+@dataclass(frozen=True)
+class ContactSet:
+    """Contacts of one or several grasps in one frame.
+
+    Attributes:
+        points_m: shape (n, d), d = 2 for a contour in the table plane, 3 for a surface.
+        normals: outward unit normals, shape (n, d).
+        point_sigma_m: standard deviation of each point along its normal, shape (n,).
+        normal_sigma_rad: standard deviation of each normal's direction, shape (n,).
+    """
+
+    points_m: Array
+    normals: Array
+    point_sigma_m: Array
+    normal_sigma_rad: Array
+
+    def __len__(self) -> int:
+        return len(self.points_m)
+
+    @property
+    def dimension(self) -> int:
+        return int(self.points_m.shape[1])
+
+    @classmethod
+    def of_grasp(cls, grasp: Grasp, dimension: int, origin_height_m: float) -> Self:
+        """The contacts of a grasp, heights counted from the object origin's.
+
+        In two dimensions points and normals are projected onto the table plane, and contacts on slopes too
+        flat to tell about the contour are left out.
+
+        Raises:
+            TrackingError: NaN or infinite entries, normals without length, contacts metres apart.
+        """
+        points, normals = grasp.points_world_m, grasp.normals_world
+        covariances = np.array([contact.point_covariance_m2 for contact in grasp.contacts]).reshape(-1, 3, 3)
+        normal_sigma = np.array([contact.normal_sigma_rad for contact in grasp.contacts])
+        _check(grasp, points, normals, covariances, normal_sigma)
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        if dimension == 2:
+            flat = np.linalg.norm(normals[:, :2], axis=1)
+            keep = flat > LARGEST_SLOPE
+            points, covariances, flat = points[keep], covariances[keep], flat[keep]
+            normals = np.column_stack([normals[keep, :2] / flat[:, None], np.zeros(len(flat))])
+            normal_sigma = normal_sigma[keep] / flat
+        along_normal = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariances, normals))
+        heights = np.array([0.0, 0.0, origin_height_m])
+        return cls((points - heights)[:, :dimension], normals[:, :dimension].copy(), along_normal, normal_sigma)
+
+    @classmethod
+    def concatenated(cls, parts: Sequence[ContactSet]) -> Self:
+        """All contacts of the parts in order."""
+        return cls(
+            np.concatenate([part.points_m for part in parts]),
+            np.concatenate([part.normals for part in parts]),
+            np.concatenate([part.point_sigma_m for part in parts]),
+            np.concatenate([part.normal_sigma_rad for part in parts]),
+        )
+
+    def in_object_frame(self, world_T_object: Array) -> ContactSet:
+        """World contacts seen from an object at the planar pose (x_m, y_m, yaw_rad)."""
+        points, normals = self.points_m.copy(), self.normals.copy()
+        object_R_world = planar_rotation(-world_T_object[2])
+        points[:, :2] = (points[:, :2] - world_T_object[:2]) @ object_R_world.T
+        normals[:, :2] = normals[:, :2] @ object_R_world.T
+        return ContactSet(points, normals, self.point_sigma_m, self.normal_sigma_rad)
+
+    def selected(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> ContactSet:
+        """The contacts picked by a boolean or index array."""
+        return ContactSet(
+            self.points_m[mask], self.normals[mask], self.point_sigma_m[mask], self.normal_sigma_rad[mask]
+        )
+
+
+def planar_rotation(angle_rad: float) -> Array:
+    """2 x 2 rotation matrix."""
+    cosine, sine = np.cos(angle_rad), np.sin(angle_rad)
+    return np.array([[cosine, -sine], [sine, cosine]])
+
+
+def _check(grasp: Grasp, points: Array, normals: Array, covariances: Array, normal_sigma: Array) -> None:
+    where = f"grasp {grasp.index}"
+    arrays = (points, normals, covariances, normal_sigma)
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise TrackingError(
+            "a contact has NaN or infinite entries", where=where, hint="Check the fingertip it came from"
+        )
+    if not np.isfinite(grasp.hand_motion_world.matrix()).all():
+        raise TrackingError("the hand's motion has NaN or infinite entries", where=where)
+    if len(points) and np.linalg.norm(normals, axis=1).min() < 1e-6:
+        raise TrackingError("a contact normal has no length", where=where)
+    if len(points) and float(np.ptp(points, axis=0).max()) > LARGEST_GRASP_m:
+        raise TrackingError(
+            f"contacts lie {np.ptp(points, axis=0).max():.3g} m apart",
+            where=where,
+            hint="Coordinates are metres; are these millimetres?",
+        )

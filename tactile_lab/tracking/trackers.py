@@ -1,0 +1,131 @@
+"""The trackers to choose from, behind one interface, and what a person may set."""
+
+from __future__ import annotations
+
+from typing import Literal, Protocol
+
+import numpy as np
+from gtsam import Pose3
+from pydantic import Field as Limit
+
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.field_grid import FieldGrid
+from tactile_lab.shape.settings import GpisSettings
+from tactile_lab.strict_yaml import StrictModel
+from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.measurement import (
+    CalibratedMeasurement,
+    CalibratedSettings,
+    GateSettings,
+    Measurement,
+    ThesisMeasurement,
+)
+from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.particle_filter import PoseEstimate
+from tactile_lab.tracking.particle_tracker import ParticleTracker
+
+FIRST_COVARIANCE = np.diag([1e-10, 1e-10, 1e-10])
+"""The first grasp defines the object frame: its pose is certain up to rounding."""
+
+GRID_MARGIN_m = 0.040
+
+THESIS_SHAPE = GpisSettings(observations="offsurface", kernel="squared_exponential", prior_mean="zero")
+"""The thesis's shape model (section 2.2)."""
+
+
+class Tracker(Protocol):
+    """Follows the object from grasp to grasp; the calls of one step come in this order."""
+
+    effective_count: float
+    """Effective number of particles or hypotheses after the last weighting."""
+
+    @property
+    def map(self) -> ContactMap:
+        """All grasps so far with their present poses."""
+
+    def predict(self, motion: Array) -> None:
+        """Move the belief by the hand's motion (eq. 3.7)."""
+
+    def weigh(self, contacts: ContactSet) -> bool:
+        """Weight the belief by a grasp's contacts in the world (eq. 3.6); False when nothing fits."""
+
+    def estimate(self) -> PoseEstimate:
+        """The present pose."""
+
+    def update_shape(self, contacts: ContactSet, use: bool) -> None:
+        """Add the grasp to the map, its contacts to the shape if they are of use."""
+
+    def resample(self) -> None:
+        """Concentrate the belief on what is likely."""
+
+    def adopt(self, corrected: ContactMap) -> None:
+        """Take over a map whose poses were corrected from outside."""
+
+    def finish(self) -> None:
+        """No further grasp will come: make the best of all of them."""
+
+
+class TrackingSettings(StrictModel):
+    """What concerns following the object.
+
+    Attributes:
+        method: "thesis" is algorithm 3.1 with (3.9) and the gate; "particle" the same filter with the calibrated
+            likelihood.
+        dimension: 2 for the horizontal contour, 3 for the surface.
+        motion: what the object does beside the hand's motion.
+        particles: their number.
+        shape: the shape model; None for the method's own.
+        gate: of the thesis's measurement model.
+        likelihood: of the calibrated one.
+        kernel_every: kernel parameters are estimated anew after so many grasps.
+        contour_grid_m, surface_grid_m: spacing of the grid that particles look the field up in.
+    """
+
+    method: Literal["thesis", "particle"] = "particle"
+    dimension: Literal[2, 3] = 2
+    motion: MotionNoise = MotionNoise()
+    particles: int = Limit(default=20_000, ge=100)
+    shape: GpisSettings | None = None
+    gate: GateSettings = GateSettings()
+    likelihood: CalibratedSettings = CalibratedSettings()
+    kernel_every: int = Limit(default=4, ge=1)
+    contour_grid_m: float = Limit(default=0.002, gt=0)
+    surface_grid_m: float = Limit(default=0.005, gt=0)
+
+
+def make_tracker(settings: TrackingSettings, first: PlacedGrasp, rng: np.random.Generator) -> Tracker:
+    """The tracker that the settings ask for, started at the first grasp."""
+    shape = settings.shape or (THESIS_SHAPE if settings.method == "thesis" else GpisSettings())
+    calibrated = settings.method != "thesis"
+    spacing_m = settings.contour_grid_m if settings.dimension == 2 else settings.surface_grid_m
+
+    def field_of(contact_map: ContactMap) -> FieldGrid:
+        fitted = contact_map.fit()
+        return FieldGrid.around(
+            fitted, margin_m=GRID_MARGIN_m, spacing_m=spacing_m, gradient=calibrated, variance=calibrated
+        )
+
+    measurement: Measurement = ThesisMeasurement(settings.gate, shape.offsurface_distance_m)
+    if calibrated:
+        measurement = CalibratedMeasurement(settings.likelihood)
+    return ParticleTracker(
+        first=ContactMap((first,), shape),
+        measurement=measurement,
+        noise=settings.motion,
+        particles=settings.particles,
+        kernel_every=settings.kernel_every,
+        field_of=field_of,
+        rng=rng,
+    )
+
+
+def palm_heading(world_T_palm: Pose3) -> float:
+    """Direction of the palm's horizontal axis in the world, radians.
+
+    The palm's z axis points along the fingers. Where that is close to vertical its x axis, to the thumb's side,
+    is used instead.
+    """
+    axes = world_T_palm.rotation().matrix()
+    along = axes[:2, 2] if np.linalg.norm(axes[:2, 2]) > 0.5 else axes[:2, 0]
+    return float(np.arctan2(along[1], along[0]))
