@@ -22,14 +22,14 @@ from typing import Any
 import numpy as np
 
 from tactile_lab.errors import SessionError
-from tactile_lab.evaluation.plain import json_text
-from tactile_lab.evaluation.prism import open_ring, prism
+from tactile_lab.evaluation.plain import json_text, plain
+from tactile_lab.evaluation.prism import Triangles, open_ring, prism
 from tactile_lab.evaluation.tables import NANOSECOND_s, contacts_text, contour_text
 from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.shape.mesh_io import write_glb, write_ply
 from tactile_lab.shape.surface import Contour, SurfaceMesh
-from tactile_lab.slam import SlamResult
+from tactile_lab.slam import SlamResult, SlamStep
 
 SCHEMA_VERSION = 1
 
@@ -52,7 +52,7 @@ def write_results(
     texts = {
         "trajectory.csv": trajectory_text(Trajectory(stamps_s, tuple(result.world_T_object))),
         "contacts.csv": contacts_text(grasps),
-        **({} if result.contour is None else {"contour.csv": contour_text(result.contour.points)}),
+        **({} if result.contour is None else {"contour.csv": contour_text(result.contour.points_m)}),
         "slam.json": json_text(_slam_record(result, settings or {})),
         "timing.json": json_text({"schema_version": SCHEMA_VERSION, "step_seconds": result.step_seconds}),
     }
@@ -87,16 +87,19 @@ def upright_contour(result: SlamResult, grasps: Sequence[Grasp]) -> SurfaceMesh 
     ring, sigma_m = _ring_with_sigma(result.contour)
     origin_m = float(placed.z())
     vertices, faces = prism(ring, -origin_m, float(heights.max()) - origin_m)
-    return SurfaceMesh(vertices, faces, np.tile(sigma_m, 2), _vertex_normals(vertices, faces))
+    normals = _vertex_normals(vertices, faces)
+    return SurfaceMesh(vertices, faces, np.tile(sigma_m, 2), normals, result.contour.is_closed)
 
 
 def _ring_with_sigma(contour: Contour) -> tuple[Array, Array]:
-    ring = open_ring(contour.points)
-    nearest = np.argmin(np.sum((ring[:, None] - contour.points[None]) ** 2, axis=2), axis=1)
-    return ring, np.asarray(contour.sigma_m)[nearest]
+    """The contour as ``contour.csv`` has it, with the standard deviation at each point."""
+    ring = open_ring(contour.points_m)
+    nearest = np.argmin(np.sum((ring[:, None] - contour.points_m[None]) ** 2, axis=2), axis=1)
+    return ring, contour.sigma_m[nearest]
 
 
-def _vertex_normals(vertices: Array, faces: Array) -> Array:
+def _vertex_normals(vertices: Array, faces: Triangles) -> Array:
+    """Area weighted mean normals of the faces at each vertex, shape (n, 3)."""
     corners = vertices[faces]
     area_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = np.zeros_like(vertices)
@@ -112,8 +115,12 @@ def _slam_record(result: SlamResult, settings: Mapping[str, Any]) -> dict[str, A
         "dimension": result.dimension,
         "status": result.status,
         "settings": settings,
-        "steps": result.steps,
+        "steps": [_without_duration(step) for step in result.steps],
         "covariances": result.covariances,
         "loops": result.loops,
         "contour_sigma_m": None if result.contour is None else _ring_with_sigma(result.contour)[1],
     }
+
+
+def _without_duration(step: SlamStep) -> dict[str, Any]:
+    return {key: value for key, value in plain(step).items() if key != "seconds"}

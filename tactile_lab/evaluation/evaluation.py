@@ -1,0 +1,230 @@
+"""All error figures of a session in one record, and its file ``evaluation.json``.
+
+Estimates come from ``results/``; truth is what the marker camera saw and the object's own mesh. What
+cannot be known (no camera, no mesh, no shape) is None in the record and null in the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from gtsam import Pose3
+
+from tactile_lab.errors import SessionError
+from tactile_lab.evaluation.plain import json_text, plain
+from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM, registration_rms_mm
+from tactile_lab.evaluation.results import Results, read_results
+from tactile_lab.evaluation.shape import (
+    ShapeComparison,
+    compare_contour,
+    compare_mesh,
+    contact_height_m,
+    horizontal_outline,
+)
+from tactile_lab.evaluation.tables import read_contour
+from tactile_lab.evaluation.trajectory import PoseErrors, compared_grasps, estimate_T_truth, pose_errors
+from tactile_lab.shape.metrics import ShapeErrors
+
+SCHEMA_VERSION = 1
+DECIMALS = 6
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What only evaluation may know.
+
+    Attributes:
+        world_T_object: the object's pose at each grasp by the marker camera, None where it was not seen.
+        mesh: the object's surface in the truth's object frame, or None.
+    """
+
+    world_T_object: tuple[Pose3 | None, ...]
+    mesh: trimesh.Trimesh | None = None
+
+
+@dataclass(frozen=True)
+class ShapeFigures:
+    """Shape errors for people: millimetres, and shares between 0 and 1."""
+
+    hausdorff_mm: float
+    mean_distance_mm: float
+    chamfer_mm: float
+    fscore_5mm: float
+    iou: float
+
+    @classmethod
+    def of(cls, errors: ShapeErrors | None) -> ShapeFigures | None:
+        """The figures of shape errors in metres."""
+        if errors is None:
+            return None
+        lengths = (errors.hausdorff_m, errors.mean_distance_m, errors.chamfer_m)
+        return cls(*(1e3 * length for length in lengths), errors.fscore_5mm, errors.iou)
+
+
+@dataclass(frozen=True)
+class LoopFigures:
+    """Similar grasps: how many were tested, how many of them accepted, and how many of those were wrong."""
+
+    tested: int
+    accepted: int
+    wrong: int | None
+
+
+@dataclass(frozen=True)
+class TimeFigures:
+    """Computing time of the SLAM steps."""
+
+    total_s: float | None
+    step_ms_median: float | None
+    step_ms_p95: float | None
+
+
+@dataclass(frozen=True)
+class TruthFigures:
+    """How many grasps the marker camera saw, how many it did not, and whether the true mesh is known."""
+
+    seen: int
+    missing: int
+    mesh: bool
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Content of ``evaluation.json``, in its order.
+
+    Attributes:
+        aligned: how the estimate's object frame was tied to the truth's for ``shape`` and ``pose``.
+        shape: errors with that alignment.
+        shape_best_fit: errors after the best rigid alignment.
+        registration_rms_mm: see :func:`tactile_lab.evaluation.registration.registration_rms_mm`.
+        failed: the object was lost or the registration error is above 5 mm; None when neither is known.
+    """
+
+    schema_version: int
+    method: str
+    seed: int
+    object: str
+    dimension: int
+    grasps: int
+    contacts: int
+    aligned: str
+    shape: ShapeFigures | None
+    shape_best_fit: ShapeFigures | None
+    pose: PoseErrors | None
+    registration_rms_mm: float | None
+    failed: bool | None
+    loops: LoopFigures
+    time: TimeFigures
+    truth: TruthFigures
+    status: str
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain data, numbers rounded to six decimals."""
+        content = _rounded(plain(self))
+        assert isinstance(content, dict)
+        return content
+
+    def as_text(self) -> str:
+        """The text of ``evaluation.json``."""
+        return json_text(self.as_json())
+
+
+def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
+    """Judge the results in a folder.
+
+    Args:
+        folder: a session's ``results/``.
+        truth: poses, one a grasp, and mesh.
+        object_name: as the session calls it.
+
+    Raises:
+        SessionError: results are missing or unreadable, or do not belong to the truth.
+        ShapeError: a mesh or contour that can not be compared.
+    """
+    results = read_results(folder)
+    poses, contacts = results.trajectory.world_T_object, results.contacts
+    if len(poses) != len(truth.world_T_object):
+        counts = f"{len(poses)} grasps in the results, {len(truth.world_T_object)} in the session"
+        raise SessionError(counts, where=str(folder), hint="Replay the session to renew its results")
+    shape = _shape(folder, results, truth)
+    points = [rows.points_world_m for rows in contacts]
+    registration_mm = registration_rms_mm(points, poses, truth.world_T_object, results.dimension)
+    seen = sum(pose is not None for pose in truth.world_T_object)
+    return Evaluation(
+        schema_version=SCHEMA_VERSION,
+        method=str(results.slam["method"]),
+        seed=int(results.slam["seed"]),
+        object=object_name,
+        dimension=results.dimension,
+        grasps=len(poses),
+        contacts=sum(len(rows.fingers) for rows in contacts),
+        aligned="first_grasp",
+        shape=None if shape is None else ShapeFigures.of(shape.first_grasp),
+        shape_best_fit=None if shape is None else ShapeFigures.of(shape.best_fit),
+        pose=pose_errors(poses, truth.world_T_object),
+        registration_rms_mm=registration_mm,
+        failed=_failed(str(results.slam["status"]), registration_mm),
+        loops=_loops(results.slam["loops"]),
+        time=_time(results.step_seconds),
+        truth=TruthFigures(seen, len(poses) - seen, truth.mesh is not None),
+        status=str(results.slam["status"]),
+    )
+
+
+def _shape(folder: Path, results: Results, truth: Truth) -> ShapeComparison | None:
+    """The comparison of contour or mesh with the truth; None where one of them is missing."""
+    name = "contour.csv" if results.dimension == 2 else "mesh.ply"
+    if truth.mesh is None or not (folder / name).is_file():
+        return None
+    alignment = estimate_T_truth(results.trajectory.world_T_object, truth.world_T_object)
+    truth_T_estimate = None if alignment is None else alignment.inverse()
+    if results.dimension == 3:
+        return compare_mesh(read_mesh(folder / name), truth.mesh, truth_T_estimate)
+    outline = true_outline(results, truth)
+    return None if outline is None else compare_contour(read_contour(folder / name)[:-1], outline, truth_T_estimate)
+
+
+def true_outline(results: Results, truth: Truth) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+    """The true mesh's horizontal section at the mean height of the contacts, shape (n, 2), truth's object frame.
+
+    Without any sighting the contacts' height in the object is not known: half the mesh's height then.
+    """
+    if truth.mesh is None:
+        return None
+    pairs = compared_grasps(truth.world_T_object, truth.world_T_object)
+    points = [results.contacts[pair.index].points_world_m for pair in pairs]
+    known = any(len(found) for found in points)
+    height_m = (
+        contact_height_m(points, [pair.truth for pair in pairs]) if known else float(truth.mesh.bounds[:, 2].mean())
+    )
+    return horizontal_outline(truth.mesh, height_m)
+
+
+def _failed(status: str, registration_mm: float | None) -> bool | None:
+    if status != "ok":
+        return True
+    return None if registration_mm is None else registration_mm > FAILURE_LIMIT_MM
+
+
+def _loops(loops: Sequence[dict[str, Any]]) -> LoopFigures:
+    return LoopFigures(len(loops), sum(bool(loop["accepted"]) for loop in loops), None)
+
+
+def _time(step_seconds: Sequence[float]) -> TimeFigures:
+    if not step_seconds:
+        return TimeFigures(None, None, None)
+    median, p95 = 1e3 * np.percentile(step_seconds, [50, 95])
+    return TimeFigures(float(np.sum(step_seconds)), float(median), float(p95))
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_rounded(item) for item in value]
+    return round(value, DECIMALS) if isinstance(value, float) else value

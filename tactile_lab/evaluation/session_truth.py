@@ -1,0 +1,89 @@
+"""The truth of a recorded session: the marker camera's pictures of each grasp, and the object's mesh.
+
+Only evaluation reads these. The pictures are decoded again from their recorded bytes, so the truth can be
+recomputed with another detector or calibration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+import trimesh
+from gtsam import Pose3
+
+from drivers.links import Datagram
+from sessions.interpreter import CAMERA_LINK
+from sessions.marks import Mark, MarkKind
+from sessions.schemas import MARKS_TOPIC, received_topic
+from sessions.session import Session
+from sessions.traffic_reader import TrafficMessage
+from tactile_lab.evaluation.evaluation import Truth
+from tactile_lab.shape.mesh_io import read_mesh
+
+Look = Callable[[Datagram], Pose3 | None]
+"""Finds the object in one recorded camera datagram: ``world_T_object``, or None where it is not seen."""
+
+
+def session_truth(session: Session, grasp_count: int, look: Look | None) -> Truth:
+    """The true pose of each grasp and the true mesh.
+
+    Args:
+        session: the recorded session.
+        grasp_count: number of grasps.
+        look: the marker detector; None for a rig without a camera.
+
+    Raises:
+        SessionError: the traffic file or a mark in it cannot be read.
+        ShapeError: the mesh cannot be used.
+    """
+    pictures = {} if look is None else marked_pictures(session.traffic().messages())
+    poses = [look(pictures[index]) if look and index in pictures else None for index in range(grasp_count)]
+    return Truth(tuple(poses), None if session.truth_mesh is None else _mesh(session))
+
+
+def _mesh(session: Session) -> trimesh.Trimesh:
+    assert session.truth_mesh is not None
+    mesh = read_mesh(session.truth_mesh)
+    return trimesh.Trimesh(np.asarray(mesh.vertices), np.asarray(mesh.faces), process=False)
+
+
+def marked_pictures(messages: Iterable[TrafficMessage]) -> dict[int, Datagram]:
+    """The camera's datagram that was marked as truth for each grasp.
+
+    A mark means the newest picture since the last mark, and the grasp whose capture is open, else the last one;
+    the first picture of a grasp counts.
+    """
+    found: dict[int, Datagram] = {}
+    picture: Datagram | None = None
+    counter = _GraspCounter()
+    for message in messages:
+        if message.topic == received_topic(CAMERA_LINK):
+            picture = Datagram(message.data, message.stamp_ns)
+        elif message.topic == MARKS_TOPIC:
+            mark = Mark.from_bytes(message.data)
+            counter.take(mark.kind)
+            if mark.kind is MarkKind.TRUTH_FRAME and picture is not None:
+                found.setdefault(counter.current, picture)
+                picture = None
+    found.pop(-1, None)
+    return found
+
+
+class _GraspCounter:
+    """Numbers the grasps as perception does: one for every capture that was ended."""
+
+    def __init__(self) -> None:
+        self._finished, self._is_open = 0, False
+
+    def take(self, kind: MarkKind) -> None:
+        """Follow one mark."""
+        if kind is MarkKind.CAPTURE_BEGIN:
+            self._is_open = True
+        elif kind is MarkKind.CAPTURE_END:
+            self._finished, self._is_open = self._finished + 1, False
+
+    @property
+    def current(self) -> int:
+        """The grasp that a picture taken now belongs to; -1 before the first."""
+        return self._finished if self._is_open else self._finished - 1

@@ -1,0 +1,88 @@
+"""How well the estimated shape fits the true one, in the truth's object frame.
+
+Twice: placed by the first grasp's true pose alone, which also counts where the object was believed to
+be, and after the best rigid alignment, which judges the shape alone (the thesis reports the second).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from gtsam import Pose3
+
+from tactile_lab.errors import ShapeError
+from tactile_lab.evaluation.prism import open_ring, signed_area_m2
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.geometry.poses import planar
+from tactile_lab.shape.alignment import best_fit_contour, best_fit_mesh
+from tactile_lab.shape.metrics import ShapeErrors, contour_errors, mesh_errors
+from tactile_lab.shape.sampling import TriangleMesh
+
+
+@dataclass(frozen=True)
+class ShapeComparison:
+    """Errors of one shape, placed in two ways.
+
+    Attributes:
+        first_grasp: placed by the first grasp's true pose; None where that is unknown.
+        best_fit: after the best rigid alignment.
+    """
+
+    first_grasp: ShapeErrors | None
+    best_fit: ShapeErrors
+
+
+def compare_contour(contour_m: Array, truth_m: Array, truth_T_estimate: Pose3 | None) -> ShapeComparison:
+    """Compare a contour of shape (n, 2), estimate's object frame, with the true outline, truth's object frame.
+
+    Args:
+        contour_m: estimated contour.
+        truth_m: true outline, shape (m, 2).
+        truth_T_estimate: from the first grasp's true pose; None where there is none.
+
+    Raises:
+        ShapeError: a contour without area or with coordinates that are not numbers.
+    """
+    start = None if truth_T_estimate is None else planar(truth_T_estimate)
+    fitted = best_fit_contour(contour_m, truth_m, start)
+    placed = None if start is None else contour_errors(contour_m, truth_m, start)
+    return ShapeComparison(placed, contour_errors(contour_m, truth_m, fitted))
+
+
+def compare_mesh(mesh: TriangleMesh, truth: TriangleMesh, truth_T_estimate: Pose3 | None) -> ShapeComparison:
+    """Compare a mesh with the true one, as :func:`compare_contour`. Raises ShapeError."""
+    fitted = best_fit_mesh(mesh, truth, truth_T_estimate)
+    placed = None if truth_T_estimate is None else mesh_errors(mesh, truth, truth_T_estimate)
+    return ShapeComparison(placed, mesh_errors(mesh, truth, fitted))
+
+
+def horizontal_outline(mesh: trimesh.Trimesh, height_m: float) -> Array:
+    """The outer outline of a mesh's horizontal section, shape (n, 2), counter-clockwise, first point not repeated.
+
+    Args:
+        mesh: watertight mesh, its object frame.
+        height_m: height of the section in that frame; brought inside the mesh where it lies beyond it.
+
+    Raises:
+        ShapeError: the section is empty or open (a mesh that is not watertight).
+    """
+    low, high = (float(value) for value in mesh.bounds[:, 2])
+    inset = 1e-3 * (high - low)
+    section = mesh.section(
+        plane_origin=[0.0, 0.0, np.clip(height_m, low + inset, high - inset)], plane_normal=[0, 0, 1]
+    )
+    rings = [] if section is None else [np.asarray(ring)[:, :2] for ring in section.discrete if len(ring) > 3]
+    if not rings:
+        raise ShapeError(
+            "the true mesh has no closed section at the contacts", hint="Check that the mesh is watertight"
+        )
+    return open_ring(max(rings, key=lambda ring: abs(signed_area_m2(ring))))
+
+
+def contact_height_m(contacts_world_m: list[Array], truth: list[Pose3]) -> float:
+    """Mean height of contacts in the truth's object frame, from the points (n, 3) and true pose of each grasp."""
+    pairs = zip(contacts_world_m, truth, strict=True)
+    heights = [pose.transformTo(point)[2] for points, pose in pairs for point in points]
+    return float(np.mean(heights)) if heights else 0.0

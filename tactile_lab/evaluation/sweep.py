@@ -1,0 +1,175 @@
+"""Many sessions in one table: objects x seeds x dimensions, with spread and failures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from tactile_lab.errors import TactileLabError
+from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
+
+UNKNOWN = "\u2013"
+
+
+@dataclass(frozen=True)
+class SweepRun:
+    """One session to run."""
+
+    object_name: str
+    dimension: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class SweepRow:
+    """What came of one run.
+
+    Attributes:
+        run: the session.
+        evaluation: content of its ``evaluation.json``, or None when it did not get that far.
+        problem: why it did not, "" otherwise.
+    """
+
+    run: SweepRun
+    evaluation: Mapping[str, Any] | None
+    problem: str = ""
+
+    @property
+    def failure(self) -> str:
+        """Why the run counts as failed, or ""."""
+        if self.evaluation is None:
+            return self.problem or "no evaluation"
+        if self.evaluation.get("status") != "ok":
+            return f"object {self.evaluation.get('status')}"
+        if self.evaluation.get("failed"):
+            return f"registration above {FAILURE_LIMIT_MM:g} mm"
+        return "" if self.figure("shape_best_fit", "hausdorff_mm") is not None else "no shape"
+
+    def figure(self, *keys: str) -> float | None:
+        """A figure of the evaluation by its keys, None where it is unknown."""
+        value: Any = self.evaluation
+        for key in keys:
+            value = value.get(key) if isinstance(value, Mapping) else None
+        return None if value is None else float(value)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Median, ninetieth percentile and maximum of the runs that have the figure."""
+
+    median: float
+    p90: float
+    largest: float
+
+    @classmethod
+    def of(cls, values: Iterable[float | None]) -> Spread | None:
+        """The spread of the known values; None when there are none."""
+        known = np.array([value for value in values if value is not None])
+        if not len(known):
+            return None
+        median, p90 = np.percentile(known, [50, 90])
+        return cls(float(median), float(p90), float(known.max()))
+
+    def text(self, digits: int = 1) -> str:
+        """The three numbers, separated by slashes."""
+        return " / ".join(f"{value:.{digits}f}" for value in (self.median, self.p90, self.largest))
+
+
+COLUMNS = (
+    ("Hausdorff, mm", ("shape", "hausdorff_mm"), 1),
+    ("Hausdorff at best fit, mm", ("shape_best_fit", "hausdorff_mm"), 1),
+    ("mean distance at best fit, mm", ("shape_best_fit", "mean_distance_mm"), 1),
+    ("position RMSE, mm", ("pose", "rmse_mm"), 1),
+    ("rotation RMSE, °", ("pose", "rmse_deg"), 1),
+    ("registration, mm", ("registration_rms_mm",), 1),
+)
+"""Figures of a summary: heading, keys in ``evaluation.json``, digits."""
+
+
+@dataclass(frozen=True)
+class SweepSummary:
+    """All runs of one object in one dimension.
+
+    Attributes:
+        object_name, dimension: what was run.
+        runs: number of runs.
+        spreads: one for each of :data:`COLUMNS`, over all runs that have the figure, failed ones included.
+        failures: seed and reason of each failed run.
+    """
+
+    object_name: str
+    dimension: int
+    runs: int
+    spreads: tuple[Spread | None, ...]
+    failures: tuple[tuple[int, str], ...]
+
+
+def planned_runs(objects: Sequence[str], dimensions: Sequence[int], seeds: Sequence[int]) -> list[SweepRun]:
+    """Every combination, seeds fastest."""
+    return [SweepRun(*combination) for combination in product(objects, dimensions, seeds)]
+
+
+def sweep(
+    runs: Iterable[SweepRun],
+    run_session: Callable[[SweepRun], Mapping[str, Any]],
+    finished: Callable[[SweepRow], None] = lambda row: None,
+) -> list[SweepRow]:
+    """Run sessions one after the other; a session that ends in one of our errors becomes a failed row.
+
+    Args:
+        runs: what to run.
+        run_session: runs one session and gives the content of its ``evaluation.json``.
+        finished: told about each row as it comes.
+    """
+    rows = []
+    for run in runs:
+        rows.append(_row(run, run_session))
+        finished(rows[-1])
+    return rows
+
+
+def _row(run: SweepRun, run_session: Callable[[SweepRun], Mapping[str, Any]]) -> SweepRow:
+    try:
+        return SweepRow(run, run_session(run))
+    except TactileLabError as error:
+        return SweepRow(run, None, str(error))
+
+
+def summaries(rows: Sequence[SweepRow]) -> list[SweepSummary]:
+    """One summary for each object and dimension, in the order of the rows."""
+    groups: dict[tuple[str, int], list[SweepRow]] = {}
+    for row in rows:
+        groups.setdefault((row.run.object_name, row.run.dimension), []).append(row)
+    return [_summary(name, dimension, group) for (name, dimension), group in groups.items()]
+
+
+def _summary(name: str, dimension: int, rows: list[SweepRow]) -> SweepSummary:
+    spreads = tuple(Spread.of(row.figure(*keys) for row in rows) for _, keys, _ in COLUMNS)
+    failures = tuple((row.run.seed, row.failure) for row in rows if row.failure)
+    return SweepSummary(name, dimension, len(rows), spreads, failures)
+
+
+def markdown_table(found: Sequence[SweepSummary]) -> str:
+    """The summaries as a Markdown table: median / p90 / maximum, and the failures with their seeds."""
+    titles = ["object", "dim.", "runs", *(title for title, _, _ in COLUMNS), "failed", "seeds and reasons"]
+    lines = [_markdown_row(titles), _markdown_row(["---", *["---:"] * (len(titles) - 2), "---"])]
+    lines += [_markdown_row(_summary_cells(summary)) for summary in found]
+    return "\n".join(lines) + "\n"
+
+
+def _summary_cells(summary: SweepSummary) -> list[str]:
+    spreads = [
+        UNKNOWN if spread is None else spread.text(digits)
+        for spread, (_, _, digits) in zip(summary.spreads, COLUMNS, strict=True)
+    ]
+    reasons = "; ".join(f"{seed}: {reason}" for seed, reason in summary.failures)
+    head = [summary.object_name, str(summary.dimension), str(summary.runs)]
+    return [*head, *spreads, str(len(summary.failures)), reasons]
+
+
+def _markdown_row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(" ".join(cell.replace("|", "\\|").split()) for cell in cells) + " |"
