@@ -137,20 +137,20 @@ class SafetySupervisor:
 
     # --- between cycles ----------------------------------------------------------------------------------------
 
-    def reason_to_end(self, stamp_ns: int) -> str | None:
-        """Why no further grasp should start, or None."""
-        if self._start_ns is not None and stamp_ns - self._start_ns > self.settings.session_limit_s * NANOSECONDS:
-            return f"the session limit of {self.settings.session_limit_s:.0f} s is reached"
-        if self._empty_grasps >= self.settings.empty_grasps:
-            return f"object lost: no contact in {self._empty_grasps} grasps in a row"
-        return None
+    def time_over(self, stamp_ns: int) -> str | None:
+        """Why no further grasp should start at this time, or None."""
+        if self._start_ns is None or stamp_ns - self._start_ns <= self.settings.session_limit_s * NANOSECONDS:
+            return None
+        return f"the session limit of {self.settings.session_limit_s:.0f} s is reached"
 
     def object_lost(self, x_m: float, y_m: float) -> str | None:
         """Why an object estimated at world x, y counts as lost, or None."""
+        if self._empty_grasps >= self.settings.empty_grasps:
+            return f"no contact in {self._empty_grasps} grasps in a row"
         out_m = self._from_centre_m(x_m, y_m)
         if out_m <= self.settings.object_radius_m:
             return None
-        return f"object lost: estimated {out_m * 100:.0f} cm from the workspace centre"
+        return f"the object is {out_m * 100:.0f} cm from the workspace centre"
 
     def count_contacts(self, contacts: int) -> None:
         """Take note of how many contacts a grasp had."""

@@ -1,0 +1,303 @@
+"""The conductor: an autonomous session, grasp after grasp, until there are enough or a reason to end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TypeVar
+
+import numpy as np
+from gtsam import Pose3
+from pydantic import Field
+
+from drivers.shadow.closing import Closing, closing
+from drivers.shadow.posture import TipEllipsoid
+from sessions.bench import Bench
+from sessions.explorer import ExplorationSettings, KnownShape, choose_grasp, known_shape
+from sessions.grasp_cycle import CycleSettings, GraspCycle, GraspPlan
+from sessions.motion import Motion
+from sessions.next_grasp import FixedRule, PlanSettings, contact_centre
+from sessions.progress import GraspReport, NullProgress, Progress
+from sessions.recorder import Level
+from sessions.safety import InterruptGuard, SafetySettings, SafetySupervisor
+from tactile_lab.clock import VirtualClock
+from tactile_lab.errors import TactileLabError, TrackingError
+from tactile_lab.geometry.contacts import Grasp
+from tactile_lab.geometry.poses import planar
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.slam import SlamStep, TactileSlam
+from tactile_lab.strict_yaml import StrictModel
+
+Answer = TypeVar("Answer")
+
+
+class ConductorSettings(StrictModel):
+    """An autonomous session.
+
+    Attributes:
+        grasps: how many.
+        fixed_grasps: how many of them follow the fixed rule before the estimate chooses.
+        missed_approaches: this many approaches in a row without a way down to the table end the session.
+        plan, cycle, exploration, safety: see there.
+    """
+
+    grasps: int = Field(default=16, ge=1)
+    fixed_grasps: int = Field(default=2, ge=1)
+    missed_approaches: int = Field(default=3, ge=1)
+    plan: PlanSettings = PlanSettings()
+    cycle: CycleSettings = CycleSettings()
+    exploration: ExplorationSettings = ExplorationSettings()
+    safety: SafetySettings = SafetySettings()
+
+
+class Ending(StrEnum):
+    """How a session ended."""
+
+    COMPLETE = "complete"
+    OBJECT_LOST = "object lost"
+    INTERRUPTED = "interrupted"
+    LIMIT = "limit reached"
+    STOPPED = "stopped"
+    """A safety limit or a failing device; the outcome carries the error."""
+
+
+@dataclass(frozen=True)
+class SessionOutcome:
+    """What came of a session.
+
+    Attributes:
+        ending: how it ended.
+        reason: the same in words.
+        grasps: everything captured, in order.
+        dropped: how often each reason kept a finger's contact out.
+        error: what stopped it, for an ending of that kind.
+    """
+
+    ending: Ending
+    reason: str
+    grasps: tuple[Grasp, ...]
+    dropped: dict[str, int]
+    error: TactileLabError | None = None
+
+
+class Conductor:
+    """Runs a session on a connected bench.
+
+    Args:
+        bench: connected; the caller closes it.
+        slam: fresh; the caller finishes it.
+        settings: of the session.
+        seed: of the session's own choices.
+        progress: is told what happens.
+        dimension: the estimation's, 2 or 3.
+    """
+
+    def __init__(
+        self,
+        bench: Bench,
+        slam: TactileSlam,
+        settings: ConductorSettings,
+        *,
+        seed: int = 0,
+        dimension: int = 2,
+        progress: Progress | None = None,
+    ) -> None:
+        self._bench, self._slam, self._settings, self._dimension = bench, slam, settings, dimension
+        self._progress = progress or NullProgress()
+        self._rng = np.random.default_rng(seed)
+        self._rule = FixedRule(settings.plan, self._rng)
+        self._supervisor = SafetySupervisor(bench, settings.safety, bench.cycle_ns)
+        self._tip = _tip_shape(bench)
+        window = settings.plan.yaw_window_rad
+        self._cycle = GraspCycle(Motion(bench, self._supervisor), settings.cycle, self._tip, window)
+        self._guard = InterruptGuard()
+        self._grasps: list[Grasp] = []
+        self._known: tuple[Gpis, KnownShape] | None = None
+        self._hand_motion = Pose3()
+        self._misses = 0
+
+    # --- the session -------------------------------------------------------------------------------------------
+
+    def run(self) -> SessionOutcome:
+        """Grasp until done. However it ends, the hand is without demand and the positioner holds.
+
+        Ctrl+C once finishes the step in hand and ends the session, twice raises KeyboardInterrupt at once.
+        """
+        try:
+            with self._guard:
+                ending, reason = self._grasp_until_done()
+            return self._ended(ending, reason)
+        except TactileLabError as error:
+            return self._ended(Ending.STOPPED, str(error), error)
+        except BaseException:
+            self._supervisor.stop()
+            raise
+
+    def _grasp_until_done(self) -> tuple[Ending, str]:
+        while True:
+            if ended := self._reason_to_end():
+                return ended
+            self._one_grasp(len(self._grasps))
+
+    def _reason_to_end(self) -> tuple[Ending, str] | None:
+        if self._guard.requested:
+            return Ending.INTERRUPTED, "interrupted by the operator"
+        if len(self._grasps) >= self._settings.grasps:
+            return Ending.COMPLETE, f"{len(self._grasps)} grasps done"
+        if self._misses >= self._settings.missed_approaches:
+            return Ending.OBJECT_LOST, f"no way down to the table in {self._misses} approaches"
+        if reason := self._supervisor.time_over(self._bench.clock.now_ns()):
+            return Ending.LIMIT, reason
+        if reason := self._supervisor.object_lost(*self._rule.centre_m):
+            return Ending.OBJECT_LOST, reason
+        return None
+
+    def _ended(self, ending: Ending, reason: str, error: TactileLabError | None = None) -> SessionOutcome:
+        problems = self._supervisor.stop()
+        text = "; ".join([reason, *(f"while stopping: {problem}" for problem in problems)])
+        self._bench.event(Level.ERROR if error else Level.INFO, "conductor", f"{ending}: {text}")
+        return SessionOutcome(ending, text, tuple(self._grasps), dict(self._bench.perception.drop_counts), error)
+
+    # --- one grasp ---------------------------------------------------------------------------------------------
+
+    def _one_grasp(self, index: int) -> None:
+        """Descend, close, settle, capture, squeeze, re-orient, release, lift; then estimate."""
+        cycle, plan = self._cycle, self._plan(index)
+        self._phase("descend")
+        if not self._arrive(plan):
+            return
+        self._phase("close")
+        cycle.close()
+        cycle.settle()
+        if self._guard.requested:
+            self._let_go()
+            return
+        self._phase("capture")
+        grasp = cycle.capture()
+        self._grasps.append(grasp)
+        missing = dict(self._bench.perception.dropped)
+        self._carry(grasp)
+        self._let_go()
+        self._phase("estimate")
+        step = self._estimate(grasp)
+        self._progress.grasp_done(self._report(grasp, plan, step, missing))
+
+    def _arrive(self, plan: GraspPlan) -> bool:
+        arrived = self._cycle.descend(plan)
+        self._misses = 0 if arrived else self._misses + 1
+        if not arrived:
+            self._tell(Level.WARNING, f"the hand came down on the object {self._cycle.landings} times: another grasp")
+        return arrived
+
+    def _carry(self, grasp: Grasp) -> None:
+        """Squeeze, and re-orient the object, unless too few fingers hold it or no grasp will follow."""
+        cycle, plan = self._cycle, self._cycle.plan
+        centre_m = contact_centre(grasp, plan) if grasp.contacts else self._rule.centre_m
+        touching = frozenset(contact.finger for contact in grasp.contacts)
+        self._supervisor.count_contacts(len(touching))
+        self._hand_motion = Pose3()
+        last = len(self._grasps) >= self._settings.grasps or self._guard.requested
+        if _holds(touching) and not last:
+            self._phase("squeeze")
+            cycle.squeeze(touching)
+            self._phase("re-orient")
+            turn_rad, shift_m = self._rule.turn(plan.frame.yaw_rad), self._rule.step_back(centre_m)
+            self._hand_motion = cycle.reorient(turn_rad, shift_m, touching)
+        self._rule.carried(centre_m, self._hand_motion)
+
+    def _let_go(self) -> None:
+        self._phase("release")
+        self._cycle.release()
+        self._phase("lift")
+        self._cycle.lift()
+
+    # --- estimation and choice ---------------------------------------------------------------------------------
+
+    def _estimate(self, grasp: Grasp) -> SlamStep | None:
+        """One step of the estimation; a grasp that it refuses is told and left out."""
+        try:
+            step = self._think(lambda: self._slam.step(grasp))
+        except TrackingError as error:
+            self._tell(Level.ERROR, str(error))
+            return None
+        state = {"index": step.index, "verdict": step.verdict, "reason": step.reason, "seconds": step.seconds}
+        self._bench.recorder.slam(self._bench.clock.now_ns(), step.world_T_object, state, step.covariance)
+        return step
+
+    def _plan(self, index: int) -> GraspPlan:
+        """The next grasp: by the estimate where there is one, else by the fixed rule."""
+        known = self._known_shape() if index >= self._settings.fixed_grasps and not self._misses else None
+        pose = self._slam.world_T_object
+        if known is None or pose is None or self._slam.is_lost:
+            return self._rule.plan(index + self._misses)
+        expected = planar(self._hand_motion * pose)
+        height_m, plan = self._rule.height_m(index), self._settings.plan
+
+        def table(name: str) -> Closing:
+            return closing(name, height_m, self._tip)
+
+        chosen = self._think(
+            lambda: choose_grasp(known, expected, plan.closings, table, plan.yaw_window_rad, self._settings.exploration)
+        )
+        return chosen or self._rule.plan(index)
+
+    def _known_shape(self) -> KnownShape | None:
+        """The shape as estimated now; None before there is one."""
+        field = self._slam.surface
+        if field is None:
+            return None
+        if self._known is None or self._known[0] is not field:
+            height_m, settings = self._slam.origin_height_m, self._settings.exploration
+            self._known = (field, self._think(lambda: known_shape(field, self._dimension, height_m, settings)))
+        return self._known[1]
+
+    def _think(self, question: Callable[[], Answer]) -> Answer:
+        """Compute without starving the devices: simulated time waits, real time is spent in cycles."""
+        if isinstance(self._bench.clock, VirtualClock):
+            return question()
+        with ThreadPoolExecutor(1) as worker:
+            answer = worker.submit(question)
+            while not answer.done():
+                self._cycle.idle()
+            return answer.result()
+
+    # --- telling -----------------------------------------------------------------------------------------------
+
+    def _report(self, grasp: Grasp, plan: GraspPlan, step: SlamStep | None, missing: dict[str, str]) -> GraspReport:
+        covariance = None if step is None else step.covariance
+        known = self._known_shape()
+        return GraspReport(
+            number=len(self._grasps),
+            planned=self._settings.grasps,
+            closing=plan.closing,
+            reason=plan.reason,
+            forces_N={contact.finger: contact.force_N for contact in grasp.contacts},
+            missing=missing,
+            landings=self._cycle.landings,
+            position_sigma_m=None if covariance is None else float(np.sqrt(np.trace(covariance[:2, :2]) / 2)),
+            yaw_sigma_rad=None if covariance is None else float(np.sqrt(covariance[2, 2])),
+            explored=None if known is None else known.explored,
+            verdict="refused" if step is None else f"{step.verdict}: {step.reason}",
+            stamp_ns=grasp.stamp_ns,
+        )
+
+    def _phase(self, name: str) -> None:
+        self._progress.phase(len(self._grasps) + 1, name)
+
+    def _tell(self, level: Level, message: str) -> None:
+        self._bench.event(level, "conductor", message)
+        self._progress.told(message)
+
+
+def _holds(touching: frozenset[str]) -> bool:
+    """Whether these fingers can carry the object: the thumb against another, or both side fingers."""
+    return ("TH" in touching and len(touching) > 1) or {"FF", "LF"} <= touching
+
+
+def _tip_shape(bench: Bench) -> TipEllipsoid:
+    """The fingertip's shape by calibration; the default one where a rig has none."""
+    for calibration in bench.fingertip_calibrations.values():
+        return TipEllipsoid(calibration.semi_axes_m, calibration.centre_distal_m)
+    return TipEllipsoid()

@@ -1,0 +1,152 @@
+"""Where to grasp next by what is known of the object: the reward of equation 4.20 over candidate grasps.
+
+Candidates stand around the estimated object: every yaw of the arm's window, a few shifts across the hand, every
+closing. Where a candidate's fingers will touch is read off the estimated surface along their closing lines; the
+candidate whose predicted contacts are least known wins, among those that promise enough contacts and have room for
+the open hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from gtsam import Pose2
+from pydantic import Field
+
+from drivers.shadow.closing import Closing
+from sessions.grasp_cycle import GraspPlan
+from sessions.motion import GraspFrame
+from tactile_lab.errors import ShapeError
+from tactile_lab.exploration.candidates import Candidate, ClosingRays, ModelledObject, ring_of_candidates
+from tactile_lab.exploration.rewards import RatedCandidate, explored_share, rate
+from tactile_lab.geometry.contacts import FINGERS, Array
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.surface import Contour, SurfaceMesh, extract_contour, extract_mesh
+from tactile_lab.strict_yaml import StrictModel
+
+
+class ExplorationSettings(StrictModel):
+    """The candidates, and which of them count.
+
+    Attributes:
+        yaws: how many, spread evenly over the arm's window.
+        shifts_m: offsets of the grasp frame across the hand.
+        least_contacts: candidates that promise fewer lose against all that promise as many.
+        clearance_m: distance from the estimated surface that the open fingertips' centres must keep.
+        contour_resolution_m, mesh_resolution_m: of the surface that the explored share is measured on.
+    """
+
+    yaws: int = Field(default=12, ge=1)
+    shifts_m: tuple[float, ...] = Field(default=(-0.015, 0.0, 0.015), min_length=1)
+    least_contacts: int = Field(default=4, ge=0)
+    clearance_m: float = Field(default=0.012, ge=0.0)
+    contour_resolution_m: float = Field(default=0.002, gt=0.0)
+    mesh_resolution_m: float = Field(default=0.006, gt=0.0)
+
+
+@dataclass(frozen=True)
+class KnownShape:
+    """The object's shape as estimated now, object frame.
+
+    Attributes:
+        field: the implicit surface.
+        dimension: 2 or 3.
+        origin_height_m: height of the object frame's origin over the table.
+        centre_m: middle of the shape's extent, x, y.
+        explored: share of the surface that is known, 0..1.
+    """
+
+    field: Gpis
+    dimension: int
+    origin_height_m: float
+    centre_m: Array
+    explored: float
+
+
+def known_shape(field: Gpis, dimension: int, origin_height_m: float, settings: ExplorationSettings) -> KnownShape:
+    """Measure the estimated surface.
+
+    Where the contacts enclose nothing yet, the object frame's origin stands in for the middle and nothing is explored.
+    """
+    try:
+        surface = _surface(field, dimension, settings)
+    except ShapeError:
+        return KnownShape(field, dimension, origin_height_m, np.zeros(2), 0.0)
+    points_m = surface.points_m if isinstance(surface, Contour) else surface.vertices
+    centre_m = (points_m[:, :2].min(axis=0) + points_m[:, :2].max(axis=0)) / 2
+    return KnownShape(field, dimension, origin_height_m, centre_m, explored_share(surface))
+
+
+def _surface(field: Gpis, dimension: int, settings: ExplorationSettings) -> Contour | SurfaceMesh:
+    if dimension == 2:
+        return extract_contour(field, resolution_m=settings.contour_resolution_m)
+    return extract_mesh(field, resolution_m=settings.mesh_resolution_m)
+
+
+def closing_rays(table: Closing) -> ClosingRays:
+    """The usable parts of a closing's lines as rays in the grasp frame."""
+    paths = [table.path(finger) for finger in FINGERS]
+    return ClosingRays(
+        fingers=FINGERS,
+        starts_m=np.array([path.centre_m(path.valid[0]) for path in paths]),
+        directions=np.array([path.direction for path in paths]),
+        lengths_m=np.array([path.length_m * (path.valid[1] - path.valid[0]) for path in paths]),
+    )
+
+
+def choose_grasp(
+    shape: KnownShape,
+    world_T_object: Pose2,
+    closings: Sequence[str],
+    table: Callable[[str], Closing],
+    yaw_window_rad: tuple[float, float],
+    settings: ExplorationSettings,
+) -> GraspPlan | None:
+    """The most promising grasp around an object at ``world_T_object``; None when no candidate has room.
+
+    Args:
+        shape: as estimated.
+        world_T_object: where the object is expected, in the table plane.
+        closings: names to choose from.
+        table: gives the closing of a name at the height of this grasp.
+        yaw_window_rad: what the arm can reach.
+        settings: the candidates.
+    """
+    known = ModelledObject(shape.field, shape.dimension, world_T_object, shape.origin_height_m)
+    rays = {name: closing_rays(table(name)) for name in closings}
+    yaws_rad = np.linspace(*yaw_window_rad, settings.yaws)
+    centre_world_m = np.asarray(world_T_object.transformFrom(shape.centre_m))
+    ring = ring_of_candidates(centre_world_m, yaws_rad, np.array(settings.shifts_m), rays)
+    roomy = [candidate for candidate in ring if _has_room(candidate, known, settings.clearance_m)]
+    if not roomy:
+        return None
+    return _plan(_best(rate(roomy, known), settings.least_contacts), table)
+
+
+def _best(rated: Sequence[RatedCandidate], least_contacts: int) -> RatedCandidate:
+    """The highest reward among the candidates with enough contacts, else the one with most contacts."""
+    enough = [item for item in rated if len(item.contacts.fingers) >= least_contacts]
+    return enough[0] if enough else max(rated, key=lambda item: len(item.contacts.fingers))
+
+
+def _plan(best: RatedCandidate, table: Callable[[str], Closing]) -> GraspPlan:
+    pose, name = best.candidate.world_T_grasp, best.candidate.closing
+    sigma_mm = 1e3 * float(np.sqrt(np.mean(best.contacts.variances_m2))) if best.contacts.fingers else 0.0
+    reason = f"{len(best.contacts.fingers)} contacts expected where the surface is known to {sigma_mm:.1f} mm"
+    frame = GraspFrame(float(pose.x()), float(pose.y()), float(pose.theta()))
+    return GraspPlan(frame, name, table(name).height_m, reason)
+
+
+def _has_room(candidate: Candidate, known: ModelledObject, clearance_m: float) -> bool:
+    """Whether the open fingertips are all clear of the estimated surface."""
+    starts_world_m = _to_world(candidate, candidate.rays.starts_m[:, :2])
+    starts_m = np.array([known.world_T_object.transformTo(point) for point in starts_world_m])
+    if known.dimension == 3:
+        starts_m = np.column_stack([starts_m, candidate.rays.starts_m[:, 2] - known.origin_height_m])
+    return bool(np.all(known.field.predict(starts_m).mean_m > clearance_m))
+
+
+def _to_world(candidate: Candidate, points_m: Array) -> Array:
+    return np.array([candidate.world_T_grasp.transformFrom(point) for point in points_m])

@@ -1,0 +1,285 @@
+"""The grasp cycle: descend, close, settle, capture, squeeze, re-orient, release, lift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from gtsam import Pose3
+from pydantic import Field
+
+from drivers.shadow.closing import Closing, closing
+from drivers.shadow.posture import TipEllipsoid
+from sessions.motion import GraspFrame, Motion
+from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
+from tactile_lab.strict_yaml import StrictModel
+
+
+class CycleSettings(StrictModel):
+    """Speeds, forces and times of the grasp cycle.
+
+    Attributes:
+        lift_m: how far above a grasp the hand travels.
+        travel_m_s, turn_rad_s: speeds above the object.
+        descent_m_s: speed of the guarded descent.
+        landing_force_N: a fingertip force during the descent that means the object is under it.
+        landing_shift_m: how far the grasp moves toward the finger that landed.
+        landing_tries: descents before the grasp is given up.
+        closing_m_s: speed of the fingertips; it sets how far the object is pushed.
+        touch_force_N: contact force at which a finger stops.
+        settle_s: rest before the capture.
+        capture_s: length of the capture (20 samples at 100 Hz).
+        squeeze_force_N: force of each finger while the object is carried; the thumb holds against their sum.
+        squeeze_s: time to build the squeeze up.
+        squeeze_gain: fingertip speed per force error, m/s per N.
+        carry_turn_rad_s, carry_m_s: speeds while the object is held.
+        open_s: time to open the hand.
+        finger_gap_m: the thumb stops this far from another tip's centre: they would touch each other.
+    """
+
+    lift_m: float = Field(default=0.12, gt=0.0)
+    travel_m_s: float = Field(default=0.25, gt=0.0)
+    turn_rad_s: float = Field(default=1.5, gt=0.0)
+    descent_m_s: float = Field(default=0.12, gt=0.0)
+    landing_force_N: float = Field(default=0.25, gt=0.0)
+    landing_shift_m: float = Field(default=0.018, gt=0.0)
+    landing_tries: int = Field(default=4, ge=1)
+    closing_m_s: float = Field(default=0.030, gt=0.0)
+    touch_force_N: float = Field(default=0.15, gt=0.0)
+    settle_s: float = Field(default=0.2, ge=0.0)
+    capture_s: float = Field(default=0.2, gt=0.0)
+    squeeze_force_N: float = Field(default=0.5, gt=0.0)
+    squeeze_s: float = Field(default=0.5, gt=0.0)
+    squeeze_gain: float = Field(default=0.06, gt=0.0)
+    carry_turn_rad_s: float = Field(default=0.6, gt=0.0)
+    carry_m_s: float = Field(default=0.06, gt=0.0)
+    open_s: float = Field(default=0.5, gt=0.0)
+    finger_gap_m: float = Field(default=0.021, ge=0.0)
+
+
+@dataclass(frozen=True)
+class GraspPlan:
+    """One grasp to do.
+
+    Attributes:
+        frame: the grasp frame in the world.
+        closing: a key of :data:`drivers.shadow.closing.PRESHAPES`.
+        height_m: height of the fingertip centres above the table.
+        reason: why this one, for people.
+    """
+
+    frame: GraspFrame
+    closing: str
+    height_m: float
+    reason: str = ""
+
+
+class GraspCycle:
+    """The verbs of one grasp, in the order in which they are meant to be called.
+
+    Args:
+        motion: supervised motion.
+        settings: speeds, forces, times.
+        tip: shape of the fingertips.
+        yaw_window_rad: yaws the arm can take up.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        settings: CycleSettings,
+        tip: TipEllipsoid | None = None,
+        yaw_window_rad: tuple[float, float] = (-np.pi, np.pi),
+    ) -> None:
+        self._motion, self.settings = motion, settings
+        self._tip, self._yaw_window_rad = tip or TipEllipsoid(), yaw_window_rad
+        self._plan: GraspPlan | None = None
+        self._progress = dict.fromkeys(FINGERS, 0.0)
+        self.landings = 0
+        """Landings on the object in the last approach."""
+
+    @property
+    def plan(self) -> GraspPlan:
+        """The grasp in hand, where it really is (a landing or a re-orientation shifts it)."""
+        assert self._plan is not None
+        return self._plan
+
+    # --- down --------------------------------------------------------------------------------------------------
+
+    def descend(self, plan: GraspPlan) -> bool:
+        """Move above, tare, and come down with care.
+
+        A fingertip that meets something on the way down stands on the object: lift, shift the grasp toward that
+        finger and try again. When thumb and fingers have both landed, the object is too long that way: turn.
+
+        Returns:
+            Whether the hand is down around the object, fingers open.
+        """
+        self._plan, self.landings = plan, 0
+        landed: set[str] = set()
+        for _ in range(self.settings.landing_tries):
+            self._move_above()
+            hit = self._come_down()
+            if not hit:
+                self._motion.supervisor.approached()
+                return True
+            self.landings += 1
+            landed.update(hit)
+            self.lift()
+            self._plan = self._evade(plan, hit, landed)
+        return False
+
+    def _move_above(self) -> None:
+        table, s = self._table(), self.settings
+        self._progress = {finger: table.path(finger).valid[0] for finger in FINGERS}
+        self._motion.blend_fingers(table, self._progress, s.open_s)
+        above = self._motion.base_joints(self.plan.frame, table, s.lift_m)
+        self._motion.move_base(above, s.travel_m_s, s.turn_rad_s)
+        self._motion.wait(s.settle_s)
+        self._motion.bench.tare()
+
+    def _come_down(self) -> list[str]:
+        """Guarded descent; the fingers that landed on something."""
+        s = self.settings
+        down = self._motion.base_joints(self.plan.frame, self._table())
+        if self._motion.move_base(down, s.descent_m_s, s.turn_rad_s, until=lambda: bool(self._landed())):
+            self._motion.wait(s.settle_s)
+        return self._landed()
+
+    def _landed(self) -> list[str]:
+        return [f for f, load_N in self._motion.loads_N().items() if load_N > self.settings.landing_force_N]
+
+    def _evade(self, plan: GraspPlan, hit: list[str], landed: set[str]) -> GraspPlan:
+        """The plan after a landing: shifted toward the fingers that landed, or turned when both sides did."""
+        if "TH" in landed and landed - {"TH"}:
+            landed.clear()
+            return replace(plan, frame=self._turned_away(plan.frame))
+        table = self._table()
+        directions = np.array([table.path(finger).start_m[:2] for finger in hit])
+        shift_m = self.settings.landing_shift_m * np.mean(directions / np.linalg.norm(directions, axis=1)[:, None], 0)
+        return replace(self.plan, frame=self.plan.frame.shifted_inside(shift_m))
+
+    def _turned_away(self, frame: GraspFrame) -> GraspFrame:
+        """A quarter turn, as far as the arm's yaw window allows, toward its middle."""
+        low, high = self._yaw_window_rad
+        turn = -np.pi / 2 if frame.yaw_rad > (low + high) / 2 else np.pi / 2
+        return replace(frame, yaw_rad=float(np.clip(frame.yaw_rad + turn, low, high)))
+
+    # --- close and measure -------------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Close every finger along its line until it touches, meets the thumb, or comes to the line's end."""
+        table = self._table()
+        step_m = self.settings.closing_m_s * self._motion.supervisor.speed_scale * self._motion.cycle_s
+        moving = set(FINGERS)
+        while moving:
+            loads_N = self._motion.loads_N()
+            moving = {f for f in moving if self._may_close(f, loads_N.get(f, 0.0))}
+            for finger in sorted(moving):
+                self._progress[finger] += step_m / table.path(finger).length_m
+            self._motion.set_fingers(table, self._progress)
+            self._motion.tick()
+
+    def _may_close(self, finger: str, load_N: float) -> bool:
+        at_end = self._progress[finger] >= self._table().path(finger).valid[1]
+        return load_N <= self.settings.touch_force_N and not at_end and not self._meets_thumb(finger)
+
+    def _meets_thumb(self, finger: str) -> bool:
+        """Whether this tip and the thumb's (any other's, for the thumb) are about to touch each other."""
+        centres = {f: self._table().path(f).centre_m(self._progress[f]) for f in FINGERS}
+        others = [f for f in FINGERS if f != "TH"] if finger == "TH" else ["TH"]
+        gap_m = min(float(np.linalg.norm(centres[finger] - centres[other])) for other in others)
+        return gap_m < self.settings.finger_gap_m
+
+    def settle(self) -> None:
+        """Let hand and object come to rest."""
+        self._motion.wait(self.settings.settle_s)
+
+    def capture(self) -> Grasp:
+        """Gather samples, make a grasp of them, and take a picture of the object as it is held."""
+        bench = self._motion.bench
+        bench.begin_capture()
+        self._motion.wait(self.settings.capture_s)
+        grasp = bench.end_capture()
+        bench.truth_frame()
+        return grasp
+
+    # --- carry -------------------------------------------------------------------------------------------------
+
+    def squeeze(self, touching: frozenset[str]) -> None:
+        """Build up the holding force of the fingers that touch; the thumb holds against their sum."""
+        targets_N = self._holding_forces_N(touching)
+        for _ in range(self._motion.cycles(self.settings.squeeze_s)):
+            self._servo_forces(targets_N)
+            self._motion.tick()
+
+    def reorient(self, turn_rad: float, shift_world_m: Array, touching: frozenset[str]) -> Pose3:
+        """Turn about the grasp's vertical axis and shift, holding the object.
+
+        Args:
+            turn_rad: about world z.
+            shift_world_m: shape (2,), along the world's axes.
+            touching: fingers that hold.
+
+        Returns:
+            The palm's motion in the world as measured: what carries the object along (eq. 3.8).
+        """
+        motion, table, start = self._motion, self._table(), self.plan.frame
+        targets_N = self._holding_forces_N(touching)
+        duration_s = max(
+            abs(turn_rad) / self.settings.carry_turn_rad_s,
+            float(np.linalg.norm(shift_world_m)) / self.settings.carry_m_s,
+        )
+
+        def base_at(share: float) -> Array:
+            dx, dy = share * shift_world_m
+            return motion.base_joints(start.moved(float(dx), float(dy), share * turn_rad), table)
+
+        world_T_before = motion.bench.perception.world_T_palm
+        motion.bench.begin_hold()
+        motion.follow(base_at, duration_s, lambda: self._servo_forces(targets_N))
+        motion.wait(self.settings.settle_s)
+        motion.bench.end_hold()
+        dx, dy = shift_world_m
+        self._plan = replace(self.plan, frame=start.moved(float(dx), float(dy), turn_rad))
+        return motion.bench.perception.world_T_palm * world_T_before.inverse()
+
+    def _holding_forces_N(self, touching: frozenset[str]) -> dict[str, float]:
+        """Force of each finger; the thumb takes the sum of what the others push along the grasp's x axis."""
+        table, force_N = self._table(), self.settings.squeeze_force_N
+        forces_N = dict.fromkeys(sorted(touching - {"TH"}), force_N)
+        if "TH" in touching:
+            pushed_N = sum(-force_N * float(table.path(finger).direction[0]) for finger in forces_N)
+            forces_N["TH"] = max(force_N, pushed_N)
+        return forces_N
+
+    def _servo_forces(self, targets_N: dict[str, float]) -> None:
+        """One cycle of force control: a fingertip moves along its line in proportion to its force error."""
+        table, loads_N = self._table(), self._motion.loads_N()
+        for finger, target_N in targets_N.items():
+            path = table.path(finger)
+            error_N = float(np.clip(target_N - loads_N.get(finger, 0.0), -1.0, 1.0))
+            step = self.settings.squeeze_gain * error_N * self._motion.cycle_s / path.length_m
+            self._progress[finger] = float(np.clip(self._progress[finger] + step, *path.valid))
+        self._motion.set_fingers(table, self._progress)
+
+    # --- and away ----------------------------------------------------------------------------------------------
+
+    def release(self) -> None:
+        """Open the hand."""
+        table = self._table()
+        self._progress = {finger: table.path(finger).valid[0] for finger in FINGERS}
+        self._motion.blend_fingers(table, self._progress, self.settings.open_s)
+
+    def lift(self) -> None:
+        """Straight up."""
+        s = self.settings
+        above = self._motion.base_joints(self.plan.frame, self._table(), s.lift_m)
+        self._motion.move_base(above, s.travel_m_s, s.turn_rad_s)
+
+    def idle(self) -> None:
+        """One cycle without motion."""
+        self._motion.tick()
+
+    def _table(self) -> Closing:
+        return closing(self.plan.closing, self.plan.height_m, self._tip)

@@ -1,0 +1,178 @@
+"""Motion: moves the hand and the positioner along paths, one supervised cycle of the bench at a time.
+
+Nothing else in a session moves anything. Every cycle goes through :meth:`Motion.tick`, where the safety supervisor
+looks at it; so no verb of the grasp cycle can forget to be supervised.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from drivers.positioner import mount_joints
+from gtsam import Pose3, Rot3
+
+from drivers.shadow.closing import Closing
+from drivers.shadow.kinematics import JOINTS, forearm_T_palm
+from sessions.bench import Bench
+from sessions.safety import SafetySupervisor, Situation
+from tactile_lab.clock import NANOSECONDS
+from tactile_lab.geometry.contacts import FINGERS, Array
+
+_STRAIGHT_WRIST = forearm_T_palm(np.zeros(len(JOINTS)))
+_HOLD_WRIST = {"WRJ1": 0.0, "WRJ2": 0.0}
+
+
+@dataclass(frozen=True)
+class GraspFrame:
+    """A grasp frame on the table: world x, y of its origin and its yaw. Height is the closing's affair."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+    @property
+    def pose(self) -> Pose3:
+        """``world_T_grasp``."""
+        return Pose3(Rot3.Yaw(self.yaw_rad), np.array([self.x_m, self.y_m, 0.0]))
+
+    def moved(self, dx_m: float = 0.0, dy_m: float = 0.0, turn_rad: float = 0.0) -> GraspFrame:
+        """Shifted along the world's axes and turned about its own origin."""
+        return GraspFrame(self.x_m + dx_m, self.y_m + dy_m, self.yaw_rad + turn_rad)
+
+    def shifted_inside(self, shift_grasp_m: Array) -> GraspFrame:
+        """Shifted by a vector (2,) given in the grasp frame itself."""
+        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        x, y = shift_grasp_m
+        return self.moved(float(c * x - s * y), float(s * x + c * y))
+
+
+class Motion:
+    """The hand and the positioner as one thing that moves.
+
+    Args:
+        bench: connected.
+        supervisor: looks at every cycle.
+    """
+
+    def __init__(self, bench: Bench, supervisor: SafetySupervisor) -> None:
+        self.bench, self.supervisor = bench, supervisor
+        self._base_q = bench.perception.base_q.copy()
+        self._targets_rad: dict[str, float] = {}
+
+    # --- time --------------------------------------------------------------------------------------------------
+
+    @property
+    def cycle_s(self) -> float:
+        """Length of a cycle."""
+        return self.bench.cycle_ns / NANOSECONDS
+
+    def tick(self) -> None:
+        """One cycle, looked at by the supervisor.
+
+        Raises:
+            SafetyError: a limit is passed.
+            DeviceError: a device failed.
+        """
+        self.bench.cycle()
+        seen = self.bench.perception
+        self.supervisor.check(
+            Situation(
+                stamp_ns=self.bench.clock.now_ns(),
+                hand_stamp_ns=seen.hand_stamp_ns,
+                loads_N=seen.loads_N() if seen.ready else {},
+                world_T_palm=seen.world_T_palm if seen.ready else None,
+            )
+        )
+
+    def wait(self, duration_s: float) -> None:
+        """Cycles for a time."""
+        for _ in range(self.cycles(duration_s)):
+            self.tick()
+
+    def cycles(self, duration_s: float) -> int:
+        """Whole cycles in a duration, at least one."""
+        return max(1, round(duration_s / self.cycle_s))
+
+    # --- the positioner ----------------------------------------------------------------------------------------
+
+    def base_joints(self, grasp: GraspFrame, closing: Closing, above_m: float = 0.0) -> Array:
+        """Positioner joints that put the palm over a grasp frame, wrist straight, near the present yaw."""
+        raised = Pose3(Rot3(), np.array([0.0, 0.0, above_m]))
+        world_T_palm = raised * grasp.pose * closing.grasp_T_palm
+        mount_T_forearm = self.bench.world_T_mount.inverse() * world_T_palm * _STRAIGHT_WRIST.inverse()
+        return np.asarray(mount_joints(mount_T_forearm, float(self._base_q[3])))
+
+    def set_base(self, q: Array) -> None:
+        """New positioner target, shape (6,), metres and radians."""
+        self._base_q = np.asarray(q, dtype=float)
+        self.bench.base.set_target(self._base_q)
+
+    def move_base(self, q: Array, speed_m_s: float, turn_rad_s: float, until: Callable[[], bool] | None = None) -> bool:
+        """Straight, smooth move of the positioner's joints.
+
+        Args:
+            q: where to, shape (6,).
+            speed_m_s, turn_rad_s: mean speeds; the slower of the two paces the move.
+            until: asked after every cycle; a yes ends the move on the spot.
+
+        Returns:
+            Whether the end was reached.
+        """
+        start, scale = self._base_q, self.supervisor.speed_scale
+        travel_s = float(np.linalg.norm(q[:3] - start[:3])) / (speed_m_s * scale)
+        turn_s = float(np.max(np.abs(q[3:] - start[3:]))) / (turn_rad_s * scale)
+        count = self.cycles(max(travel_s, turn_s))
+        for step in range(1, count + 1):
+            self.set_base(start + smooth(step / count) * (q - start))
+            self.tick()
+            if until is not None and until():
+                return False
+        return True
+
+    def follow(self, pose_at: Callable[[float], Array], duration_s: float, each: Callable[[], None]) -> None:
+        """Positioner joints as a function of smooth progress 0..1; ``each`` acts before every cycle."""
+        count = self.cycles(duration_s / self.supervisor.speed_scale)
+        for step in range(1, count + 1):
+            self.set_base(pose_at(smooth(step / count)))
+            each()
+            self.tick()
+
+    # --- the fingers -------------------------------------------------------------------------------------------
+
+    def set_fingers(self, closing: Closing, progress: Mapping[str, float]) -> None:
+        """Targets of the fingers at their progress on the closing's lines; the wrist stays straight."""
+        targets = dict(_HOLD_WRIST)
+        for finger in FINGERS:
+            targets.update(closing.joints(finger, progress[finger]))
+        self._targets_rad = targets
+        self.bench.hand.set_targets(targets)
+
+    def blend_fingers(self, closing: Closing, progress: Mapping[str, float], duration_s: float) -> None:
+        """From the present targets to those at ``progress``, straight in joint space."""
+        start = self._targets_rad or self._measured_targets(closing, progress)
+        self.set_fingers(closing, progress)
+        end = self._targets_rad
+        count = self.cycles(duration_s / self.supervisor.speed_scale)
+        for step in range(1, count + 1):
+            share = step / count
+            self.bench.hand.set_targets({name: (1 - share) * start[name] + share * end[name] for name in end})
+            self.tick()
+
+    def _measured_targets(self, closing: Closing, progress: Mapping[str, float]) -> dict[str, float]:
+        """Where the motors stand now, for the names that ``progress`` will command."""
+        joints = dict(zip(JOINTS, self.bench.perception.joints_rad.tolist(), strict=True))
+        for finger in FINGERS[:4]:
+            joints[f"{finger}J0"] = joints[f"{finger}J1"] + joints[f"{finger}J2"]
+        names = [*_HOLD_WRIST, *(name for finger in FINGERS for name in closing.joints(finger, progress[finger]))]
+        return {name: joints[name] for name in names}
+
+    def loads_N(self) -> dict[str, float]:
+        """Contact force on each fingertip, newest sample."""
+        return self.bench.perception.loads_N()
+
+
+def smooth(share: float) -> float:
+    """Progress with zero speed at both ends (cubic)."""
+    return share * share * (3.0 - 2.0 * share)

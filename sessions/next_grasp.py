@@ -1,0 +1,142 @@
+"""Where to grasp next, as far as the hand's own contacts tell it.
+
+The first grasps of a session, and all grasps after the estimation has lost the object, follow a fixed rule: the grasp
+frame goes where the last contacts say that the object is, the yaw alternates between both sides of the arm's window,
+the closings alternate too. :mod:`sessions.explorer` chooses better once there is an estimate to choose by.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from gtsam import Pose3
+from pydantic import Field, model_validator
+
+from drivers.shadow.closing import PRESHAPES
+from sessions.grasp_cycle import GraspPlan
+from sessions.motion import GraspFrame
+from tactile_lab.geometry.contacts import Array, Grasp
+from tactile_lab.geometry.poses import planar, transform_points
+from tactile_lab.strict_yaml import StrictModel
+
+
+class PlanSettings(StrictModel):
+    """What may be grasped, and how.
+
+    Attributes:
+        closings: closings to alternate between.
+        contact_heights_m: heights of the fingertip centres above the table, taken in turn.
+        yaw_window_rad: lowest and highest yaw of the grasp frame that the arm can reach.
+        start_m: where the object is expected before the first grasp, world x, y.
+        turn_rad: smallest and largest re-orientation.
+        return_m: largest step back toward ``start_m`` while the object is carried.
+    """
+
+    closings: tuple[str, ...] = ("pinch", "radial")
+    contact_heights_m: tuple[float, ...] = Field(default=(0.022,), min_length=1)
+    yaw_window_rad: tuple[float, float] = (-1.31, 1.31)
+    start_m: tuple[float, float] = (0.0, 0.0)
+    turn_rad: tuple[float, float] = (0.23, 0.79)
+    return_m: float = Field(default=0.03, ge=0.0)
+
+    @model_validator(mode="after")
+    def _sensible(self) -> PlanSettings:
+        if not self.closings or (unknown := sorted(set(self.closings) - set(PRESHAPES))):
+            raise ValueError(f"closings {unknown} are not known; choose from {', '.join(PRESHAPES)}")
+        if not all(0.015 <= height_m <= 0.12 for height_m in self.contact_heights_m):
+            raise ValueError("contact heights lie between 0.015 and 0.12 m")
+        if not self.yaw_window_rad[0] < self.yaw_window_rad[1]:
+            raise ValueError("the yaw window's first value must be the smaller one")
+        if not 0.0 <= self.turn_rad[0] <= self.turn_rad[1]:
+            raise ValueError("the re-orientation's first value must be the smaller one, and not negative")
+        return self
+
+
+_TYPICAL_HALF_WIDTH_m = 0.030  # between one side's contacts and the middle, where only one side touches
+_MISSED_SIDE_m = {"FF": -0.012, "MF": -0.004, "RF": 0.004, "LF": 0.012}  # a finger that met nothing: object is aside
+
+
+def contact_centre(grasp: Grasp, plan: GraspPlan) -> Array:
+    """Where the middle of the object is, world x, y, from one grasp's contacts alone.
+
+    Across the hand it is midway between thumb and fingers; along it, midway between first and little finger where
+    they close from the sides, else away from the fingers that met nothing.
+    """
+    frame = plan.frame.pose
+    points_m = transform_points(frame.inverse(), grasp.points_world_m)[:, :2]
+    touched = dict(zip((contact.finger for contact in grasp.contacts), points_m, strict=True))
+    centre_m = np.array([_across(touched), _along(touched, plan.closing), 0.0])
+    return np.asarray(transform_points(frame, centre_m[None])[0, :2])
+
+
+def _across(touched: dict[str, Array]) -> float:
+    fronts = [point[0] for finger, point in touched.items() if finger != "TH"]
+    match bool(fronts), "TH" in touched:
+        case True, True:
+            return float(max(fronts) + touched["TH"][0]) / 2
+        case True, False:
+            return float(np.mean(fronts)) - _TYPICAL_HALF_WIDTH_m
+        case False, True:
+            return float(touched["TH"][0]) + _TYPICAL_HALF_WIDTH_m
+        case _:
+            return 0.0
+
+
+def _along(touched: dict[str, Array], closing: str) -> float:
+    if not touched:
+        return 0.0
+    if closing == "radial" and {"FF", "LF"} <= set(touched):
+        return float(touched["FF"][1] + touched["LF"][1]) / 2
+    return sum(shift for finger, shift in _MISSED_SIDE_m.items() if finger not in touched)
+
+
+class FixedRule:
+    """Plans grasps and re-orientations without an estimate of the shape.
+
+    Args:
+        settings: what may be grasped.
+        rng: the session's own source of chance.
+    """
+
+    def __init__(self, settings: PlanSettings, rng: np.random.Generator) -> None:
+        self.settings, self._rng = settings, rng
+        self.centre_m: Array = np.array(settings.start_m)
+        """Where the object is thought to be, world x, y."""
+
+    def plan(self, index: int) -> GraspPlan:
+        """The grasp number ``index``, from 0."""
+        low, high = self.settings.yaw_window_rad
+        side = 0.53 if index % 2 else -0.53
+        yaw = (low + high) / 2 + (side + self._rng.uniform(-0.19, 0.19)) * (high - low) / 2
+        frame = GraspFrame(float(self.centre_m[0]), float(self.centre_m[1]), float(yaw))
+        return GraspPlan(frame, self.closing(index), self.height_m(index), "alternating yaw")
+
+    def closing(self, index: int) -> str:
+        """The closing whose turn it is: each twice, so that it meets both sides of the window."""
+        return self.settings.closings[(index // 2) % len(self.settings.closings)]
+
+    def height_m(self, index: int) -> float:
+        """The contact height whose turn it is."""
+        return self.settings.contact_heights_m[index % len(self.settings.contact_heights_m)]
+
+    def turn(self, yaw_rad: float) -> float:
+        """A re-orientation that keeps the hand in its yaw window."""
+        low, high = self.settings.yaw_window_rad
+        least, most = self.settings.turn_rad
+        size = float(self._rng.uniform(least, most))
+        if yaw_rad + size <= high:
+            return size
+        if yaw_rad - size >= low:
+            return -size
+        room_up, room_down = max(0.0, high - yaw_rad), max(0.0, yaw_rad - low)
+        return room_up if room_up >= room_down else -room_down
+
+    def step_back(self, centre_m: Array) -> Array:
+        """Shift (2,) in the world that brings an object at ``centre_m`` nearer to where it started."""
+        step_m = np.array(self.settings.start_m) - centre_m
+        size_m = float(np.linalg.norm(step_m))
+        return np.asarray(step_m * min(1.0, self.settings.return_m / size_m)) if size_m > 0 else step_m
+
+    def carried(self, centre_m: Array, hand_motion_world: Pose3) -> None:
+        """Take note of where the object's middle was before the hand carried it."""
+        motion = planar(hand_motion_world)
+        self.centre_m = np.asarray(motion.transformFrom(centre_m))

@@ -1,0 +1,171 @@
+"""Safety: limits, freshness, the way to stop, and Ctrl+C."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from gtsam import Pose3, Rot3
+
+from sessions.safety import InterruptGuard, SafetySettings, SafetySupervisor, Situation
+from tactile_lab.errors import DeviceError, SafetyError
+
+CYCLE_ns = 10_000_000
+
+
+@dataclass
+class StoppableBench:
+    """Counts stops and the cycles after them; can fail."""
+
+    failure: Exception | None = None
+    calls: list[str] = field(default_factory=list)
+
+    def stop(self) -> None:
+        self.calls.append("stop")
+
+    def cycle(self) -> None:
+        self.calls.append("cycle")
+        if self.failure is not None:
+            raise self.failure
+
+
+def supervisor(**settings: object) -> SafetySupervisor:
+    return SafetySupervisor(StoppableBench(), SafetySettings(**settings), CYCLE_ns)  # type: ignore[arg-type]
+
+
+def palm_at(x: float, y: float, z: float) -> Pose3:
+    return Pose3(Rot3(), np.array([x, y, z]))
+
+
+def situation(
+    stamp_ns: int = 0,
+    hand_stamp_ns: int | None = 0,
+    loads_N: dict[str, float] | None = None,
+    palm: Pose3 | None = None,
+) -> Situation:
+    return Situation(stamp_ns, hand_stamp_ns, loads_N or {}, palm or palm_at(0, 0, 0.2))
+
+
+def test_an_ordinary_cycle_passes() -> None:
+    supervisor().check(situation(loads_N={"FF": 0.5, "TH": 2.0}))
+
+
+@pytest.mark.parametrize("load_N", [6.1, 50.0, float("inf"), float("nan")])
+def test_too_much_force_stops_and_names_the_finger(load_N: float) -> None:
+    with pytest.raises(SafetyError, match="TH: fingertip force"):
+        supervisor().check(situation(loads_N={"FF": 0.5, "TH": load_N}))
+
+
+def test_force_at_the_limit_passes() -> None:
+    supervisor(force_limit_N=3.0).check(situation(loads_N={"FF": 3.0}))
+
+
+def test_low_palm_stops() -> None:
+    with pytest.raises(SafetyError, match="palm only 50 mm above the table"):
+        supervisor().check(situation(palm=palm_at(0, 0, 0.05)))
+
+
+def test_palm_outside_the_workspace_stops() -> None:
+    with pytest.raises(SafetyError, match="palm 500 mm from the workspace centre"):
+        supervisor().check(situation(palm=palm_at(0.3, 0.4, 0.2)))
+
+
+def test_workspace_is_about_its_own_centre() -> None:
+    supervisor(workspace_centre_m=(0.3, 0.4)).check(situation(palm=palm_at(0.3, 0.4, 0.2)))
+
+
+def test_stale_hand_stops_after_the_allowed_cycles() -> None:
+    watch = supervisor(stale_cycles=5)
+    watch.check(situation(stamp_ns=5 * CYCLE_ns, hand_stamp_ns=0))
+    with pytest.raises(SafetyError, match="no fresh status for 60 ms"):
+        watch.check(situation(stamp_ns=6 * CYCLE_ns, hand_stamp_ns=0))
+
+
+def test_stale_time_rules_on_fast_cycles() -> None:
+    watch = SafetySupervisor(StoppableBench(), SafetySettings(stale_s=0.010, stale_cycles=2), cycle_ns=1_000_000)
+    watch.check(situation(stamp_ns=10_000_000, hand_stamp_ns=0))
+    with pytest.raises(SafetyError, match="no fresh status"):
+        watch.check(situation(stamp_ns=11_000_000, hand_stamp_ns=0))
+
+
+def test_hand_that_never_answers_stops() -> None:
+    watch = supervisor(stale_cycles=5)
+    watch.check(situation(stamp_ns=1000, hand_stamp_ns=None))
+    with pytest.raises(SafetyError, match="no fresh status"):
+        watch.check(situation(stamp_ns=1000 + 6 * CYCLE_ns, hand_stamp_ns=None))
+
+
+def test_session_time_runs_out() -> None:
+    watch = supervisor(session_limit_s=10.0)
+    assert watch.time_over(10**12) is None  # nothing has begun
+    watch.check(situation(stamp_ns=5_000_000_000, hand_stamp_ns=5_000_000_000))
+    assert watch.time_over(15_000_000_000) is None
+    assert "session limit of 10 s" in str(watch.time_over(15_000_000_001))
+
+
+def test_object_far_away_is_lost() -> None:
+    watch = supervisor()
+    assert watch.object_lost(0.15, 0.19) is None
+    assert watch.object_lost(0.18, 0.24) == "the object is 30 cm from the workspace centre"
+
+
+def test_object_is_lost_after_empty_grasps_in_a_row() -> None:
+    watch = supervisor(empty_grasps=2)
+    for contacts in (0, 3, 0):
+        watch.count_contacts(contacts)
+    assert watch.object_lost(0.0, 0.0) is None
+    watch.count_contacts(0)
+    assert watch.object_lost(0.0, 0.0) == "no contact in 2 grasps in a row"
+
+
+def test_first_approach_is_slow() -> None:
+    watch = supervisor(first_moves_scale=0.4)
+    assert watch.speed_scale == pytest.approx(0.4)
+    watch.approached()
+    assert watch.speed_scale == 1.0
+
+
+def test_stop_sends_zero_demands_for_several_cycles() -> None:
+    bench = StoppableBench()
+    assert SafetySupervisor(bench, SafetySettings(), CYCLE_ns).stop() == ()
+    assert bench.calls == ["stop", *["cycle"] * 5]
+
+
+def test_stop_tells_what_failed_and_never_raises() -> None:
+    bench = StoppableBench(failure=DeviceError("link is down", where="hand"))
+    assert SafetySupervisor(bench, SafetySettings(), CYCLE_ns).stop() == ("hand: link is down",)
+
+
+def test_first_interrupt_is_noted_second_is_immediate() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with InterruptGuard() as guard:
+        assert not guard.requested
+        os.kill(os.getpid(), signal.SIGINT)
+        assert guard.requested
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_handler_comes_back_after_an_error() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(ValueError, match="broken"), InterruptGuard():
+        raise ValueError("broken")
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_guard_does_nothing_outside_the_main_thread() -> None:
+    seen: list[bool] = []
+
+    def work() -> None:
+        with InterruptGuard() as guard:
+            seen.append(guard.requested)
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    worker.join()
+    assert seen == [False]
