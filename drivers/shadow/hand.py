@@ -1,0 +1,296 @@
+"""The Shadow Dexterous Hand on its palm's process image: lifecycle, cyclic exchange, limits and health."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.links import Datagram, Link
+from drivers.shadow.hand_samples import HandDecoder, HandSample
+from drivers.shadow.hand_settings import HandSettings
+from drivers.shadow.joint_calibration import JointCalibration
+from drivers.shadow.motor_data import ToMotor
+from drivers.shadow.motor_polling import MotorPolling
+from drivers.shadow.motor_watch import Fault, MotorWatch
+from drivers.shadow.motors import MotorMap
+from drivers.shadow.palm_codec import MOTORS, EdcCommand, PalmCommand, encode_command
+from drivers.shadow.position_control import PositionControl
+from drivers.shadow.tactile_requests import TactileRotation
+from tactile_lab.clock import NANOSECONDS, Clock
+from tactile_lab.errors import CodecError, DeviceError
+from tactile_lab.geometry.contacts import Array
+
+__all__ = ["HandCounters", "HandDecoder", "HandSample", "HandSettings", "ShadowHand"]
+
+MOTOR_PATIENCE_ns = 20_000_000
+"""A motor halts itself when it has seen no demand for 20 ms."""
+
+_NO_DEMAND = np.zeros(MOTORS, dtype=np.int16)
+
+
+@dataclass
+class HandCounters:
+    """Cycles since connecting.
+
+    Attributes:
+        cycles: exchanges.
+        lost: exchanges without a valid status.
+        lost_in_a_row: the present run of them.
+        malformed: messages that were no status of this palm.
+    """
+
+    cycles: int = 0
+    lost: int = 0
+    lost_in_a_row: int = 0
+    malformed: int = 0
+
+
+class ShadowHand:
+    """The hand.
+
+    Nothing moves until :meth:`set_targets`. A serious motor flag, a hot motor or a run of lost cycles stops the hand:
+    demands become zero and every further :meth:`exchange` raises, until :meth:`resume`.
+
+    Args:
+        link: whole process images, 70 bytes out and 232 bytes in.
+        clock: the session's clock.
+        calibration: of the hand's joints.
+        settings: see :class:`HandSettings`.
+        motors: which motor pulls which joint; the simulated hand's (rh_E_v3) unless given. A real hand needs its own.
+    """
+
+    def __init__(
+        self,
+        link: Link,
+        clock: Clock,
+        calibration: JointCalibration,
+        settings: HandSettings | None = None,
+        motors: MotorMap | None = None,
+    ) -> None:
+        self._link, self._clock = link, clock
+        self._settings = settings or HandSettings()
+        motors = motors or MotorMap.load()
+        self._control = PositionControl(motors, self._settings.gains)
+        self._watch = MotorWatch(motors, self._settings.heat, link.name)
+        self._decoder = HandDecoder(calibration)
+        self._connected = False
+        self._reset()
+
+    def _reset(self) -> None:
+        """As new: nothing received, nothing sent, no target."""
+        self._decoder.restart()
+        self._polling, self._tactile = MotorPolling(), TactileRotation(self._settings.tactile)
+        self._counters = HandCounters()
+        self._last: HandSample | None = None
+        self._sent_ns: int | None = None
+        self._connected_ns = self._demands_since_ns = self._clock.now_ns()
+        self.resume()
+
+    # --- lifecycle ---------------------------------------------------------------------------------------------
+
+    def connect(self) -> None:
+        """Open the link, send the all-zero image and wait for the palm's first status. All or nothing, repeatable.
+
+        Raises:
+            DeviceError: the link does not open or the palm does not answer.
+        """
+        if self._connected:
+            return
+        self._link.open()
+        try:
+            self._reset()
+            self._wake_palm()
+        except BaseException:
+            self._link.close()
+            raise
+        self._connected = True
+
+    def close(self) -> None:
+        """Send zero demands for several cycles and close the link. Idempotent.
+
+        Raises:
+            DeviceError: the device failed meanwhile; the link is closed all the same.
+        """
+        if not self._connected:
+            return
+        self._connected = False
+        try:
+            for _ in range(self._settings.close_cycles):
+                self._cycle(_NO_DEMAND)
+                self._pause()
+        finally:
+            self._link.close()
+
+    def _wake_palm(self) -> None:
+        self._link.send(encode_command(PalmCommand()))
+        self._take(self._link.receive())
+        for _ in range(self._settings.connect_tries):
+            self._pause()
+            if (sample := self._cycle(_NO_DEMAND)) is not None:
+                self._last = sample
+                return
+        raise DeviceError(
+            f"the palm gave no valid status in {self._settings.connect_tries} cycles",
+            where=self._link.name,
+            hint="Check the hand's power and its cable",
+        )
+
+    def _pause(self) -> None:
+        self._clock.sleep_until_ns(self._clock.now_ns() + round(self._settings.cycle_s * NANOSECONDS))
+
+    # --- motion ------------------------------------------------------------------------------------------------
+
+    def set_targets(self, targets_rad: Mapping[str, float]) -> None:
+        """Set targets by driven joint (J0 for J1 + J2), clamped to the joint limits; the others keep theirs.
+
+        Raises:
+            DeviceError: a name is not a driven joint, or a target is not a finite number. Nothing is changed then.
+        """
+        self._control.set_targets(targets_rad)
+
+    @property
+    def targets_rad(self) -> dict[str, float]:
+        """The targets that are set, by driven joint, radians."""
+        return self._control.targets_rad
+
+    def stop(self) -> None:
+        """Zero demands in every exchange from now on, until :meth:`resume`. Never raises.
+
+        Without further exchanges the motors halt themselves within 20 ms.
+        """
+        self._stopped = True
+
+    def resume(self) -> None:
+        """Take back a stop or a fault. Targets are forgotten, so that nothing moves before new ones are set."""
+        self._stopped = False
+        self._fault: Fault | None = None
+        self._counters.lost_in_a_row = 0
+        self._motion_since_ns: int | None = None
+        self._control.clear()
+
+    # --- the cycle ---------------------------------------------------------------------------------------------
+
+    def exchange(self) -> HandSample:
+        """One cycle: send the demands, receive the status.
+
+        Returns:
+            The new sample, or after a lost cycle the last good one, marked as not fresh.
+
+        Raises:
+            DeviceError: not connected; or the hand had stopped itself before this cycle. The message names the motor.
+        """
+        if not self._connected or self._last is None:
+            raise DeviceError("not connected", where=self._link.name, hint="Connect the hand first")
+        fault = self._fault
+        sample = self._cycle(self._demand(self._last))
+        if sample is None:
+            self._last = replace(self._last, fresh=False)
+            self._count_loss()
+        else:
+            self._last, self._counters.lost_in_a_row = sample, 0
+        if fault is not None:
+            raise fault.error()
+        return self._last
+
+    def receive(self, datagram: Datagram) -> HandSample | None:
+        """Decode one status without any other effect; None when the palm did not write it or it is a repetition.
+
+        Raises:
+            CodecError: not a status of the 0220 palm.
+        """
+        return self._decoder.receive(datagram)
+
+    def _cycle(self, demand: NDArray[np.int16]) -> HandSample | None:
+        now_ns = self._clock.now_ns()
+        if self._sent_ns is None or now_ns - self._sent_ns > MOTOR_PATIENCE_ns:
+            self._demands_since_ns = now_ns
+        which_motors, kind = self._polling.next(now_ns)
+        self._link.send(
+            encode_command(
+                PalmCommand(
+                    edc_command=EdcCommand.SENSOR_DATA,
+                    from_motor_data_type=kind,
+                    which_motors=which_motors,
+                    to_motor_data_type=ToMotor.DEMAND_PWM,
+                    motor_data=demand,
+                    tactile_data_type=self._tactile.next(),
+                )
+            )
+        )
+        self._sent_ns = now_ns
+        self._counters.cycles += 1
+        return self._take(self._link.receive())
+
+    def _take(self, datagrams: list[Datagram]) -> HandSample | None:
+        newest = None
+        for datagram in datagrams:
+            try:
+                sample = self.receive(datagram)
+            except CodecError:
+                self._counters.malformed += 1  # shown by health(); the cycle counts as lost
+                continue
+            if sample is not None:
+                newest = sample
+                self._fault = self._fault or self._watch.fault(sample.status, settling=self._settling)
+        return newest
+
+    def _demand(self, last: HandSample) -> NDArray[np.int16]:
+        if self._stopped or self._fault is not None or self._counters.lost_in_a_row >= self._settings.blind_after:
+            self._motion_since_ns = None
+            return _NO_DEMAND
+        return self._control.demand(last.joints_rad, self._limit_share(last))
+
+    def _limit_share(self, last: HandSample) -> Array:
+        if self._motion_since_ns is None and self._control.active:
+            self._motion_since_ns = self._clock.now_ns()
+        return np.minimum(self._soft_start_share(), self._watch.pwm_share(last.motor.temperature_C))
+
+    def _soft_start_share(self) -> float:
+        rise_ns = self._settings.soft_start_s * NANOSECONDS
+        if self._motion_since_ns is None or not rise_ns:
+            return 1.0
+        return min((self._clock.now_ns() - self._motion_since_ns) / rise_ns, 1.0)
+
+    # --- what can go wrong -------------------------------------------------------------------------------------
+
+    @property
+    def _settling(self) -> bool:
+        flowing_ns = self._clock.now_ns() - self._demands_since_ns
+        return flowing_ns < self._settings.demand_grace_s * NANOSECONDS
+
+    def _count_loss(self) -> None:
+        counters = self._counters
+        counters.lost += 1
+        counters.lost_in_a_row += 1
+        self._demands_since_ns = self._clock.now_ns()
+        if counters.lost_in_a_row >= self._settings.lost_limit and self._fault is None:
+            self._fault = Fault(
+                f"stopped after {counters.lost_in_a_row} cycles in a row without a valid status",
+                self._link.name,
+                "Check the cable and the hand's power, then connect again",
+            )
+
+    # --- state for people --------------------------------------------------------------------------------------
+
+    @property
+    def counters(self) -> HandCounters:
+        """A copy of the counters."""
+        return replace(self._counters)
+
+    def health(self) -> tuple[str, ...]:
+        """What is wrong with the hand, in words; empty when all is well."""
+        problems = []
+        if self._fault is not None:
+            problems.append(str(self._fault.error()))
+        if self._counters.lost:
+            problems.append(f"{self._counters.lost} of {self._counters.cycles} cycles lost")
+        if self._counters.malformed:
+            problems.append(f"{self._counters.malformed} messages were no status of a 0220 palm")
+        if self._decoder.counts.stale:
+            problems.append(f"{self._decoder.counts.stale} statuses were repetitions of old ones")
+        if self._last is not None:
+            problems += self._watch.problems(self._last, self._connected_ns)
+        return tuple(problems)

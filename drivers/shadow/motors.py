@@ -1,0 +1,142 @@
+"""The 20 motors: which joint each one pulls, and how the host drives it to an angle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from drivers.shadow.kinematics import JOINT_INDEX, JOINTS, JOINT_LIMITS_rad
+from drivers.shadow.motor_data import MAX_PWM
+from drivers.shadow.palm_codec import MOTORS
+from tactile_lab import strict_yaml
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.strict_yaml import StrictModel
+
+DRIVEN_JOINTS: tuple[str, ...] = (
+    *("FFJ0", "FFJ3", "FFJ4", "MFJ0", "MFJ3", "MFJ4", "RFJ0", "RFJ3", "RFJ4", "LFJ0", "LFJ3", "LFJ4", "LFJ5"),
+    *("THJ1", "THJ2", "THJ3", "THJ4", "THJ5", "WRJ1", "WRJ2"),
+)
+"""What can be driven, one name a motor; J0 is the coupled pair J1 + J2 of a finger."""
+
+
+def angles_of_driven(name: str) -> tuple[str, ...]:
+    """The joints whose angles add up to the driven joint's: two for a J0, else the joint itself."""
+    return (f"{name[:2]}J1", f"{name[:2]}J2") if name.endswith("J0") else (name,)
+
+
+class _MotorFile(StrictModel):
+    motors: dict[str, int]
+    reversed: tuple[str, ...] = ()
+
+
+class MotorMap:
+    """Which motor pulls which joint.
+
+    Args:
+        numbers: motor number 0 to 19 of each of :data:`DRIVEN_JOINTS`.
+        backwards: driven joints that a positive duty cycle turns towards smaller angles.
+        where: the file, for error messages.
+
+    Attributes:
+        names: driven joint of each motor, by motor number.
+        numbers: motor number of each driven joint.
+        sign: +1 or -1 by motor number, shape (20,).
+        from_joints: matrix, shape (20, 24), that takes joint angles to those of the driven joints by motor number.
+        limits_rad: lower and upper limit by motor number, shape (20, 2), radians.
+
+    Raises:
+        ConfigurationError: a joint or a motor is missing, unknown or named twice.
+    """
+
+    def __init__(self, numbers: Mapping[str, int], backwards: tuple[str, ...] = (), where: str = "motor map") -> None:
+        _check_one_to_one(numbers, backwards, where)
+        self.numbers: Mapping[str, int] = dict(numbers)
+        self.names: tuple[str, ...] = tuple(sorted(numbers, key=lambda name: numbers[name]))
+        self.sign: NDArray[np.int64] = np.array([-1 if name in backwards else 1 for name in self.names])
+        self.from_joints = self._matrix()
+        self.limits_rad: Array = self.from_joints @ JOINT_LIMITS_rad
+
+    @classmethod
+    def load(cls, path: Path | None = None) -> MotorMap:
+        """Read a motor map.
+
+        Args:
+            path: the hand's file; None for the simulated hand's, whose numbers are those of Shadow's rh_E_v3.
+
+        Raises:
+            ConfigurationError: the file cannot be used.
+        """
+        if path is None:
+            packaged = resources.files("tactile_lab") / "rigs" / "calibrations" / "simulated-hand" / "motors.yaml"
+            with resources.as_file(packaged) as file:
+                return cls.load(file)
+        content = strict_yaml.load_model(path, _MotorFile)
+        return cls(content.motors, content.reversed, str(path))
+
+    def _matrix(self) -> Array:
+        matrix = np.zeros((MOTORS, len(JOINTS)))
+        for motor, name in enumerate(self.names):
+            matrix[motor, [JOINT_INDEX[joint] for joint in angles_of_driven(name)]] = 1.0
+        return matrix
+
+
+def _check_one_to_one(numbers: Mapping[str, int], backwards: tuple[str, ...], where: str) -> None:
+    hint = f"Name each of the {MOTORS} motors once: {', '.join(DRIVEN_JOINTS)}"
+    if missing := sorted(set(DRIVEN_JOINTS) - set(numbers)):
+        raise ConfigurationError(f"no motor for {', '.join(missing)}", where=where, hint=hint)
+    if unknown := sorted((set(numbers) | set(backwards)) - set(DRIVEN_JOINTS)):
+        raise ConfigurationError(f"no driven joint called {', '.join(unknown)}", where=where, hint=hint)
+    if sorted(numbers.values()) != list(range(MOTORS)):
+        raise ConfigurationError(f"motor numbers are not 0 to {MOTORS - 1}, each once", where=where, hint=hint)
+
+
+class JointGains(StrictModel):
+    """Host position control of one joint.
+
+    Attributes:
+        pwm_per_rad: duty cycle counts per radian of error.
+        deadband_rad: errors within it give no demand; larger ones count from its edge.
+        max_pwm: largest duty cycle, counts of 1023.
+    """
+
+    pwm_per_rad: float = Field(gt=0.0)
+    deadband_rad: float = Field(ge=0.0, default=0.003)
+    max_pwm: float = Field(gt=0.0, le=MAX_PWM, default=600.0)
+
+
+class GainTable(StrictModel):
+    """Gains by class of joint, with exceptions by name.
+
+    The defaults are the magnitudes that Shadow delivers with hand 378 for control of the duty cycle.
+
+    Attributes:
+        coupled: J0 of the fingers.
+        flexion: J3 of the fingers.
+        spread: J4 of the fingers and LFJ5.
+        thumb: THJ1 to THJ5.
+        wrist: WRJ1 and WRJ2.
+        exceptions: gains of single driven joints.
+    """
+
+    coupled: JointGains = JointGains(pwm_per_rad=4500.0)
+    flexion: JointGains = JointGains(pwm_per_rad=6000.0)
+    spread: JointGains = JointGains(pwm_per_rad=7100.0, deadband_rad=0.004, max_pwm=500.0)
+    thumb: JointGains = JointGains(pwm_per_rad=5500.0, max_pwm=500.0)
+    wrist: JointGains = JointGains(pwm_per_rad=9000.0, deadband_rad=0.004)
+    exceptions: dict[str, JointGains] = Field(default_factory=dict)
+
+    def of(self, name: str) -> JointGains:
+        """Gains of one driven joint."""
+        if name in self.exceptions:
+            return self.exceptions[name]
+        if name.startswith("TH"):
+            return self.thumb
+        if name.startswith("WR"):
+            return self.wrist
+        return {"J0": self.coupled, "J3": self.flexion}.get(name[2:], self.spread)
