@@ -94,7 +94,7 @@ class FingertipCalibration(StrictModel):
             no contact there is valid; the shell on the Shadow hand covers the palm side only, y up to 5.1 mm.
         force_sigma_N, moment_sigma_Nm: noise of one sample, per axis.
         force_drift_N, moment_drift_Nm: what may have crept in since the tare, per axis, one standard deviation.
-        point_floor_m, normal_floor_rad: error that no averaging removes (joint angles, shape of the shell), per axis.
+        point_floor_m, normal_floor_rad: error of the shell itself (shape, mounting) that no averaging removes, per axis.
     """
 
     semi_axes_m: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
@@ -108,8 +108,8 @@ class FingertipCalibration(StrictModel):
     moment_sigma_Nm: PositiveFloat = 1e-3 / 64
     force_drift_N: float = Field(default=0.01, ge=0.0)
     moment_drift_Nm: float = Field(default=5e-5, ge=0.0)
-    point_floor_m: float = Field(default=0.0005, ge=0.0)
-    normal_floor_rad: float = Field(default=0.03, ge=0.0)
+    point_floor_m: float = Field(default=0.0003, ge=0.0)
+    normal_floor_rad: float = Field(default=0.02, ge=0.0)
 
 
 def _known_fingers(fingertips: dict[str, FingertipCalibration]) -> dict[str, FingertipCalibration]:

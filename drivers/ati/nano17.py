@@ -41,7 +41,7 @@ class Nano17(ForceTip):
         super().__init__(finger, calibration, settings)
         self.foreign_datagrams = 0
         self._link, self._clock, self._box = link, clock, settings
-        self._connected_ns: int | None = None
+        self._connected = False
 
     def connect(self) -> None:
         """Open the link, end any stream an earlier client left running, and start ours. All or nothing; repeatable.
@@ -49,7 +49,7 @@ class Nano17(ForceTip):
         Raises:
             DeviceError: the link can not be opened or used.
         """
-        if self._connected_ns is not None:
+        if self._connected:
             return
         self._link.open()
         try:
@@ -58,13 +58,13 @@ class Nano17(ForceTip):
         except DeviceError:
             self._link.close()
             raise
-        self._connected_ns = self._clock.now_ns()
+        self._connected = True
 
     def close(self) -> None:
         """End the stream and close the link; idempotent. A box that is gone already is no error."""
-        if self._connected_ns is None:
+        if not self._connected:
             return
-        self._connected_ns = None
+        self._connected = False
         with contextlib.suppress(DeviceError):  # the link is given up anyway
             self._link.send(rdt_codec.encode_request(Command.STOP))
         self._link.close()
@@ -101,10 +101,8 @@ class Nano17(ForceTip):
     def health(self) -> tuple[str, ...]:
         """As :meth:`ForceTip.health`, and whether the box still sends."""
         problems = list(super().health())
-        if self._connected_ns is not None:
-            last = self.newest.stamp_ns if self.newest else self._connected_ns
-            if (silent := (self._clock.now_ns() - last) / 1e6) > self._box.silent_ms:
-                problems.append(f"no record for {silent:.0f} ms")
+        if self.newest and (silent := (self._clock.now_ns() - self.newest.stamp_ns) / 1e6) > self._box.silent_ms:
+            problems.append(f"no record for {silent:.0f} ms")
         if self.foreign_datagrams:
             problems.append(f"{self.foreign_datagrams} datagrams that are no RDT records")
         return tuple(problems)

@@ -226,7 +226,7 @@ def test_a_tare_is_refused_while_the_hand_moves_or_samples_are_missing(tip: Nano
     stream.feed(BIAS, n=20)
     tip.tare(np.eye(3))
     kept = tip.tare_record
-    stream.feed(BIAS + [0.2, 0, 0, 0, 0, 0], n=10)
+    stream.feed(BIAS + np.array([0.2, 0, 0, 0, 0, 0]), n=10)
     with pytest.raises(DeviceError, match="Hold the hand still"):
         tip.tare(np.eye(3))
     assert tip.tare_record is kept
@@ -268,13 +268,12 @@ def test_a_stuck_sensor_loop_is_noticed(tip: Nano17) -> None:
 def test_silence_is_noticed_by_the_clock(calibration: FingertipCalibration) -> None:
     clock = VirtualClock()
     tip = Nano17("FF", ReplayLink("ft/FF", []), clock, calibration, Nano17Settings())
-    tip.connect()
     assert tip.load_N(np.eye(3)) == 0.0
     assert tip.health() == ("no sample received yet", "not tared")
-    clock.sleep_until_ns(150_000_000)
-    assert "no record for 150 ms" in tip.health()
     tip.update([WrenchSample(clock.now_ns(), np.zeros(6), 1, 7)])
     assert tip.health() == ("not tared",)
+    clock.sleep_until_ns(150_000_000)
+    assert "no record for 150 ms" in tip.health()
 
 
 def test_losses_disorder_and_restarts_are_counted() -> None:
@@ -305,7 +304,7 @@ def test_a_torque_that_never_fits_the_force_makes_the_sensor_faulty(
     tip.tare(np.eye(3))
     _, normal, wrench = pressed(calibration, np.array([0, -1.0, 0.2]), np.zeros(3))
     good = pressed(calibration, np.array([0, -1.0, 0.2]), -normal)[2]
-    bad = good + [0, 0, 0, 0.03, 0, 0]
+    bad = good + np.array([0, 0, 0, 0.03, 0, 0])
     for expected, wrench in ((0, good), (0, bad), (0, bad), (0, bad), (1, bad), (1, bad)):
         tip.begin_capture()
         stream.feed(still + wrench)

@@ -1,0 +1,67 @@
+"""Contact point and normal from a BioTac's electrodes.
+
+Pressing thins the fluid over an electrode and lowers its count. Only such *squeezed* electrodes count: fluid that is
+pushed aside raises the others, which lie where nothing touches. On recordings with the contact normal measured by
+motion capture (19 electrodes, 4030 samples) the skin normal at the point of equation 2.24 errs by 8 to 10 degrees in
+the median with squeezed electrodes and plain weights, the sum of squeezed electrode normals by 9 to 10, and the sum
+over all electrodes by 21 to 27.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.biotac.electrodes import ElectrodeLayout
+from tactile_lab.geometry.contacts import Array
+
+
+@dataclass(frozen=True)
+class ElectrodeContact:
+    """Contacts in the BioTac frame; NaN where no electrode is squeezed.
+
+    Attributes:
+        points_m: on the skin, shape (n, 3).
+        normals: the skin's outward unit normals there, shape (n, 3).
+        squeeze: sum of the counts by which electrodes are squeezed, shape (n,).
+    """
+
+    points_m: Array
+    normals: Array
+    squeeze: Array
+
+
+def squeezed(change: Array, noise_counts: float) -> Array:
+    """How much each electrode is squeezed, counts >= 0, shape as ``change`` (reading minus tare)."""
+    lowered = -np.minimum(change, 0.0)
+    return np.asarray(np.where(lowered > noise_counts, lowered, 0.0))
+
+
+def contact_from_electrodes(
+    change: Array, layout: ElectrodeLayout, *, noise_counts: float = 0.0, power: float = 1.0
+) -> ElectrodeContact:
+    """Weighted mean of the squeezed electrodes' positions, brought out to the skin (eq. 2.24).
+
+    Args:
+        change: electrode readings minus their tare, counts, shape (n, electrodes).
+        layout: of the same number of electrodes.
+        noise_counts: smaller changes are noise.
+        power: exponent of the weights; 1 is best on real recordings.
+    """
+    squeeze = squeezed(change, noise_counts)
+    weights = squeeze**power
+    with np.errstate(invalid="ignore"):
+        inside = weights @ layout.positions_m / weights.sum(axis=1, keepdims=True)
+        points, normals = layout.skin.project(inside)
+    return ElectrodeContact(points, normals, squeeze.sum(axis=1))
+
+
+def force_direction(change: Array, layout: ElectrodeLayout, *, noise_counts: float = 0.0) -> Array:
+    """Unit vectors (n, 3) along the sum of the squeezed electrodes' normals, each weighted by its squeeze.
+
+    The direction out of the finger from which the force comes; NaN where no electrode is squeezed.
+    """
+    pressed = squeezed(change, noise_counts) @ layout.normals
+    with np.errstate(invalid="ignore"):
+        return np.asarray(pressed / np.linalg.norm(pressed, axis=1, keepdims=True))
