@@ -11,6 +11,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -159,7 +160,7 @@ class PalmStatus:
         """Whether the palm wrote this status in time."""
         return self.edc_command == EdcCommand.SENSOR_DATA
 
-    @property
+    @cached_property
     def heard_motors(self) -> NDArray[np.intp]:
         """Numbers of the motors that answered with the stated type, ascending."""
         if self.which_motors not in (0, 1):

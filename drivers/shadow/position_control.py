@@ -30,7 +30,7 @@ class PositionControl:
         self._gain = np.array([each.pwm_per_rad for each in table])
         self._deadband_rad = np.array([each.deadband_rad for each in table])
         self._limit = np.array([each.max_pwm for each in table])
-        self._targets_rad = np.full(MOTORS, np.nan)
+        self._targets_rad, self._is_set = np.zeros(MOTORS), np.zeros(MOTORS, dtype=bool)
 
     def set_targets(self, targets_rad: Mapping[str, float]) -> None:
         """Set targets by driven joint, clamped to the joint limits; joints not named keep theirs.
@@ -46,21 +46,22 @@ class PositionControl:
         if not np.isfinite(wanted_rad).all():
             raise DeviceError("a joint target is not a finite number", where="hand", hint="Check the planned path")
         self._targets_rad[numbers] = np.clip(wanted_rad, *self._motors.limits_rad[numbers].T)
+        self._is_set[numbers] = True
 
     def clear(self) -> None:
         """Forget all targets: no demand until new ones are set."""
-        self._targets_rad.fill(np.nan)
+        self._is_set.fill(False)
 
     @property
     def active(self) -> bool:
         """Whether any target is set."""
-        return bool((self._targets_rad == self._targets_rad).any())
+        return bool(self._is_set.any())
 
     @property
     def targets_rad(self) -> dict[str, float]:
         """The targets that are set, by driven joint, radians."""
-        pairs = zip(self._motors.names, self._targets_rad.tolist(), strict=True)
-        return {name: target for name, target in pairs if target == target}
+        targets_rad = self._targets_rad.tolist()
+        return {self._motors.names[motor]: targets_rad[motor] for motor in np.flatnonzero(self._is_set)}
 
     def demand(self, joints_rad: Array, limit_share: Array | float) -> NDArray[np.int16]:
         """Duty cycle of each motor.
@@ -73,7 +74,8 @@ class PositionControl:
             Counts of 1023, shape (20,), by motor number.
         """
         error_rad = self._targets_rad - self._motors.from_joints @ joints_rad
-        beyond_rad = error_rad - np.clip(error_rad, -self._deadband_rad, self._deadband_rad)
+        beyond_rad = error_rad - np.minimum(np.maximum(error_rad, -self._deadband_rad), self._deadband_rad)
         limit = self._limit * limit_share
-        pwm = np.nan_to_num(np.clip(self._gain * beyond_rad, -limit, limit))
-        return np.asarray(np.rint(pwm) * self._motors.sign, dtype=np.int16)
+        pwm = np.rint(np.minimum(np.maximum(self._gain * beyond_rad, -limit), limit)) * self._motors.sign
+        pwm[~self._is_set] = 0.0
+        return np.asarray(pwm, dtype=np.int16)
