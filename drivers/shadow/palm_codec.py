@@ -11,7 +11,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import cached_property
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -160,20 +160,15 @@ class PalmStatus:
         """Whether the palm wrote this status in time."""
         return self.edc_command == EdcCommand.SENSOR_DATA
 
-    @cached_property
+    @property
     def heard_motors(self) -> NDArray[np.intp]:
         """Numbers of the motors that answered with the stated type, ascending."""
-        if self.which_motors not in (0, 1):
-            return _NO_MOTORS
-        asked = _ASKED_MOTORS[self.which_motors]
-        return np.asarray(asked[((self.arrived & ~self.had_errors) >> asked) & 1 == 1])
+        return _marked_motors(self.arrived & ~self.had_errors, self.which_motors)
 
     @property
     def silent_motors(self) -> NDArray[np.intp]:
         """Numbers of the asked motors that did not answer, or not with the stated type."""
-        if self.which_motors not in (0, 1):
-            return _NO_MOTORS
-        return np.setdiff1d(_ASKED_MOTORS[self.which_motors], self.heard_motors, assume_unique=True)
+        return _marked_motors(~self.arrived | self.had_errors, self.which_motors)
 
     @property
     def not_fitted(self) -> tuple[int, ...]:
@@ -181,8 +176,13 @@ class PalmStatus:
         return tuple(channel for channel in OPTIONAL_CHANNELS if self.sensors[channel] == channel)
 
 
-_NO_MOTORS = np.arange(0)
-_ASKED_MOTORS = (np.arange(0, MOTORS, 2), np.arange(1, MOTORS, 2))
+@lru_cache(maxsize=64)
+def _marked_motors(mask: int, which_motors: int) -> NDArray[np.intp]:
+    """The even (0) or odd (1) motors whose bit is set; none for any other parity. Shared, so not writable."""
+    asked = range(which_motors, MOTORS, 2) if which_motors in (0, 1) else range(0)
+    motors = np.array([motor for motor in asked if mask >> motor & 1], dtype=np.intp)
+    motors.flags.writeable = False
+    return motors
 
 
 def encode_command(command: PalmCommand) -> bytes:
