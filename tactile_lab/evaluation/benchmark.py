@@ -25,6 +25,9 @@ MAP_CONTACTS = 100
 GRASP_CONTACTS = 5
 THESIS_WEIGHTING_ms = 6000.0
 """The thesis gives 6 seconds on average for 20 000 particles (section 3.5)."""
+SHAPE_SIZES = ((2, 80), (2, 320), (3, 80), (3, 160))
+"""Dimension and number of contacts."""
+QUERIES = 10_000
 SEMI_AXES_m = (0.050, 0.030)
 _POINT_SIGMA_m, _NORMAL_SIGMA_rad = 0.001, 0.0873
 
@@ -160,21 +163,23 @@ def _labelled(contacts: ContactSet, distance_m: float = 0.010) -> tuple[Array, A
 def shape_table(clock: Clock | None = None, *, repeats: int = 5) -> TimingTable:
     """Fit and query of the shape model as it grows, planar and spatial, with its memory."""
     watch = _Stopwatch(clock or MonotonicClock(), repeats)
-    timings = []
-    for dimension, count in ((2, 80), (2, 320), (3, 80), (3, 160)):
-        contacts = ball_contacts(count, dimension)
-        field = _fit(contacts)
-        queries = np.random.default_rng(1).uniform(-0.06, 0.06, (10_000, dimension))
-        size = f"{dimension}-D, {count} contacts"
-        timings.append(watch(f"fit, {size}", lambda contacts=contacts: _fit(contacts), f"{_size(field)} observations"))
-        timings.append(
-            watch(
-                f"query, {size}",
-                lambda field=field, queries=queries: field.predict(queries, gradient=True, variance=True),
-                f"{len(queries)} points with gradient and variance",
-            )
-        )
+    timings = [line for size in SHAPE_SIZES for line in _shape_timings(watch, *size)]
     return TimingTable("Shape model", tuple(timings))
+
+
+def _shape_timings(watch: _Stopwatch, dimension: int, count: int) -> tuple[Timing, Timing]:
+    contacts = ball_contacts(count, dimension)
+    field = _fit(contacts)
+    queries = np.random.default_rng(1).uniform(-0.06, 0.06, (QUERIES, dimension))
+    size = f"{dimension}-D, {count} contacts"
+    return (
+        watch(f"fit, {size}", lambda: _fit(contacts), f"{_size(field)} observations"),
+        watch(
+            f"query, {size}",
+            lambda: field.predict(queries, gradient=True, variance=True),
+            f"{QUERIES} points with gradient and variance",
+        ),
+    )
 
 
 def _fit(contacts: ContactSet) -> Gpis:

@@ -62,8 +62,13 @@ class ShapeFigures:
         """The figures of shape errors in metres."""
         if errors is None:
             return None
-        lengths = (errors.hausdorff_m, errors.mean_distance_m, errors.chamfer_m)
-        return cls(*(1e3 * length for length in lengths), errors.fscore_5mm, errors.iou)
+        return cls(
+            hausdorff_mm=1e3 * errors.hausdorff_m,
+            mean_distance_mm=1e3 * errors.mean_distance_m,
+            chamfer_mm=1e3 * errors.chamfer_m,
+            fscore_5mm=errors.fscore_5mm,
+            iou=errors.iou,
+        )
 
 
 @dataclass(frozen=True)

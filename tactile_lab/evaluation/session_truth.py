@@ -21,6 +21,9 @@ from sessions.traffic_reader import TrafficMessage
 from tactile_lab.evaluation.evaluation import Truth
 from tactile_lab.shape.mesh_io import read_mesh
 
+TRUTH_TRAJECTORY = "truth.csv"
+"""The true poses in ``results/``, in the form of ``trajectory.csv``."""
+
 Look = Callable[[Datagram], Pose3 | None]
 """Finds the object in one recorded camera datagram: ``world_T_object``, or None where it is not seen."""
 
@@ -39,12 +42,15 @@ def session_truth(session: Session, grasp_count: int, look: Look | None) -> Trut
     """
     pictures = {} if look is None else marked_pictures(session.traffic().messages())
     poses = [look(pictures[index]) if look and index in pictures else None for index in range(grasp_count)]
-    return Truth(tuple(poses), None if session.truth_mesh is None else _mesh(session))
+    return Truth(tuple(poses), read_truth_mesh(session))
 
 
-def _mesh(session: Session) -> trimesh.Trimesh:
-    assert session.truth_mesh is not None
-    mesh = read_mesh(session.truth_mesh)
+def read_truth_mesh(session: Session) -> trimesh.Trimesh | None:
+    """The object's own mesh, None where the session has none. Raises ShapeError."""
+    path = session.truth_mesh
+    if path is None:
+        return None
+    mesh = read_mesh(path)
     return trimesh.Trimesh(np.asarray(mesh.vertices), np.asarray(mesh.faces), process=False)
 
 

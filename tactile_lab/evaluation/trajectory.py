@@ -160,14 +160,23 @@ def pose_errors(estimate: Poses, truth: Poses) -> PoseErrors | None:
         return None
     found = {pair.index: _difference(pair.truth, pair.estimate) for pair in both}
     table = _table(found.values())
+    rmse, final, step = (
+        _rms(table[1:]),
+        GraspError(*map(float, table[-1])),
+        _rms(_table(map(_step_error, both, both[1:]))),
+    )
     drift = _slope_through_zero(np.array([pair.index - both[0].index for pair in both]), table)
     return PoseErrors(
-        tuple(found.get(index) for index in range(len(truth))),
-        both[0].index,
-        *_rms(table[1:]),
-        *map(float, table[-1]),
-        *drift,
-        *_rms(_table(map(_step_error, both, both[1:]))),
+        per_grasp=tuple(found.get(index) for index in range(len(truth))),
+        aligned_at=both[0].index,
+        rmse_mm=rmse.mm,
+        rmse_deg=rmse.deg,
+        final_mm=final.mm,
+        final_deg=final.deg,
+        drift_mm_per_grasp=drift.mm,
+        drift_deg_per_grasp=drift.deg,
+        step_mm=step.mm,
+        step_deg=step.deg,
     )
 
 
@@ -185,11 +194,9 @@ def _table(errors: Iterable[GraspError]) -> Array:
     return np.array([[error.mm, error.deg] for error in errors])
 
 
-def _rms(table: Array) -> tuple[float, float]:
-    mm, deg = np.sqrt(np.mean(table**2, axis=0))
-    return float(mm), float(deg)
+def _rms(table: Array) -> GraspError:
+    return GraspError(*map(float, np.sqrt(np.mean(table**2, axis=0))))
 
 
-def _slope_through_zero(steps: NDArray[np.int_], table: Array) -> tuple[float, float]:
-    mm, deg = steps @ table / float(steps @ steps)
-    return float(mm), float(deg)
+def _slope_through_zero(steps: NDArray[np.int_], table: Array) -> GraspError:
+    return GraspError(*map(float, steps @ table / float(steps @ steps)))

@@ -10,7 +10,8 @@ import numpy as np
 from gtsam import Pose3
 from numpy.typing import NDArray
 
-from tactile_lab.evaluation.results import ContactRows, Results
+from tactile_lab.evaluation.results import Results
+from tactile_lab.evaluation.tables import ContactRows
 from tactile_lab.evaluation.trajectory import estimate_T_truth
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import rotate, transform_points
@@ -27,8 +28,9 @@ class SessionFacts:
         object_name: the object's catalogue name or the operator's word for it.
         rig: name of the rig.
         started: date and time, ISO 8601, or "" where the clock was virtual.
-        status: open, closed or recovered.
+        status: closed, or what else became of it.
         notes: the operator's notes.
+        problem: why the session failed, "" where it did not.
         made_with: name and value of everything that made the session: command, versions, settings.
         calibrations: file name and hash of each calibration copy.
     """
@@ -38,6 +40,7 @@ class SessionFacts:
     started: str = ""
     status: str = "closed"
     notes: str = ""
+    problem: str = ""
     made_with: tuple[tuple[str, str], ...] = ()
     calibrations: tuple[tuple[str, str], ...] = ()
 
@@ -68,7 +71,7 @@ def with_plain_lids(surface: Surface) -> Surface:
 
 
 @dataclass(frozen=True)
-class Truth:
+class TrueShape:
     """What the marker camera and the object's model say, model in the truth's own object frame.
 
     Attributes:
@@ -102,7 +105,7 @@ class ReportContent:
     surface: Surface | None = None
     contour_m: Array | None = None
     contour_sigma_m: Array = field(default_factory=lambda: np.zeros(0))
-    truth: Truth | None = None
+    truth: TrueShape | None = None
 
     @property
     def estimate_T_truth(self) -> Pose3 | None:

@@ -81,7 +81,7 @@ def _draw_contacts(chart: Chart, grasp: PlacedContacts) -> None:
         at = 1e3 * point[:2]
         chart.segment(at, at + NORMAL_LENGTH_mm * normal[:2], "normal")
         tip = f"grasp {grasp.grasp + 1}, {FINGER_NAMES[finger]} finger, {force:.2f} N".replace("thumb finger", "thumb")
-        chart.dot(*at, "contact", tip=tip)
+        chart.dot(at, "contact", tip=tip)
 
 
 def colour_bar(high_mm: float) -> str:
@@ -119,7 +119,7 @@ def _series(points: Array, grasps: int, label: str, title: str, unit: str) -> st
     chart.area([np.concatenate([points, base])], "under")
     chart.path(points, "estimate")
     for number, value in points:
-        chart.dot(number, value, "mark", tip=f"grasp {number:.0f}: {value:.2f} {unit}")
+        chart.dot((number, value), "mark", tip=f"grasp {number:.0f}: {value:.2f} {unit}")
     return chart.text(title, f"Ends at {points[-1, 1]:.2f} {unit}, largest {points[:, 1].max():.2f} {unit}.")
 
 
@@ -155,7 +155,7 @@ def _draw_path(chart: Chart, poses: tuple[Pose3 | None, ...], kind: str) -> None
         heading = place + reach * np.array([np.cos(pose.theta()), np.sin(pose.theta())])
         chart.segment(place, heading, f"{kind}-heading")
         radius = 5.0 if index == known[0][0] else 3.2
-        chart.dot(*place, f"{kind}-dot", radius=radius, tip=f"grasp {index + 1}, {kind}")
+        chart.dot(place, f"{kind}-dot", radius=radius, tip=f"grasp {index + 1}, {kind}")
 
 
 def force_map(content: ReportContent) -> str | None:

@@ -76,7 +76,7 @@ def _shrink(picture: NDArray[np.uint8], size_px: int) -> NDArray[np.uint8]:
     weighted = np.concatenate([picture[..., :3] * alpha, alpha], axis=2)
     small = cv2.resize(weighted, (size_px, size_px), interpolation=cv2.INTER_AREA)
     colours = small[..., :3] / np.maximum(small[..., 3:], 1e-6)
-    return np.rint(np.concatenate([colours, small[..., 3:] * 255.0], axis=2)).astype(np.uint8)
+    return np.asarray(np.rint(np.concatenate([colours, small[..., 3:] * 255.0], axis=2)), dtype=np.uint8)
 
 
 def png_data_uri(picture: NDArray[np.uint8]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -29,7 +29,7 @@ def head(content: ReportContent) -> Markup:
         ("date", facts.started),
     ]
     line = join((join((f"{name} ", element("b", value))) for name, value in parts if value), "  ·  ")
-    notes = [element("p", facts.notes, class_="facts")] if facts.notes else []
+    notes = [element("p", text, class_="facts") for text in (facts.notes, facts.problem) if text]
     return element(
         "header",
         element(
@@ -216,27 +216,33 @@ def _tracking_lead(content: ReportContent) -> str:
 
 def loops_card(content: ReportContent) -> Markup:
     """Similar grasps that were tested and what came of them."""
-    loops = content.results.slam.get("loops") or []
+    loops = content.results.slam["loops"]
     if not loops:
         text = element("p", "No grasp was similar enough to an earlier one to be tested.", class_="lead")
         return element("div", element("h3", "Similar grasps"), text, class_="card")
-    titles, rows = loop_rows(loops)
-    text = (0, *(column for column, entry in enumerate(rows[0]) if not entry[:1].isdigit()))
-    return element("div", element("h3", "Similar grasps"), table(titles, rows, text), class_="card")
+    rows = [_loop_row(loop) for loop in loops]
+    titles = ["grasps", "faces", "test value", "limit", "verdict", "reason"]
+    accepted = sum(bool(loop["accepted"]) for loop in loops)
+    told = f"{accepted} of {len(loops)} went into the pose graph."
+    return element(
+        "div",
+        element("h3", "Similar grasps"),
+        element("p", told, class_="lead"),
+        element("div", table(titles, rows, (0, 4, 5)), class_="tall"),
+        class_="card",
+    )
 
 
-def loop_rows(loops: list[Mapping[str, Any]]) -> tuple[list[str], list[list[str]]]:
-    """The loop table: columns are those of the loops' own records."""
-    names = [name for name, value in loops[0].items() if not isinstance(value, list | dict)]
-    return [name.replace("_", " ") for name in names], [[_cell(loop.get(name)) for name in names] for loop in loops]
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return UNKNOWN
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+def _loop_row(loop: Mapping[str, Any]) -> list[str | Markup]:
+    verdict = badge("accepted", "good") if loop["accepted"] else badge("refused", "warn")
+    return [
+        f"{loop['earlier'] + 1} \u2013 {loop['later'] + 1}",
+        str(loop["faces"]),
+        _number(loop["test_value"]),
+        _number(loop["limit"]),
+        verdict,
+        str(loop["reason"]),
+    ]
 
 
 def grasp_section(content: ReportContent) -> Markup:
@@ -245,25 +251,30 @@ def grasp_section(content: ReportContent) -> Markup:
     parts = [element("h2", "Grasps")]
     if picture is not None:
         parts.append(figure(picture, "Newton; a dashed place is a finger that did not touch.", "Contact forces"))
-    rows = [grasp_row(content, index) for index in range(len(content.results.contacts))]
-    titles = ["grasp", "time, s", "contacts", "verdict", "position σ, mm", "heading σ, °", "error, mm", "error, °"]
-    parts.append(element("div", table(titles, rows, (0, 3)), class_="card wide"))
+    rows = [_grasp_row(content, index) for index in range(len(content.results.contacts))]
+    titles = ["grasp", "time, s", "contacts", "verdict", "reason", "σ, mm", "σ, °", "error, mm", "error, °"]
+    note = "σ is the estimate's own standard deviation of position and heading; the error is against the marker camera."
+    parts.append(element("div", table(titles, rows, (0, 3, 4)), element("p", note, class_="note"), class_="card wide"))
     return join(parts)
 
 
-def grasp_row(content: ReportContent, index: int) -> list[str | Markup]:
+_VERDICTS = {"first": "good", "tracked": "good", "uncertain": "warn", "untracked": "bad"}
+
+
+def _grasp_row(content: ReportContent, index: int) -> list[str | Markup]:
     """One grasp: when, what was felt, what SLAM made of it, how well."""
     results = content.results
-    steps = results.slam["steps"]
-    step: Mapping[str, Any] = steps[index] if index < len(steps) else {}
-    per_grasp = ((content.evaluation or {}).get("pose") or {}).get("per_grasp") or []
-    error: Mapping[str, Any] = (per_grasp[index] if index < len(per_grasp) else None) or {}
-    sigma_mm, sigma_deg = pose_sigma(step)
+    step: Mapping[str, Any] = _entry(results.slam["steps"], index)
+    error: Mapping[str, Any] = _entry(((content.evaluation or {}).get("pose") or {}).get("per_grasp"), index)
+    covariances = results.slam.get("covariances") or ()
+    sigma_mm, sigma_deg = _pose_sigma(covariances[index] if index < len(covariances) else None)
+    verdict = str(step.get("verdict", UNKNOWN))
     return [
         str(index + 1),
         f"{results.trajectory.stamps_s[index]:.1f}",
-        str(len(results.contacts[index].fingers)),
-        str(step.get("verdict", UNKNOWN)),
+        f"{step.get('contacts_used', UNKNOWN)} of {len(results.contacts[index].fingers)}",
+        badge(verdict, _VERDICTS.get(verdict, "warn")),
+        str(step.get("reason", "")),
         _number(sigma_mm, 2),
         _number(sigma_deg, 2),
         _number(error.get("mm"), 2),
@@ -271,13 +282,17 @@ def grasp_row(content: ReportContent, index: int) -> list[str | Markup]:
     ]
 
 
-def pose_sigma(step: Mapping[str, Any]) -> tuple[float | None, float | None]:
-    """Position and heading standard deviations of one step, millimetres and degrees, from its planar covariance."""
-    covariance = step.get("covariance")
+def _entry(entries: Sequence[Mapping[str, Any] | None] | None, index: int) -> Mapping[str, Any]:
+    """An entry of a list that may be too short or hold nulls."""
+    return (entries[index] if entries and index < len(entries) else None) or {}
+
+
+def _pose_sigma(covariance: Sequence[Sequence[float | None]] | None) -> tuple[float | None, float | None]:
+    """Standard deviations of position and heading, millimetres and degrees, from a covariance of (x, y, yaw)."""
     if covariance is None or any(entry is None for row in covariance for entry in row):
         return None, None
-    variances = np.diag(np.array(covariance, dtype=float))
-    return 1e3 * float(np.sqrt(variances[0] + variances[1])), float(np.degrees(np.sqrt(variances[2])))
+    x, y, yaw = np.diag(np.array(covariance, dtype=float))
+    return 1e3 * float(np.sqrt(x + y)), float(np.degrees(np.sqrt(yaw)))
 
 
 def evaluation_section(content: ReportContent) -> Markup:

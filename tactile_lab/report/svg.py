@@ -15,7 +15,6 @@ import numpy as np
 
 from tactile_lab.geometry.contacts import Array
 
-
 Place = tuple[float, float]
 
 
@@ -108,10 +107,12 @@ class Chart:
         trace = "".join(self.trace(ring, closed=True) for ring in rings)
         self.add(f'<path class="{kind}" fill-rule="evenodd" d="{trace}"/>')
 
-    def dot(self, x: float, y: float, kind: str, *, radius: float = 3.5, tip: str = "", style: str = "") -> None:
-        """A dot with a text that shows under the pointer."""
+    def dot(
+        self, at: Sequence[float] | Array, kind: str, *, radius: float = 3.5, tip: str = "", style: str = ""
+    ) -> None:
+        """A dot at (x, y) with a text that shows under the pointer."""
         title = f"<title>{escape(tip)}</title>" if tip else ""
-        place = f'cx="{self.x(x):.2f}" cy="{self.y(y):.2f}" r="{radius:g}"'
+        place = f'cx="{self.x(at[0]):.2f}" cy="{self.y(at[1]):.2f}" r="{radius:g}"'
         self.add(f'<circle class="{kind}" {place}{_style(style)}>{title}</circle>')
 
     def segment(self, start: Array, end: Array, kind: str, style: str = "") -> None:

@@ -56,7 +56,8 @@ def truth_lines(vertices_m: Array, faces: Faces) -> Array:
 
 
 def _section(mesh: trimesh.Trimesh, height_m: float) -> Array:
-    lines = trimesh.intersections.mesh_plane(mesh, [0.0, 0.0, 1.0], [0.0, 0.0, height_m])
+    plane = {"plane_normal": [0.0, 0.0, 1.0], "plane_origin": [0.0, 0.0, height_m]}
+    lines = trimesh.intersections.mesh_plane(mesh, **plane)  # type: ignore[no-untyped-call]
     return np.asarray(lines, dtype=float).reshape(-1, 3)
 
 

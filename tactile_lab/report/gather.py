@@ -1,0 +1,116 @@
+"""Reads a session folder into the content of its report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+
+from sessions.manifest import Manifest
+from sessions.session import RESULTS, Session
+from tactile_lab.evaluation.evaluation import Truth, true_outline
+from tactile_lab.evaluation.plain import read_json_object
+from tactile_lab.evaluation.results import Results, read_results
+from tactile_lab.evaluation.session_truth import TRUTH_TRAJECTORY, read_truth_mesh
+from tactile_lab.evaluation.shape import horizontal_outline
+from tactile_lab.evaluation.tables import read_contour
+from tactile_lab.evaluation.trajectory import read_trajectory
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.report.content import ReportContent, SessionFacts, Surface, TrueShape, with_plain_lids
+from tactile_lab.shape.mesh_io import read_mesh
+
+_EVALUATE = "Run: tactile-lab evaluate"
+
+
+def gather(session: Session) -> ReportContent:
+    """Everything a report shows, from the session's description, its results and its evaluation.
+
+    Raises:
+        SessionError: there are no results, or a file is not as the program leaves it.
+        ShapeError: a mesh that cannot be read.
+    """
+    folder = session.folder / RESULTS
+    results = read_results(folder)
+    surface = _surface(folder / "mesh.ply", results.dimension)
+    contour_m, sigma_m = _outline(folder, results, surface)
+    return ReportContent(
+        facts=facts(session.manifest),
+        results=results,
+        evaluation=_evaluation(folder / "evaluation.json"),
+        surface=surface,
+        contour_m=contour_m,
+        contour_sigma_m=sigma_m,
+        truth=_truth(session, results),
+    )
+
+
+def facts(manifest: Manifest) -> SessionFacts:
+    """The description of a session, as text."""
+    made_with = [
+        ("session", manifest.name),
+        *((f"{name} seed" if name != "seed" else name, str(seed)) for name, seed in manifest.seeds.items()),
+        *((f"setting {name}", _short(value)) for name, value in manifest.settings.items()),
+        *(manifest.versions.items()),
+    ]
+    return SessionFacts(
+        object_name=manifest.object_name,
+        rig=manifest.rig,
+        started=manifest.started_utc.replace("T", " ").replace("+00:00", " UTC"),
+        status=manifest.status,
+        notes=manifest.notes,
+        problem=manifest.problem,
+        made_with=tuple(made_with),
+        calibrations=tuple((f"{role} ({copy.file})", copy.sha256) for role, copy in manifest.calibration.items()),
+    )
+
+
+def _short(value: Any) -> str:
+    """A setting on one line."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key}: {_short(item)}" for key, item in value.items())
+    return str(value)
+
+
+def _evaluation(path: Path) -> dict[str, Any] | None:
+    return read_json_object(path, hint=_EVALUATE) if path.is_file() else None
+
+
+def _surface(path: Path, dimension: int) -> Surface | None:
+    if not path.is_file():
+        return None
+    mesh = read_mesh(path)
+    surface = Surface(mesh.vertices, mesh.faces, mesh.sigma_m, mesh.normals)
+    return surface if dimension == 3 else with_plain_lids(surface)
+
+
+def _outline(folder: Path, results: Results, surface: Surface | None) -> tuple[Array | None, Array]:
+    """The contour, in space the surface's section at the contacts, with its standard deviations."""
+    if results.dimension == 2:
+        return _contour(folder / "contour.csv", results)
+    if surface is None:
+        return None, np.zeros(0)
+    mesh = trimesh.Trimesh(surface.vertices_m, surface.faces, process=False)
+    outline = horizontal_outline(mesh, 0.0)  # the object frame's origin is at the first contacts' mean height
+    flat = np.column_stack([outline, np.zeros(len(outline))])
+    _, nearest = cKDTree(surface.vertices_m).query(flat)
+    return outline, surface.sigma_m[nearest]
+
+
+def _contour(path: Path, results: Results) -> tuple[Array | None, Array]:
+    if not path.is_file():
+        return None, np.zeros(0)
+    sigma_m = results.slam.get("contour_sigma_m") or ()
+    return read_contour(path)[:-1], np.array(sigma_m, dtype=float)
+
+
+def _truth(session: Session, results: Results) -> TrueShape | None:
+    path = session.folder / RESULTS / TRUTH_TRAJECTORY
+    if not path.is_file():
+        return None
+    truth = Truth(read_trajectory(path).world_T_object, read_truth_mesh(session))
+    mesh = None if truth.mesh is None else (np.asarray(truth.mesh.vertices), np.asarray(truth.mesh.faces))
+    return TrueShape(truth.world_T_object, mesh, true_outline(results, truth))
