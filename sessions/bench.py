@@ -216,7 +216,7 @@ class Bench:
         report = self._mark(MarkKind.TARE, tuple(fingers))
         assert isinstance(report, TareReport)
         for finger, reason in report.refused.items():
-            self.event(Level.WARNING, finger, f"tare refused: {reason}")
+            self.event(Level.WARNING, finger, reason)
         return report
 
     def begin_capture(self) -> None:

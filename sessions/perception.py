@@ -96,13 +96,14 @@ class Perception:
         self._joints_rad: Array | None = None
         self._base_q: Array | None = None
         self._geometry: HandGeometry | None = None
+        self._loads_N: dict[str, float] | None = None
         self._frame: FrameReading | None = None
         self._capture: _Capture | None = None
         self._hold_start: Pose3 | None = None
         self._hand_motion_world = Pose3()
         self._grasp_count = 0
         self.dropped: dict[str, str] = {}
-        """Fingers without a contact in the last grasp, and why."""
+        """Fingers without a contact in the last grasp, and why; what a sensor says of itself is in problems()."""
         self.drop_counts: Counter[str] = Counter()
         """The reasons over the whole session."""
 
@@ -110,6 +111,7 @@ class Perception:
 
     def on_hand(self, sample: HandReading) -> None:
         """Joint angles, and the slots of fingertips that come with them."""
+        self._loads_N = None
         for fingertip in self._slots.values():
             fingertip.update(sample)
         if not sample.fresh:
@@ -121,12 +123,14 @@ class Perception:
 
     def on_base(self, sample: BaseReading) -> None:
         """The positioner's joints."""
+        self._loads_N = None
         self._base_q, self._geometry = np.asarray(sample.q, dtype=float), None
         if self._capture is not None:
             self._capture.base_q.append(self._base_q)
 
     def on_wrench(self, finger: str, samples: Sequence[Any]) -> None:
         """Samples of one fingertip's own link."""
+        self._loads_N = None
         self._wrench[finger].update(samples)
 
     def on_frame(self, frame: FrameReading) -> None:
@@ -171,11 +175,13 @@ class Perception:
 
     def load_N(self, finger: str) -> float:
         """Contact force on one fingertip, the tip's own weight taken off, newest sample."""
-        return self.fingertips[finger].load_N(self.world_R_distal(finger))
+        return self.loads_N()[finger]
 
     def loads_N(self) -> dict[str, float]:
-        """Contact force on each fingertip of the rig."""
-        return {finger: self.load_N(finger) for finger in self.fingertips}
+        """Contact force on each fingertip of the rig; infinite where the newest sample is void."""
+        if self._loads_N is None:
+            self._loads_N = {finger: tip.load_N(self.world_R_distal(finger)) for finger, tip in self.fingertips.items()}
+        return dict(self._loads_N)
 
     def problems(self) -> tuple[str, ...]:
         """What is wrong with fingertips, in words, each beginning with the finger's name."""
@@ -208,6 +214,8 @@ class Perception:
                 return self._truth_frame()
 
     def _tare(self, mark: Mark) -> TareReport:
+        self._latest()
+        self._loads_N = None
         refused = {}
         for finger in mark.fingers:
             if finger not in self.fingertips:
@@ -249,7 +257,7 @@ class Perception:
         for finger, fingertip in self.fingertips.items():
             tip = fingertip.contact(geometry.world_T_distal[FINGERS.index(finger), :3, :3])
             if tip is None:
-                self.dropped[finger] = next(iter(fingertip.health()), "no contact")
+                self.dropped[finger] = "no contact"
             elif not heard:
                 self.dropped[finger] = "no joint angles during the capture"
             elif tip.force_N < self.settings.minimum_force_N:

@@ -106,9 +106,12 @@ class TrafficReader:
             for record in self._records(frames):
                 if isinstance(record, Channel):
                     channels[record.id] = record.topic
-                elif isinstance(record, Message) and record.channel_id in channels:
+                elif isinstance(record, Message):
                     self.loss.missing_messages += (record.sequence - expected) & 0xFFFFFFFF
                     expected = record.sequence + 1
+                    if record.channel_id not in channels:  # its description was in a damaged chunk
+                        self.loss.missing_messages += 1
+                        continue
                     topic = channels[record.channel_id]
                     yield TrafficMessage(topic, record.data, record.publish_time, record.sequence)
             self.loss.truncated, self.loss.unreadable_bytes = not frames.complete, frames.unreadable_bytes
