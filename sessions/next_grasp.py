@@ -31,7 +31,7 @@ class PlanSettings(StrictModel):
         return_m: largest step back toward ``start_m`` while the object is carried.
     """
 
-    closings: tuple[str, ...] = ("pinch", "radial")
+    closings: tuple[str, ...] = Field(default=("pinch", "radial"), min_length=1)
     contact_heights_m: tuple[float, ...] = Field(default=(0.022,), min_length=1)
     yaw_window_rad: tuple[float, float] = (-1.31, 1.31)
     start_m: tuple[float, float] = (0.0, 0.0)
@@ -40,7 +40,7 @@ class PlanSettings(StrictModel):
 
     @model_validator(mode="after")
     def _sensible(self) -> PlanSettings:
-        if not self.closings or (unknown := sorted(set(self.closings) - set(PRESHAPES))):
+        if unknown := sorted(set(self.closings) - set(PRESHAPES)):
             raise ValueError(f"closings {unknown} are not known; choose from {', '.join(PRESHAPES)}")
         if not all(0.015 <= height_m <= 0.12 for height_m in self.contact_heights_m):
             raise ValueError("contact heights lie between 0.015 and 0.12 m")

@@ -1,0 +1,224 @@
+"""A world without physics for the conductor: a disc on the table, fingers that are where they are told to be.
+
+Tips touch by penetration: 500 N/m. A held disc goes with the palm, a released one stays.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from drivers.positioner import mount_T_forearm
+from gtsam import Pose3
+
+from drivers.fingertip import TipContact
+from drivers.shadow.kinematics import JOINT_INDEX, JOINTS
+from sessions.marks import Mark, MarkKind
+from sessions.perception import Perception, TareReport
+from sessions.recorder import Level, NullRecorder
+from tactile_lab.clock import VirtualClock
+from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
+
+CYCLE_ns = 10_000_000
+TIP_RADIUS_m, TIP_CENTRE_m = 0.0085, np.array([0.0, 0.0, 0.019])
+STIFFNESS_N_m = 500.0
+HIGH_ABOVE = np.array([-0.35, 0.0, 0.45, 0.0, 0.0, 0.0])
+
+
+@dataclass
+class Disc:
+    """An upright disc: centre on the table (2,), radius, height, and its turn as it was carried."""
+
+    centre_m: Array
+    radius_m: float = 0.035
+    height_m: float = 0.04
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A sample of the hand."""
+
+    stamp_ns: int
+    joints_rad: Array
+    fresh: bool = True
+
+
+@dataclass(frozen=True)
+class BaseState:
+    """A sample of the positioner."""
+
+    stamp_ns: int
+    q: Array
+
+
+class DiscTip:
+    """A fingertip that feels the disc."""
+
+    def __init__(self, finger: str, world: DiscWorld) -> None:
+        self.finger, self._world = finger, world
+        self.tares = 0
+
+    def update(self, samples: object) -> None:
+        """The world knows already."""
+
+    def tare(self, world_R_distal: Array, *, reason: str = "") -> None:
+        self.tares += 1
+
+    def load_N(self, world_R_distal: Array) -> float:
+        return self._world.load_N(self.finger)
+
+    def begin_capture(self) -> None:
+        """Nothing is gathered."""
+
+    def contact(self, world_R_distal: Array) -> TipContact | None:
+        load_N = self._world.load_N(self.finger)
+        if load_N < 0.05:
+            return None
+        outward = self._world.outward(self.finger)
+        point_m = TIP_CENTRE_m - world_R_distal.T @ outward * TIP_RADIUS_m
+        normal = world_R_distal.T @ outward
+        return TipContact(point_m, normal, 1e-6 * np.eye(3), 0.05, load_N, 0.0)
+
+    def health(self) -> tuple[str, ...]:
+        return ()
+
+
+class Mover:
+    """The hand or the positioner: takes targets, counts stops."""
+
+    def __init__(self, take: Callable[[object], None]) -> None:
+        self._take, self.stops = take, 0
+
+    def set_targets(self, targets_rad: Mapping[str, float]) -> None:
+        self._take(targets_rad)
+
+    def set_target(self, q: Array) -> None:
+        self._take(q)
+
+    def stop(self) -> None:
+        self.stops += 1
+
+
+class DiscWorld:
+    """Looks like a bench to the conductor.
+
+    Args:
+        disc: the object; None for an empty table.
+        before_cycle: called before every cycle, to make things go wrong.
+    """
+
+    def __init__(self, disc: Disc | None, before_cycle: Callable[[DiscWorld], None] | None = None) -> None:
+        self.disc, self.before_cycle = disc, before_cycle
+        self.clock, self.cycle_ns = VirtualClock(), CYCLE_ns
+        self.hand, self.base = Mover(self._move_fingers), Mover(self._move_base)
+        self.camera, self.fingertip_calibrations = None, {}
+        self.recorder = NullRecorder()
+        self.marks: list[MarkKind] = []
+        self.events: list[tuple[Level, str]] = []
+        self.world_T_mount = Pose3()
+        self.joints_rad, self.base_q = np.zeros(len(JOINTS)), HIGH_ABOVE.copy()
+        self.silent, self.cycles = False, 0
+        self._held_from: Pose3 | None = None
+        self.perception = Perception(
+            wrench_fingertips={finger: DiscTip(finger, self) for finger in FINGERS},
+            mount_T_forearm=mount_T_forearm,
+            world_T_mount=self.world_T_mount,
+        )
+        self.cycle()
+
+    # --- what moves --------------------------------------------------------------------------------------------
+
+    def _move_fingers(self, targets_rad: object) -> None:
+        assert isinstance(targets_rad, dict)
+        for name, angle in targets_rad.items():
+            if name.endswith("J0"):
+                self.joints_rad[JOINT_INDEX[f"{name[:2]}J1"]] = 0.375 * angle
+                self.joints_rad[JOINT_INDEX[f"{name[:2]}J2"]] = 0.625 * angle
+            else:
+                self.joints_rad[JOINT_INDEX[name]] = angle
+
+    def _move_base(self, q: object) -> None:
+        self.base_q = np.asarray(q, dtype=float)
+
+    def cycle(self) -> None:
+        if self.before_cycle is not None:
+            self.before_cycle(self)
+        self.cycles += 1
+        now_ns = self.clock.now_ns()
+        if not self.silent:
+            self.perception.on_hand(Reading(now_ns, self.joints_rad.copy()))
+        self.perception.on_base(BaseState(now_ns, self.base_q.copy()))
+        self._carry()
+        self.clock.sleep_until_ns(now_ns + CYCLE_ns)
+
+    def _carry(self) -> None:
+        if self._held_from is None or self.disc is None:
+            return
+        palm = self.perception.world_T_palm
+        motion = palm * self._held_from.inverse()
+        self.disc.centre_m = np.asarray(motion.transformFrom(np.array([*self.disc.centre_m, 0.0])))[:2]
+        self._held_from = palm
+
+    # --- what touches ------------------------------------------------------------------------------------------
+
+    def _tip_m(self, finger: str) -> Array:
+        return np.asarray(self.perception.world_T_distal[finger].transformFrom(TIP_CENTRE_m))
+
+    def outward(self, finger: str) -> Array:
+        """Out of the disc toward a tip, world frame, shape (3,)."""
+        assert self.disc is not None
+        away = self._tip_m(finger)[:2] - self.disc.centre_m
+        return np.array([*(away / np.linalg.norm(away)), 0.0])
+
+    def load_N(self, finger: str) -> float:
+        """Contact force of a tip."""
+        if self.disc is None:
+            return 0.0
+        tip_m = self._tip_m(finger)
+        aside_m = self.disc.radius_m + TIP_RADIUS_m - float(np.linalg.norm(tip_m[:2] - self.disc.centre_m))
+        below_m = self.disc.height_m + TIP_RADIUS_m - tip_m[2]
+        return STIFFNESS_N_m * max(0.0, min(aside_m, below_m))
+
+    # --- marks -------------------------------------------------------------------------------------------------
+
+    def _mark(self, kind: MarkKind) -> object:
+        self.marks.append(kind)
+        return self.perception.mark(Mark(kind, self.clock.now_ns()))
+
+    def tare(self) -> TareReport:
+        report = self._mark(MarkKind.TARE)
+        assert isinstance(report, TareReport)
+        return report
+
+    def begin_capture(self) -> None:
+        self._mark(MarkKind.CAPTURE_BEGIN)
+
+    def end_capture(self) -> Grasp:
+        grasp = self._mark(MarkKind.CAPTURE_END)
+        assert isinstance(grasp, Grasp)
+        return grasp
+
+    def begin_hold(self) -> None:
+        self._mark(MarkKind.HOLD_BEGIN)
+        self._held_from = self.perception.world_T_palm
+
+    def end_hold(self) -> None:
+        self._mark(MarkKind.HOLD_END)
+        self._held_from = None
+
+    def truth_frame(self) -> None:
+        self._mark(MarkKind.TRUTH_FRAME)
+
+    def stop(self) -> None:
+        self.hand.stop()
+        self.base.stop()
+
+    def event(self, level: Level, source: str, message: str) -> None:
+        self.events.append((level, message))
+
+    @property
+    def mark_counts(self) -> Counter[MarkKind]:
+        """How often each kind of mark was set."""
+        return Counter(self.marks)
