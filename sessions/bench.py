@@ -15,6 +15,7 @@ from typing import Protocol
 from gtsam import Pose3
 
 from drivers.fingertip import FingertipCalibration, FingertipSensor
+from drivers.links import Link
 from drivers.shadow.kinematics import JOINTS
 from sessions.instruments import BaseInstrument, CameraInstrument, HandInstrument, Instrument, PolledInstrument
 from sessions.interpreter import Observer
@@ -49,6 +50,30 @@ class CycleCounts:
     skipped: int = 0
 
 
+class SensorStream:
+    """A device that sends by itself, emptied without decoding: the tap of its link has fed Perception already.
+
+    Args:
+        device: what starts and ends the stream.
+        link: the tapped link it was built on.
+    """
+
+    def __init__(self, device: Instrument, link: Link) -> None:
+        self._device, self._link = device, link
+
+    def connect(self) -> None:
+        """Start the stream. Raises DeviceError."""
+        self._device.connect()
+
+    def close(self) -> None:
+        """End the stream; idempotent."""
+        self._device.close()
+
+    def poll(self) -> None:
+        """Take everything that waits on the link. Raises DeviceError."""
+        self._link.receive()
+
+
 class Bench:
     """The devices of a rig.
 
@@ -56,7 +81,7 @@ class Bench:
         clock: the session's clock.
         cycle_ns: period of the common cycle.
         hand, base, camera: live devices on tapped links.
-        wrench_devices: live devices of the fingertips' own links, by finger.
+        wrench_devices: live devices of the fingertips' own links, by finger (see :class:`SensorStream`).
         observer: the tap of all those links; its Perception and its recorder are the bench's.
         fingertip_calibrations: by finger.
         truth: the truth channel of a simulated rig; goes to the recorder and nowhere else.

@@ -49,14 +49,15 @@ class TrafficWriter:
         """Messages by topic."""
         self._failure: SessionError | None = None
         self._channels: dict[str, int] = {}
-        self._log_ns = 0
+        self._log_ns = self._sequence = 0
         self._flushed_ns: int | None = None
         self._file = _CutBackFile(path)
+        self._guard = _Guard(self)
         self._syncer: _Syncer | None = None
         self._writer: Any = Writer(
             cast(IO[bytes], self._file), chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD
         )
-        with _Guard(self):
+        with self._guard:
             self._writer.start(profile=PROFILE, library=f"tactile-lab {version('tactile-lab')}")
             self._writer.add_metadata(PROFILE, {**(info or {}), "format": FORMAT})
         self._syncer = _Syncer(self._file)
@@ -68,16 +69,16 @@ class TrafficWriter:
         Raises:
             SessionError: the disk is full or failed; what was recorded before is kept and readable.
         """
-        with _Guard(self):
-            sequence = self.counts.total() & _SEQUENCE_MASK
+        with self._guard:
             self._log_ns = max(self._log_ns, stamp_ns)
-            self._writer.add_message(self._channel(topic), self._log_ns, data, stamp_ns, sequence)
+            self._writer.add_message(self._channel(topic), self._log_ns, data, stamp_ns, self._sequence)
+            self._sequence = (self._sequence + 1) & _SEQUENCE_MASK
             self.counts[topic] += 1
             self._flush_when_due()
 
     def flush(self) -> None:
         """Hand everything so far to the operating system. Raises SessionError as :meth:`write`."""
-        with _Guard(self):
+        with self._guard:
             self._writer.flush()
             self._flushed_ns = self._log_ns
 
@@ -93,7 +94,7 @@ class TrafficWriter:
         self._syncer = None
         try:
             if self._failure is None:
-                with _Guard(self):
+                with self._guard:
                     self._writer.finish()
                     self._file.sync()
         finally:
@@ -155,10 +156,10 @@ class _Guard:
         self._writer.check()
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, OSError):
-            raise self._writer.fail(error) from error
         if error is None:
             self._writer.keep()
+        elif isinstance(error, OSError):
+            raise self._writer.fail(error) from error
 
 
 class _CutBackFile:

@@ -10,7 +10,7 @@ from gtsam import Pose3, Rot3
 from drivers.fingertip import TipContact
 from drivers.links import Datagram, MemoryLink, TappedLink
 from drivers.shadow.kinematics import JOINTS
-from sessions.bench import Bench
+from sessions.bench import Bench, SensorStream
 from sessions.interpreter import Interpreter, Observer, fingertip_link
 from sessions.perception import Perception, PerceptionSettings
 from sessions.recorder import NullRecorder
@@ -180,9 +180,6 @@ class FakeDevice:
             self.clock.sleep_until_ns(self.clock.now_ns() + self.work_ns)
         return self.link.receive()[-1:]
 
-    def poll(self):
-        return self.link.receive()
-
     def capture(self):
         self.link.send(b"TRIGGER")
         return self.link.receive()[-1]
@@ -207,6 +204,10 @@ class FakeRig:
     calls: list
 
 
+def _stream(device):
+    return SensorStream(device, device.link)
+
+
 def make_rig(recorder=None, *, seed=0, damage=0.0, unsteady=True, start_ns=0, truth=None):
     clock, calls = VirtualClock(start_ns), []
     interpreter = make_interpreter()
@@ -228,7 +229,7 @@ def make_rig(recorder=None, *, seed=0, damage=0.0, unsteady=True, start_ns=0, tr
         hand=devices["hand"],
         base=devices["base"],
         observer=observer,
-        wrench_devices={finger: devices[fingertip_link(finger)] for finger in FINGERS},
+        wrench_devices={finger: _stream(devices[fingertip_link(finger)]) for finger in FINGERS},
         camera=devices["camera"],
         truth=truth,
     )
