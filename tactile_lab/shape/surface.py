@@ -14,6 +14,7 @@ from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import FieldGrid
 from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.sampling import polygon_area
 
 Indices: TypeAlias = NDArray[np.int64]
 Mask: TypeAlias = NDArray[np.bool_]
@@ -72,8 +73,8 @@ def extract_contour(gpis: Gpis, *, resolution_m: float = 0.001, largest_margin_m
     from skimage.measure import find_contours  # here, so that importing this module stays quick
 
     solid = _solid(gpis, resolution_m, largest_margin_m)
-    loops = find_contours(solid.values_m, 0.0, fully_connected="high")
-    places = max(loops, key=lambda loop: abs(_signed_area(loop)))[:-1]
+    loops = find_contours(solid.values_m, 0.0, fully_connected="high")  # type: ignore[no-untyped-call]
+    places = max(loops, key=lambda loop: abs(polygon_area(loop)))[:-1]
     points, _, sigma = _refined(gpis, solid.lower_m + resolution_m * places, resolution_m)
     return _counter_clockwise(Contour(points, sigma, solid.is_closed))
 
@@ -83,7 +84,9 @@ def extract_mesh(gpis: Gpis, *, resolution_m: float = 0.003, largest_margin_m: f
     from skimage.measure import marching_cubes  # here, so that importing this module stays quick
 
     solid = _solid(gpis, resolution_m, largest_margin_m)
-    places, faces, _, _ = marching_cubes(solid.values_m, 0.0, gradient_direction="ascent", allow_degenerate=False)
+    places, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
+        solid.values_m, 0.0, gradient_direction="descent", allow_degenerate=False
+    )
     vertices, normals, sigma = _refined(gpis, solid.lower_m + resolution_m * places.astype(float), resolution_m)
     return SurfaceMesh(vertices, faces.astype(np.int64), sigma, normals, solid.is_closed)
 
@@ -156,12 +159,7 @@ def _slope(gradient: Array) -> Array:
     return np.asarray(np.maximum(np.linalg.norm(gradient, axis=1), _FLATTEST_SLOPE))
 
 
-def _signed_area(polygon: Array) -> float:
-    following = np.roll(polygon, -1, axis=0)
-    return 0.5 * float(np.sum(polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]))
-
-
 def _counter_clockwise(contour: Contour) -> Contour:
-    if _signed_area(contour.points_m) > 0:
+    if polygon_area(contour.points_m) > 0:
         return contour
     return Contour(contour.points_m[::-1].copy(), contour.sigma_m[::-1].copy(), contour.is_closed)

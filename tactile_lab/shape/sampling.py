@@ -1,0 +1,81 @@
+"""Even, repeatable samples of contours and meshes, and exact distances to them."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from tactile_lab.geometry.contacts import Array
+
+_PAIRS_AT_ONCE = 1 << 20
+
+
+class TriangleMesh(Protocol):
+    """What is asked of a mesh: a :class:`SurfaceMesh` and trimesh's own meshes have it."""
+
+    @property
+    def vertices(self) -> Any:
+        """Shape (n, 3), metres."""
+
+    @property
+    def faces(self) -> Any:
+        """Shape (m, 3), vertex indices, counter-clockwise seen from outside."""
+
+
+def polygon_area(polygon_m: Array) -> float:
+    """Area within a closed polygon of shape (n, 2), positive if it is counter-clockwise."""
+    following = np.roll(polygon_m, -1, axis=0)
+    return 0.5 * float(np.sum(polygon_m[:, 0] * following[:, 1] - polygon_m[:, 1] * following[:, 0]))
+
+
+def sample_polygon(polygon_m: Array, step_m: float) -> Array:
+    """Points along a closed polygon of shape (n, 2), evenly spaced by at most ``step_m``."""
+    closed = np.vstack([polygon_m, polygon_m[:1]])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    places = np.linspace(0.0, along[-1], int(np.ceil(along[-1] / step_m)) + 1)[:-1]
+    return np.column_stack([np.interp(places, along, closed[:, axis]) for axis in (0, 1)])
+
+
+def sample_mesh(mesh: TriangleMesh, count: int, seed: int = 0) -> Array:
+    """Points spread over the surface of a mesh in proportion to area, shape (count, 3); the same for the same seed."""
+    rng = np.random.default_rng(seed)
+    corners = np.asarray(mesh.vertices, dtype=float)[np.asarray(mesh.faces)]
+    edges = corners[:, 1:] - corners[:, :1]
+    shares = np.cumsum(np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1))
+    stratified = (np.arange(count) + rng.random(count)) / count * shares[-1]
+    face = np.minimum(np.searchsorted(shares, stratified, side="right"), len(shares) - 1)
+    first, second = rng.random((2, count))
+    folded = first + second > 1
+    first, second = np.where(folded, 1 - first, first), np.where(folded, 1 - second, second)
+    return np.asarray(corners[face, 0] + first[:, None] * edges[face, 0] + second[:, None] * edges[face, 1])
+
+
+def distances_to_polygon(points_m: Array, polygon_m: Array) -> Array:
+    """Exact distances from points of shape (q, 2) to the outline of a closed polygon of shape (n, 2)."""
+    size = max(1, _PAIRS_AT_ONCE // len(polygon_m))
+    blocks = [_distances_to_segments(points_m[i : i + size], polygon_m) for i in range(0, len(points_m), size)]
+    return np.concatenate(blocks)
+
+
+def distances_to_mesh(points_m: Array, mesh: TriangleMesh) -> Array:
+    """Exact distances from points of shape (q, 3) to the surface of a mesh."""
+    import igl  # here, so that importing this module stays quick
+
+    vertices, faces = mesh_arrays(mesh)
+    squared = igl.point_mesh_squared_distance(np.ascontiguousarray(points_m), vertices, faces)[0]
+    return np.asarray(np.sqrt(squared), dtype=float)
+
+
+def mesh_arrays(mesh: TriangleMesh) -> tuple[Array, Any]:
+    """Vertices and faces as contiguous arrays of float64 and int64."""
+    return np.ascontiguousarray(mesh.vertices, dtype=float), np.ascontiguousarray(mesh.faces, dtype=np.int64)
+
+
+def _distances_to_segments(points_m: Array, polygon_m: Array) -> Array:
+    starts_x, starts_y = polygon_m.T
+    edges_x, edges_y = (np.roll(polygon_m, -1, axis=0) - polygon_m).T
+    squared_lengths = np.maximum(edges_x**2 + edges_y**2, np.finfo(float).tiny)
+    from_x, from_y = points_m[:, :1] - starts_x, points_m[:, 1:] - starts_y
+    share = np.clip((from_x * edges_x + from_y * edges_y) / squared_lengths, 0.0, 1.0)
+    return np.asarray(np.hypot(from_x - share * edges_x, from_y - share * edges_y).min(axis=1))
