@@ -117,10 +117,10 @@ def load_biotacs(path: Path) -> dict[str, BioTacCalibration]:
 class BioTac:
     """One BioTac (a :class:`~drivers.fingertip.FingertipSensor`)."""
 
-    def __init__(self, finger: str, calibration: BioTacCalibration, settings: BioTacSettings) -> None:
+    def __init__(self, finger: str, calibration: BioTacCalibration, settings: BioTacSettings | None = None) -> None:
         self.finger = finger
         self.calibration = calibration
-        self._settings = settings
+        self._settings = settings = settings or BioTacSettings()
         self._slot = FINGERS.index(finger)
         skin = calibration.skin.surface() if calibration.skin else None
         self._layout = electrode_layout(calibration.electrodes, skin)

@@ -1,0 +1,104 @@
+"""The lens of the camera: from our own YAML, or from the files OpenCV's calibration programs write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from pydantic import Field, field_validator
+
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.strict_yaml import StrictModel, load_model, validate
+
+_DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+
+
+class CameraCalibration(StrictModel):
+    """A pinhole camera with Brown's distortion, as OpenCV has it.
+
+    Attributes:
+        focal_px: focal lengths along x and y, pixels.
+        centre_px: principal point, pixels.
+        distortion: k1, k2, p1, p2, k3 and so on; 0, 4, 5, 8, 12 or 14 coefficients.
+        size_px: width and height of the pictures it was made for; None where the file does not say.
+    """
+
+    focal_px: tuple[float, float]
+    centre_px: tuple[float, float]
+    distortion: tuple[float, ...] = ()
+    size_px: tuple[int, int] | None = None
+    note: str = Field(default="", max_length=2000)
+
+    @field_validator("focal_px")
+    @classmethod
+    def _positive(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if min(value) <= 0.0:
+            raise ValueError("focal lengths are greater than 0")
+        return value
+
+    @field_validator("distortion")
+    @classmethod
+    def _known_length(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        if len(value) not in _DISTORTION_LENGTHS:
+            raise ValueError(f"{len(value)} distortion coefficients; OpenCV knows {_DISTORTION_LENGTHS}")
+        return value
+
+    @property
+    def matrix(self) -> Array:
+        """Camera matrix, shape (3, 3), pixels."""
+        return np.array(
+            [[self.focal_px[0], 0.0, self.centre_px[0]], [0.0, self.focal_px[1], self.centre_px[1]], [0, 0, 1]]
+        )
+
+    @property
+    def distortion_coefficients(self) -> Array:
+        """Distortion in OpenCV's order, at least four coefficients."""
+        return np.array(self.distortion or (0.0,) * 4)
+
+    def rays(self, pixels: Array) -> Array:
+        """Directions of pixels (n, 2), distortion undone: shape (n, 3), camera frame, z = 1."""
+        points = cv2.undistortPoints(
+            np.asarray(pixels, float).reshape(-1, 1, 2), self.matrix, self.distortion_coefficients
+        )
+        return np.hstack([np.asarray(points, float)[:, 0], np.ones((len(points), 1))])
+
+    def project(self, points_camera_m: Array) -> Array:
+        """Pixels (n, 2) of points (n, 3) in the camera frame."""
+        pixels, _ = cv2.projectPoints(
+            points_camera_m, np.zeros(3), np.zeros(3), self.matrix, self.distortion_coefficients
+        )
+        return np.asarray(pixels[:, 0], float)
+
+
+def load_camera(path: Path) -> CameraCalibration:
+    """Read a camera calibration: our YAML, or OpenCV's (known by its ``%YAML:1.0`` head).
+
+    Raises:
+        ConfigurationError: the file can not be read, or is no calibration.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(9)
+    except OSError as error:
+        raise ConfigurationError(f"cannot be read ({error.strerror})", where=str(path)) from error
+    return _opencv(path) if head == b"%YAML:1.0" else load_model(path, CameraCalibration)
+
+
+def _opencv(path: Path) -> CameraCalibration:
+    try:
+        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+        matrix, distortion = storage.getNode("camera_matrix").mat(), storage.getNode("distortion_coefficients").mat()
+        size = [int(storage.getNode(name).real()) for name in ("image_width", "image_height")]
+    except (cv2.error, SystemError) as error:
+        raise ConfigurationError("is no OpenCV file", where=str(path)) from error
+    if matrix is None or distortion is None or matrix.shape != (3, 3):
+        raise ConfigurationError("has no camera_matrix and distortion_coefficients", where=str(path))
+    content = {
+        "focal_px": (float(matrix[0, 0]), float(matrix[1, 1])),
+        "centre_px": (float(matrix[0, 2]), float(matrix[1, 2])),
+        "distortion": tuple(float(value) for value in distortion.ravel()),
+        "size_px": tuple(size) if min(size) > 0 else None,
+    }
+    return validate(content, CameraCalibration, where=str(path))

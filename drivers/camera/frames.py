@@ -1,0 +1,80 @@
+"""Encoded pictures (JPEG, PNG) to images, checked before the decoder sees them."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.errors import CodecError
+
+Image = NDArray[np.uint8]
+LARGEST_PIXELS = 40_000_000
+"""A header that promises more is damaged or hostile."""
+
+_PNG_HEAD, _PNG_TAIL = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB\x60\x82"
+_JPEG_HEAD, _JPEG_TAIL = b"\xff\xd8", b"\xff\xd9"
+_JPEG_SIZES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One picture.
+
+    Attributes:
+        stamp_ns: arrival at the host.
+        image: grey levels, shape (height, width), uint8.
+    """
+
+    stamp_ns: int
+    image: Image
+
+
+def decode_image(payload: bytes, *, largest_pixels: int = LARGEST_PIXELS) -> Image:
+    """Grey image of a JPEG or PNG, shape (height, width).
+
+    Raises:
+        CodecError: neither format, cut short, damaged, or of more pixels than ``largest_pixels``.
+    """
+    width, height = _size(payload)
+    if not 0 < width * height <= largest_pixels:
+        raise _error(f"a picture of {width} x {height} pixels")
+    try:
+        image = cv2.imdecode(np.frombuffer(payload, np.uint8), cv2.IMREAD_GRAYSCALE)
+    except cv2.error as error:
+        raise _error("picture damaged") from error
+    if image is None:
+        raise _error("picture damaged")
+    return np.asarray(image, np.uint8)
+
+
+def _size(payload: bytes) -> tuple[int, int]:
+    """Width and height that the head promises; refuses what is no picture or lacks its end."""
+    if payload.startswith(_PNG_HEAD):
+        if not payload.endswith(_PNG_TAIL) or len(payload) < 33:
+            raise _error("PNG cut short")
+        width, height = struct.unpack(">II", payload[16:24])
+        return width, height
+    if payload.startswith(_JPEG_HEAD):
+        if not payload.rstrip(b"\0").endswith(_JPEG_TAIL):
+            raise _error("JPEG cut short")
+        return _jpeg_size(payload)
+    raise _error(f"{len(payload)} bytes that are neither JPEG nor PNG")
+
+
+def _jpeg_size(payload: bytes) -> tuple[int, int]:
+    position = 2
+    while position + 9 <= len(payload) and payload[position] == 0xFF:
+        marker, length = payload[position + 1], int.from_bytes(payload[position + 2 : position + 4], "big")
+        if marker in _JPEG_SIZES:
+            height, width = struct.unpack(">HH", payload[position + 5 : position + 9])
+            return width, height
+        position += 2 + length
+    raise _error("JPEG without a size")
+
+
+def _error(what: str) -> CodecError:
+    return CodecError(what, where="camera frame", hint="Check the camera's link and its picture format")

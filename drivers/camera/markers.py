@@ -1,0 +1,148 @@
+"""ArUco markers in a picture: who, and where its corners are.
+
+A marker's frame: x to the right and y up on the print, z out of it; corners in OpenCV's order, clockwise from the top
+left. Markers on the underside of the table are seen from below: their z points down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import cv2
+import numpy as np
+from gtsam import Pose3
+from pydantic import Field, field_validator
+
+from drivers.camera.calibration import CameraCalibration
+from drivers.camera.frames import Image
+from drivers.fingertip import RigidTransform
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.strict_yaml import StrictModel
+
+_DOWN = RigidTransform(translation_m=(0.0, 0.0, 0.0), rpy_rad=(float(np.pi), 0.0, 0.0))
+
+
+class MarkerSettings(StrictModel):
+    """The two markers of the rig.
+
+    Attributes:
+        dictionary: OpenCV's name of the dictionary.
+        world_id, world_side_m: marker fixed to the table; side of its black square.
+        object_id, object_side_m: marker under the object.
+        world_T_worldmarker: its pose in the world; z down.
+        object_T_objectmarker: pose of the other in the object's frame; z down while the object stands on the table.
+        corner_sigma_px: error of a detected corner, per axis.
+        table_sigma_m, table_sigma_rad: error that stays however sharp the picture is: the glass bends the rays (not
+            modelled), the markers are glued on by hand.
+        ambiguous_ratio: two poses of a single marker whose reprojection errors differ by less than this factor can
+            not be told apart.
+        moved_px: a world marker that far from its mean has moved, and its mean begins anew.
+    """
+
+    dictionary: str = "DICT_4X4_50"
+    world_id: int = Field(default=0, ge=0)
+    world_side_m: float = Field(default=0.050, gt=0.0)
+    object_id: int = Field(default=7, ge=0)
+    object_side_m: float = Field(default=0.035, gt=0.0)
+    world_T_worldmarker: RigidTransform = _DOWN
+    object_T_objectmarker: RigidTransform = _DOWN
+    corner_sigma_px: float = Field(default=0.2, gt=0.0)
+    table_sigma_m: float = Field(default=0.0003, ge=0.0)
+    table_sigma_rad: float = Field(default=0.001, ge=0.0)
+    ambiguous_ratio: float = Field(default=3.0, gt=1.0)
+    moved_px: float = Field(default=2.0, gt=0.0)
+
+    @field_validator("dictionary")
+    @classmethod
+    def _known(cls, value: str) -> str:
+        if not value.startswith("DICT_") or not isinstance(getattr(cv2.aruco, value, None), int):
+            raise ValueError(f"{value!r} is no dictionary of OpenCV")
+        return value
+
+
+@dataclass(frozen=True)
+class MarkerPose:
+    """One of the two poses a square's four corners allow.
+
+    Attributes:
+        camera_T_marker: the pose.
+        reprojection_px: root mean square distance of the projected corners from the seen ones.
+    """
+
+    camera_T_marker: Pose3
+    reprojection_px: float
+
+
+@lru_cache(maxsize=8)
+def _detector(dictionary: str) -> Any:
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    return cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary)), parameters)
+
+
+def detect(image: Image, dictionary: str) -> dict[int, Array]:
+    """Markers in a picture by number: corners, shape (4, 2), pixels, refined below a pixel.
+
+    A number seen more than once is left out: which of the two it is can not be known.
+    """
+    corners, numbers, _ = _detector(dictionary).detectMarkers(image)
+    found = [] if numbers is None else [int(number) for number in np.ravel(numbers)]
+    return {
+        number: np.asarray(quad, float).reshape(4, 2)
+        for number, quad in zip(found, corners, strict=True)
+        if found.count(number) == 1
+    }
+
+
+def marker_corners(side_m: float) -> Array:
+    """Corners in the marker's frame, shape (4, 3), metres."""
+    return side_m / 2 * np.array([[-1.0, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]])
+
+
+def marker_poses(corners_px: Array, side_m: float, camera: CameraCalibration) -> tuple[MarkerPose, ...]:
+    """Both poses of a single square, better one first (IPPE); the second is the first's mirror image nearly.
+
+    Far away, small or nearly face-on squares give both almost the same error.
+    """
+    _, rotations, translations, _ = cv2.solvePnPGeneric(
+        marker_corners(side_m),
+        np.asarray(corners_px, float),
+        camera.matrix,
+        camera.distortion_coefficients,
+        flags=cv2.SOLVEPNP_IPPE_SQUARE,
+    )
+    poses = [_pose(r, t) for r, t in zip(rotations, translations, strict=True)]
+    return tuple(
+        sorted(
+            (MarkerPose(pose, reprojection_px(pose, corners_px, side_m, camera)) for pose in poses),
+            key=lambda found: found.reprojection_px,
+        )
+    )
+
+
+def refine_pose(guess: Pose3, corners_px: Array, side_m: float, camera: CameraCalibration) -> Pose3:
+    """The pose near ``guess`` with the smallest reprojection error."""
+    rotation, translation = cv2.solvePnPRefineLM(
+        marker_corners(side_m),
+        np.asarray(corners_px, float),
+        camera.matrix,
+        camera.distortion_coefficients,
+        cv2.Rodrigues(guess.rotation().matrix())[0],
+        np.array(guess.translation()).reshape(3, 1),
+    )
+    return _pose(rotation, translation)
+
+
+def reprojection_px(camera_T_marker: Pose3, corners_px: Array, side_m: float, camera: CameraCalibration) -> float:
+    """Root mean square distance between the projected and the seen corners, pixels."""
+    matrix = camera_T_marker.matrix()
+    projected = camera.project(marker_corners(side_m) @ matrix[:3, :3].T + matrix[:3, 3])
+    return float(np.sqrt(np.mean(np.sum((projected - corners_px) ** 2, axis=1))))
+
+
+def _pose(rotation_vector: Any, translation: Any) -> Pose3:
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = cv2.Rodrigues(rotation_vector)[0], np.ravel(translation)
+    return Pose3(matrix)
