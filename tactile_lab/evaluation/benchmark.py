@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import tracemalloc
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -72,6 +73,15 @@ class TimingTable:
             )
             for timing in self.timings
         ]
+
+    def as_json(self) -> dict[str, Any]:
+        """Title and lines as plain data."""
+        return {"title": self.title, "timings": [asdict(timing) for timing in self.timings]}
+
+
+def run_benchmarks(clock: Clock | None = None) -> list[TimingTable]:
+    """All benchmarks. Raises ConfigurationError, see :func:`weighting_table`."""
+    return [weighting_table(clock), shape_table(clock)]
 
 
 @dataclass(frozen=True)

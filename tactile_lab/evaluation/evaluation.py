@@ -28,6 +28,7 @@ from tactile_lab.evaluation.shape import (
 )
 from tactile_lab.evaluation.tables import read_contour
 from tactile_lab.evaluation.trajectory import PoseErrors, compared_grasps, estimate_T_truth, pose_errors
+from tactile_lab.shape.mesh_io import read_mesh
 from tactile_lab.shape.metrics import ShapeErrors
 
 SCHEMA_VERSION = 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -22,6 +23,10 @@ class SweepRun:
     object_name: str
     dimension: int
     seed: int
+
+
+RunSession = Callable[[SweepRun], Mapping[str, Any]]
+"""Runs one session and gives the content of its ``evaluation.json``."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,20 @@ class SweepRow:
         if self.evaluation.get("failed"):
             return f"registration above {FAILURE_LIMIT_MM:g} mm"
         return "" if self.figure("shape_best_fit", "hausdorff_mm") is not None else "no shape"
+
+    def line(self) -> str:
+        """The row in one line, for progress."""
+        head = f"{self.run.object_name}, {self.run.dimension}-D, seed {self.run.seed}"
+        if self.failure:
+            return f"{head}: failed, {self.failure}"
+        figures = (self.figure("shape_best_fit", "hausdorff_mm"), self.figure("pose", "rmse_mm"))
+        hausdorff, position = (UNKNOWN if figure is None else f"{figure:.1f}" for figure in figures)
+        return f"{head}: Hausdorff {hausdorff} mm at best fit, position {position} mm"
+
+    def as_json(self) -> dict[str, Any]:
+        """Run, evaluation and failure as plain data."""
+        run = {"object": self.run.object_name, "dimension": self.run.dimension, "seed": self.run.seed}
+        return {**run, "failure": self.failure or None, "evaluation": self.evaluation}
 
     def figure(self, *keys: str) -> float | None:
         """A figure of the evaluation by its keys, None where it is unknown."""
@@ -115,24 +134,27 @@ def planned_runs(objects: Sequence[str], dimensions: Sequence[int], seeds: Seque
 
 def sweep(
     runs: Iterable[SweepRun],
-    run_session: Callable[[SweepRun], Mapping[str, Any]],
+    run_session: RunSession,
     finished: Callable[[SweepRow], None] = lambda row: None,
+    each: Callable[[Callable[[SweepRun], SweepRow], Iterable[SweepRun]], Iterable[SweepRow]] = map,
 ) -> list[SweepRow]:
-    """Run sessions one after the other; a session that ends in one of our errors becomes a failed row.
+    """Run sessions; one that ends in one of our errors becomes a failed row, and the sweep goes on.
 
     Args:
         runs: what to run.
         run_session: runs one session and gives the content of its ``evaluation.json``.
-        finished: told about each row as it comes.
+        finished: told about each row, in the order of the runs.
+        each: applies a function to all runs, in order: the built-in ``map``, or a process pool's.
     """
     rows = []
-    for run in runs:
-        rows.append(_row(run, run_session))
-        finished(rows[-1])
+    for row in each(partial(run_one, run_session=run_session), runs):
+        rows.append(row)
+        finished(row)
     return rows
 
 
-def _row(run: SweepRun, run_session: Callable[[SweepRun], Mapping[str, Any]]) -> SweepRow:
+def run_one(run: SweepRun, run_session: RunSession) -> SweepRow:
+    """One row of a sweep."""
     try:
         return SweepRow(run, run_session(run))
     except TactileLabError as error:
@@ -155,13 +177,19 @@ def _summary(name: str, dimension: int, rows: list[SweepRow]) -> SweepSummary:
 
 def markdown_table(found: Sequence[SweepSummary]) -> str:
     """The summaries as a Markdown table: median / p90 / maximum, and the failures with their seeds."""
-    titles = ["object", "dim.", "runs", *(title for title, _, _ in COLUMNS), "failed", "seeds and reasons"]
+    titles = summary_titles()
     lines = [_markdown_row(titles), _markdown_row(["---", *["---:"] * (len(titles) - 2), "---"])]
-    lines += [_markdown_row(_summary_cells(summary)) for summary in found]
+    lines += [_markdown_row(summary_cells(summary)) for summary in found]
     return "\n".join(lines) + "\n"
 
 
-def _summary_cells(summary: SweepSummary) -> list[str]:
+def summary_titles() -> list[str]:
+    """Headings of :func:`summary_cells`."""
+    return ["object", "dim.", "runs", *(title for title, _, _ in COLUMNS), "failed", "seeds and reasons"]
+
+
+def summary_cells(summary: SweepSummary) -> list[str]:
+    """One summary as a row of texts."""
     spreads = [
         UNKNOWN if spread is None else spread.text(digits)
         for spread, (_, _, digits) in zip(summary.spreads, COLUMNS, strict=True)

@@ -14,13 +14,18 @@ REPORT = "report.html"
 __all__ = ["REPORT", "write"]
 
 
-def write(folder: Path) -> Path:
-    """Write ``results/report.html`` of a session folder; the file's path.
+def write(folder: Path, results: Path | None = None) -> Path:
+    """Write ``report.html`` beside the results it shows; the file's path.
+
+    Args:
+        folder: the session's folder.
+        results: the folder of the results to show; the session's own when None.
 
     Raises:
         SessionError: no session folder, no results yet, or the file cannot be written.
         ShapeError: a mesh that cannot be read.
     """
-    path = folder / RESULTS / REPORT
-    write_whole(path, page(gather(Session.open(folder))).encode())
+    results = results or folder / RESULTS
+    path = results / REPORT
+    write_whole(path, page(gather(Session.open(folder), results)).encode())
     return path

@@ -11,7 +11,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from sessions.manifest import Manifest
-from sessions.session import RESULTS, Session
+from sessions.session import Session
 from tactile_lab.evaluation.evaluation import Truth, true_outline
 from tactile_lab.evaluation.plain import read_json_object
 from tactile_lab.evaluation.results import Results, read_results
@@ -26,14 +26,17 @@ from tactile_lab.shape.mesh_io import read_mesh
 _EVALUATE = "Run: tactile-lab evaluate"
 
 
-def gather(session: Session) -> ReportContent:
+def gather(session: Session, folder: Path) -> ReportContent:
     """Everything a report shows, from the session's description, its results and its evaluation.
+
+    Args:
+        session: the session.
+        folder: its results, or those of a replay.
 
     Raises:
         SessionError: there are no results, or a file is not as the program leaves it.
         ShapeError: a mesh that cannot be read.
     """
-    folder = session.folder / RESULTS
     results = read_results(folder)
     surface = _surface(folder / "mesh.ply", results.dimension)
     contour_m, sigma_m = _outline(folder, results, surface)
@@ -44,7 +47,7 @@ def gather(session: Session) -> ReportContent:
         surface=surface,
         contour_m=contour_m,
         contour_sigma_m=sigma_m,
-        truth=_truth(session, results),
+        truth=_truth(session, folder, results),
     )
 
 
@@ -107,8 +110,8 @@ def _contour(path: Path, results: Results) -> tuple[Array | None, Array]:
     return read_contour(path)[:-1], np.array(sigma_m, dtype=float)
 
 
-def _truth(session: Session, results: Results) -> TrueShape | None:
-    path = session.folder / RESULTS / TRUTH_TRAJECTORY
+def _truth(session: Session, folder: Path, results: Results) -> TrueShape | None:
+    path = folder / TRUTH_TRAJECTORY
     if not path.is_file():
         return None
     truth = Truth(read_trajectory(path).world_T_object, read_truth_mesh(session))

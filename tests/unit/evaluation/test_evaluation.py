@@ -1,0 +1,186 @@
+"""The evaluation of a session: figures, nulls, status."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from gtsam import Pose3, Rot3
+from synthetic_grasps import SIZE_m, Recorded, box_grasps
+
+from sessions.marks import Mark, MarkKind
+from sessions.traffic_reader import TrafficMessage
+from tactile_lab.errors import SessionError, ShapeError
+from tactile_lab.evaluation.evaluation import Evaluation, Truth, evaluate, true_outline
+from tactile_lab.evaluation.result_files import write_results
+from tactile_lab.evaluation.results import read_results
+from tactile_lab.evaluation.session_truth import marked_pictures
+from tactile_lab.evaluation.shape import horizontal_outline
+from tactile_lab.evaluation.table import evaluation_rows
+from tactile_lab.slam import SlamSettings, TactileSlam
+
+GRASPS = 6
+
+
+@pytest.fixture(scope="module")
+def recorded() -> Recorded:
+    return box_grasps(GRASPS, seed=1, motion_noise=0.1)
+
+
+@pytest.fixture(scope="module", params=[2, 3])
+def results(request: pytest.FixtureRequest, recorded: Recorded, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("results")
+    slam = TactileSlam(SlamSettings(dimension=request.param), seed=3)
+    for grasp in recorded.grasps:
+        slam.step(grasp)
+    write_results(folder, slam.finish(), recorded.grasps)
+    return folder
+
+
+def full_truth(recorded: Recorded) -> Truth:
+    return Truth(recorded.truth, trimesh.creation.box(SIZE_m))
+
+
+@pytest.fixture(scope="module")
+def evaluation(results: Path, recorded: Recorded) -> Evaluation:
+    return evaluate(results, full_truth(recorded), "box")
+
+
+def test_keys_are_those_of_the_design(evaluation: Evaluation) -> None:
+    content = evaluation.as_json()
+    assert {"schema_version", "method", "seed", "object", "grasps", "contacts", "shape", "pose"} <= set(content)
+    assert {"loops", "time", "status", "aligned", "shape_best_fit", "registration_rms_mm", "failed"} <= set(content)
+    figures = {"hausdorff_mm", "mean_distance_mm", "chamfer_mm", "fscore_5mm", "iou"}
+    assert set(content["shape"]) == set(content["shape_best_fit"]) == figures
+    assert {"rmse_mm", "rmse_deg", "final_mm", "final_deg", "per_grasp"} <= set(content["pose"])
+    assert set(content["loops"]) == {"tested", "accepted", "wrong"}
+    assert set(content["time"]) == {"total_s", "step_ms_median", "step_ms_p95"}
+    assert content["aligned"] == "first_grasp"
+
+
+def test_figures_of_a_gentle_session_are_small(evaluation: Evaluation) -> None:
+    assert evaluation.status == "ok"
+    assert evaluation.pose is not None
+    assert evaluation.pose.rmse_mm < 6.0
+    assert evaluation.shape_best_fit is not None
+    assert evaluation.shape_best_fit.mean_distance_mm < 12.0
+    assert evaluation.registration_rms_mm is not None
+    assert evaluation.failed is (evaluation.registration_rms_mm > 5.0)
+    assert (evaluation.grasps, evaluation.contacts) == (GRASPS, 5 * GRASPS)
+
+
+def test_best_fit_is_no_worse_on_average_than_the_first_grasp(evaluation: Evaluation) -> None:
+    assert evaluation.shape is not None
+    assert evaluation.shape_best_fit is not None
+    assert evaluation.shape_best_fit.mean_distance_mm <= evaluation.shape.mean_distance_mm + 0.2
+
+
+def test_file_is_strict_json_and_repeatable(results: Path, recorded: Recorded, evaluation: Evaluation) -> None:
+    def refuse(word: str) -> None:
+        raise AssertionError(word)
+
+    assert json.loads(evaluation.as_text(), parse_constant=refuse) == evaluation.as_json()
+    assert evaluate(results, full_truth(recorded), "box").as_text() == evaluation.as_text()
+
+
+def test_unseen_grasps_are_counted_and_null(results: Path, recorded: Recorded) -> None:
+    seen = (recorded.truth[0], None, *recorded.truth[2:])
+    content = evaluate(results, Truth(seen), "box").as_json()
+    assert content["truth"] == {"seen": GRASPS - 1, "missing": 1, "mesh": False}
+    assert content["pose"]["per_grasp"][1] is None
+    assert content["shape"] is None
+    assert content["shape_best_fit"] is None
+
+
+def test_without_any_truth_everything_that_needs_it_is_null(results: Path) -> None:
+    content = evaluate(results, Truth((None,) * GRASPS), "box").as_json()
+    assert content["pose"] is None
+    assert content["registration_rms_mm"] is None
+    assert content["failed"] is None
+    assert content["status"] == "ok"
+
+
+def test_mesh_without_sightings_gives_the_best_fit_alone(results: Path, recorded: Recorded) -> None:
+    content = evaluate(results, Truth((None,) * GRASPS, trimesh.creation.box(SIZE_m)), "box").as_json()
+    assert content["shape"] is None
+    assert content["shape_best_fit"]["hausdorff_mm"] > 0.0
+
+
+def test_truth_of_another_session_is_refused(results: Path, recorded: Recorded) -> None:
+    with pytest.raises(SessionError, match="6 grasps in the results, 5 in the session"):
+        evaluate(results, Truth(recorded.truth[:5]), "box")
+
+
+def test_lost_object_is_a_failure_whatever_the_registration(results: Path, recorded: Recorded, tmp_path: Path) -> None:
+    for path in results.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    slam = tmp_path / "slam.json"
+    slam.write_text(slam.read_text().replace('"status": "ok"', '"status": "lost"'))
+    assert evaluate(tmp_path, Truth(recorded.truth), "box").failed is True
+
+
+def test_section_is_at_the_contacts_height_in_the_object(results: Path, recorded: Recorded) -> None:
+    cone = trimesh.creation.cone(radius=0.05, height=0.06, sections=64)
+    cone.apply_translation([0.0, 0.0, -0.03])
+    outline = true_outline(read_results(results), Truth(recorded.truth, cone))
+    assert outline is not None
+    points = np.concatenate([grasp.points_world_m for grasp in recorded.grasps])
+    radius = 0.05 * (1 - (points[:, 2].mean() - 0.02 + 0.03) / 0.06)
+    assert np.linalg.norm(outline, axis=1).max() == pytest.approx(radius, rel=0.02)
+
+
+def test_section_beyond_the_mesh_is_taken_at_its_end_and_an_open_mesh_is_told() -> None:
+    box = trimesh.creation.box(SIZE_m)
+    assert np.ptp(horizontal_outline(box, 1.0), axis=0) == pytest.approx(SIZE_m[:2])
+    sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 0, 1]], [[0, 1, 2]])
+    with pytest.raises(ShapeError, match="no closed section"):
+        horizontal_outline(sheet, 0.5)
+
+
+def test_rows_for_people_show_dashes_for_what_is_unknown(results: Path) -> None:
+    content = evaluate(results, Truth((None,) * GRASPS), "box").as_json()
+    rows = {row.label: row for row in evaluation_rows(content)}
+    assert rows["Hausdorff distance"].value == "\u2013"
+    assert rows["Registration error"].note == "not known"
+    assert rows["Contacts"].value == str(5 * GRASPS)
+    assert rows["Marker sightings"].note == "6 grasps without a sighting"
+
+
+def message(topic: str, data: bytes, number: int) -> TrafficMessage:
+    return TrafficMessage(topic, data, 1000 * number, number)
+
+
+def traffic(*events: MarkKind | bytes) -> list[TrafficMessage]:
+    found = []
+    for number, event in enumerate(events):
+        if isinstance(event, bytes):
+            found.append(message("/link/camera/rx", event, number))
+        else:
+            found.append(message("/marks", Mark(event, 1000 * number).to_bytes(), number))
+    return found
+
+
+def test_marked_picture_belongs_to_the_open_or_else_the_last_grasp() -> None:
+    begin, end, mark = MarkKind.CAPTURE_BEGIN, MarkKind.CAPTURE_END, MarkKind.TRUTH_FRAME
+    events = traffic(b"early", mark, begin, end, b"old", b"first", mark, begin, b"second", mark, end, begin, end)
+    found = marked_pictures(events)
+    assert {index: picture.payload for index, picture in found.items()} == {0: b"first", 1: b"second"}
+
+
+def test_mark_without_a_new_picture_and_second_pictures_count_for_nothing() -> None:
+    begin, end, mark = MarkKind.CAPTURE_BEGIN, MarkKind.CAPTURE_END, MarkKind.TRUTH_FRAME
+    events = traffic(begin, end, b"first", mark, b"after release", mark, begin, end, mark)
+    assert {index: picture.payload for index, picture in marked_pictures(events).items()} == {0: b"first"}
+
+
+def test_aligned_error_is_independent_of_where_the_truths_frame_lies(results: Path, recorded: Recorded) -> None:
+    offset = Pose3(Rot3.Yaw(1.1), np.array([0.02, -0.01, 0.005]))
+    moved = Truth(tuple(pose * offset.inverse() for pose in recorded.truth))
+    first, second = evaluate(results, Truth(recorded.truth), "box"), evaluate(results, moved, "box")
+    assert first.registration_rms_mm == pytest.approx(second.registration_rms_mm, abs=1e-6)
+    assert first.pose is not None
+    assert second.pose is not None
+    assert first.pose.rmse_deg == pytest.approx(second.pose.rmse_deg, abs=1e-4)
