@@ -16,8 +16,9 @@ import numpy as np
 from gtsam import Pose3, Rot3
 
 from drivers.shadow.kinematics import JOINT_TABLE, Joint, JOINT_LIMITS_rad
-from drivers.simulation.links import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Ellipsoid, Shape
-from drivers.simulation.motors import DISTAL_COUPLING, MOTOR_CLASSES
+from drivers.shadow.motors import DRIVEN_JOINTS
+from drivers.simulation.geared_motors import DISTAL_COUPLING, motor_class
+from drivers.simulation.hand_bodies import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Ellipsoid, Shape
 from drivers.simulation.objects import Hull, ObjectModel, Piece
 from tactile_lab.geometry.contacts import FINGERS, Array
 
@@ -72,16 +73,20 @@ _TRAIL_Nm_rad, _TRAIL_Nms_rad = 0.25, 0.01  # elastic coupling of J1 to J2
 
 @dataclass(frozen=True)
 class TipBody:
-    """One fingertip beyond its force sensor.
+    """One fingertip beyond its sensor.
 
     Attributes:
         distal_T_sensor: the sensor's measuring frame in the distal frame.
-        shape: the skin, in the distal frame.
-        com_distal_m: centre of mass in the distal frame.
+        distal_T_skin: centre and axes of the ellipsoid that touches.
+        semi_axes_m: its semi-axes.
+        mass_kg: mass beyond the sensor.
+        com_distal_m: its centre in the distal frame.
     """
 
     distal_T_sensor: Pose3
-    shape: Ellipsoid | Capsule
+    distal_T_skin: Pose3
+    semi_axes_m: tuple[float, float, float]
+    mass_kg: float
     com_distal_m: tuple[float, float, float]
 
 
@@ -228,12 +233,17 @@ def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody) -> None:
     name = f"{finger} tip"
     body = distal.add_body(name=name)
     body.explicitinertial = True
-    body.mass = tip.shape.mass_kg
+    body.mass = tip.mass_kg
     body.ipos = tip.com_distal_m
-    body.inertia = [0.4 * tip.shape.mass_kg * 0.01**2] * 3  # a ball of 10 mm: nothing depends on it
-    body.add_geom(name=name, **_geometry(tip.shape), **_surface(_RUBBER, _TIP, _OBJECT | _TABLE))
-    rotation = _quaternion(tip.distal_T_sensor.rotation())
-    body.add_site(name=name, pos=tip.distal_T_sensor.translation(), quat=rotation)
+    body.inertia = [0.4 * tip.mass_kg * 0.01**2] * 3  # a ball of 10 mm: nothing depends on it
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+        size=tip.semi_axes_m,
+        **_placed(tip.distal_T_skin),
+        **_surface(_RUBBER, _TIP, _OBJECT | _TABLE),
+    )
+    body.add_site(name=name, **_placed(tip.distal_T_sensor))
     body.add_site(name=f"{finger} distal")
     for quantity, kind in (("force", mujoco.mjtSensor.mjSENS_FORCE), ("moment", mujoco.mjtSensor.mjSENS_TORQUE)):
         spec.add_sensor(name=f"{finger} {quantity}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=name)
@@ -242,7 +252,8 @@ def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody) -> None:
 def _add_motors(spec: Any) -> None:
     for finger in FINGERS[:4]:
         _add_distal_tendons(spec, finger)
-    for joint, motor in MOTOR_CLASSES.items():
+    for joint in DRIVEN_JOINTS:
+        motor = motor_class(joint)
         coupled = joint.endswith("J0")
         kind = mujoco.mjtTrn.mjTRN_TENDON if coupled else mujoco.mjtTrn.mjTRN_JOINT
         actuator = spec.add_actuator(name=joint, target=joint, trntype=kind)
@@ -296,6 +307,10 @@ def _piece_geometry(spec: Any, piece: Piece, mesh_name: str) -> dict[str, Any]:
     }
     size = [*piece.size_m, 0.0, 0.0][:3]
     return {"type": kinds[piece.kind], "size": size, "pos": piece.position_object_m}
+
+
+def _placed(pose: Pose3) -> dict[str, Any]:
+    return {"pos": pose.translation(), "quat": _quaternion(pose.rotation())}
 
 
 def _quaternion(rotation: Rot3) -> Array:

@@ -12,8 +12,8 @@ from gtsam import Pose2, Pose3, Rot3
 from numpy.typing import NDArray
 
 from drivers.shadow.kinematics import JOINTS
+from drivers.shadow.motors import DRIVEN_JOINTS
 from drivers.simulation.model import BASE_JOINTS, BASE_LIMITS, TIMESTEP_s
-from drivers.simulation.motors import DRIVEN_JOINTS
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.geometry.contacts import FINGERS, Array
 

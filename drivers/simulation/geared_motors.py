@@ -7,10 +7,7 @@ Each motor is the linear model of a direct-current motor behind a gear: torque a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-
-from tactile_lab.geometry.contacts import FINGERS
 
 
 @dataclass(frozen=True)
@@ -28,23 +25,21 @@ class MotorClass:
     stall_current_mA: float
 
 
-_WRIST = MotorClass(10.0, 2.0, 1400.0)
-_KNUCKLE = MotorClass(1.0, 0.10, 900.0)  # 65 N tendon over about 10 mm, and some reserve
-_DISTAL = MotorClass(0.8, 0.06, 900.0)  # drives J1 + J2 of a finger
-_THUMB_BASE = MotorClass(2.0, 0.12, 1400.0)  # 190 N tendon
+_WRIST = MotorClass(10.0, 4.0, 350.0)
+_KNUCKLE = MotorClass(0.5, 0.12, 217.0)  # 65 N on the tendon over about 8 mm
+_DISTAL = MotorClass(0.4, 0.06, 217.0)  # pulls J1 and J2 of a finger together
+_THUMB = MotorClass(0.6, 0.10, 217.0)
+_THUMB_BASE = MotorClass(0.9, 0.15, 350.0)
 
-MOTOR_CLASSES: Mapping[str, MotorClass] = {
-    **{f"{finger}J0": _DISTAL for finger in FINGERS[:4]},
-    **{f"{finger}{joint}": _KNUCKLE for finger in FINGERS[:4] for joint in ("J3", "J4")},
-    "LFJ5": _KNUCKLE,
-    **dict.fromkeys(("THJ1", "THJ2", "THJ3"), _KNUCKLE),
-    **dict.fromkeys(("THJ4", "THJ5"), _THUMB_BASE),
-    **dict.fromkeys(("WRJ1", "WRJ2"), _WRIST),
-}
-"""The motor of each of the 20 driven joints; J0 is the coupled pair J1 + J2 of a finger."""
 
-DRIVEN_JOINTS: tuple[str, ...] = tuple(MOTOR_CLASSES)
-"""Order of every per-joint motor vector inside the simulation, 20 names."""
+def motor_class(driven: str) -> MotorClass:
+    """The motor of one of the 20 driven joints (:data:`drivers.shadow.motors.DRIVEN_JOINTS`)."""
+    if driven.startswith("WR"):
+        return _WRIST
+    if driven.startswith("TH"):
+        return _THUMB_BASE if driven in ("THJ4", "THJ5") else _THUMB
+    return _DISTAL if driven.endswith("J0") else _KNUCKLE
+
 
 DISTAL_COUPLING = 0.6
 """J1 follows J2 at this share while nothing touches the finger (the tendon pair has no sensor for it)."""

@@ -1,0 +1,65 @@
+"""The camera under the table as seen from its link: a trigger in, one encoded picture out."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from drivers.camera.camera import TRIGGER
+from drivers.links import Datagram
+from drivers.simulation.camera_renderer import Placed, TableCamera
+from drivers.simulation.objects import ObjectModel
+from drivers.simulation.plant import Plant
+from tactile_lab.errors import CodecError
+from tactile_lab.geometry.poses import transform_points
+
+
+class CameraEmulator:
+    """Far end of the camera's link.
+
+    Args:
+        plant: where the object lies.
+        camera: what draws the pictures.
+        target: the object, for the shape of its underside.
+        table_marker: the marker on the table and its pose in the world.
+        object_marker: the marker under the object and its pose in the object frame.
+        jpeg_quality: of the pictures.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        camera: TableCamera,
+        target: ObjectModel,
+        table_marker: Placed,
+        object_marker: Placed,
+        jpeg_quality: int,
+    ) -> None:
+        self._plant, self._camera = plant, camera
+        foot = target.foot_object_m
+        self._foot_object_m = np.column_stack([foot, np.full(len(foot), -target.rest_height_m)])
+        self._table_marker, self._object_marker = table_marker, object_marker
+        self._jpeg = [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality]
+        self._outbox: list[Datagram] = []
+
+    def write(self, payload: bytes) -> None:
+        """Take a trigger and a picture.
+
+        Raises:
+            CodecError: something else than a trigger.
+        """
+        if payload != TRIGGER:
+            raise CodecError(f"{len(payload)} bytes that are no trigger", where="simulated camera")
+        self._outbox.append(Datagram(self._picture(), self._plant.stamp_ns))
+
+    def read(self) -> list[Datagram]:
+        """The pictures taken since the last call."""
+        arrived, self._outbox = self._outbox, []
+        return arrived
+
+    def _picture(self) -> bytes:
+        world_T_object = self._plant.world_T_object
+        marker, object_T_marker = self._object_marker
+        foot_world_m = transform_points(world_T_object, self._foot_object_m)
+        image = self._camera.render((self._table_marker, (marker, world_T_object * object_T_marker)), foot_world_m)
+        return cv2.imencode(".jpg", image, self._jpeg)[1].tobytes()

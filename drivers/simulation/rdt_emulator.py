@@ -1,0 +1,151 @@
+"""Net F/T boxes with Nano17 sensors as seen from the wire: one RDT stream a fingertip (protocols C.1, C.6).
+
+The boxes of the five fingers sample at the same instants here; on a bench each would keep its own time.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.ati import rdt_codec
+from drivers.ati.rdt_codec import RECORD, Command
+from drivers.links import Datagram
+from drivers.simulation.plant import Plant
+from drivers.simulation.settings import ForceSensorSettings
+from tactile_lab.clock import NANOSECONDS
+from tactile_lab.geometry.contacts import FINGERS, Array
+
+RANGE = np.array([12.0, 12.0, 17.0, 0.12, 0.12, 0.12])
+"""Measuring range of a Nano17 SI-12-0.12, newtons and newton metres."""
+
+RESOLUTION = np.array([1 / 320] * 3 + [1e-3 / 64] * 3)
+"""Its resolution, newtons and newton metres."""
+
+INTERNAL_RATE_Hz = 7000
+_SATURATED = rdt_codec.SATURATION | 1 << 31
+_SOCKET_DATAGRAMS = 5000  # what a receive buffer holds before datagrams are lost
+_SHAPE = (len(FINGERS), 6)
+
+
+class NanoSensors:
+    """The five force sensors: true loads to readings with offset, drift, noise and the sensor's resolution.
+
+    Args:
+        plant: the physics behind the sensors.
+        settings: how large the errors are.
+        rng: where they come from.
+    """
+
+    def __init__(self, plant: Plant, settings: ForceSensorSettings, rng: np.random.Generator) -> None:
+        self._plant, self._rng = plant, rng
+        self._offset = _six(settings.offset_N, settings.offset_Nm) * rng.standard_normal(_SHAPE)
+        self._keep = float(np.exp(-1 / (settings.rate_hz * settings.drift_time_s)))
+        self._wander = np.sqrt(1 - self._keep**2) * _six(settings.drift_N, settings.drift_Nm)
+        self._drift = _six(settings.drift_N, settings.drift_Nm) * rng.standard_normal(_SHAPE)
+        self._noise = settings.noise_lsb * RESOLUTION
+
+    def read(self) -> tuple[Array, NDArray[np.bool_]]:
+        """One reading: wrenches, shape (5, 6), sensor frames, and which sensors are saturated, shape (5,)."""
+        fresh = self._rng.standard_normal((2, *_SHAPE))
+        self._drift = self._keep * self._drift + self._wander * fresh[0]
+        measured = self._plant.wrenches + self._offset + self._drift + self._noise * fresh[1]
+        inside = np.minimum(np.maximum(measured, -RANGE), RANGE)
+        return np.rint(inside / RESOLUTION) * RESOLUTION, (inside != measured).any(axis=1)
+
+
+class RdtBox:
+    """Far end of one fingertip's link: answers requests, sends a record for each reading while a stream runs."""
+
+    def __init__(self) -> None:
+        self.sent = 0
+        self.bias_asked = False
+        self._left: int | None = 0  # records still to send; None is without end
+        self._outbox: deque[Datagram] = deque(maxlen=_SOCKET_DATAGRAMS)
+
+    @property
+    def streaming(self) -> bool:
+        """Whether a client wants records."""
+        return self._left != 0
+
+    def write(self, payload: bytes) -> None:
+        """Take a request. A start counts the records from 1 again; a software bias wants a new start after it.
+
+        Raises:
+            CodecError: not an RDT request.
+        """
+        request = rdt_codec.decode_request(payload)
+        if request.command == Command.START:
+            self._left, self.sent = request.count or None, 0
+        elif request.command in (Command.STOP, Command.SET_SOFTWARE_BIAS):
+            self._left = 0
+            self.bias_asked = self.bias_asked or request.command == Command.SET_SOFTWARE_BIAS
+
+    def read(self) -> list[Datagram]:
+        """The records that arrived since the last call, one a datagram."""
+        arrived = list(self._outbox)
+        self._outbox.clear()
+        return arrived
+
+    def push(self, record: bytes, stamp_ns: int) -> None:
+        """Send one record."""
+        self._left = None if self._left is None else self._left - 1
+        self._outbox.append(Datagram(record, stamp_ns))
+
+
+class RdtBank:
+    """The boxes of all five fingers with their common sampling time.
+
+    Args:
+        plant: the physics behind the sensors.
+        settings: rate, scale and errors.
+        rng: where the errors come from.
+
+    Attributes:
+        boxes: far end of each finger's link.
+    """
+
+    def __init__(self, plant: Plant, settings: ForceSensorSettings, rng: np.random.Generator) -> None:
+        self.boxes = {finger: RdtBox() for finger in FINGERS}
+        self._plant, self._sensors = plant, NanoSensors(plant, settings, rng)
+        self._period_ns = NANOSECONDS // settings.rate_hz
+        self._next_ns = plant.stamp_ns + self._period_ns
+        self._software_bias = np.zeros(_SHAPE)
+        self._scale = _six(settings.counts_per_N, settings.counts_per_Nm)
+
+    @property
+    def next_event_ns(self) -> int | None:
+        """When the next reading is due."""
+        return self._next_ns
+
+    def tick(self) -> None:
+        """Read the sensors, and send a record from every box that has a client."""
+        self._next_ns += self._period_ns
+        wrenches, saturated = self._sensors.read()
+        for row, box in enumerate(self.boxes.values()):
+            if box.bias_asked:
+                self._software_bias[row], box.bias_asked = wrenches[row], False
+            box.sent += box.streaming
+        if any(box.streaming for box in self.boxes.values()):
+            self._send(self._records(wrenches - self._software_bias, saturated))
+
+    def _records(self, wrenches: Array, saturated: NDArray[np.bool_]) -> bytes:
+        """The records of all five boxes, one after the other."""
+        internal_samples = self._plant.stamp_ns * INTERNAL_RATE_Hz // NANOSECONDS
+        return rdt_codec.encode_records(
+            np.array([box.sent for box in self.boxes.values()]),
+            np.full(len(FINGERS), internal_samples),
+            np.where(saturated, _SATURATED, 0),
+            np.rint(wrenches * self._scale),
+        )
+
+    def _send(self, records: bytes) -> None:
+        for row, box in enumerate(self.boxes.values()):
+            if box.streaming:
+                box.push(records[row * RECORD.itemsize : (row + 1) * RECORD.itemsize], self._plant.stamp_ns)
+
+
+def _six(force: float, moment: float) -> Array:
+    return np.array([force] * 3 + [moment] * 3)

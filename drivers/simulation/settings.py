@@ -1,0 +1,109 @@
+"""Settings of the simulated rig: the object, the fingertips, and how imperfect the devices are."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from pydantic import Field
+
+from drivers.fingertip import RigidTransform
+from tactile_lab.strict_yaml import StrictModel
+
+
+class ObjectStart(StrictModel):
+    """Where the object lies at the beginning: position on the table in the world frame, turn about the vertical."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
+class JointSensorSettings(StrictModel):
+    """Errors of the hand's joint sensors, one standard deviation.
+
+    Attributes:
+        bias_rad: constant through a session, drawn for each joint.
+        noise_rad: from reading to reading.
+    """
+
+    bias_rad: float = Field(default=math.radians(0.6), ge=0.0)
+    noise_rad: float = Field(default=math.radians(0.1), ge=0.0)
+
+
+class ForceSensorSettings(StrictModel):
+    """A Nano17 SI-12-0.12 behind a Net F/T box (protocols C.1, C.6).
+
+    Attributes:
+        rate_hz: records per second (the box's comrdtrate).
+        counts_per_N, counts_per_Nm: the box's scale (cfgcpf, cfgcpt).
+        offset_N, offset_Nm: untared reading of a session, one standard deviation per axis.
+        drift_N, drift_Nm: wandering about it, one standard deviation per axis.
+        drift_time_s: time after which the wandering has forgotten where it was.
+        noise_lsb: noise of one reading in steps of the sensor's resolution.
+    """
+
+    rate_hz: int = Field(default=100, ge=1, le=500)
+    counts_per_N: float = Field(default=1_000_000.0, gt=0.0)
+    counts_per_Nm: float = Field(default=1_000_000.0, gt=0.0)
+    offset_N: float = Field(default=0.3, ge=0.0)
+    offset_Nm: float = Field(default=0.002, ge=0.0)
+    drift_N: float = Field(default=0.01, ge=0.0)
+    drift_Nm: float = Field(default=5e-5, ge=0.0)
+    drift_time_s: float = Field(default=20.0, gt=0.0)
+    noise_lsb: float = Field(default=1.0, ge=0.0)
+
+
+class BiotacSettings(StrictModel):
+    """Synthetic BioTac response.
+
+    Attributes:
+        noise_counts: noise of an electrode reading.
+        response_length_m: how far from a contact an electrode still feels it.
+    """
+
+    noise_counts: float = Field(default=4.0, ge=0.0)
+    response_length_m: float = Field(default=0.003, gt=0.0)
+
+
+class CameraSettings(StrictModel):
+    """The camera under the table beyond its lens.
+
+    Attributes:
+        world_T_camera: its pose, z along the view (up), x along the picture's rows.
+        glass_thickness_m, glass_index: the table's plate.
+        blur_px: sharpness, one standard deviation.
+        noise_levels: noise of a pixel of 255.
+        jpeg_quality: of the pictures it sends.
+    """
+
+    world_T_camera: RigidTransform = RigidTransform(translation_m=(-0.005, -0.04, -0.58), rpy_rad=(-0.07, 0.05, 0.0))
+    glass_thickness_m: float = Field(default=0.008, ge=0.0)
+    glass_index: float = Field(default=1.5, ge=1.0)
+    blur_px: float = Field(default=0.8, gt=0.0)
+    noise_levels: float = Field(default=3.0, ge=0.0)
+    jpeg_quality: int = Field(default=90, ge=1, le=100)
+
+
+class SimulationSettings(StrictModel):
+    """The simulated rig.
+
+    Attributes:
+        object: name in the catalogue (:mod:`drivers.simulation.objects`) or ``mesh:<path>``.
+        object_mass_kg: its mass.
+        start: where it lies at the beginning; drawn from the seed when not given.
+        start_sigma_m: spread of the drawn position per axis, about the middle of the table. Any turn is as likely.
+        fingertips: the kind on all five fingers.
+        world_T_mount: where the positioner really stands; a rig's forearm-to-world calibration may be off from it.
+    """
+
+    object: str = "box-10x6x4"
+    object_mass_kg: float = Field(default=0.3, gt=0.0, le=5.0)
+    start: ObjectStart | None = None
+    start_sigma_m: float = Field(default=0.01, ge=0.0, le=0.1)
+    fingertips: Literal["nano17", "biotac"] = "nano17"
+    world_T_mount: RigidTransform = RigidTransform(translation_m=(0.0, 0.0, 0.0))
+    joint_sensors: JointSensorSettings = JointSensorSettings()
+    force_sensors: ForceSensorSettings = ForceSensorSettings()
+    biotac: BiotacSettings = BiotacSettings()
+    camera: CameraSettings = CameraSettings()

@@ -1,0 +1,205 @@
+"""The simulated rig: one physics, one clock, and the far ends of all links.
+
+Waiting on the clock is what moves the world: the physics steps on, and every device acts at its own times in between
+(force sensors sample, motors halt for want of demands). Everything random comes from one seed, so that the same
+commands give the same bytes again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from gtsam import Pose2, Pose3
+
+from drivers.camera.markers import MarkerSettings
+from drivers.fingertip import RigidTransform
+from drivers.links import Link, MemoryLink, Peer
+from drivers.simulation.biotac_emulator import BiotacSection, BiotacSkin
+from drivers.simulation.calibration import SimulatedCalibration
+from drivers.simulation.camera_emulator import CameraEmulator
+from drivers.simulation.camera_renderer import PrintedMarker, TableCamera
+from drivers.simulation.model import build_model
+from drivers.simulation.motor_bank import MotorBank
+from drivers.simulation.objects import ObjectModel, object_model
+from drivers.simulation.palm_emulator import JointSensors, NoTactile, PalmEmulator, TactileSection
+from drivers.simulation.plant import Plant, STEP_ns
+from drivers.simulation.positioner_emulator import PositionerEmulator
+from drivers.simulation.rdt_emulator import RdtBank
+from drivers.simulation.settings import SimulationSettings
+from tactile_lab.clock import VirtualClock
+from tactile_lab.geometry.contacts import FINGERS, Contact
+
+_RANDOM_PARTS = ("object", "joints", "motors", "palm", "forces", "tactile", "camera")
+
+
+@dataclass(frozen=True)
+class TruthSample:
+    """What really is: for the truth channel, which only evaluation reads.
+
+    Attributes:
+        stamp_ns: time of the sample.
+        world_T_object: pose of the object frame.
+        contacts: where fingertips touch the object; one finger may touch at several points.
+        fingers_on_table: fingers whose tip touches the table.
+    """
+
+    stamp_ns: int
+    world_T_object: Pose3
+    contacts: tuple[Contact, ...]
+    fingers_on_table: tuple[str, ...]
+
+
+class TimedDevice(Protocol):
+    """A device that acts by itself at certain times."""
+
+    @property
+    def next_event_ns(self) -> int | None:
+        """When it acts next; None while nothing is due."""
+
+    def tick(self) -> None:
+        """Act."""
+
+
+class SimulatedClock(VirtualClock):
+    """A virtual clock whose waiting moves the simulated world."""
+
+    def __init__(self, world: SimulatedWorld) -> None:
+        super().__init__()
+        self._world = world
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        self._world.advance_to(deadline_ns)
+        super().sleep_until_ns(deadline_ns)
+
+
+class SimulatedWorld:
+    """The simulated rig.
+
+    Args:
+        settings: object, fingertips and how imperfect the devices are.
+        seed: of everything random.
+        calibration: what the rig is really like; the packaged simulated hand unless given.
+
+    Raises:
+        ConfigurationError: unknown object, or a calibration that does not fit the settings.
+        ShapeError: an object mesh that cannot be used.
+    """
+
+    def __init__(
+        self, settings: SimulationSettings, seed: int, calibration: SimulatedCalibration | None = None
+    ) -> None:
+        self.settings = settings
+        self.calibration = calibration or SimulatedCalibration.packaged()
+        self.object_model: ObjectModel = object_model(settings.object)
+        children = np.random.SeedSequence(seed).spawn(len(_RANDOM_PARTS))
+        self._random = dict(zip(_RANDOM_PARTS, map(np.random.default_rng, children), strict=True))
+        self._plant = self._build_plant()
+        self._peers: dict[str, Peer] = {}
+        self._devices: list[TimedDevice] = []
+        self._add_palm()
+        self._peers["base"] = PositionerEmulator(self._plant)
+        if settings.fingertips == "nano17":
+            self._add_force_sensors()
+        self._peers["camera"] = self._build_camera()
+        self.clock = SimulatedClock(self)
+
+    def links(self) -> dict[str, Link]:
+        """New links by device name: ``hand``, ``base``, ``camera``, and ``ft/FF`` to ``ft/TH`` with Nano17 tips."""
+        return {name: MemoryLink(name, peer) for name, peer in self._peers.items()}
+
+    @property
+    def marker_settings(self) -> MarkerSettings:
+        """The markers of this rig with this object: a small foot carries a smaller marker, some carry it off-centre."""
+        marker = self.object_model.marker
+        glued = RigidTransform(translation_m=marker.centre_object_m, rpy_rad=(np.pi, 0.0, 0.0))
+        return self.calibration.markers.model_copy(
+            update={"object_side_m": marker.side_m, "object_T_objectmarker": glued}
+        )
+
+    def advance_to(self, deadline_ns: int) -> None:
+        """Move the world on to a time of the clock, device by device as their times come."""
+        last = deadline_ns // STEP_ns
+        while True:
+            due_ns = self._next_event_ns()
+            step = last if due_ns is None else min(last, -(-due_ns // STEP_ns))
+            self._plant.advance(step - self._plant.stamp_ns // STEP_ns)
+            if due_ns is None or due_ns > self._plant.stamp_ns:
+                return
+            for device in self._devices:
+                if device.next_event_ns == due_ns:
+                    device.tick()
+
+    def truth(self) -> TruthSample:
+        """The true state now."""
+        touches = self._plant.contacts()
+        return TruthSample(
+            stamp_ns=self._plant.stamp_ns,
+            world_T_object=self._plant.world_T_object,
+            contacts=tuple(
+                Contact(
+                    finger=touch.finger,
+                    point_world_m=touch.point_world_m,
+                    normal_world=touch.normal_world,
+                    point_covariance_m2=np.zeros((3, 3)),
+                    normal_sigma_rad=0.0,
+                    force_N=float(np.linalg.norm(touch.force_on_tip_world_N)),
+                )
+                for touch in touches
+                if touch.touched == "object"
+            ),
+            fingers_on_table=tuple(sorted({touch.finger for touch in touches if touch.touched == "table"})),
+        )
+
+    def _next_event_ns(self) -> int | None:
+        due = [device.next_event_ns for device in self._devices]
+        return min((stamp_ns for stamp_ns in due if stamp_ns is not None), default=None)
+
+    def _build_plant(self) -> Plant:
+        settings = self.settings
+        tips = {finger: self.calibration.tip_body(finger, settings.fingertips) for finger in FINGERS}
+        mount = settings.world_T_mount.pose()
+        return Plant(build_model(self.object_model, settings.object_mass_kg, tips, mount), self._start())
+
+    def _start(self) -> Pose2:
+        rng, given = self._random["object"], self.settings.start
+        x, y = self.settings.start_sigma_m * rng.standard_normal(2)
+        yaw = rng.uniform(-np.pi, np.pi)
+        return Pose2(given.x_m, given.y_m, given.yaw_rad) if given else Pose2(x, y, yaw)
+
+    def _add_palm(self) -> None:
+        calibration, random = self.calibration, self._random
+        joints = JointSensors(calibration.joints, self.settings.joint_sensors, random["joints"])
+        motors = MotorBank(self._plant, calibration.motors, random["motors"])
+        self._peers["hand"] = PalmEmulator(self._plant, joints, motors, self._build_tactile(), random["palm"])
+        self._devices.append(motors)
+
+    def _add_force_sensors(self) -> None:
+        bank = RdtBank(self._plant, self.settings.force_sensors, self._random["forces"])
+        self._peers |= {f"ft/{finger}": box for finger, box in bank.boxes.items()}
+        self._devices.append(bank)
+
+    def _build_tactile(self) -> TactileSection:
+        if self.settings.fingertips == "nano17":
+            return NoTactile()
+        biotacs: Mapping[str, BiotacSkin] = {
+            finger: BiotacSkin(self.calibration.biotacs[finger], self.settings.biotac, self._random["tactile"])
+            for finger in FINGERS
+        }
+        return BiotacSection(self._plant, biotacs)
+
+    def _build_camera(self) -> CameraEmulator:
+        markers = self.marker_settings
+        camera = TableCamera(self.calibration.camera, self.settings.camera, self._random["camera"])
+        table = PrintedMarker(markers.dictionary, markers.world_id, markers.world_side_m)
+        glued = PrintedMarker(markers.dictionary, markers.object_id, markers.object_side_m)
+        return CameraEmulator(
+            self._plant,
+            camera,
+            self.object_model,
+            (table, markers.world_T_worldmarker.pose()),
+            (glued, markers.object_T_objectmarker.pose()),
+            self.settings.camera.jpeg_quality,
+        )
