@@ -1,0 +1,297 @@
+"""The six-axis positioner that carries the hand: a device that never jumps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from drivers.links import Datagram, Link
+from drivers.positioner_codec import (
+    LARGEST_SEQUENCE,
+    QUESTION,
+    PositionerCommand,
+    decode_status,
+    encode_command,
+)
+from drivers.positioner_kinematics import mount_joints, mount_T_forearm
+from tactile_lab.clock import NANOSECONDS, Clock
+from tactile_lab.errors import CodecError, DeviceError
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.strict_yaml import StrictModel
+
+__all__ = ["Positioner", "PositionerSample", "PositionerSettings", "mount_T_forearm", "mount_joints"]
+
+AXES = ("x", "y", "z", "yaw", "pitch", "roll")
+
+_LONGEST_STEP_s = 0.05
+"""After a pause of the host a step is no longer than after this time."""
+
+_SHORTEST_STEP_s = 1e-6
+
+Range = tuple[float, float]
+
+
+class PositionerSettings(StrictModel):
+    """Limits of the positioner.
+
+    Attributes:
+        speed_m_s: largest speed of each linear axis.
+        speed_rad_s: largest speed of each rotation.
+        ranges: lower and upper end of each axis, metres and radians; targets are clamped to them.
+        lost_limit: so many cycles in a row without a status stop the positioner.
+        following_m: a linear axis this far from where it was sent stops the positioner: something is in its way.
+        following_rad: the same for the rotations.
+        cycle_s: period of the questions while connecting.
+        connect_tries: questions until the positioner must have answered.
+    """
+
+    speed_m_s: float = Field(default=0.5, gt=0.0)
+    speed_rad_s: float = Field(default=2.5, gt=0.0)
+    ranges: tuple[Range, Range, Range, Range, Range, Range] = (
+        (-1.0, 1.0),
+        (-1.0, 1.0),
+        (-0.3, 1.3),
+        (-12.5, 12.5),
+        (-1.0, 1.9),
+        (-2.2, 2.2),
+    )
+    lost_limit: int = Field(default=10, ge=1)
+    following_m: float = Field(default=0.1, gt=0.0)
+    following_rad: float = Field(default=0.5, gt=0.0)
+    cycle_s: float = Field(default=0.01, gt=0.0)
+    connect_tries: int = Field(default=20, ge=1)
+
+    @model_validator(mode="after")
+    def _ranges_are_not_empty(self) -> PositionerSettings:
+        for axis, (lower, upper) in zip(AXES, self.ranges, strict=True):
+            if lower >= upper:
+                raise ValueError(f"the range of {axis} is empty")
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class PositionerSample:
+    """Where the positioner stands.
+
+    Attributes:
+        stamp_ns: arrival, session clock.
+        q: measured axes, shape (6,), metres and radians.
+        fresh: False for the last sample repeated after a lost cycle.
+    """
+
+    stamp_ns: int
+    q: Array
+    fresh: bool = True
+
+
+@dataclass
+class PositionerCounters:
+    """Cycles since connecting.
+
+    Attributes:
+        cycles: exchanges.
+        lost: exchanges without a new status.
+        lost_in_a_row: the present run of them.
+        malformed: messages that were no status.
+    """
+
+    cycles: int = 0
+    lost: int = 0
+    lost_in_a_row: int = 0
+    malformed: int = 0
+
+
+class Positioner:
+    """The positioner as a device.
+
+    What is sent creeps from the present position to the target within the speed limits, on a straight line in the
+    axes. While no status comes nothing is sent any further; a run of lost cycles or an axis that does not follow
+    stops the positioner, and every further :meth:`exchange` raises until :meth:`resume`.
+
+    Args:
+        link: whole commands and statuses.
+        clock: the session's clock.
+        settings: see :class:`PositionerSettings`.
+    """
+
+    def __init__(self, link: Link, clock: Clock, settings: PositionerSettings | None = None) -> None:
+        self._link, self._clock = link, clock
+        self._settings = settings or PositionerSettings()
+        self._range = np.array(self._settings.ranges).T
+        self._speed = np.repeat([self._settings.speed_m_s, self._settings.speed_rad_s], 3)
+        self._following = np.repeat([self._settings.following_m, self._settings.following_rad], 3)
+        self._connected = False
+        self._reset()
+
+    def _reset(self) -> None:
+        """As new: nothing received, nothing sent."""
+        self._heard: int | None = None
+        self._sequence = QUESTION
+        self._last: PositionerSample | None = None
+        self._sent = self._target = np.zeros(6)
+        self._sent_ns = self._clock.now_ns()
+        self._stopped = False
+        self._fault: tuple[str, str] | None = None
+        self._counters = PositionerCounters()
+
+    # --- lifecycle ---------------------------------------------------------------------------------------------
+
+    def connect(self) -> None:
+        """Open the link and ask where the axes stand; nothing moves. All or nothing, repeatable.
+
+        Raises:
+            DeviceError: the link does not open or the positioner does not answer.
+        """
+        if self._connected:
+            return
+        self._link.open()
+        try:
+            self._reset()
+            self._ask()
+        except BaseException:
+            self._link.close()
+            raise
+        self._connected = True
+
+    def close(self) -> None:
+        """Close the link; the positioner holds its last target. Idempotent."""
+        if self._connected:
+            self._connected = False
+            self._link.close()
+
+    def _ask(self) -> None:
+        for _ in range(self._settings.connect_tries):
+            self._link.send(encode_command(PositionerCommand(QUESTION, None)))
+            self._last = self._take(self._link.receive())
+            if self._last is not None:
+                self._sent = self._target = self._last.q
+                return
+            self._clock.sleep_until_ns(self._clock.now_ns() + round(self._settings.cycle_s * NANOSECONDS))
+        raise DeviceError(
+            f"no answer to {self._settings.connect_tries} questions",
+            where=self._link.name,
+            hint="Check the positioner's power and cable",
+        )
+
+    # --- motion ------------------------------------------------------------------------------------------------
+
+    def set_target(self, q: Array) -> None:
+        """Set where to go, shape (6,), metres and radians, clamped to the ranges. Without effect while stopped.
+
+        Raises:
+            DeviceError: not six finite numbers.
+        """
+        target = np.asarray(q, dtype=float)
+        if target.shape != (6,) or not np.isfinite(target).all():
+            raise DeviceError("a target is not six finite numbers", where=self._link.name, hint="Check the path")
+        if not self._stopped and self._fault is None:
+            self._target = np.clip(target, *self._range)
+
+    def stop(self) -> None:
+        """Stay here until :meth:`resume`. Never raises."""
+        self._stopped = True
+        self._target = self._sent
+
+    def resume(self) -> None:
+        """Take back a stop or a fault; the target is where the positioner stands."""
+        self._stopped, self._fault = False, None
+        self._counters.lost_in_a_row = 0
+        if self._last is not None:
+            self._sent = self._target = self._last.q
+
+    # --- the cycle ---------------------------------------------------------------------------------------------
+
+    def exchange(self) -> PositionerSample:
+        """One cycle: send the next step towards the target, receive the status.
+
+        Returns:
+            The new sample, or after a lost cycle the last one, marked as not fresh.
+
+        Raises:
+            DeviceError: not connected; or the positioner had stopped itself before this cycle.
+        """
+        if not self._connected or self._last is None:
+            raise DeviceError("not connected", where=self._link.name, hint="Connect the positioner first")
+        fault = self._fault
+        self._send_step()
+        sample = self._take(self._link.receive())
+        if sample is None:
+            self._last = replace(self._last, fresh=False)
+            self._count_loss()
+        else:
+            self._last, self._counters.lost_in_a_row = sample, 0
+            self._check_following(sample)
+        if fault is not None:
+            raise DeviceError(fault[0], where=self._link.name, hint=fault[1])
+        return self._last
+
+    def receive(self, datagram: Datagram) -> PositionerSample | None:
+        """Decode one status; None when it repeats the one before.
+
+        Raises:
+            CodecError: not a status, or its positions are not numbers.
+        """
+        status = decode_status(datagram.payload)
+        if not np.isfinite(status.q).all():
+            raise CodecError("a status without finite positions", where=self._link.name)
+        repeated, self._heard = status.sequence == self._heard, status.sequence
+        return None if repeated else PositionerSample(datagram.stamp_ns, status.q)
+
+    def _send_step(self) -> None:
+        now_ns = self._clock.now_ns()
+        if not self._counters.lost_in_a_row:
+            self._sent = self._step_towards_target((now_ns - self._sent_ns) / NANOSECONDS)
+        self._sent_ns = now_ns
+        self._sequence = self._sequence % LARGEST_SEQUENCE + 1
+        self._link.send(encode_command(PositionerCommand(self._sequence, self._sent)))
+        self._counters.cycles += 1
+
+    def _step_towards_target(self, duration_s: float) -> Array:
+        distance = self._target - self._sent
+        cycles_needed = np.max(np.abs(distance) / self._speed) / max(min(duration_s, _LONGEST_STEP_s), _SHORTEST_STEP_s)
+        return self._target if cycles_needed <= 1.0 else self._sent + distance / cycles_needed
+
+    def _take(self, datagrams: list[Datagram]) -> PositionerSample | None:
+        newest = None
+        for datagram in datagrams:
+            try:
+                newest = self.receive(datagram) or newest
+            except CodecError:
+                self._counters.malformed += 1  # shown by health(); the cycle counts as lost
+        return newest
+
+    # --- what can go wrong -------------------------------------------------------------------------------------
+
+    def _count_loss(self) -> None:
+        self._counters.lost += 1
+        self._counters.lost_in_a_row += 1
+        if self._counters.lost_in_a_row >= self._settings.lost_limit and self._fault is None:
+            self._hold(f"stopped after {self._counters.lost_in_a_row} cycles in a row without a status")
+
+    def _check_following(self, sample: PositionerSample) -> None:
+        behind = np.abs(self._sent - sample.q) / self._following
+        if behind.max() > 1.0 and self._fault is None:
+            self._hold(f"stopped: {AXES[behind.argmax()]} does not follow, something may be in its way")
+            self._sent = self._target = sample.q
+
+    def _hold(self, what: str) -> None:
+        self._target = self._sent
+        self._fault = (what, "Find the cause, then resume")
+
+    # --- state for people --------------------------------------------------------------------------------------
+
+    @property
+    def counters(self) -> PositionerCounters:
+        """A copy of the counters."""
+        return replace(self._counters)
+
+    def health(self) -> tuple[str, ...]:
+        """What is wrong with the positioner, in words; empty when all is well."""
+        problems = [self._fault[0]] if self._fault is not None else []
+        if self._counters.lost:
+            problems.append(f"{self._counters.lost} of {self._counters.cycles} cycles lost")
+        if self._counters.malformed:
+            problems.append(f"{self._counters.malformed} messages were no status of a positioner")
+        return tuple(problems)
