@@ -1,0 +1,147 @@
+"""A grasp in the simulated world, recorded, and understood again from its bytes: the same, bit for bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivers.ati.nano17 import Nano17, Nano17Settings
+from drivers.biotac.biotac import BioTac
+from drivers.camera.camera import Camera
+from drivers.links import ReplayLink, TappedLink
+from drivers.positioner import Positioner, mount_joints, mount_T_forearm
+from drivers.shadow.closing import closing
+from drivers.shadow.hand import HandSettings, ShadowHand
+from drivers.shadow.hand_samples import HandDecoder
+from drivers.shadow.kinematics import JOINTS, forearm_T_palm
+from drivers.simulation.settings import ObjectStart, SimulationSettings
+from drivers.simulation.world import SimulatedWorld
+from sessions.bench import Bench, SensorStream
+from sessions.interpreter import Interpreter, Observer, fingertip_link
+from sessions.perception import Perception, TruthFrame
+from sessions.replay import Replay
+from sessions.session import create_session
+from tactile_lab.clock import VirtualClock
+from tactile_lab.geometry.contacts import FINGERS, Grasp
+
+CYCLE_ns = 10_000_000
+SETTINGS = Nano17Settings()
+
+
+def make_interpreter(world):
+    known, clock = world.calibration, VirtualClock()
+    slots, tips = {}, {}
+    if world.settings.fingertips == "nano17":
+        tips = {
+            finger: Nano17(finger, ReplayLink(fingertip_link(finger), []), clock, tip, SETTINGS)
+            for finger, tip in known.fingertips.items()
+        }
+    else:
+        slots = {finger: BioTac(finger, tip) for finger, tip in known.biotacs.items()}
+    perception = Perception(
+        wrench_fingertips=tips,
+        slot_fingertips=slots,
+        mount_T_forearm=mount_T_forearm,
+        world_T_mount=world.settings.world_T_mount.pose(),
+    )
+    return Interpreter(
+        perception,
+        hand=HandDecoder(known.joints),
+        base=Positioner(ReplayLink("base", []), clock),
+        wrenches=tips,
+        camera=Camera(ReplayLink("camera", []), clock),
+        clock=clock,
+    )
+
+
+def make_bench(world, recorder):
+    observer, known = Observer(recorder, make_interpreter(world)), world.calibration
+    links = {name: TappedLink(link, observer, world.clock) for name, link in world.links().items()}
+    hand_settings = HandSettings(tactile="biotac" if world.settings.fingertips == "biotac" else "none")
+    wrenches = {finger: links[fingertip_link(finger)] for finger in FINGERS if fingertip_link(finger) in links}
+    return Bench(
+        clock=world.clock,
+        cycle_ns=CYCLE_ns,
+        hand=ShadowHand(links["hand"], world.clock, known.joints, hand_settings, known.motors),
+        base=Positioner(links["base"], world.clock),
+        observer=observer,
+        wrench_devices={
+            finger: SensorStream(Nano17(finger, link, world.clock, known.fingertips[finger], SETTINGS), link)
+            for finger, link in wrenches.items()
+        },
+        camera=Camera(links["camera"], world.clock),
+        truth=world.truth,
+    )
+
+
+def close_on_object(bench, table, stop_N):
+    """Every finger goes on along its line until it feels the object."""
+    progress = {finger: table.path(finger).valid[0] for finger in FINGERS}
+    for _ in range(250):
+        loads_N = bench.perception.loads_N()
+        for finger in FINGERS:
+            if loads_N[finger] < stop_N:
+                progress[finger] += 4e-4 / table.path(finger).length_m
+        bench.hand.set_targets({n: a for f in FINGERS for n, a in table.joints(f, progress[f]).items()})
+        bench.cycle()
+
+
+def grasp_twice(bench, stop_N):
+    table = closing("pinch", 0.022)
+    mount_T_palm = bench.world_T_mount.inverse() * table.grasp_T_palm
+    q = mount_joints(mount_T_palm * forearm_T_palm(np.zeros(len(JOINTS))).inverse(), 0.0)
+    bench.connect()
+    bench.hand.set_targets({**table.open_targets(), "WRJ1": 0.0, "WRJ2": 0.0})
+    bench.base.set_target(q + np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]))
+    bench.run(1_500_000_000)
+    bench.tare()
+    bench.base.set_target(q)
+    bench.run(600_000_000)
+    close_on_object(bench, table, stop_N)
+    grasps = []
+    for _ in range(2):
+        bench.begin_capture()
+        bench.run(200_000_000)
+        grasps.append(bench.end_capture())
+        bench.truth_frame()
+        bench.begin_hold()
+        bench.base.set_target(q + np.array([0.01, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        bench.run(200_000_000)
+        bench.end_hold()
+    bench.close()
+    return grasps
+
+
+def bits(grasp):
+    """Everything in a grasp, as bytes."""
+    contacts = [
+        (
+            contact.finger,
+            contact.point_world_m.tobytes(),
+            contact.normal_world.tobytes(),
+            contact.point_covariance_m2.tobytes(),
+            contact.normal_sigma_rad.hex(),
+            contact.force_N.hex(),
+        )
+        for contact in grasp.contacts
+    ]
+    poses = (grasp.world_T_palm.matrix().tobytes(), grasp.hand_motion_world.matrix().tobytes())
+    return grasp.index, grasp.stamp_ns, contacts, poses
+
+
+@pytest.mark.parametrize(("fingertips", "stop_N"), [("nano17", 0.3), ("biotac", 0.3)])
+def test_a_simulated_session_is_understood_the_same_from_its_bytes(tmp_path, fingertips, stop_N):
+    start = ObjectStart(x_m=0.0, y_m=0.0, yaw_rad=1.5708)
+    world = SimulatedWorld(SimulationSettings(fingertips=fingertips, start=start), seed=4)
+    with create_session(tmp_path, rig="sim", rig_description={}, object_name=world.settings.object) as session:
+        live = grasp_twice(make_bench(world, session.recorder), stop_N)
+    replay = Replay(session, make_interpreter(world))
+    outcomes = list(replay.outcomes())
+    assert not replay.loss
+    replayed = [outcome for outcome in outcomes if isinstance(outcome, Grasp)]
+    assert [bits(grasp) for grasp in replayed] == [bits(grasp) for grasp in live]
+    assert len(live[0].contacts) >= 3
+    assert live[1].hand_motion_world.x() == pytest.approx(0.01, abs=0.002)
+    frames = [outcome for outcome in outcomes if isinstance(outcome, TruthFrame)]
+    assert [frame.grasp_index for frame in frames] == [0, 1]
+    assert frames[0].frame.image.ndim == 2
