@@ -94,7 +94,7 @@ class FingertipCalibration(StrictModel):
             no contact there is valid; the shell on the Shadow hand covers the palm side only, y up to 5.1 mm.
         force_sigma_N, moment_sigma_Nm: noise of one sample, per axis.
         force_drift_N, moment_drift_Nm: what may have crept in since the tare, per axis, one standard deviation.
-        point_floor_m, normal_floor_rad: error of the shell itself (shape, mounting) that no averaging removes, per axis.
+        point_floor_m, normal_floor_rad: error of shape and mounting that no averaging removes, per axis.
     """
 
     semi_axes_m: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
