@@ -11,7 +11,8 @@ What happens to grasps that can not be placed:
 - No particle explains the contacts (with the thesis's gate: fewer than four close and observable ones): the
   predicted pose stays, with its grown covariance, the contacts are kept aside: "untracked".
 - The pose is corrected, but remains so uncertain that it moves the contacts along their normals by more than
-  ``placement_limit_m`` (few contacts, or a direction not observed): the contacts are kept aside: "uncertain".
+  ``placement_limit_m`` (few contacts, or a direction not observed): "uncertain". A particle filter keeps the
+  contacts aside, because its only map could not take them back; joint hypotheses use them and stay revisable.
 
 A session is lost when the last ``lost_after`` grasps were untracked, or more than half of all.
 """

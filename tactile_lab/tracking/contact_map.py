@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.gpis import Gpis
@@ -56,7 +57,7 @@ class ContactMap:
         )
 
     @property
-    def grasp_indices(self) -> Array:
+    def grasp_indices(self) -> NDArray[np.intp]:
         """The grasp that each of :attr:`contacts` comes from, shape (n,)."""
         counts = [len(grasp.contacts_world) if grasp.used else 0 for grasp in self.placed]
         return np.repeat(np.arange(len(self.placed)), counts)

@@ -64,11 +64,11 @@ class ParticleTracker:
     def estimate(self) -> PoseEstimate:
         return self._belief.estimate()
 
-    def update_shape(self, contacts: ContactSet, use: bool) -> None:
+    def update_shape(self, contacts: ContactSet, certain: bool) -> None:
         estimate = self.estimate()
-        grasp = PlacedGrasp(contacts, estimate.row, estimate.covariance, self._motion, use)
+        grasp = PlacedGrasp(contacts, estimate.row, estimate.covariance, self._motion, used=certain)
         self._map = self._map.with_grasp(grasp)
-        if use and len(self._map.placed) % self._kernel_every == 0:
+        if certain and len(self._map.placed) % self._kernel_every == 0:
             self._map = self._map.with_best_kernel()
 
     def resample(self) -> None:

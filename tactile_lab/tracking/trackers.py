@@ -14,6 +14,7 @@ from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.joint_tracker import JointSettings, JointTracker
 from tactile_lab.tracking.measurement import (
     CalibratedMeasurement,
     CalibratedSettings,
@@ -53,8 +54,8 @@ class Tracker(Protocol):
     def estimate(self) -> PoseEstimate:
         """The present pose."""
 
-    def update_shape(self, contacts: ContactSet, use: bool) -> None:
-        """Add the grasp to the map, its contacts to the shape if they are of use."""
+    def update_shape(self, contacts: ContactSet, certain: bool) -> None:
+        """Add the grasp to the map. A tracker with one hypothesis keeps uncertain contacts out of the shape."""
 
     def resample(self) -> None:
         """Concentrate the belief on what is likely."""
@@ -71,24 +72,26 @@ class TrackingSettings(StrictModel):
 
     Attributes:
         method: "thesis" is algorithm 3.1 with (3.9) and the gate; "particle" the same filter with the calibrated
-            likelihood.
+            likelihood; "joint" keeps several trajectories, proposed by the measurement and smoothed with the shape.
         dimension: 2 for the horizontal contour, 3 for the surface.
         motion: what the object does beside the hand's motion.
         particles: their number.
         shape: the shape model; None for the method's own.
         gate: of the thesis's measurement model.
         likelihood: of the calibrated one.
+        joint: parameters of the hypotheses.
         kernel_every: kernel parameters are estimated anew after so many grasps.
         contour_grid_m, surface_grid_m: spacing of the grid that particles look the field up in.
     """
 
-    method: Literal["thesis", "particle"] = "particle"
+    method: Literal["thesis", "particle", "joint"] = "joint"
     dimension: Literal[2, 3] = 2
     motion: MotionNoise = MotionNoise()
     particles: int = Limit(default=20_000, ge=100)
     shape: GpisSettings | None = None
     gate: GateSettings = GateSettings()
     likelihood: CalibratedSettings = CalibratedSettings()
+    joint: JointSettings = JointSettings()
     kernel_every: int = Limit(default=4, ge=1)
     contour_grid_m: float = Limit(default=0.002, gt=0)
     surface_grid_m: float = Limit(default=0.005, gt=0)
@@ -109,6 +112,10 @@ def make_tracker(settings: TrackingSettings, first: PlacedGrasp, rng: np.random.
     measurement: Measurement = ThesisMeasurement(settings.gate, shape.offsurface_distance_m)
     if calibrated:
         measurement = CalibratedMeasurement(settings.likelihood)
+    if settings.method == "joint":
+        return JointTracker(
+            ContactMap((first,), shape), settings.motion, settings.joint, settings.kernel_every, field_of
+        )
     return ParticleTracker(
         first=ContactMap((first,), shape),
         measurement=measurement,

@@ -1,0 +1,188 @@
+"""Several hypotheses of the whole trajectory, each smoothed jointly with the shape integrated out.
+
+The filter of algorithm 3.1 commits to one map grasp by grasp and can not take a wrong pose back. Here a
+hypothesis is a whole trajectory, and the place of a particle's weight is taken by its evidence: the likelihood
+of all contacts for these poses (:mod:`pose_evidence`), the motion model, and free space. Each grasp the best
+hypotheses branch into the poses that the measurement proposes, are smoothed, compared, and the best are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydantic import Field as Limit
+from scipy.special import log_ndtr
+
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.field_grid import Field
+from tactile_lab.strict_yaml import StrictModel
+from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.motion import MotionNoise, compose, deviation
+from tactile_lab.tracking.particle_filter import PoseEstimate
+from tactile_lab.tracking.pose_evidence import PoseEvidence
+from tactile_lab.tracking.proposals import ProposalSettings, fit_poses, propose
+
+FREE_DISTANCES_m = np.array([0.004, 0.008, 0.012, 0.016])
+"""A fingertip is there: so far out along each contact's normal there is no object."""
+
+_FREE_TOLERANCE_m = 0.001
+_FREE_WEIGHT = 0.5
+"""Points behind one contact tell much the same, so each counts half."""
+
+
+class JointSettings(StrictModel):
+    """Parameters of the hypotheses.
+
+    Attributes:
+        proposals: how poses are proposed.
+        hypotheses: so many are kept from grasp to grasp.
+        smoothed: so many of the branches, by evidence before smoothing, are smoothed.
+        evidence_gap: hypotheses that much less likely than the best (natural logarithm) are given up.
+        iterations: of the optimiser at each grasp.
+        final_iterations: of the optimiser at the end.
+    """
+
+    proposals: ProposalSettings = ProposalSettings()
+    hypotheses: int = Limit(default=4, ge=1)
+    smoothed: int = Limit(default=8, ge=1)
+    evidence_gap: float = Limit(default=20.0, gt=0)
+    iterations: int = Limit(default=25, ge=1)
+    final_iterations: int = Limit(default=80, ge=1)
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A trajectory and the map it makes; ``cost`` is the negative log evidence."""
+
+    map: ContactMap
+    cost: float
+
+
+class JointTracker:
+    """Keeps the most likely trajectories."""
+
+    def __init__(
+        self,
+        first: ContactMap,
+        noise: MotionNoise,
+        settings: JointSettings,
+        kernel_every: int,
+        field_of: Callable[[ContactMap], Field],
+    ) -> None:
+        self._noise, self._settings, self._kernel_every, self._field_of = noise, settings, kernel_every, field_of
+        self._hypotheses = [Hypothesis(first, 0.0)]
+        self._branches: list[Hypothesis] = []
+        self._motion = np.zeros(3)
+        self.effective_count = 1.0
+
+    @property
+    def map(self) -> ContactMap:
+        return self._hypotheses[0].map
+
+    def predict(self, motion: Array) -> None:
+        self._motion = motion
+
+    def weigh(self, contacts: ContactSet) -> bool:
+        """Branch every hypothesis into the poses proposed for this grasp, smooth the likeliest and rank them."""
+        if len(contacts) == 0:
+            self._branches = [self._predicted(hypothesis, contacts) for hypothesis in self._hypotheses]
+            return False
+        branches = [branch for hypothesis in self._hypotheses for branch in self._branched(hypothesis, contacts)]
+        branches = self._likeliest(branches, self._settings.smoothed)
+        smoothed = [self._smoothed(branch, self._settings.iterations) for branch in branches]
+        self._branches = self._likeliest(_different(smoothed), self._settings.hypotheses)
+        weights = self._weights(self._branches)
+        self.effective_count = float(1 / np.sum(weights**2))
+        return True
+
+    def estimate(self) -> PoseEstimate:
+        """The likeliest hypothesis's pose; the covariance holds its own and the spread of the hypotheses."""
+        best = self._branches[0].map.placed[-1]
+        away = deviation(np.array([branch.map.placed[-1].row for branch in self._branches]), best.row)
+        spread = (away * self._weights(self._branches)[:, None]).T @ away
+        return PoseEstimate(best.row, best.covariance + spread)
+
+    def update_shape(self, contacts: ContactSet, certain: bool) -> None:
+        """The branches hold the new contacts already, each hypothesis where it believes them to be."""
+        best = self._branches[0]
+        last = replace(best.map.placed[-1], covariance=self.estimate().covariance)
+        self._branches[0] = replace(best, map=replace(best.map, placed=(*best.map.placed[:-1], last)))
+
+    def resample(self) -> None:
+        """Go on with the ranked branches; now and then with new kernel parameters, the same for all."""
+        self._hypotheses = self._branches
+        if len(self.map.placed) % self._kernel_every == 0:
+            self._share_kernel(self.map.with_best_kernel())
+
+    def adopt(self, corrected: ContactMap) -> None:
+        self._hypotheses[0] = replace(self._hypotheses[0], map=corrected)
+
+    def finish(self) -> None:
+        """Smooth the remaining hypotheses to the end, kernel parameters included."""
+        for _ in range(2):
+            smoothed = [self._smoothed(hypothesis, self._settings.final_iterations) for hypothesis in self._hypotheses]
+            self._hypotheses = self._likeliest(_different(smoothed), self._settings.hypotheses)
+            self._share_kernel(self.map.with_best_kernel())
+
+    def _predicted(self, hypothesis: Hypothesis, contacts: ContactSet) -> Hypothesis:
+        last = hypothesis.map.placed[-1]
+        row, covariance = compose(self._motion, last.row), last.covariance + np.diag(self._noise.sigmas**2)
+        grasp = PlacedGrasp(contacts, row, covariance, self._motion, used=False)
+        return replace(hypothesis, map=hypothesis.map.with_grasp(grasp))
+
+    def _branched(self, hypothesis: Hypothesis, contacts: ContactSet) -> list[Hypothesis]:
+        predicted = compose(self._motion, hypothesis.map.placed[-1].row)
+        field = self._field_of(hypothesis.map)
+        settings = self._settings.proposals
+        rows, _ = propose(predicted, contacts, field, self._noise, settings)
+        fit = fit_poses(rows, predicted, contacts, field, self._noise, settings)
+        return [
+            self._rated(hypothesis.map.with_grasp(PlacedGrasp(contacts, row, covariance, self._motion, used=True)))
+            for row, covariance in zip(rows, np.linalg.inv(fit.information), strict=True)
+        ]
+
+    def _rated(self, contact_map: ContactMap) -> Hypothesis:
+        evidence = PoseEvidence(contact_map, self._noise).value(contact_map.rows)
+        return Hypothesis(contact_map, evidence + free_space_cost(contact_map))
+
+    def _smoothed(self, hypothesis: Hypothesis, iterations: int) -> Hypothesis:
+        evidence = PoseEvidence(hypothesis.map, self._noise)
+        rows, cost = evidence.maximised(hypothesis.map.rows, iterations)
+        smoothed = hypothesis.map.with_rows(rows)
+        return Hypothesis(smoothed, cost + free_space_cost(smoothed))
+
+    def _likeliest(self, hypotheses: list[Hypothesis], count: int) -> list[Hypothesis]:
+        ranked = sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)[:count]
+        return [one for one in ranked if one.cost < ranked[0].cost + self._settings.evidence_gap]
+
+    @staticmethod
+    def _weights(hypotheses: list[Hypothesis]) -> Array:
+        costs = np.array([hypothesis.cost for hypothesis in hypotheses])
+        weights = np.exp(costs.min() - costs)
+        return np.asarray(weights / weights.sum())
+
+    def _share_kernel(self, best: ContactMap) -> None:
+        self._hypotheses = [replace(one, map=replace(one.map, settings=best.settings)) for one in self._hypotheses]
+
+
+def free_space_cost(contact_map: ContactMap) -> float:
+    """Negative log probability that the places where fingertips were are outside the object."""
+    contacts = contact_map.contacts
+    outward = contacts.points_m[:, None] + FREE_DISTANCES_m[:, None] * contacts.normals[:, None]
+    found = contact_map.fit().predict(outward.reshape(-1, contacts.dimension), variance=True)
+    assert found.variance_m2 is not None
+    sigma = np.sqrt(found.variance_m2 + contacts.point_sigma_m.mean() ** 2)
+    return float(-_FREE_WEIGHT * log_ndtr((found.mean_m + _FREE_TOLERANCE_m) / sigma).sum())
+
+
+def _different(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
+    """The likeliest of those that ended at the same trajectory (within 0.5 mm and 0.6 degrees)."""
+    kept: list[Hypothesis] = []
+    for one in sorted(hypotheses, key=lambda hypothesis: hypothesis.cost):
+        gaps = [np.abs(deviation(one.map.rows, other.map.rows)).max(axis=0) for other in kept]
+        if all((gap > [0.0005, 0.0005, 0.01]).any() for gap in gaps):
+            kept.append(one)
+    return kept
