@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import struct
-
-import numpy as np
-
 from drivers.links import Datagram
+from drivers.positioner_codec import PositionerStatus, decode_command, encode_status
 from drivers.simulation.plant import Plant
-from tactile_lab.errors import CodecError
-
-_IMAGE = struct.Struct("<I6d")
 
 
 class PositionerEmulator:
@@ -25,16 +19,16 @@ class PositionerEmulator:
         self._outbox: list[Datagram] = []
 
     def write(self, payload: bytes) -> None:
-        """Take a command and answer with the measured joints under the same sequence number.
+        """Take a command and answer with the measured joints under the same sequence number; a question moves nothing.
 
         Raises:
             CodecError: not a command.
         """
-        if len(payload) != _IMAGE.size:
-            raise CodecError(f"a command of {len(payload)} bytes instead of {_IMAGE.size}", where="positioner")
-        sequence, *target = _IMAGE.unpack(payload)
-        self._plant.move_base(np.array(target))
-        self._outbox.append(Datagram(_IMAGE.pack(sequence, *self._plant.base), self._plant.stamp_ns))
+        command = decode_command(payload)
+        if command.targets is not None:
+            self._plant.move_base(command.targets)
+        status = PositionerStatus(command.sequence, self._plant.base)
+        self._outbox.append(Datagram(encode_status(status), self._plant.stamp_ns))
 
     def read(self) -> list[Datagram]:
         """The answers since the last call."""
