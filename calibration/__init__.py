@@ -1,0 +1,1 @@
+"""Calibration: what ties the sensors to the world, in files a rig names."""

@@ -129,6 +129,11 @@ class Bench:
         """The forearm-to-world calibration."""
         return self.perception.world_T_mount
 
+    @property
+    def undecodable(self) -> Mapping[str, int]:
+        """Received messages that broke their protocol, by link."""
+        return self._observer.interpreter.undecodable
+
     # --- lifecycle ---------------------------------------------------------------------------------------------
 
     def connect(self) -> None:

@@ -92,6 +92,9 @@ class HandInstrument(Instrument, Protocol):
     def stop(self) -> None:
         """No demand from now on; never raises."""
 
+    def health(self) -> tuple[str, ...]:
+        """What is wrong, in words; empty when all is well."""
+
 
 class BaseInstrument(Instrument, Protocol):
     """The live positioner."""

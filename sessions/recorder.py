@@ -36,6 +36,13 @@ class TrafficSink(Protocol):
         """Take one message. Raises SessionError when it can not be kept."""
 
 
+class NullTraffic:
+    """A sink that keeps nothing, for benches that only look."""
+
+    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
+        """Not kept."""
+
+
 class Recorder:
     """A :class:`drivers.links.Tap` that also takes marks, samples, events and truth.
 

@@ -139,6 +139,11 @@ class TactileSlam:
         self._steps: list[SlamStep] = []
         self._surface: tuple[ContactMap, Gpis] | None = None
 
+    @property
+    def settings(self) -> SlamSettings:
+        """What was asked for."""
+        return self._settings
+
     def step(self, grasp: Grasp) -> SlamStep:
         """Take one grasp into account (algorithm 3.1, then the graph).
 

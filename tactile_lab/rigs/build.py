@@ -1,0 +1,108 @@
+"""From a rig's description to connected devices, and to the decoders a replay needs."""
+
+from __future__ import annotations
+
+from calibration.forearm import load_forearm
+from drivers.ati.nano17 import Nano17
+from drivers.biotac.biotac import BioTac, load_biotacs
+from drivers.camera.camera import Camera
+from drivers.fingertip import FingertipCalibration, load_fingertips
+from drivers.links import Link, ReplayLink, TappedLink
+from drivers.positioner import Positioner, mount_T_forearm
+from drivers.shadow.hand import ShadowHand
+from drivers.shadow.hand_samples import HandDecoder
+from drivers.shadow.joint_calibration import JointCalibration
+from drivers.shadow.motors import MotorMap
+from drivers.simulation.world import SimulatedWorld
+from sessions.bench import Bench
+from sessions.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, Interpreter, Observer, fingertip_link
+from sessions.perception import Perception
+from sessions.recorder import Recorder
+from tactile_lab.clock import NANOSECONDS, Clock, VirtualClock
+from tactile_lab.geometry.contacts import FINGERS
+from tactile_lab.rigs.description import Rig
+
+
+def simulated_world(rig: Rig, seed: int, object_name: str) -> SimulatedWorld:
+    """The world of a simulated rig with an object on its table.
+
+    Raises:
+        ConfigurationError: no such object.
+        ShapeError: the object's mesh can not be used.
+    """
+    description = rig.description
+    changes = {"object": object_name, "fingertips": description.fingertips}
+    return SimulatedWorld(description.simulation.model_copy(update=changes), seed)
+
+
+def build_bench(rig: Rig, world: SimulatedWorld, recorder: Recorder) -> Bench:
+    """All devices of a rig on tapped links, not yet connected."""
+    links, description = world.links(), rig.description
+    observer = Observer(recorder, build_interpreter(rig))
+
+    def tapped(name: str) -> Link:
+        return TappedLink(links[name], observer, world.clock)
+
+    return Bench(
+        clock=world.clock,
+        cycle_ns=round(description.cycle_s * NANOSECONDS),
+        hand=_hand(rig, tapped(HAND_LINK), world.clock),
+        base=Positioner(tapped(BASE_LINK), world.clock, description.base),
+        observer=observer,
+        wrench_devices={
+            finger: Nano17(finger, tapped(fingertip_link(finger)), world.clock, calibration, description.nano17)
+            for finger, calibration in _force_tips(rig).items()
+        },
+        camera=Camera(tapped(CAMERA_LINK), world.clock) if "camera" in rig.files else None,
+        fingertip_calibrations=_force_tips(rig),
+        truth=world.truth,
+    )
+
+
+def build_interpreter(rig: Rig) -> Interpreter:
+    """Decoders and a fresh perception: what understands a rig's bytes, live and in replay alike."""
+    clock, description = VirtualClock(), rig.description
+    tips = {
+        finger: Nano17(finger, _silent(fingertip_link(finger)), clock, calibration, description.nano17)
+        for finger, calibration in _force_tips(rig).items()
+    }
+    forearm = load_forearm(rig.files["forearm"])
+    perception = Perception(
+        wrench_fingertips=tips,
+        slot_fingertips=_biotacs(rig),
+        mount_T_forearm=mount_T_forearm,
+        world_T_mount=forearm.world_T_mount.pose(),
+        mount_covariance=forearm.covariance(),
+        settings=description.perception,
+    )
+    return Interpreter(
+        perception,
+        hand=HandDecoder(JointCalibration.load(rig.files["joints"])),
+        base=Positioner(_silent(BASE_LINK), clock, description.base),
+        wrenches=tips,
+        camera=Camera(_silent(CAMERA_LINK), clock) if "camera" in rig.files else None,
+        clock=clock,
+    )
+
+
+def _hand(rig: Rig, link: Link, clock: Clock) -> ShadowHand:
+    tactile = "biotac" if rig.description.fingertips == "biotac" else "none"
+    settings = rig.description.hand.model_copy(update={"cycle_s": rig.description.cycle_s, "tactile": tactile})
+    joints, motors = JointCalibration.load(rig.files["joints"]), MotorMap.load(rig.files["motors"])
+    return ShadowHand(link, clock, joints, settings, motors)
+
+
+def _force_tips(rig: Rig) -> dict[str, FingertipCalibration]:
+    return load_fingertips(rig.files["fingertips"]) if rig.description.fingertips == "nano17" else {}
+
+
+def _biotacs(rig: Rig) -> dict[str, BioTac]:
+    if rig.description.fingertips != "biotac":
+        return {}
+    calibrations = load_biotacs(rig.files["fingertips"])
+    return {finger: BioTac(finger, calibrations[finger]) for finger in FINGERS if finger in calibrations}
+
+
+def _silent(name: str) -> Link:
+    """A link for devices that only decode."""
+    return ReplayLink(name, ())

@@ -1,0 +1,135 @@
+"""What a rig file says. One program, many rigs: the file names the devices and the calibration to use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from drivers.ati.nano17 import Nano17Settings
+from drivers.positioner import PositionerSettings
+from drivers.shadow.hand import HandSettings
+from drivers.simulation.settings import SimulationSettings
+from sessions.conductor import ConductorSettings
+from sessions.perception import PerceptionSettings
+from sessions.session import Session
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.strict_yaml import StrictModel, load_model, validate
+
+
+class CalibrationFiles(StrictModel):
+    """Calibration files, relative to the rig file.
+
+    Attributes:
+        joints: joint sensor tables of this hand (Shadow's calibration.yaml).
+        motors: which motor pulls which joint.
+        fingertips: shape, mounting and weight of the fingertips.
+        forearm: where the positioner stands in the world.
+        camera, markers: lens, and the markers of the rig; left out for a rig without a camera.
+    """
+
+    joints: str
+    motors: str
+    fingertips: str
+    forearm: str
+    camera: str | None = None
+    markers: str | None = None
+
+    @model_validator(mode="after")
+    def _camera_with_markers(self) -> CalibrationFiles:
+        if (self.camera is None) != (self.markers is None):
+            raise ValueError("camera and markers belong together: name both or neither")
+        return self
+
+
+class RigDescription(StrictModel):
+    """A rig.
+
+    Attributes:
+        name, summary: for people.
+        kind: where the bytes come from. Only the simulated world is built so far.
+        cycle_s: period of the common cycle, seconds.
+        fingertips: the kind of fingertip on all fingers.
+        calibration: files to use.
+        hand, nano17, base, perception, conductor: settings of the parts.
+        simulation: the simulated world (its fingertips follow ``fingertips``).
+    """
+
+    name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
+    summary: str
+    kind: Literal["simulated"]
+    cycle_s: float = Field(ge=0.001, le=0.02)
+    fingertips: Literal["nano17", "biotac"]
+    calibration: CalibrationFiles
+    hand: HandSettings = HandSettings()
+    nano17: Nano17Settings = Nano17Settings()
+    base: PositionerSettings = PositionerSettings()
+    perception: PerceptionSettings = PerceptionSettings()
+    conductor: ConductorSettings = ConductorSettings()
+    simulation: SimulationSettings = SimulationSettings()
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A description with the calibration files it names, by role, all of them present."""
+
+    description: RigDescription
+    files: dict[str, Path]
+    source: str
+
+    def plain(self) -> dict[str, Any]:
+        """The description as plain data, the form kept in ``session.yaml``."""
+        return self.description.model_dump(mode="json")
+
+
+def load_rig(name_or_path: str) -> Rig:
+    """A shipped rig by its name, or a rig file by its path.
+
+    Raises:
+        ConfigurationError: no such rig, a file that does not fit, or a calibration file that is missing.
+    """
+    path = Path(name_or_path)
+    if path.suffix not in {".yaml", ".yml"}:
+        path = shipped_rigs().get(name_or_path, path)
+    if path.suffix not in {".yaml", ".yml"}:
+        known = ", ".join(shipped_rigs())
+        raise ConfigurationError("no such rig", where=name_or_path, hint=f"Name one of {known}, or a .yaml file")
+    description = load_model(path, RigDescription)
+    named = description.calibration.model_dump(exclude_none=True)
+    files = {role: path.parent / file for role, file in named.items()}
+    return Rig(description, _present(files, str(path)), str(path))
+
+
+def rig_of_session(session: Session) -> Rig:
+    """The rig a session was recorded with, on its own copies of the calibration files.
+
+    Raises:
+        ConfigurationError: the recorded description does not fit this version.
+        SessionError: a calibration copy is missing or was changed.
+    """
+    where = f"{session.folder}/session.yaml"
+    description = validate(session.manifest.rig_description, RigDescription, where=where)
+    files = {role: session.calibration_file(role) for role in session.manifest.calibration}
+    return Rig(description, files, where)
+
+
+def shipped_rigs() -> dict[str, Path]:
+    """Rig files that come with the program, by name."""
+    return {path.stem: path for path in sorted(_shipped())}
+
+
+def _shipped() -> Iterator[Path]:
+    folder = Path(str(resources.files("tactile_lab.rigs")))
+    yield from folder.glob("*.yaml")
+
+
+def _present(files: dict[str, Path], where: str) -> dict[str, Path]:
+    for role, file in files.items():
+        if not file.is_file():
+            hint = f"Calibrate it, or correct calibration.{role} in the rig file"
+            raise ConfigurationError(f"names a {role} calibration that is missing: {file}", where=where, hint=hint)
+    return files
