@@ -12,7 +12,7 @@ _OVERLAP_SAMPLES = 100_000
 
 def polygon_overlap(first_m: Array, second_m: Array) -> float:
     """Intersection over union of the areas of two closed simple polygons, exact."""
-    shared = abs(_shared_area(first_m, second_m))
+    shared = abs(shared_area(first_m, second_m))
     union = abs(polygon_area(first_m)) + abs(polygon_area(second_m)) - shared
     return shared / union if union > 0 else 0.0
 
@@ -26,10 +26,10 @@ def mesh_overlap(first: TriangleMesh, second: TriangleMesh) -> float:
     points = both.min(axis=0) + np.ptp(both, axis=0) * _evenly_spread(_OVERLAP_SAMPLES)
     inside = [np.asarray(igl.fast_winding_number(*mesh, points)) > 0.5 for mesh in meshes]
     union = np.count_nonzero(inside[0] | inside[1])
-    return np.count_nonzero(inside[0] & inside[1]) / union if union else 0.0
+    return float(np.count_nonzero(inside[0] & inside[1]) / union) if union else 0.0
 
 
-def _shared_area(first_m: Array, second_m: Array) -> float:
+def shared_area(first_m: Array, second_m: Array) -> float:
     """Area within both polygons, positive if they turn the same way.
 
     The inside of a polygon is the sum of the signed strips between its edges and a line below, so that the

@@ -34,31 +34,26 @@ class ZeroMean:
 class OutwardMean:
     """Untouched space is believed to be outside, and the more so the farther from the data.
 
-    ``sqrt(|x - centre|^2 + softness^2) - depth``: a cone with a rounded tip, of slope one far out like
-    a distance, in place of the quadratic of (2.19), whose slope grows without bound.
+    ``sqrt(|x - centre|^2 + softness^2)``: a cone with a rounded tip, positive everywhere and of slope one far
+    out like a distance, in place of the quadratic of (2.19), whose slope grows without bound.
 
     Attributes:
         centre_m: shape (d,), the middle of the data.
-        softness_m: radius of the rounded tip.
-        depth_m: subtracted from the cone; less than ``softness_m`` keeps the prior positive everywhere.
+        softness_m: radius of the rounded tip, and the smallest value.
     """
 
     centre_m: Array
     softness_m: float
-    depth_m: float
 
     @classmethod
     def around(cls, points_m: Array, softness_m: float) -> Self:
         """The prior for contacts of shape (n, d): centred between their extremes."""
         centre = (points_m.min(axis=0) + points_m.max(axis=0)) / 2
-        return cls(centre, softness_m, 0.0)
+        return cls(centre, softness_m)
 
     def value(self, points_m: Array) -> Array:
-        return self._cone(points_m) - self.depth_m
-
-    def gradient(self, points_m: Array) -> Array:
-        return np.asarray((points_m - self.centre_m) / self._cone(points_m)[:, None])
-
-    def _cone(self, points_m: Array) -> Array:
         squared = np.sum((points_m - self.centre_m) ** 2, axis=1)
         return np.asarray(np.sqrt(squared + self.softness_m**2))
+
+    def gradient(self, points_m: Array) -> Array:
+        return np.asarray((points_m - self.centre_m) / self.value(points_m)[:, None])
