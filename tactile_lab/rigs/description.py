@@ -119,7 +119,7 @@ def rig_of_session(session: Session) -> Rig:
 
 def shipped_rigs() -> dict[str, Path]:
     """Rig files that come with the program, by name."""
-    return {path.stem: path for path in sorted(_shipped())}
+    return {path.stem: path for path in sorted(_shipped(), key=lambda path: path.stem)}
 
 
 def _shipped() -> Iterator[Path]:
