@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-import numpy as np
 import trimesh
 from gtsam import Pose3
 
@@ -47,11 +46,7 @@ def session_truth(session: Session, grasp_count: int, look: Look | None) -> Trut
 
 def read_truth_mesh(session: Session) -> trimesh.Trimesh | None:
     """The object's own mesh, None where the session has none. Raises ShapeError."""
-    path = session.truth_mesh
-    if path is None:
-        return None
-    mesh = read_mesh(path)
-    return trimesh.Trimesh(np.asarray(mesh.vertices), np.asarray(mesh.faces), process=False)
+    return None if session.truth_mesh is None else read_mesh(session.truth_mesh)
 
 
 def marked_pictures(messages: Iterable[TrafficMessage]) -> dict[int, Datagram]:

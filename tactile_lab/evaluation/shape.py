@@ -16,7 +16,7 @@ from tactile_lab.errors import ShapeError
 from tactile_lab.evaluation.prism import open_ring, signed_area_m2
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import planar
-from tactile_lab.shape.alignment import best_fit_contour, best_fit_mesh
+from tactile_lab.shape.alignment import align_contours, align_meshes
 from tactile_lab.shape.metrics import ShapeErrors, contour_errors, mesh_errors
 from tactile_lab.shape.sampling import TriangleMesh
 
@@ -46,15 +46,20 @@ def compare_contour(contour_m: Array, truth_m: Array, truth_T_estimate: Pose3 | 
         ShapeError: a contour without area or with coordinates that are not numbers.
     """
     start = None if truth_T_estimate is None else planar(truth_T_estimate)
-    fitted = best_fit_contour(contour_m, truth_m, start)
     placed = None if start is None else contour_errors(contour_m, truth_m, start)
-    return ShapeComparison(placed, contour_errors(contour_m, truth_m, fitted))
+    return ShapeComparison(placed, contour_errors(contour_m, truth_m, align_contours(contour_m, truth_m)))
 
 
 def compare_mesh(mesh: TriangleMesh, truth: TriangleMesh, truth_T_estimate: Pose3 | None) -> ShapeComparison:
-    """Compare a mesh with the true one, as :func:`compare_contour`. Raises ShapeError."""
-    fitted = best_fit_mesh(mesh, truth, truth_T_estimate)
+    """Compare a mesh with the true one, as :func:`compare_contour`.
+
+    The best fit turns about the vertical only: the object stands on the table throughout a session.
+
+    Raises:
+        ShapeError: a mesh without faces or with coordinates that are not numbers.
+    """
     placed = None if truth_T_estimate is None else mesh_errors(mesh, truth, truth_T_estimate)
+    fitted = align_meshes(mesh, truth, upright=True)
     return ShapeComparison(placed, mesh_errors(mesh, truth, fitted))
 
 

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from sessions.manifest import Manifest
 from sessions.session import Session
+from tactile_lab.errors import ShapeError
 from tactile_lab.evaluation.evaluation import Truth, true_outline
 from tactile_lab.evaluation.plain import read_json_object
 from tactile_lab.evaluation.results import Results, read_results
@@ -85,9 +86,25 @@ def _evaluation(path: Path) -> dict[str, Any] | None:
 def _surface(path: Path, dimension: int) -> Surface | None:
     if not path.is_file():
         return None
-    mesh = read_mesh(path)
-    surface = Surface(mesh.vertices, mesh.faces, mesh.sigma_m, mesh.normals)
+    surface = read_surface(path)
     return surface if dimension == 3 else with_plain_lids(surface)
+
+
+def read_surface(path: Path) -> Surface:
+    """An estimated surface with the standard deviations its file holds.
+
+    Raises:
+        ShapeError: not a mesh as the program writes it.
+    """
+    mesh = read_mesh(path)
+    written = mesh.metadata["_ply_raw"]["vertex"]["data"]  # reading merges equal vertices and drops their properties
+    if "sigma_m" not in (written.dtype.names or ()):
+        raise ShapeError(
+            "holds no standard deviations", where=str(path), hint="Replay the session to renew its results"
+        )
+    _, nearest = cKDTree(np.column_stack([written[axis] for axis in "xyz"])).query(mesh.vertices)
+    sigma_m = np.asarray(written["sigma_m"], dtype=float)[nearest]
+    return Surface(np.asarray(mesh.vertices), np.asarray(mesh.faces), sigma_m, np.asarray(mesh.vertex_normals))
 
 
 def _outline(folder: Path, results: Results, surface: Surface | None) -> tuple[Array | None, Array]:

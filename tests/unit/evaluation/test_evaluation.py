@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from gtsam import Pose3, Rot3
-from synthetic_grasps import SIZE_m, Recorded, box_grasps
+from synthetic_grasps import Recorded, SIZE_m, box_grasps
 
 from sessions.marks import Mark, MarkKind
 from sessions.traffic_reader import TrafficMessage

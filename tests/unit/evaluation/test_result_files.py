@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import trimesh
 from gtsam import Pose2, Pose3
-from synthetic_grasps import SIZE_m, Recorded, box_grasps
+from synthetic_grasps import Recorded, SIZE_m, box_grasps
 
 from tactile_lab.errors import SessionError, ShapeError
 from tactile_lab.evaluation.plain import json_text, plain

@@ -75,8 +75,8 @@ def test_missing_and_foreign_files_are_session_errors(tmp_path: Path) -> None:
         read_trajectory(tmp_path / "absent.csv")
     with pytest.raises(SessionError, match="first line"):
         read_trajectory(write(tmp_path / "foreign.csv", "a,b\n1,2\n"))
+    (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(SessionError, match="cannot be read"):
-        (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
         read_trajectory(tmp_path / "binary.csv")
 
 
