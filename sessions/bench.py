@@ -23,7 +23,7 @@ from sessions.marks import Mark, MarkKind
 from sessions.perception import Outcome, Perception, TareReport, TruthFrame
 from sessions.recorder import Level, Recorder
 from tactile_lab.clock import NANOSECONDS, Clock
-from tactile_lab.errors import DeviceError, SessionError
+from tactile_lab.errors import DeviceError, SessionError, TactileLabError
 from tactile_lab.geometry.contacts import FINGERS, Contact, Grasp
 
 READY_TIMEOUT_ns = 2 * NANOSECONDS
@@ -157,7 +157,7 @@ class Bench:
         """Stop and close every device, each even if another fails; idempotent.
 
         Raises:
-            DeviceError: the first device that did not close.
+            TactileLabError: of the first device that did not close.
         """
         if problems := self._close_all():
             raise problems[0]
@@ -182,13 +182,13 @@ class Bench:
                 )
             self.cycle()
 
-    def _close_all(self) -> list[DeviceError]:
-        problems: list[DeviceError] = []
+    def _close_all(self) -> list[TactileLabError]:
+        problems: list[TactileLabError] = []
         self.stop()
         for instrument in reversed(self._instruments()):
             try:
                 instrument.close()
-            except DeviceError as error:
+            except TactileLabError as error:
                 problems.append(error)
         self._deadline_ns = None
         return problems

@@ -96,18 +96,26 @@ def _for_finger(perception: Perception, finger: str) -> Callable[[Sequence[Any]]
 
 
 class Observer:
-    """The tap of a live session: record first, then interpret."""
+    """The tap of a live session: record first, then interpret.
+
+    When recording fails, the error is raised once, where it happened, and ends the session. The links stay usable
+    after that, unrecorded, so that zero demands still reach the hand; marks are refused.
+    """
 
     def __init__(self, recorder: Recorder, interpreter: Interpreter) -> None:
         self.recorder, self.interpreter = recorder, interpreter
 
     def transmitted(self, link: str, payload: bytes, stamp_ns: int) -> None:
         """The program sends; recorded only."""
-        self.recorder.transmitted(link, payload, stamp_ns)
+        if not self.recorder.broken:
+            self.recorder.transmitted(link, payload, stamp_ns)
 
     def received(self, link: str, payload: bytes, stamp_ns: int) -> None:
         """A device sent."""
-        self.recorder.received(link, payload, stamp_ns)
+        if not self.recorder.broken:
+            self.recorder.received(link, payload, stamp_ns)
+            if link == CAMERA_LINK:
+                self.recorder.image(stamp_ns, payload)
         self.interpreter.received(link, payload, stamp_ns)
 
     def mark(self, mark: Mark) -> Outcome | None:

@@ -51,6 +51,8 @@ class Recorder:
     """
 
     def __init__(self, sink: TrafficSink) -> None:
+        self.broken = False
+        """A message could not be kept, and its writer was told so: what follows is not recorded."""
         self._sink = sink
         self._next_state_ns: int | None = None
 
@@ -135,7 +137,11 @@ class Recorder:
             self._put_json(schemas.TRUTH_CONTACTS_TOPIC, content, stamp_ns)
 
     def _put(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        self._sink.write(topic, data, stamp_ns)
+        try:
+            self._sink.write(topic, data, stamp_ns)
+        except BaseException:
+            self.broken = True
+            raise
 
     def _put_json(self, topic: str, content: schemas.Json, stamp_ns: int) -> None:
         self._put(topic, schemas.encode(content), stamp_ns)
@@ -145,10 +151,7 @@ class NullRecorder(Recorder):
     """A recorder that keeps nothing, for experiments in memory."""
 
     def __init__(self) -> None:
-        super().__init__(self)
-
-    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        """Nothing to keep."""
+        super().__init__(NullTraffic())
 
     def state_due(self, now_ns: int) -> bool:
         return False

@@ -121,12 +121,13 @@ class RunningSession(Session):
             self._traffic.close()
         except SessionError as error:
             status, problem = "failed", problem or str(error)
+        lost = {**(data_loss or {}), "traffic_cut_short": int(not self._traffic.complete)}
         self.manifest = self.manifest.model_copy(
             update={
                 "status": status,
                 "ended_utc": _iso(now or datetime.now(UTC)),
                 "counts": {**dict(sorted(self._traffic.counts.items())), **(counts or {})},
-                "data_loss": {kind: number for kind, number in (data_loss or {}).items() if number},
+                "data_loss": {kind: number for kind, number in lost.items() if number},
                 "problem": problem,
             }
         )

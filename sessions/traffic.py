@@ -47,6 +47,8 @@ class TrafficWriter:
         self.path = path
         self.counts: Counter[str] = Counter()
         """Messages by topic."""
+        self.complete = False
+        """The file was finished with everything in it."""
         self._failure: SessionError | None = None
         self._channels: dict[str, int] = {}
         self._log_ns = self._sequence = 0
@@ -97,6 +99,7 @@ class TrafficWriter:
                 with self._guard:
                     self._writer.finish()
                     self._file.sync()
+                self.complete = True
         finally:
             self._file.close()
 
@@ -133,16 +136,20 @@ class TrafficWriter:
             raise self.fail(self._syncer.error)
 
     def fail(self, error: OSError) -> SessionError:
-        """Cut the file back to its last complete part, and remember why the recording ended."""
+        """The disk failed: keep what is complete, and remember why the recording ended."""
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        what = "the disk is full" if full else f"can not be written ({error.strerror or error})"
+        return self._end(what, "free some space and start a new session" if full else "check the disk")
+
+    def abandon(self) -> None:
+        """Something (a second Ctrl+C) broke into a write: the chunk at hand may be torn and is not to be written."""
+        self._end("writing was broken off", "start a new session")
+
+    def _end(self, what: str, advice: str) -> SessionError:
         with suppress(OSError):  # a file that can not be shortened reads as truncated, which is told on reading
             self._file.cut_back()
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-        self._failure = SessionError(
-            "the disk is full" if full else f"can not be written ({error.strerror or error})",
-            where=str(self.path),
-            hint=f"The {self._file.kept} bytes recorded so far are kept; "
-            + ("free some space and start a new session" if full else "check the disk"),
-        )
+        hint = f"The {self._file.kept} bytes recorded so far are kept; {advice}"
+        self._failure = SessionError(what, where=str(self.path), hint=hint)
         return self._failure
 
 
@@ -160,6 +167,8 @@ class _Guard:
             self._writer.keep()
         elif isinstance(error, OSError):
             raise self._writer.fail(error) from error
+        else:
+            self._writer.abandon()
 
 
 class _CutBackFile:

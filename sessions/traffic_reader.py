@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
@@ -71,13 +71,8 @@ class Loss:
         return "; ".join(parts)
 
     def counts(self) -> dict[str, int]:
-        """The loss as numbers, for a session's record."""
-        return {
-            "truncated": int(self.truncated),
-            "unreadable_bytes": self.unreadable_bytes,
-            "damaged_chunks": self.damaged_chunks,
-            "missing_messages": self.missing_messages,
-        }
+        """The loss as numbers by kind, for a session's record; empty when nothing was lost."""
+        return {kind: int(number) for kind, number in asdict(self).items() if number}
 
 
 class TrafficReader:

@@ -132,15 +132,41 @@ def test_bytes_are_recorded_before_they_are_understood():
     assert [topic for topic, _, _ in memory.messages[:2]] == ["/link/hand/tx", "/link/hand/rx"]
 
 
-def test_a_recorder_that_fails_stops_the_cycle_before_anything_is_understood():
-    class Full:
-        def write(self, topic, data, stamp_ns):
-            raise SessionError("the disk is full", where="traffic.mcap")
+class FullAfter(Memory):
+    """A traffic sink with room for some messages."""
 
-    rig = make_rig(Recorder(Full()))
+    room = 0
+
+    def write(self, topic, data, stamp_ns):
+        if len(self.messages) >= self.room:
+            raise SessionError("the disk is full", where="traffic.mcap")
+        super().write(topic, data, stamp_ns)
+
+
+def test_a_recorder_that_fails_stops_the_cycle_before_anything_is_understood():
+    rig = make_rig(Recorder(FullAfter()))
     with pytest.raises(SessionError, match="the disk is full"):
         rig.bench.connect()
     assert not rig.bench.perception.ready
+
+
+@pytest.mark.parametrize("room", [50, 51, 52, 53, 54])
+def test_after_a_failed_recording_the_hand_can_still_be_stopped(room):
+    sink = FullAfter()
+    sink.room = room
+    rig = make_rig(Recorder(sink), unsteady=False)
+    rig.bench.connect()
+    with pytest.raises(SessionError, match="the disk is full"):
+        rig.bench.run(1_000_000_000)
+    sent = len(rig.peers["hand"].received)
+    rig.bench.stop()
+    rig.devices["hand"].exchange()
+    assert len(rig.peers["hand"].received) == sent + 1
+    with pytest.raises(SessionError, match="the disk is full"):
+        rig.bench.begin_capture()
+    rig.bench.close()
+    assert "close hand" in rig.calls
+    assert len(sink.messages) == room
 
 
 def test_a_session_leaves_samples_marks_contacts_and_truth():
@@ -154,7 +180,7 @@ def test_a_session_leaves_samples_marks_contacts_and_truth():
     seconds = rig.clock.now_ns() / 1e9
     assert 0.7 * 25 * seconds < topics["/hand/joints"] <= 25 * seconds + 1
     assert topics["/hand/joints"] == topics["/hand/loads"] == topics["/tf"]
-    assert topics["/contacts"] == 3
+    assert topics["/contacts"] == topics["/camera/image"] == 3
     assert topics["/marks"] == 1 + 3 * (2 + 1 + 4)
     assert topics["/truth/object"] >= topics["/hand/joints"]
     joints = json.loads(next(data for topic, data, _ in memory.messages if topic == "/hand/joints"))

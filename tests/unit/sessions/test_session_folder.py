@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+import errno
 import hashlib
+import os
 from datetime import UTC, datetime
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sessions import traffic
 from sessions.listing import find_session, list_sessions, summarize
 from sessions.manifest import Manifest, read_manifest, write_manifest
 from sessions.session import Session, create_session
@@ -201,3 +204,25 @@ def test_a_root_that_can_not_be_made_is_told(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(SessionError, match="can not be made"):
         create(tmp_path / "file" / "sessions")
+
+
+def test_a_recording_that_was_broken_off_is_told_as_data_loss(tmp_path, monkeypatch):
+    def fill(descriptor, data):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def run():
+        with create(tmp_path) as session:
+            session.recorder.received("hand", b"kept", 0)
+            session.recorder.received("hand", b"not kept", 10**9)
+            monkeypatch.setattr(traffic.os, "write", fill)
+            session.recorder.received("hand", b"not kept", 2 * 10**9)
+
+    with pytest.raises(SessionError, match="the disk is full"):
+        run()
+    (summary,) = list_sessions(tmp_path)
+    manifest = read_manifest(summary.folder)
+    assert manifest.status == "failed"
+    assert "the disk is full" in manifest.problem
+    assert manifest.data_loss == {"traffic_cut_short": 1}
+    assert summary.data_loss
+    assert next(Session.open(summary.folder).traffic().messages()).data == b"kept"

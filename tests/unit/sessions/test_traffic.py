@@ -157,7 +157,7 @@ def test_a_damaged_chunk_is_left_out_and_the_gap_is_counted(whole, tmp_path):
     assert reader.loss.missing_messages == 200 - len(found) > 0
     assert not reader.loss.truncated
     assert found[-1] == 199
-    assert reader.loss.counts()["damaged_chunks"] == 1
+    assert reader.loss.counts() == {"damaged_chunks": 1, "missing_messages": 200 - len(found)}
 
 
 def test_a_killed_writer_loses_at_most_a_tenth_of_a_second(tmp_path):
@@ -250,3 +250,21 @@ def test_a_failing_disk_found_by_the_sync_ends_the_recording(tmp_path, monkeypat
     with pytest.raises(SessionError, match="Input/output error"):
         writer.write("/marks", b"{}", 0)
     writer.close()
+
+
+def test_an_interrupt_inside_a_write_leaves_a_readable_file(tmp_path, monkeypatch):
+    writer = record(tmp_path / "t.mcap", close=False)
+
+    def interrupt(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(writer._writer, "add_message", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        writer.write("/link/hand/rx", b"", 0)
+    writer.close()
+    reader = TrafficReader(tmp_path / "t.mcap")
+    found = numbers(reader)
+    assert found == list(range(len(found)))
+    assert (199 - found[-1]) * STEP_ns // 3 <= traffic.FLUSH_PERIOD_ns
+    assert reader.loss.truncated
+    assert reader.loss.damaged_chunks == 0
