@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from drivers.links import Datagram
 from drivers.shadow.joint_calibration import JointCalibration
+from drivers.shadow.kinematics import JOINTS
 from drivers.shadow.motor_data import FromMotor
 from drivers.shadow.palm_codec import (
     MOTORS,
@@ -49,6 +50,9 @@ class NoTactile:
         return 0, np.zeros((5, 16), np.uint8)
 
 
+_WRIST = [index for index, joint in enumerate(JOINTS) if joint.startswith("WR")]
+
+
 class JointSensors:
     """The joint sensors: true angles to ADC counts, with this session's bias, noise and rounding.
 
@@ -63,6 +67,7 @@ class JointSensors:
     ) -> None:
         self._calibration, self._rng = calibration, rng
         self._bias_rad = settings.bias_rad * rng.standard_normal(joints)
+        self._bias_rad[_WRIST] = 0.0  # the forearm's calibration is taken with the wrist held, and takes its bias in
         self._noise_rad = settings.noise_rad
 
     def counts(self, joints_rad: Array) -> NDArray[np.int_]:
