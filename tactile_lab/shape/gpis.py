@@ -118,7 +118,7 @@ class Gpis:
         start = np.append(self.kernel.log_parameters, np.log(self.noise_scale))[: len(bounds)]
 
         def objective(log_parameters: Array) -> tuple[float, Array]:
-            candidate = self._with_log_parameters(log_parameters)
+            candidate = self.with_log_parameters(log_parameters)
             return -candidate.log_marginal_likelihood(), -candidate.log_marginal_likelihood_gradient()[: len(bounds)]
 
         found = minimize(
@@ -129,7 +129,16 @@ class Gpis:
             bounds=Bounds(bounds[:, 0], bounds[:, 1]),
             options={"maxiter": max_iterations, "ftol": 1e-6},
         )
-        return self._with_log_parameters(found.x)
+        return self.with_log_parameters(found.x)
+
+    def with_log_parameters(self, log_parameters: Array) -> Self:
+        """The same contacts with other kernel parameters and, if one more is given, another noise scale."""
+        count = len(self.kernel.log_parameters)
+        kernel = self.kernel.with_log_parameters(log_parameters[:count])
+        noise_scale = float(np.exp(log_parameters[count])) if len(log_parameters) > count else self.noise_scale
+        return type(self)(
+            self.contacts_m, self.normals, self.settings, self.observations, kernel, self.prior, noise_scale
+        )
 
     def log_marginal_likelihood(self) -> float:
         """``log p(observations | parameters)``.
@@ -221,14 +230,6 @@ class Gpis:
         size = max(1, _BLOCK_ENTRIES // len(self._residual))
         for first in range(0, max(count, 1), size):
             yield slice(first, min(first + size, count))
-
-    def _with_log_parameters(self, log_parameters: Array) -> Self:
-        count = len(self.kernel.log_parameters)
-        kernel = self.kernel.with_log_parameters(log_parameters[:count])
-        noise_scale = float(np.exp(log_parameters[count])) if len(log_parameters) > count else self.noise_scale
-        return type(self)(
-            self.contacts_m, self.normals, self.settings, self.observations, kernel, self.prior, noise_scale
-        )
 
     def _bounds(self, noise: bool) -> Array:
         amplitude = np.square(_AMPLITUDE_BOUNDS_m)

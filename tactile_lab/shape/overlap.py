@@ -7,7 +7,7 @@ import numpy as np
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.sampling import TriangleMesh, mesh_arrays, polygon_area
 
-_OVERLAP_SAMPLES = 100_000
+_OVERLAP_SAMPLES = 40_000
 
 
 def polygon_overlap(first_m: Array, second_m: Array) -> float:
