@@ -3,8 +3,8 @@
 The world marker, which does not move, is averaged over frames and gives the camera's pose. The object's marker lies on
 the table, so that only its place and its turn are free: the rays through its corners are cut with the plane in which
 the marker lies, and the square is laid into the four points. Unlike the pose of a single square (both IPPE solutions
-are given for comparison) this can not flip. The glass bends rays by a small sideways shift; as both markers lie
-under the same glass most of it cancels, and what is left is in ``table_sigma_m``.
+are given for comparison) this can not flip. The sideways shift of rays in the table's glass is taken into account for
+both markers.
 """
 
 from __future__ import annotations
@@ -16,17 +16,18 @@ from gtsam import Pose3, Rot3
 
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.frames import Frame
+from drivers.camera.glass import Glass
 from drivers.camera.markers import (
     MarkerPose,
     MarkerSettings,
     detect,
     marker_corners,
     marker_poses,
+    points_reprojection_px,
     refine_pose,
-    reprojection_px,
 )
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import rotate
+from tactile_lab.geometry.poses import rotate, transform_points
 
 FACE_DOWN = Pose3(Rot3(np.diag([1.0, -1.0, -1.0])), np.zeros(3))
 """A marker seen from below: its z points down."""
@@ -87,22 +88,34 @@ class WorldMarker:
     def camera_T_world(self) -> Pose3 | None:
         """The world in the camera's frame; None before the first sight.
 
-        Of the two poses a square allows the better one is refined and taken.
+        Of the two poses a square allows the better one is taken, then refined twice: once to know from where the
+        camera looks through the glass, once with the corners where they seem to be.
         """
         if self._corners_px is None:
             return None
-        side = self._settings.world_side_m
-        best = marker_poses(self._corners_px, side, self._camera)[0].camera_T_marker
-        refined = refine_pose(best, self._corners_px, side, self._camera)
-        return refined * self._settings.world_T_worldmarker.pose().inverse()
+        guess = marker_poses(self._corners_px, self._settings.world_side_m, self._camera)[0].camera_T_marker
+        pose = guess * self._settings.world_T_worldmarker.pose().inverse()
+        for _ in range(2):
+            pose = refine_pose(pose, self._apparent_corners_m(pose), self._corners_px, self._camera)
+        return pose
 
     def reprojection_px(self) -> float:
         """Root mean square reprojection error of the mean corners, pixels; NaN before the first sight."""
         pose = self.camera_T_world()
         if pose is None or self._corners_px is None:
             return float("nan")
-        marker = pose * self._settings.world_T_worldmarker.pose()
-        return reprojection_px(marker, self._corners_px, self._settings.world_side_m, self._camera)
+        return points_reprojection_px(pose, self._apparent_corners_m(pose), self._corners_px, self._camera)
+
+    def _apparent_corners_m(self, camera_T_world: Pose3) -> Array:
+        corners = transform_points(
+            self._settings.world_T_worldmarker.pose(), marker_corners(self._settings.world_side_m)
+        )
+        return table_glass(self._settings).apparent(corners, np.array(camera_T_world.inverse().translation()))
+
+
+def table_glass(settings: MarkerSettings) -> Glass:
+    """The plate the settings describe."""
+    return Glass(settings.glass_thickness_m, settings.glass_index)
 
 
 class ObjectTracker:
@@ -114,30 +127,32 @@ class ObjectTracker:
         self._object_T_marker = settings.object_T_objectmarker.pose()
 
     def object_pose(self, frame: Frame) -> ObjectSighting | None:
-        """Where the object is in this frame; None when its marker is not seen, or the world marker never was.
-
-        The plane the object's marker lies in is the one of the world marker's world, z = 0.
-        """
+        """Where the object is in this frame; None when its marker is not seen, or the world marker never was."""
         seen = detect(frame.image, self._settings.dictionary)
         if self._settings.world_id in seen:
             self.world.add(seen[self._settings.world_id])
-        camera_T_world, corners_px = self.world.camera_T_world(), seen.get(self._settings.object_id)
-        if camera_T_world is None or corners_px is None:
+        corners_px = seen.get(self._settings.object_id)
+        return None if corners_px is None else self.sighting(frame.stamp_ns, corners_px)
+
+    def sighting(self, stamp_ns: int, corners_px: Array) -> ObjectSighting | None:
+        """The object from the corners of its marker, shape (4, 2), which lies on the table, z = 0 of the world.
+
+        None before the world marker was seen, or when the corners can not be on the table.
+        """
+        camera_T_world = self.world.camera_T_world()
+        if camera_T_world is None:
             return None
         on_table = self._on_table(camera_T_world.inverse(), corners_px)
-        if on_table is None:
-            return None
-        return self._sighting(frame.stamp_ns, camera_T_world, corners_px, on_table)
+        return None if on_table is None else self._sighting(stamp_ns, camera_T_world, corners_px, on_table)
 
     def _on_table(self, world_T_camera: Pose3, corners_px: Array) -> Array | None:
-        """The corners on the table, shape (4, 2), world; None when a ray never meets it."""
+        """The corners on the table, shape (4, 2), world; None when a ray never comes up to it."""
         rays = rotate(world_T_camera, self._camera.rays(corners_px))
         origin = np.array(world_T_camera.translation())
-        with np.errstate(divide="ignore", invalid="ignore"):
-            reach = -origin[2] / rays[:, 2]
-        if not np.all(np.isfinite(reach) & (reach > 0)):
+        if origin[2] >= 0.0 or np.any(rays[:, 2] <= 0.0):
             return None
-        return np.asarray(origin[:2] + reach[:, None] * rays[:, :2])
+        slope = rays[:, :2] / rays[:, 2:]
+        return np.asarray(origin[:2] - origin[2] * slope - table_glass(self._settings).shift(slope))
 
     def _sighting(self, stamp_ns: int, camera_T_world: Pose3, corners_px: Array, on_table: Array) -> ObjectSighting:
         model = marker_corners(self._settings.object_side_m) @ FACE_DOWN.rotation().matrix().T

@@ -16,9 +16,11 @@ from gtsam import Pose3
 from pydantic import Field, field_validator
 
 from drivers.camera.calibration import CameraCalibration
+from drivers.camera.edges import refine_corners
 from drivers.camera.frames import Image
 from drivers.fingertip import RigidTransform
 from tactile_lab.geometry.contacts import Array
+from tactile_lab.geometry.poses import transform_points
 from tactile_lab.strict_yaml import StrictModel
 
 _DOWN = RigidTransform(translation_m=(0.0, 0.0, 0.0), rpy_rad=(float(np.pi), 0.0, 0.0))
@@ -34,8 +36,8 @@ class MarkerSettings(StrictModel):
         world_T_worldmarker: its pose in the world; z down.
         object_T_objectmarker: pose of the other in the object's frame; z down while the object stands on the table.
         corner_sigma_px: error of a detected corner, per axis.
-        table_sigma_m, table_sigma_rad: error that stays however sharp the picture is: the glass bends the rays (not
-            modelled), the markers are glued on by hand.
+        glass_thickness_m, glass_index: the table's plate between camera and markers.
+        table_sigma_m, table_sigma_rad: error that stays however sharp the picture is (markers are glued on by hand).
         ambiguous_ratio: two poses of a single marker whose reprojection errors differ by less than this factor can
             not be told apart.
         moved_px: a world marker that far from its mean has moved, and its mean begins anew.
@@ -48,7 +50,9 @@ class MarkerSettings(StrictModel):
     object_side_m: float = Field(default=0.035, gt=0.0)
     world_T_worldmarker: RigidTransform = _DOWN
     object_T_objectmarker: RigidTransform = _DOWN
-    corner_sigma_px: float = Field(default=0.2, gt=0.0)
+    corner_sigma_px: float = Field(default=0.1, gt=0.0)
+    glass_thickness_m: float = Field(default=0.0, ge=0.0)
+    glass_index: float = Field(default=1.5, ge=1.0)
     table_sigma_m: float = Field(default=0.0003, ge=0.0)
     table_sigma_rad: float = Field(default=0.001, ge=0.0)
     ambiguous_ratio: float = Field(default=3.0, gt=1.0)
@@ -90,7 +94,7 @@ def detect(image: Image, dictionary: str) -> dict[int, Array]:
     corners, numbers, _ = _detector(dictionary).detectMarkers(image)
     found = [] if numbers is None else [int(number) for number in np.ravel(numbers)]
     return {
-        number: np.asarray(quad, float).reshape(4, 2)
+        number: refine_corners(image, np.asarray(quad, float).reshape(4, 2))
         for number, quad in zip(found, corners, strict=True)
         if found.count(number) == 1
     }
@@ -122,24 +126,28 @@ def marker_poses(corners_px: Array, side_m: float, camera: CameraCalibration) ->
     )
 
 
-def refine_pose(guess: Pose3, corners_px: Array, side_m: float, camera: CameraCalibration) -> Pose3:
-    """The pose near ``guess`` with the smallest reprojection error."""
+def refine_pose(camera_T_points: Pose3, points_m: Array, pixels: Array, camera: CameraCalibration) -> Pose3:
+    """The pose near a first guess that brings points (n, 3) nearest to their pixels (n, 2)."""
     rotation, translation = cv2.solvePnPRefineLM(
-        marker_corners(side_m),
-        np.asarray(corners_px, float),
+        np.asarray(points_m, float),
+        np.asarray(pixels, float),
         camera.matrix,
         camera.distortion_coefficients,
-        cv2.Rodrigues(guess.rotation().matrix())[0],
-        np.array(guess.translation()).reshape(3, 1),
+        cv2.Rodrigues(camera_T_points.rotation().matrix())[0],
+        np.array(camera_T_points.translation()).reshape(3, 1),
     )
     return _pose(rotation, translation)
 
 
 def reprojection_px(camera_T_marker: Pose3, corners_px: Array, side_m: float, camera: CameraCalibration) -> float:
     """Root mean square distance between the projected and the seen corners, pixels."""
-    matrix = camera_T_marker.matrix()
-    projected = camera.project(marker_corners(side_m) @ matrix[:3, :3].T + matrix[:3, 3])
-    return float(np.sqrt(np.mean(np.sum((projected - corners_px) ** 2, axis=1))))
+    return points_reprojection_px(camera_T_marker, marker_corners(side_m), corners_px, camera)
+
+
+def points_reprojection_px(camera_T_points: Pose3, points_m: Array, pixels: Array, camera: CameraCalibration) -> float:
+    """Root mean square distance between projected points (n, 3) and pixels (n, 2)."""
+    projected = camera.project(transform_points(camera_T_points, points_m))
+    return float(np.sqrt(np.mean(np.sum((projected - pixels) ** 2, axis=1))))
 
 
 def _pose(rotation_vector: Any, translation: Any) -> Pose3:
