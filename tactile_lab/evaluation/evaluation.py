@@ -16,6 +16,7 @@ import trimesh
 from gtsam import Pose3
 
 from tactile_lab.errors import SessionError
+from tactile_lab.evaluation.loops import wrong_loops
 from tactile_lab.evaluation.plain import json_text, plain
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM, registration_rms_mm
 from tactile_lab.evaluation.results import Results, read_results
@@ -74,7 +75,7 @@ class ShapeFigures:
 
 @dataclass(frozen=True)
 class LoopFigures:
-    """Similar grasps: how many were tested, how many of them accepted, and how many of those were wrong."""
+    """Similar grasps: how many were tested, accepted, and of those wrong (None where the truth is not known)."""
 
     tested: int
     accepted: int
@@ -175,7 +176,7 @@ def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
         pose=pose_errors(poses, truth.world_T_object),
         registration_rms_mm=registration_mm,
         failed=_failed(str(results.slam["status"]), registration_mm),
-        loops=_loops(results.slam["loops"]),
+        loops=_loops(results, truth),
         time=_time(results.step_seconds),
         truth=TruthFigures(seen, len(poses) - seen, truth.mesh is not None),
         status=str(results.slam["status"]),
@@ -217,8 +218,10 @@ def _failed(status: str, registration_mm: float | None) -> bool | None:
     return None if registration_mm is None else registration_mm > FAILURE_LIMIT_MM
 
 
-def _loops(loops: Sequence[dict[str, Any]]) -> LoopFigures:
-    return LoopFigures(len(loops), sum(bool(loop["accepted"]) for loop in loops), None)
+def _loops(results: Results, truth: Truth) -> LoopFigures:
+    loops = results.slam["loops"]
+    wrong = wrong_loops(loops, results.trajectory.world_T_object, truth.world_T_object)
+    return LoopFigures(len(loops), sum(bool(loop["accepted"]) for loop in loops), wrong)
 
 
 def _time(step_seconds: Sequence[float]) -> TimeFigures:

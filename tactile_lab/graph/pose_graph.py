@@ -57,6 +57,7 @@ class LoopReport:
         limit: what it may be.
         accepted: whether it went into the graph.
         reason: why, in words.
+        earlier_T_later: the relative pose of the object's frames that the shared contacts speak for (3.26).
     """
 
     earlier: int
@@ -66,14 +67,14 @@ class LoopReport:
     limit: float
     accepted: bool
     reason: str
+    earlier_T_later: gtsam.Pose2
 
 
 @dataclass(frozen=True)
 class Loop:
-    """A tested relative pose between two grasps: ``earlier_T_later`` with its covariance (gtsam's order)."""
+    """A tested loop, with the covariance of its relative pose (gtsam's order)."""
 
     report: LoopReport
-    relative: gtsam.Pose2
     covariance: Array
 
 
@@ -119,26 +120,32 @@ def _tested_loop(
     # Seen from the object frame the later contacts move by the correction, so the later pose moves by its inverse.
     moved = gtsam.Pose2.Logmap(correction)
     test_value = float(moved @ np.linalg.solve(spread, moved))
-    report = _judge(shared, alignment, test_value, earlier, later, settings)
-    return Loop(report, estimated.compose(correction.inverse()), covariance)
+    relative = estimated.compose(correction.inverse())
+    verdict, reason = _judge(shared, alignment, test_value, settings)
+    limit = _test_limit(settings)
+    return Loop(
+        LoopReport(earlier, later, shared.faces, test_value, limit, verdict, reason, relative),
+        covariance,
+    )
 
 
-def _judge(
-    shared: SharedContacts, alignment: Alignment, value: float, earlier: int, later: int, settings: PoseGraphSettings
-) -> LoopReport:
-    limit = float(chi2.ppf(settings.confidence, 3))
+def _test_limit(settings: PoseGraphSettings) -> float:
+    return float(chi2.ppf(settings.confidence, 3))
+
+
+def _judge(shared: SharedContacts, alignment: Alignment, value: float, settings: PoseGraphSettings) -> tuple[bool, str]:
+    """Whether a loop is accepted, and why."""
+    limit = _test_limit(settings)
     fit_limit = float(chi2.ppf(settings.confidence, max(alignment.degrees_of_freedom, 1)))
     if not shared.similar:
-        verdict, reason = False, shared.reason
-    elif not alignment.observable:
-        verdict, reason = False, "the pairs leave a direction free"
-    elif alignment.chi_square > fit_limit:
-        verdict, reason = False, f"contacts do not fit each other ({1e3 * alignment.rms_m:.1f} mm rms)"
-    elif value > limit:
-        verdict, reason = False, f"contradicts the filter (test value {value:.1f} above {limit:.1f})"
-    else:
-        verdict, reason = True, f"{shared.faces} shared faces, test value {value:.1f} below {limit:.1f}"
-    return LoopReport(earlier, later, shared.faces, value, limit, verdict, reason)
+        return False, shared.reason
+    if not alignment.observable:
+        return False, "the pairs leave a direction free"
+    if alignment.chi_square > fit_limit:
+        return False, f"contacts do not fit each other ({1e3 * alignment.rms_m:.1f} mm rms)"
+    if value > limit:
+        return False, f"contradicts the filter (test value {value:.1f} above {limit:.1f})"
+    return True, f"{shared.faces} shared faces, test value {value:.1f} below {limit:.1f}"
 
 
 def _believable(covariance: Array, settings: PoseGraphSettings) -> Array:
@@ -179,7 +186,7 @@ def optimise_poses(contact_map: ContactMap, loops: list[Loop], settings: PoseGra
     cost = gtsam.noiseModel.mEstimator.GemanMcClure.Create(settings.robust_scale)
     for loop in (loop for loop in loops if loop.report.accepted):
         robust = gtsam.noiseModel.Robust.Create(cost, gtsam.noiseModel.Gaussian.Covariance(loop.covariance))
-        graph.add(gtsam.BetweenFactorPose2(loop.report.earlier, loop.report.later, loop.relative, robust))
+        graph.add(gtsam.BetweenFactorPose2(loop.report.earlier, loop.report.later, loop.report.earlier_T_later, robust))
     found = gtsam.LevenbergMarquardtOptimizer(graph, start).optimize()
     corrected = np.array([pose_row(found.atPose2(index)) for index in range(len(rows))])
     return contact_map.with_rows(corrected)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tactile_lab.evaluation.loops import first_in_map
 from tactile_lab.evaluation.table import EvaluationRow, evaluation_rows
 from tactile_lab.report import figures
 from tactile_lab.report.content import ReportContent, Surface
@@ -220,7 +221,8 @@ def loops_card(content: ReportContent) -> Markup:
     if not loops:
         text = element("p", "No grasp was similar enough to an earlier one to be tested.", class_="lead")
         return element("div", element("h3", "Similar grasps"), text, class_="card")
-    rows = [_loop_row(loop) for loop in loops]
+    born = first_in_map(content.results.trajectory.world_T_object)
+    rows = [_loop_row(loop, born) for loop in loops]
     titles = ["grasps", "faces", "test value", "limit", "verdict", "reason"]
     accepted = sum(bool(loop["accepted"]) for loop in loops)
     told = f"{accepted} of {len(loops)} went into the pose graph."
@@ -233,10 +235,10 @@ def loops_card(content: ReportContent) -> Markup:
     )
 
 
-def _loop_row(loop: Mapping[str, Any]) -> list[str | Markup]:
+def _loop_row(loop: Mapping[str, Any], born: int) -> list[str | Markup]:
     verdict = badge("accepted", "good") if loop["accepted"] else badge("refused", "warn")
     return [
-        f"{loop['earlier'] + 1} \u2013 {loop['later'] + 1}",
+        f"{born + loop['earlier'] + 1} \u2013 {born + loop['later'] + 1}",
         str(loop["faces"]),
         _number(loop["test_value"]),
         _number(loop["limit"]),

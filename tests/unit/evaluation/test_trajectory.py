@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactile_lab.errors import SessionError
+from tactile_lab.evaluation.loops import wrong_loops
 from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.evaluation.trajectory import (
     COLUMNS,
@@ -21,7 +22,7 @@ from tactile_lab.evaluation.trajectory import (
     read_trajectory,
     trajectory_text,
 )
-from tactile_lab.geometry.poses import transform_points
+from tactile_lab.geometry.poses import planar, transform_points
 
 OFFSET = Pose3(Rot3.RzRyRx(0.1, -0.2, 0.7), np.array([0.01, -0.03, 0.02]))
 """An arbitrary object frame of an estimate, seen from the truth's."""
@@ -164,3 +165,27 @@ def test_registration_error_grows_with_one_wrong_pose_and_is_less_than_the_shift
 def test_registration_needs_two_grasps_with_contacts() -> None:
     empty = [np.zeros((0, 3))] * 4
     assert registration_rms_mm([contacts()[0], *empty], SAME, TRUTH, 3) is None
+
+
+def loop(relative: Pose3, *, accepted: bool = True) -> dict[str, object]:
+    matrix = planar(relative).matrix().tolist()
+    return {"earlier": 0, "later": 2, "accepted": accepted, "earlier_T_later": matrix}
+
+
+UPRIGHT = tuple(pose * table_pose(0.02, 0.01, 0.6) for pose in TRUTH)
+RIGHT = UPRIGHT[1].between(UPRIGHT[3])
+ALIAS = RIGHT * table_pose(0.0, 0.0, np.pi)
+
+
+def test_loop_that_took_another_face_is_wrong_and_noise_is_not() -> None:
+    estimate = (None, *UPRIGHT[1:])
+    noisy = RIGHT * table_pose(0.002, -0.001, 0.03)
+    loops = [loop(RIGHT), loop(noisy), loop(ALIAS), loop(ALIAS, accepted=False)]
+    assert wrong_loops(loops, estimate, TRUTH) == 1
+
+
+def test_loops_without_truth_can_not_be_judged() -> None:
+    estimate = (None, *UPRIGHT[1:])
+    assert wrong_loops([loop(RIGHT)], estimate, (*TRUTH[:3], None, TRUTH[4])) is None
+    assert wrong_loops([loop(RIGHT)], estimate, (None,) * 5) is None
+    assert wrong_loops([], estimate, TRUTH) == 0

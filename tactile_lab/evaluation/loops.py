@@ -1,0 +1,49 @@
+"""Loops against the truth: how many of those that went into the pose graph were wrong associations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gtsam import Pose2, Pose3
+
+from tactile_lab.evaluation.trajectory import Poses, estimate_T_truth
+from tactile_lab.geometry.poses import planar
+
+WRONG_DISTANCE_m = 0.010
+WRONG_ANGLE_rad = np.radians(10.0)
+"""A loop that is off by more than this is no noise (about 1 mm and 2 degrees) but another face."""
+
+
+def first_in_map(estimate: Poses) -> int:
+    """The grasp in which the object frame was born: number 0 of the pose graph."""
+    return next((index for index, pose in enumerate(estimate) if pose is not None), 0)
+
+
+def wrong_loops(loops: Sequence[Mapping[str, Any]], estimate: Poses, truth: Poses) -> int | None:
+    """How many accepted loops contradict the truth; None when one of them can not be checked.
+
+    Args:
+        loops: as in ``slam.json``: grasps in the graph, verdict, relative pose (3 x 3).
+        estimate: estimated poses of all grasps; they fix the object frame that the loops speak of.
+        truth: true poses of all grasps.
+    """
+    alignment, offset = estimate_T_truth(estimate, truth), first_in_map(estimate)
+    if alignment is None:
+        return None
+    known = [None if pose is None else pose * alignment.inverse() for pose in truth]
+    checked = [_is_wrong(loop, known[offset:]) for loop in loops if loop["accepted"]]
+    return None if None in checked else sum(bool(wrong) for wrong in checked)
+
+
+def _is_wrong(loop: Mapping[str, Any], truth: Sequence[Pose3 | None]) -> bool | None:
+    earlier, later = truth[loop["earlier"]], truth[loop["later"]]
+    if earlier is None or later is None:
+        return None
+    off = _pose(loop["earlier_T_later"]).between(planar(earlier.between(later)))
+    return bool(np.hypot(off.x(), off.y()) > WRONG_DISTANCE_m or abs(off.theta()) > WRONG_ANGLE_rad)
+
+
+def _pose(matrix: Sequence[Sequence[float]]) -> Pose2:
+    return Pose2(matrix[0][2], matrix[1][2], float(np.arctan2(matrix[1][0], matrix[0][0])))
