@@ -17,8 +17,8 @@ from sessions import schemas
 from sessions.marks import Mark
 from tactile_lab.geometry.contacts import Array, Contact, Grasp
 
-STATE_PERIOD_ns = 40_000_000
-"""State samples are written at most this often: 25 Hz."""
+STATE_PERIOD_ns = 80_000_000
+"""State samples are written at most this often: 12.5 Hz."""
 
 
 class Level(IntEnum):

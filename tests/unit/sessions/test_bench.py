@@ -178,7 +178,7 @@ def test_a_session_leaves_samples_marks_contacts_and_truth():
     rig.bench.close()
     topics = memory.topics()
     seconds = rig.clock.now_ns() / 1e9
-    assert 0.7 * 25 * seconds < topics["/hand/joints"] <= 25 * seconds + 1
+    assert 0.7 * 12.5 * seconds < topics["/hand/joints"] <= 12.5 * seconds + 1
     assert topics["/hand/joints"] == topics["/hand/loads"] == topics["/tf"]
     assert topics["/contacts"] == topics["/camera/image"] == 3
     assert topics["/marks"] == 1 + 3 * (2 + 1 + 4)

@@ -110,7 +110,7 @@ def test_names_of_links_may_hold_slashes():
 def test_state_samples_are_thinned_out():
     recorder = Recorder(NullRecorder())
     due = [stamp for stamp in range(0, 1_000_000_000, STEP_ns) if recorder.state_due(stamp)]
-    assert len(due) == 25
+    assert len(due) == 13
 
 
 @QUICK
