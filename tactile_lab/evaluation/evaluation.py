@@ -24,11 +24,13 @@ from tactile_lab.evaluation.shape import (
     ShapeComparison,
     compare_contour,
     compare_mesh,
+    contact_distances_m,
     contact_height_m,
     horizontal_outline,
 )
 from tactile_lab.evaluation.tables import read_contour
 from tactile_lab.evaluation.trajectory import PoseErrors, compared_grasps, estimate_T_truth, pose_errors
+from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.mesh_io import read_mesh
 from tactile_lab.shape.metrics import ShapeErrors
 
@@ -92,6 +94,14 @@ class TimeFigures:
 
 
 @dataclass(frozen=True)
+class SensingFigures:
+    """Distance of the felt contacts from the true surface at the true pose: what the sensing alone gets wrong."""
+
+    median_mm: float
+    p95_mm: float
+
+
+@dataclass(frozen=True)
 class TruthFigures:
     """How many grasps the marker camera saw, how many it did not, and whether the true mesh is known."""
 
@@ -109,6 +119,7 @@ class Evaluation:
         shape: errors with that alignment.
         shape_best_fit: errors after the best rigid alignment.
         registration_rms_mm: see :func:`tactile_lab.evaluation.registration.registration_rms_mm`.
+        sensing: see :class:`SensingFigures`; None without sightings or mesh.
         failed: the object was lost or the registration error is above 5 mm; None when neither is known.
     """
 
@@ -124,6 +135,7 @@ class Evaluation:
     shape_best_fit: ShapeFigures | None
     pose: PoseErrors | None
     registration_rms_mm: float | None
+    sensing: SensingFigures | None
     failed: bool | None
     loops: LoopFigures
     time: TimeFigures
@@ -175,6 +187,7 @@ def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
         shape_best_fit=None if shape is None else ShapeFigures.of(shape.best_fit),
         pose=pose_errors(poses, truth.world_T_object),
         registration_rms_mm=registration_mm,
+        sensing=_sensing(results, truth),
         failed=_failed(str(results.slam["status"]), registration_mm),
         loops=_loops(results, truth),
         time=_time(results.step_seconds),
@@ -196,20 +209,33 @@ def _shape(folder: Path, results: Results, truth: Truth) -> ShapeComparison | No
     return None if outline is None else compare_contour(read_contour(folder / name)[:-1], outline, truth_T_estimate)
 
 
-def true_outline(results: Results, truth: Truth) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+def true_outline(results: Results, truth: Truth) -> Array | None:
     """The true mesh's horizontal section at the mean height of the contacts, shape (n, 2), truth's object frame.
 
     Without any sighting the contacts' height in the object is not known: half the mesh's height then.
     """
     if truth.mesh is None:
         return None
-    pairs = compared_grasps(truth.world_T_object, truth.world_T_object)
-    points = [results.contacts[pair.index].points_world_m for pair in pairs]
+    points, poses = _seen_contacts(results, truth)
     known = any(len(found) for found in points)
-    height_m = (
-        contact_height_m(points, [pair.truth for pair in pairs]) if known else float(truth.mesh.bounds[:, 2].mean())
-    )
+    height_m = contact_height_m(points, poses) if known else float(truth.mesh.bounds[:, 2].mean())
     return horizontal_outline(truth.mesh, height_m)
+
+
+def _seen_contacts(results: Results, truth: Truth) -> tuple[list[Array], list[Pose3]]:
+    """World contacts and true pose of every grasp that the camera saw."""
+    pairs = compared_grasps(truth.world_T_object, truth.world_T_object)
+    return [results.contacts[pair.index].points_world_m for pair in pairs], [pair.truth for pair in pairs]
+
+
+def _sensing(results: Results, truth: Truth) -> SensingFigures | None:
+    if truth.mesh is None:
+        return None
+    distances_m = contact_distances_m(*_seen_contacts(results, truth), truth.mesh)
+    if not len(distances_m):
+        return None
+    median, p95 = 1e3 * np.percentile(distances_m, [50, 95])
+    return SensingFigures(float(median), float(p95))
 
 
 def _failed(status: str, registration_mm: float | None) -> bool | None:

@@ -15,10 +15,10 @@ from gtsam import Pose3
 from tactile_lab.errors import ShapeError
 from tactile_lab.evaluation.prism import open_ring, signed_area_m2
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import planar
+from tactile_lab.geometry.poses import planar, transform_points
 from tactile_lab.shape.alignment import align_contours, align_meshes
 from tactile_lab.shape.metrics import ShapeErrors, contour_errors, mesh_errors
-from tactile_lab.shape.sampling import TriangleMesh
+from tactile_lab.shape.sampling import TriangleMesh, distances_to_mesh
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,16 @@ def horizontal_outline(mesh: trimesh.Trimesh, height_m: float) -> Array:
             "the true mesh has no closed section at the contacts", hint="Check that the mesh is watertight"
         )
     return open_ring(max(rings, key=lambda ring: abs(signed_area_m2(ring))))
+
+
+def contact_distances_m(contacts_world_m: list[Array], truth: list[Pose3], mesh: TriangleMesh) -> Array:
+    """How far each contact was from the true surface when it was felt, shape (n,).
+
+    It judges the sensing alone: joints, fingertips and calibration, without any estimated pose.
+    """
+    placed = [transform_points(pose.inverse(), points) for points, pose in zip(contacts_world_m, truth, strict=True)]
+    points = np.concatenate([*placed, np.zeros((0, 3))])
+    return distances_to_mesh(points, mesh) if len(points) else np.zeros(0)
 
 
 def contact_height_m(contacts_world_m: list[Array], truth: list[Pose3]) -> float:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
+
 UNKNOWN = "\u2013"
 
 
@@ -29,58 +31,64 @@ def evaluation_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
 
 
 _SHAPE = (
-    ("hausdorff_mm", "Hausdorff distance", "mm", 2, "largest distance between the two surfaces, both directions"),
-    ("mean_distance_mm", "Mean distance", "mm", 2, "mean distance between the surfaces, both directions"),
-    ("chamfer_mm", "Chamfer distance", "mm", 2, "sum of the two mean distances"),
-    ("fscore_5mm", "F-score", "", 3, "share of both surfaces within 5 mm of the other"),
-    ("iou", "Overlap", "", 3, "common part of both shapes over their union"),
+    ("hausdorff_mm", "Hausdorff distance", "mm", 2, "largest distance, both directions"),
+    ("mean_distance_mm", "Mean distance", "mm", 2, "mean of both directions"),
+    ("chamfer_mm", "Chamfer distance", "mm", 2, "sum of both mean distances"),
+    ("fscore_5mm", "F-score at 5 mm", "", 3, "share of both surfaces within 5 mm"),
+    ("iou", "Overlap", "", 3, "intersection over union"),
 )
 
 
 def _shape_rows(first: Mapping[str, Any], best: Mapping[str, Any]) -> list[EvaluationRow]:
     return [
-        EvaluationRow(label, _text(first.get(key), digits), unit, f"{note}; {_text(best.get(key), digits)} at best fit")
+        EvaluationRow(label, _text(first.get(key), digits), unit, f"{_text(best.get(key), digits)} at best fit; {note}")
         for key, label, unit, digits, note in _SHAPE
     ]
 
 
-_POSE = (
-    ("rmse_mm", "Position error", "mm", 2, "RMS over the grasps after the aligned one"),
-    ("rmse_deg", "Rotation error", "°", 2, "RMS over the grasps after the aligned one"),
-    ("final_mm", "Final position error", "mm", 2, "at the last compared grasp"),
-    ("final_deg", "Final rotation error", "°", 2, "at the last compared grasp"),
-    ("drift_mm_per_grasp", "Position drift", "mm a grasp", 3, "slope of the error over the session"),
-    ("drift_deg_per_grasp", "Rotation drift", "° a grasp", 3, "slope of the error over the session"),
-    ("step_mm", "Step error, position", "mm", 2, "RMS error of the motion between grasps"),
-    ("step_deg", "Step error, rotation", "°", 2, "RMS error of the motion between grasps"),
-)
-
-
 def _pose_rows(pose: Mapping[str, Any]) -> list[EvaluationRow]:
-    return [EvaluationRow(label, _text(pose.get(key), digits), unit, note) for key, label, unit, digits, note in _POSE]
+    return [_pose_row("Position error", "mm", pose), _pose_row("Rotation error", "deg", pose)]
+
+
+def _pose_row(label: str, unit: str, pose: Mapping[str, Any]) -> EvaluationRow:
+    rmse, final, step, drift = (
+        _text(pose.get(key), 2) for key in (f"rmse_{unit}", f"final_{unit}", f"step_{unit}", f"drift_{unit}_per_grasp")
+    )
+    note = f"RMS; {final} at the end, {step} from grasp to grasp, drift {drift} a grasp"
+    return EvaluationRow(label, rmse, {"deg": "°"}.get(unit, unit), note)
 
 
 def _run_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
     loops, time, truth = (evaluation.get(key) or {} for key in ("loops", "time", "truth"))
-    verdict = {True: "failed: above 5 mm", False: "passed: at most 5 mm"}.get(evaluation.get("failed"), "not known")  # type: ignore[arg-type]
-    seen, missing = truth.get("seen"), truth.get("missing")
+    sensing = evaluation.get("sensing") or {}
+    grasps, missing = evaluation.get("grasps"), _text(truth.get("missing"), 0)
+    spread = f"median; 95 % below {_text(time.get('step_ms_p95'), 0)} ms, {_text(time.get('total_s'), 1)} s in all"
     return [
-        EvaluationRow("Registration error", _text(evaluation.get("registration_rms_mm"), 2), "mm", verdict),
-        EvaluationRow("Contacts", _text(evaluation.get("contacts"), 0), "", f"in {evaluation.get('grasps')} grasps"),
+        EvaluationRow(
+            "Registration error", _text(evaluation.get("registration_rms_mm"), 2), "mm", _verdict(evaluation)
+        ),
+        EvaluationRow("Contact error", _text(sensing.get("median_mm"), 2), "mm", _sensing_note(sensing)),
+        EvaluationRow("Contacts", _text(evaluation.get("contacts"), 0), "", f"in {grasps} grasps"),
         EvaluationRow("Loops accepted", _text(loops.get("accepted"), 0), "", _loop_note(loops)),
-        EvaluationRow("Marker sightings", _text(seen, 0), "", f"{_text(missing, 0)} grasps without a sighting"),
-        EvaluationRow("Step time", _text(time.get("step_ms_median"), 0), "ms", f"{_p95(time)} ms for the slowest 5 %"),
-        EvaluationRow("SLAM time", _text(time.get("total_s"), 1), "s", "all steps together"),
-        EvaluationRow("Status", str(evaluation.get("status", UNKNOWN)), "", "of the tracking"),
+        EvaluationRow("Marker sightings", _text(truth.get("seen"), 0), "", f"{missing} grasps without one"),
+        EvaluationRow("Step time", _text(time.get("step_ms_median"), 0), "ms", spread),
+        EvaluationRow("Tracking", str(evaluation.get("status", UNKNOWN)), "", "ok or lost"),
     ]
 
 
+def _sensing_note(sensing: Mapping[str, Any]) -> str:
+    return f"median to the true surface at the true pose; 95 % below {_text(sensing.get('p95_mm'), 2)} mm"
+
+
+def _verdict(evaluation: Mapping[str, Any]) -> str:
+    if evaluation.get("registration_rms_mm") is None:
+        return "not known without truth"
+    passed = evaluation["registration_rms_mm"] <= FAILURE_LIMIT_MM
+    return f"{'passed: at most' if passed else 'failed: above'} {FAILURE_LIMIT_MM:g} mm"
+
+
 def _loop_note(loops: Mapping[str, Any]) -> str:
-    return f"of {_text(loops.get('tested'), 0)} tested, {_text(loops.get('wrong'), 0)} of them wrong"
-
-
-def _p95(time: Mapping[str, Any]) -> str:
-    return _text(time.get("step_ms_p95"), 0)
+    return f"of {_text(loops.get('tested'), 0)} tested, {_text(loops.get('wrong'), 0)} of the accepted wrong"
 
 
 def _text(value: float | None, digits: int) -> str:

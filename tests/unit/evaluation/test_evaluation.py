@@ -72,6 +72,12 @@ def test_figures_of_a_gentle_session_are_small(evaluation: Evaluation) -> None:
     assert (evaluation.grasps, evaluation.contacts) == (GRASPS, 5 * GRASPS)
 
 
+def test_contacts_with_half_a_millimetre_of_noise_are_that_far_from_the_true_surface(evaluation: Evaluation) -> None:
+    assert evaluation.sensing is not None
+    assert 0.1 < evaluation.sensing.median_mm < 0.6
+    assert evaluation.sensing.median_mm < evaluation.sensing.p95_mm < 1.6
+
+
 def test_best_fit_is_no_worse_on_average_than_the_first_grasp(evaluation: Evaluation) -> None:
     assert evaluation.shape is not None
     assert evaluation.shape_best_fit is not None
@@ -93,6 +99,7 @@ def test_unseen_grasps_are_counted_and_null(results: Path, recorded: Recorded) -
     assert content["pose"]["per_grasp"][1] is None
     assert content["shape"] is None
     assert content["shape_best_fit"] is None
+    assert content["sensing"] is None
 
 
 def test_without_any_truth_everything_that_needs_it_is_null(results: Path) -> None:
@@ -144,9 +151,9 @@ def test_rows_for_people_show_dashes_for_what_is_unknown(results: Path) -> None:
     content = evaluate(results, Truth((None,) * GRASPS), "box").as_json()
     rows = {row.label: row for row in evaluation_rows(content)}
     assert rows["Hausdorff distance"].value == "\u2013"
-    assert rows["Registration error"].note == "not known"
+    assert rows["Registration error"].note == "not known without truth"
     assert rows["Contacts"].value == str(5 * GRASPS)
-    assert rows["Marker sightings"].note == "6 grasps without a sighting"
+    assert rows["Marker sightings"].note == "6 grasps without one"
 
 
 def message(topic: str, data: bytes, number: int) -> TrafficMessage:
