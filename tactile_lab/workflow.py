@@ -121,6 +121,7 @@ def run_session(request: SessionRequest, progress: Progress) -> FinishedSession:
             bench.close()
         _close(session, outcome, bench.counts.overruns, bench.undecodable)
     progress.phase(len(outcome.grasps), "model and evaluation")
+    _estimate_rest(slam, outcome.grasps)
     finished = _judge(session, rig, slam, outcome.grasps, session.results)
     return replace(finished, outcome=outcome, data_loss=session.manifest.data_loss)
 
@@ -191,8 +192,7 @@ def replay_session(session: Session, settings: SlamSettings, seed: int, out: Pat
     rig = rig_of_session(session)
     slam, replay = TactileSlam(settings, seed), Replay(session, build_interpreter(rig))
     grasps = [outcome for outcome in replay.outcomes() if isinstance(outcome, Grasp)]
-    for grasp in grasps:
-        slam.step(grasp)
+    _estimate_rest(slam, grasps)
     finished = _judge(session, rig, slam, grasps, out)
     return replace(finished, data_loss={**session.manifest.data_loss, **replay.loss.counts()})
 
@@ -215,6 +215,12 @@ def differing_files(one: Path, other: Path) -> list[str]:
         return (folder / name).read_bytes() if (folder / name).is_file() else None
 
     return [name for name in REPLAYABLE if content(one, name) != content(other, name)]
+
+
+def _estimate_rest(slam: TactileSlam, grasps: Sequence[Grasp]) -> None:
+    """Take the grasps that the estimation has not seen: all of a replay, the last one of a session cut short."""
+    for grasp in grasps[slam.step_count :]:
+        slam.step(grasp)
 
 
 def _judge(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp], out: Path) -> FinishedSession:

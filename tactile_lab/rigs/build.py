@@ -14,7 +14,7 @@ from drivers.shadow.hand_samples import HandDecoder
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motors import MotorMap
 from drivers.simulation.world import SimulatedWorld
-from sessions.bench import Bench
+from sessions.bench import Bench, SensorStream
 from sessions.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, Interpreter, Observer, fingertip_link
 from sessions.perception import Perception
 from sessions.recorder import Recorder
@@ -43,16 +43,17 @@ def build_bench(rig: Rig, world: SimulatedWorld, recorder: Recorder) -> Bench:
     def tapped(name: str) -> Link:
         return TappedLink(links[name], observer, world.clock)
 
+    def stream(finger: str, calibration: FingertipCalibration) -> SensorStream:
+        link = tapped(fingertip_link(finger))
+        return SensorStream(Nano17(finger, link, world.clock, calibration, description.nano17), link)
+
     return Bench(
         clock=world.clock,
         cycle_ns=round(description.cycle_s * NANOSECONDS),
         hand=_hand(rig, tapped(HAND_LINK), world.clock),
         base=Positioner(tapped(BASE_LINK), world.clock, description.base),
         observer=observer,
-        wrench_devices={
-            finger: Nano17(finger, tapped(fingertip_link(finger)), world.clock, calibration, description.nano17)
-            for finger, calibration in _force_tips(rig).items()
-        },
+        wrench_devices={finger: stream(finger, calibration) for finger, calibration in _force_tips(rig).items()},
         camera=Camera(tapped(CAMERA_LINK), world.clock) if "camera" in rig.files else None,
         fingertip_calibrations=_force_tips(rig),
         truth=world.truth,
