@@ -38,6 +38,7 @@ def read_mesh(path: Path | str) -> trimesh.Trimesh:
     if not SMALLEST_EXTENT_m <= extent_m <= LARGEST_EXTENT_m:
         hint = "Coordinates are metres; are these millimetres?" if extent_m > 1 else "Coordinates are metres"
         raise ShapeError(f"is {extent_m:.4g} m long", where=str(path), hint=hint)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
     if not mesh.is_watertight:
         raise ShapeError(
             f"is not closed ({_open_edge_count(mesh)} open edges)", where=str(path), hint="Close its holes first"
@@ -92,7 +93,7 @@ def _load(path: Path) -> trimesh.Trimesh:
     if not path.is_file():
         raise ShapeError("file not found", where=str(path), hint="Check the path")
     try:
-        return trimesh.load_mesh(path)
+        return trimesh.load_mesh(path, process=False)
     except Exception as error:  # each format's reader fails in its own way on foreign bytes
         raise ShapeError(
             f"can not be read as a mesh ({type(error).__name__}: {error})",

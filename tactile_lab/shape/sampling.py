@@ -39,16 +39,24 @@ def sample_polygon(polygon_m: Array, step_m: float) -> Array:
 
 def sample_mesh(mesh: TriangleMesh, count: int, seed: int = 0) -> Array:
     """Points spread over the surface of a mesh in proportion to area, shape (count, 3); the same for the same seed."""
+    return sample_mesh_with_normals(mesh, count, seed)[0]
+
+
+def sample_mesh_with_normals(mesh: TriangleMesh, count: int, seed: int = 0) -> tuple[Array, Array]:
+    """As :func:`sample_mesh`, and the unit normals of the faces there."""
     rng = np.random.default_rng(seed)
     corners = np.asarray(mesh.vertices, dtype=float)[np.asarray(mesh.faces)]
-    edges = corners[:, 1:] - corners[:, :1]
-    shares = np.cumsum(np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1))
+    origins, first_edges, second_edges = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normals = np.cross(first_edges, second_edges)
+    doubled_areas = np.linalg.norm(normals, axis=1)
+    shares = np.cumsum(doubled_areas)
     stratified = (np.arange(count) + rng.random(count)) / count * shares[-1]
     face = np.minimum(np.searchsorted(shares, stratified, side="right"), len(shares) - 1)
-    first, second = rng.random((2, count))
+    first, second = rng.random((2, count, 1))
     folded = first + second > 1
     first, second = np.where(folded, 1 - first, first), np.where(folded, 1 - second, second)
-    return np.asarray(corners[face, 0] + first[:, None] * edges[face, 0] + second[:, None] * edges[face, 1])
+    points = origins[face] + first * first_edges[face] + second * second_edges[face]
+    return points, normals[face] / doubled_areas[face, None]
 
 
 def distances_to_polygon(points_m: Array, polygon_m: Array) -> Array:
