@@ -62,11 +62,10 @@ class JointSensors:
         rng: where they come from.
     """
 
-    def __init__(
-        self, calibration: JointCalibration, settings: JointSensorSettings, rng: np.random.Generator, joints: int = 24
-    ) -> None:
+    def __init__(self, calibration: JointCalibration, settings: JointSensorSettings, rng: np.random.Generator) -> None:
         self._calibration, self._rng = calibration, rng
-        self._bias_rad = settings.bias_rad * rng.standard_normal(joints)
+        spread = [settings.wrist_bias_rad if name.startswith("WR") else settings.bias_rad for name in JOINTS]
+        self._bias_rad = np.array(spread) * rng.standard_normal(len(JOINTS))
         self._bias_rad[_WRIST] = 0.0  # the forearm's calibration is taken with the wrist held, and takes its bias in
         self._noise_rad = settings.noise_rad
 

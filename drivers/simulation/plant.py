@@ -11,7 +11,7 @@ import numpy as np
 from gtsam import Pose2, Pose3, Rot3
 from numpy.typing import NDArray
 
-from drivers.shadow.kinematics import JOINTS
+from drivers.shadow.kinematics import JOINTS, joint_vector
 from drivers.shadow.motors import DRIVEN_JOINTS
 from drivers.simulation.model import BASE_JOINTS, BASE_LIMITS, TIMESTEP_s
 from tactile_lab.clock import NANOSECONDS
@@ -62,7 +62,7 @@ class Plant:
         self._distal = [model.site(f"{finger} distal").id for finger in FINGERS]
         self._tips = {model.geom(f"{finger} tip").id: finger for finger in FINGERS}
         self._table = model.geom("table").id
-        self._object = model.body("object").id
+        self._object, self._palm = model.body("object").id, model.body("WRJ1").id
         self._place(start)
 
     def _place(self, start: Pose2) -> None:
@@ -71,9 +71,12 @@ class Plant:
         data.qpos[address + 3 : address + 7] = np.cos(start.theta() / 2), 0, 0, np.sin(start.theta() / 2)
         data.qpos[self._base] = START_BASE
         data.ctrl[self._servos] = START_BASE
-        for joint, angle in _START_HAND_rad.items():
-            data.qpos[self._joints[JOINTS.index(joint)]] = angle
-        mujoco.mj_forward(self._model, data)
+        self.pose_hand(joint_vector(_START_HAND_rad))
+
+    def pose_hand(self, joints_rad: Array) -> None:
+        """Put the hand into a posture at once, shape (24,), without moving time."""
+        self._data.qpos[self._joints] = joints_rad
+        mujoco.mj_forward(self._model, self._data)
 
     @property
     def stamp_ns(self) -> int:
@@ -121,6 +124,11 @@ class Plant:
         """True pose of a finger's distal frame."""
         site = self._distal[FINGERS.index(finger)]
         return Pose3(Rot3(self._data.site_xmat[site].reshape(3, 3)), self._data.site_xpos[site])
+
+    @property
+    def world_T_palm(self) -> Pose3:
+        """True pose of the palm frame."""
+        return Pose3(Rot3(self._data.xmat[self._palm].reshape(3, 3)), self._data.xpos[self._palm])
 
     @property
     def world_T_object(self) -> Pose3:

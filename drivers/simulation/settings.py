@@ -23,11 +23,13 @@ class JointSensorSettings(StrictModel):
     """Errors of the hand's joint sensors, one standard deviation.
 
     Attributes:
-        bias_rad: constant through a session, drawn for each joint.
+        bias_rad: constant through a session, drawn for each joint of the fingers.
+        wrist_bias_rad: the same for the wrist; small, as the forearm-to-world calibration takes up most of it.
         noise_rad: from reading to reading.
     """
 
     bias_rad: float = Field(default=math.radians(0.6), ge=0.0)
+    wrist_bias_rad: float = Field(default=math.radians(0.1), ge=0.0)
     noise_rad: float = Field(default=math.radians(0.1), ge=0.0)
 
 

@@ -16,7 +16,7 @@ from gtsam import Pose2, Pose3
 
 from drivers.camera.markers import MarkerSettings
 from drivers.fingertip import RigidTransform
-from drivers.links import Link, MemoryLink, Peer
+from drivers.links import Datagram, Link, MemoryLink, Peer
 from drivers.simulation.biotac_emulator import BiotacSection, BiotacSkin
 from drivers.simulation.calibration import SimulatedCalibration
 from drivers.simulation.camera_emulator import CameraEmulator
@@ -63,6 +63,21 @@ class TimedDevice(Protocol):
         """Act."""
 
 
+class _Plug:
+    """A peer whose cable can be pulled: messages vanish both ways until it is in again."""
+
+    def __init__(self, peer: Peer) -> None:
+        self.peer, self.plugged = peer, True
+
+    def write(self, payload: bytes) -> None:
+        if self.plugged:
+            self.peer.write(payload)
+
+    def read(self) -> list[Datagram]:
+        arrived = self.peer.read()
+        return arrived if self.plugged else []
+
+
 class SimulatedClock(VirtualClock):
     """A virtual clock whose waiting moves the simulated world."""
 
@@ -104,11 +119,20 @@ class SimulatedWorld:
         if settings.fingertips == "nano17":
             self._add_force_sensors()
         self._peers["camera"] = self._build_camera()
+        self._plugs = {name: _Plug(peer) for name, peer in self._peers.items()}
         self.clock = SimulatedClock(self)
 
     def links(self) -> dict[str, Link]:
         """New links by device name: ``hand``, ``base``, ``camera``, and ``ft/FF`` to ``ft/TH`` with Nano17 tips."""
-        return {name: MemoryLink(name, peer) for name, peer in self._peers.items()}
+        return {name: MemoryLink(name, plug) for name, plug in self._plugs.items()}
+
+    def unplug(self, name: str) -> None:
+        """Pull a device's cable: from now on nothing passes either way."""
+        self._plugs[name].plugged = False
+
+    def plug_in(self, name: str) -> None:
+        """Put a device's cable in again; what was sent meanwhile is lost."""
+        self._plugs[name].plugged = True
 
     @property
     def marker_settings(self) -> MarkerSettings:
