@@ -8,7 +8,6 @@ hypotheses branch into the poses that the measurement proposes, are smoothed, co
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +15,7 @@ from pydantic import Field as Limit
 from scipy.special import log_ndtr
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.field_grid import Field
+from tactile_lab.shape.field_grid import Field, FieldGrid
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
@@ -33,6 +32,10 @@ _FREE_WEIGHT = 0.5
 """Points behind one contact tell much the same, so each counts half."""
 
 
+GRID_MARGIN_m = 0.040
+GRID_SPACING_m = 0.003
+
+
 class JointSettings(StrictModel):
     """Parameters of the hypotheses.
 
@@ -46,9 +49,9 @@ class JointSettings(StrictModel):
     """
 
     proposals: ProposalSettings = ProposalSettings()
-    hypotheses: int = Limit(default=4, ge=1)
-    smoothed: int = Limit(default=8, ge=1)
-    evidence_gap: float = Limit(default=20.0, gt=0)
+    hypotheses: int = Limit(default=8, ge=1)
+    smoothed: int = Limit(default=12, ge=1)
+    evidence_gap: float = Limit(default=25.0, gt=0)
     iterations: int = Limit(default=25, ge=1)
     final_iterations: int = Limit(default=80, ge=1)
 
@@ -70,9 +73,8 @@ class JointTracker:
         noise: MotionNoise,
         settings: JointSettings,
         kernel_every: int,
-        field_of: Callable[[ContactMap], Field],
     ) -> None:
-        self._noise, self._settings, self._kernel_every, self._field_of = noise, settings, kernel_every, field_of
+        self._noise, self._settings, self._kernel_every = noise, settings, kernel_every
         self._hypotheses = [Hypothesis(first, 0.0)]
         self._branches: list[Hypothesis] = []
         self._motion = np.zeros(3)
@@ -135,7 +137,7 @@ class JointTracker:
 
     def _branched(self, hypothesis: Hypothesis, contacts: ContactSet) -> list[Hypothesis]:
         predicted = compose(self._motion, hypothesis.map.placed[-1].row)
-        field = self._field_of(hypothesis.map)
+        field = self._field(hypothesis.map)
         settings = self._settings.proposals
         rows, _ = propose(predicted, contacts, field, self._noise, settings)
         fit = fit_poses(rows, predicted, contacts, field, self._noise, settings)
@@ -143,6 +145,14 @@ class JointTracker:
             self._rated(hypothesis.map.with_grasp(PlacedGrasp(contacts, row, covariance, self._motion, used=True)))
             for row, covariance in zip(rows, np.linalg.inv(fit.information), strict=True)
         ]
+
+    @staticmethod
+    def _field(contact_map: ContactMap) -> Field:
+        """In the plane a coarse grid is cheaper than the field itself; in space it is not, for so few samples."""
+        fitted = contact_map.fit()
+        if fitted.contacts_m.shape[1] == 3:
+            return fitted
+        return FieldGrid.around(fitted, margin_m=GRID_MARGIN_m, spacing_m=GRID_SPACING_m)
 
     def _rated(self, contact_map: ContactMap) -> Hypothesis:
         evidence = PoseEvidence(contact_map, self._noise).value(contact_map.rows)

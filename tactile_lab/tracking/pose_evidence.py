@@ -207,11 +207,12 @@ def _(kernel: ThinPlate, squared: Array, phi: Profile) -> Array:
 
 
 def _inverse_power(squared: Array, power: float) -> Array:
-    return np.divide(1.0, squared**power, out=np.zeros_like(squared), where=squared > 1e-18)
+    return np.asarray(np.divide(1.0, squared**power, out=np.zeros_like(squared), where=squared > 1e-18))
 
 
 def _directional_change(prior: PriorMean, points: Array, directions: Array) -> Array:
     """Second derivative of the prior times a direction at each point, by central differences."""
     lengths = np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
     step = 1e-5 * directions / lengths
-    return (prior.gradient(points + step) - prior.gradient(points - step)) * lengths / 2e-5
+    change = prior.gradient(points + step) - prior.gradient(points - step)
+    return np.asarray(change * lengths / 2e-5)

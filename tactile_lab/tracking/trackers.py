@@ -113,9 +113,7 @@ def make_tracker(settings: TrackingSettings, first: PlacedGrasp, rng: np.random.
     if calibrated:
         measurement = CalibratedMeasurement(settings.likelihood)
     if settings.method == "joint":
-        return JointTracker(
-            ContactMap((first,), shape), settings.motion, settings.joint, settings.kernel_every, field_of
-        )
+        return JointTracker(ContactMap((first,), shape), settings.motion, settings.joint, settings.kernel_every)
     return ParticleTracker(
         first=ContactMap((first,), shape),
         measurement=measurement,
