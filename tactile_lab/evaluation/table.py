@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
@@ -23,11 +23,12 @@ class EvaluationRow:
 
 def evaluation_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
     """Rows from the content of ``evaluation.json``; what is unknown shows as a dash."""
-    return [
+    rows = [
         *_shape_rows(evaluation.get("shape") or {}, evaluation.get("shape_best_fit") or {}),
         *_pose_rows(evaluation.get("pose") or {}),
         *_run_rows(evaluation),
     ]
+    return [replace(row, unit="") if row.value == UNKNOWN else row for row in rows]
 
 
 _SHAPE = (

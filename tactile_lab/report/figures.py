@@ -89,7 +89,7 @@ def colour_bar(high_mm: float) -> str:
     chart = Chart(Frame(260, 34, left=4, right=22, top=2, bottom=20), (0.0, high_mm), (0.0, 1.0))
     edges = np.linspace(0.0, high_mm, 53)
     for low, high, colour in zip(edges[:-1], edges[1:], sigma_colours(edges[:-1] / 1e3, high_mm), strict=True):
-        chart.box((low, 0.0), (high + high_mm / 300, 1.0), "cell", style=f"fill:{colour}")
+        chart.box((low, 0.0), (high, 1.0), "bar", style=f"fill:{colour}")
     for value in chart.x.ticks(4):
         chart.label(value, 0.0, tick_label(value), "tick", "middle", dy=15)
     return chart.text("Colour scale", f"Standard deviation of the surface from 0 to {tick_label(high_mm)} millimetres.")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -54,11 +53,12 @@ def gather(session: Session, folder: Path) -> ReportContent:
 
 def facts(manifest: Manifest) -> SessionFacts:
     """The description of a session, as text."""
+    plain_settings = {name: value for name, value in manifest.settings.items() if not isinstance(value, dict)}
     made_with = [
         ("session", manifest.name),
-        *((f"{name} seed" if name != "seed" else name, str(seed)) for name, seed in manifest.seeds.items()),
-        *((f"setting {name}", _short(value)) for name, value in manifest.settings.items()),
-        *(manifest.versions.items()),
+        *((f"seed: {name}", str(seed)) for name, seed in manifest.seeds.items()),
+        *((f"setting: {name}", str(value)) for name, value in plain_settings.items()),
+        *((f"version: {name}", number) for name, number in manifest.versions.items()),
     ]
     return SessionFacts(
         object_name=manifest.object_name,
@@ -70,13 +70,6 @@ def facts(manifest: Manifest) -> SessionFacts:
         made_with=tuple(made_with),
         calibrations=tuple((f"{role} ({copy.file})", copy.sha256) for role, copy in manifest.calibration.items()),
     )
-
-
-def _short(value: Any) -> str:
-    """A setting on one line."""
-    if isinstance(value, Mapping):
-        return ", ".join(f"{key}: {_short(item)}" for key, item in value.items())
-    return str(value)
 
 
 def _evaluation(path: Path) -> dict[str, Any] | None:

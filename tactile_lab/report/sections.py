@@ -79,10 +79,7 @@ def key_figures(content: ReportContent) -> Markup:
 
 def _tile(name: str, value: str, unit: str, under: str) -> Markup:
     number = element("dd", value, *([element("small", unit)] if unit and value != UNKNOWN else []))
-    return element("div", element("dt", name), number, element("dd", under, class_="under", style=_SMALL))
-
-
-_SMALL = "font-size:12.5px;font-weight:400;letter-spacing:0;margin:3px 0 0"
+    return element("div", element("dt", name), number, element("dd", under, class_="hint"))
 
 
 def _best(value: float | None, digits: int = 1, unit: str = " mm") -> str:
@@ -312,13 +309,26 @@ def _evaluation_row(row: EvaluationRow) -> list[str | Markup]:
 
 
 def origin_section(content: ReportContent) -> Markup:
-    """How the session was made: command, versions, settings, calibrations."""
-    parts = [element("h2", "How it was made")]
+    """How the session was made: seeds, versions, calibrations, and all settings of the estimation."""
     rows = [[name, element("code", value)] for name, value in content.facts.made_with]
-    settings = content.results.slam.get("settings") or {}
-    rows += [[f"SLAM: {name}", element("code", str(value))] for name, value in settings.items()]
-    rows += [[f"calibration {name}", element("code", digest)] for name, digest in content.facts.calibrations]
-    return join([*parts, element("div", table(["item", "value"], rows, (0, 1)), class_="card wrap")])
+    rows += [[f"calibration: {role}", element("code", digest)] for role, digest in content.facts.calibrations]
+    settings = [[name, element("code", value)] for name, value in flat(content.results.slam.get("settings") or {})]
+    folded = element(
+        "details", element("summary", "Settings of the estimation"), table(["setting", "value"], settings, (0, 1))
+    )
+    card = element("div", table(["item", "value"], rows, (0, 1)), folded if settings else "", class_="card wrap")
+    return join([element("h2", "How it was made"), card])
+
+
+def flat(settings: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
+    """Nested settings as dotted names with their values as text."""
+    rows = []
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            rows += flat(value, f"{above}{name}.")
+        else:
+            rows.append((f"{above}{name}", str(value)))
+    return rows
 
 
 def resource(name: str) -> str:

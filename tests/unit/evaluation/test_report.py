@@ -79,7 +79,7 @@ def make_session(root: Path, dimension: int, *, with_truth: bool = True) -> Path
     slam = TactileSlam(SlamSettings(dimension=dimension), seed=7)
     for grasp in recorded.grasps:
         slam.step(grasp)
-    write_results(session.results, slam.finish(), recorded.grasps, {"method": "joint"})
+    write_results(session.results, slam.finish(), recorded.grasps, {"method": "joint", "back_end": {"limits": [1, 2]}})
     if with_truth:
         stamps = (0.0,) * GRASPS
         text = trajectory_text(Trajectory(stamps, recorded.truth))
@@ -139,8 +139,13 @@ def test_sections_figures_and_facts_are_there(text: str) -> None:
     words = Page(text).texts
     for heading in ("Shape", "Tracking", "Grasps", "Evaluation", "How it was made"):
         assert heading in words
-    for fact in ("Hausdorff distance", "Registration error", "2026-03-04 05:06:07 UTC", "tracked", "gtsam"):
+    for fact in ("Hausdorff distance", "Registration error", "2026-03-04 05:06:07 UTC", "tracked", "version: gtsam"):
         assert fact in words
+
+
+def test_nested_settings_have_dotted_names(text: str) -> None:
+    words = Page(text).texts
+    assert words[words.index("back_end.limits") + 1] == "[1, 2]"
 
 
 def test_viewer_data_are_consistent_arrays(text: str) -> None:
