@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactile_lab.report import sections
+from tactile_lab.report import listings, sections
 from tactile_lab.report.content import ReportContent
 from tactile_lab.report.markup import Markup, element, join
 
@@ -26,9 +26,9 @@ def page(content: ReportContent) -> str:
         sections.key_figures(content),
         sections.shape_section(content),
         sections.tracking_section(content),
-        sections.grasp_section(content),
-        sections.evaluation_section(content),
-        sections.origin_section(content),
+        listings.grasp_section(content),
+        listings.evaluation_section(content),
+        listings.origin_section(content),
         element("footer", "Lengths in millimetres, angles in degrees. Files beside this page: see results/."),
     )
     script = [] if content.surface is None else [element("script", Markup(sections.resource("viewer.js")))]

@@ -1,0 +1,138 @@
+"""The tabular parts of a report: loops, grasps, evaluation, origin."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tactile_lab.evaluation.loops import first_in_map
+from tactile_lab.evaluation.table import UNKNOWN, EvaluationRow, evaluation_rows
+from tactile_lab.report import figures
+from tactile_lab.report.content import ReportContent
+from tactile_lab.report.markup import Markup, badge, element, figure, join, table
+
+
+def number(value: float | None, digits: int = 1) -> str:
+    """A figure with so many digits, a dash where it is not known."""
+    return UNKNOWN if value is None else f"{value:.{digits}f}"
+
+
+def loops_card(content: ReportContent) -> Markup:
+    """Similar grasps that were tested and what came of them."""
+    loops = content.results.slam["loops"]
+    if not loops:
+        text = element("p", "No grasp was similar enough to an earlier one to be tested.", class_="lead")
+        return element("div", element("h3", "Similar grasps"), text, class_="card")
+    born = first_in_map(content.results.trajectory.world_T_object)
+    rows = [_loop_row(loop, born) for loop in loops]
+    titles = ["grasps", "faces", "test value", "limit", "verdict", "reason"]
+    accepted = sum(bool(loop["accepted"]) for loop in loops)
+    told = f"{accepted} of {len(loops)} went into the pose graph."
+    return element(
+        "div",
+        element("h3", "Similar grasps"),
+        element("p", told, class_="lead"),
+        element("div", table(titles, rows, (0, 4, 5)), class_="tall"),
+        class_="card",
+    )
+
+
+def _loop_row(loop: Mapping[str, Any], born: int) -> list[str | Markup]:
+    verdict = badge("accepted", "good") if loop["accepted"] else badge("refused", "warn")
+    return [
+        f"{born + loop['earlier'] + 1} \u2013 {born + loop['later'] + 1}",
+        str(loop["faces"]),
+        number(loop["test_value"]),
+        number(loop["limit"]),
+        verdict,
+        str(loop["reason"]),
+    ]
+
+
+def grasp_section(content: ReportContent) -> Markup:
+    """Forces and one line a grasp."""
+    picture = figures.force_map(content)
+    parts = [element("h2", "Grasps")]
+    if picture is not None:
+        parts.append(figure(picture, "Newton; a dashed place is a finger that did not touch.", "Contact forces"))
+    rows = [_grasp_row(content, index) for index in range(len(content.results.contacts))]
+    titles = ["grasp", "time, s", "contacts", "verdict", "reason", "σ, mm", "σ, °", "error, mm", "error, °"]
+    note = "σ is the estimate's own standard deviation of position and heading; the error is against the marker camera."
+    parts.append(element("div", table(titles, rows, (0, 3, 4)), element("p", note, class_="note"), class_="card wide"))
+    return join(parts)
+
+
+_VERDICTS = {"first": "good", "tracked": "good", "uncertain": "warn", "untracked": "bad"}
+
+
+def _grasp_row(content: ReportContent, index: int) -> list[str | Markup]:
+    """One grasp: when, what was felt, what SLAM made of it, how well."""
+    results = content.results
+    step: Mapping[str, Any] = _entry(results.slam["steps"], index)
+    error: Mapping[str, Any] = _entry(((content.evaluation or {}).get("pose") or {}).get("per_grasp"), index)
+    covariances = results.slam.get("covariances") or ()
+    sigma_mm, sigma_deg = _pose_sigma(covariances[index] if index < len(covariances) else None)
+    verdict = str(step.get("verdict", UNKNOWN))
+    return [
+        str(index + 1),
+        f"{results.trajectory.stamps_s[index]:.1f}",
+        f"{step.get('contacts_used', UNKNOWN)} of {len(results.contacts[index].fingers)}",
+        badge(verdict, _VERDICTS.get(verdict, "warn")),
+        str(step.get("reason", "")),
+        number(sigma_mm, 2),
+        number(sigma_deg, 2),
+        number(error.get("mm"), 2),
+        number(error.get("deg"), 2),
+    ]
+
+
+def _entry(entries: Sequence[Mapping[str, Any] | None] | None, index: int) -> Mapping[str, Any]:
+    """An entry of a list that may be too short or hold nulls."""
+    return (entries[index] if entries and index < len(entries) else None) or {}
+
+
+def _pose_sigma(covariance: Sequence[Sequence[float | None]] | None) -> tuple[float | None, float | None]:
+    """Standard deviations of position and heading, millimetres and degrees, from a covariance of (x, y, yaw)."""
+    if covariance is None or any(entry is None for row in covariance for entry in row):
+        return None, None
+    x, y, yaw = np.diag(np.array(covariance, dtype=float))
+    return 1e3 * float(np.sqrt(x + y)), float(np.degrees(np.sqrt(yaw)))
+
+
+def evaluation_section(content: ReportContent) -> Markup:
+    """The evaluation as a table with what each figure means."""
+    parts = [element("h2", "Evaluation")]
+    if content.evaluation is None:
+        return join([*parts, element("p", "The session has not been evaluated. Run: tactile-lab evaluate SESSION")])
+    rows = [_evaluation_row(row) for row in evaluation_rows(content.evaluation)]
+    return join([*parts, element("div", table(["figure", "value", "meaning"], rows, (0, 2)), class_="card")])
+
+
+def _evaluation_row(row: EvaluationRow) -> list[str | Markup]:
+    value = join((row.value, element("span", row.unit, class_="unit") if row.unit else Markup("")))
+    return [row.label, value, row.note]
+
+
+def origin_section(content: ReportContent) -> Markup:
+    """How the session was made: seeds, versions, calibrations, and all settings of the estimation."""
+    rows = [[name, element("code", value)] for name, value in content.facts.made_with]
+    rows += [[f"calibration: {role}", element("code", digest)] for role, digest in content.facts.calibrations]
+    settings = [[name, element("code", value)] for name, value in flat(content.results.slam.get("settings") or {})]
+    folded = element(
+        "details", element("summary", "Settings of the estimation"), table(["setting", "value"], settings, (0, 1))
+    )
+    card = element("div", table(["item", "value"], rows, (0, 1)), folded if settings else "", class_="card wrap")
+    return join([element("h2", "How it was made"), card])
+
+
+def flat(settings: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
+    """Nested settings as dotted names with their values as text."""
+    rows = []
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            rows += flat(value, f"{above}{name}.")
+        else:
+            rows.append((f"{above}{name}", str(value)))
+    return rows
