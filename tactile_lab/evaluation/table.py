@@ -9,6 +9,7 @@ from typing import Any
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
 
 UNKNOWN = "\u2013"
+NEEDS_TWO = "needs the true pose at two grasps"
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,8 @@ def _pose_row(label: str, unit: str, pose: Mapping[str, Any]) -> EvaluationRow:
     rmse, final, step, drift = (
         _text(pose.get(key), 2) for key in (f"rmse_{unit}", f"final_{unit}", f"step_{unit}", f"drift_{unit}_per_grasp")
     )
+    if not pose:
+        return EvaluationRow(label, UNKNOWN, "", NEEDS_TWO)
     note = f"RMS; {final} at the end, {step} from grasp to grasp, drift {drift} a grasp"
     return EvaluationRow(label, rmse, {"deg": "°"}.get(unit, unit), note)
 
@@ -62,19 +65,23 @@ def _pose_row(label: str, unit: str, pose: Mapping[str, Any]) -> EvaluationRow:
 def _run_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
     loops, time, truth = (evaluation.get(key) or {} for key in ("loops", "time", "truth"))
     sensing = evaluation.get("sensing") or {}
-    grasps, missing = evaluation.get("grasps"), _text(truth.get("missing"), 0)
+    grasps, missing = evaluation.get("grasps", 0), truth.get("missing", 0)
     spread = f"median; 95 % below {_text(time.get('step_ms_p95'), 0)} ms, {_text(time.get('total_s'), 1)} s in all"
     return [
         EvaluationRow(
             "Registration error", _text(evaluation.get("registration_rms_mm"), 2), "mm", _verdict(evaluation)
         ),
         EvaluationRow("Contact error", _text(sensing.get("median_mm"), 2), "mm", _sensing_note(sensing)),
-        EvaluationRow("Contacts", _text(evaluation.get("contacts"), 0), "", f"in {grasps} grasps"),
+        EvaluationRow("Contacts", _text(evaluation.get("contacts"), 0), "", f"in {_of('grasp', grasps)}"),
         EvaluationRow("Loops accepted", _text(loops.get("accepted"), 0), "", _loop_note(loops)),
-        EvaluationRow("Marker sightings", _text(truth.get("seen"), 0), "", f"{missing} grasps without one"),
+        EvaluationRow("Marker sightings", _text(truth.get("seen"), 0), "", f"{_of('grasp', missing)} without one"),
         EvaluationRow("Step time", _text(time.get("step_ms_median"), 0), "ms", spread),
         EvaluationRow("Tracking", str(evaluation.get("status", UNKNOWN)), "", "ok or lost"),
     ]
+
+
+def _of(what: str, count: int) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def _sensing_note(sensing: Mapping[str, Any]) -> str:
@@ -83,7 +90,7 @@ def _sensing_note(sensing: Mapping[str, Any]) -> str:
 
 def _verdict(evaluation: Mapping[str, Any]) -> str:
     if evaluation.get("registration_rms_mm") is None:
-        return "not known without truth"
+        return NEEDS_TWO
     passed = evaluation["registration_rms_mm"] <= FAILURE_LIMIT_MM
     return f"{'passed: at most' if passed else 'failed: above'} {FAILURE_LIMIT_MM:g} mm"
 

@@ -151,7 +151,7 @@ def test_rows_for_people_show_dashes_for_what_is_unknown(results: Path) -> None:
     content = evaluate(results, Truth((None,) * GRASPS), "box").as_json()
     rows = {row.label: row for row in evaluation_rows(content)}
     assert rows["Hausdorff distance"].value == "\u2013"
-    assert rows["Registration error"].note == "not known without truth"
+    assert rows["Registration error"].note == "needs the true pose at two grasps"
     assert rows["Contacts"].value == str(5 * GRASPS)
     assert rows["Marker sightings"].note == "6 grasps without one"
 
