@@ -27,6 +27,7 @@ class SafetySettings(StrictModel):
 
     Attributes:
         force_limit_N: largest contact force on one fingertip.
+        force_cycles: cycles in a row over the limit that stop the rig: a fingertip that slips along the object jerks.
         stale_s: without a fresh hand status for this long the rig stops; never less than ``stale_cycles`` cycles.
         stale_cycles: see ``stale_s``.
         palm_minimum_height_m: lowest height of the palm's origin above the table.
@@ -39,6 +40,7 @@ class SafetySettings(StrictModel):
     """
 
     force_limit_N: float = Field(default=6.0, gt=0.0)
+    force_cycles: int = Field(default=3, ge=1)
     stale_s: float = Field(default=0.010, gt=0.0)
     stale_cycles: int = Field(default=5, ge=1)
     palm_minimum_height_m: float = Field(default=0.08, ge=0.0)
@@ -93,6 +95,7 @@ class SafetySupervisor:
         self._bench, self.settings = bench, settings
         self._stale_ns = max(round(settings.stale_s * NANOSECONDS), settings.stale_cycles * cycle_ns)
         self._start_ns: int | None = None
+        self._over_limit: dict[str, int] = {}
         self._empty_grasps = 0
         self._approached = False
 
@@ -119,10 +122,12 @@ class SafetySupervisor:
             )
 
     def _check_forces(self, loads_N: Mapping[str, float]) -> None:
-        for finger, load_N in loads_N.items():
-            if not load_N <= self.settings.force_limit_N:
+        over = {f: load_N for f, load_N in loads_N.items() if not load_N <= self.settings.force_limit_N}  # NaN is over
+        self._over_limit = {finger: self._over_limit.get(finger, 0) + 1 for finger in over}
+        for finger, cycles in self._over_limit.items():
+            if cycles >= self.settings.force_cycles:
                 raise SafetyError(
-                    f"fingertip force {load_N:.1f} N is over the limit of {self.settings.force_limit_N:.1f} N",
+                    f"fingertip force {over[finger]:.1f} N is over the limit of {self.settings.force_limit_N:.1f} N",
                     where=finger,
                     hint="Look at the hand and the object before going on",
                 )

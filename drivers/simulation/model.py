@@ -39,8 +39,8 @@ class _Contact(NamedTuple):
     priority: int = 0
 
 
-_RUBBER = _Contact((0.9, 0.003, 1e-4), (0.006, 1.0), (0.90, 0.97, 0.001, 0.5, 2.0), priority=2)
-_GLASS = _Contact((0.35, 0.005, 0.002), (0.004, 1.0), (0.95, 0.99, 0.0005, 0.5, 2.0), priority=1)
+_RUBBER = _Contact((0.9, 0.003, 1e-4), (0.010, 1.0), (0.50, 0.90, 0.002, 0.5, 2.0), priority=2)  # harder ones chatter
+_GLASS = _Contact((0.35, 0.005, 0.002), (0.006, 1.0), (0.95, 0.99, 0.0005, 0.5, 2.0), priority=1)
 _WOOD = _Contact((0.5, 0.003, 1e-4), (0.004, 1.0), (0.95, 0.99, 0.0005, 0.5, 2.0))
 
 

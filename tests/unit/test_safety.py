@@ -56,8 +56,16 @@ def test_an_ordinary_cycle_passes() -> None:
 
 @pytest.mark.parametrize("load_N", [6.1, 50.0, float("inf"), float("nan")])
 def test_too_much_force_stops_and_names_the_finger(load_N: float) -> None:
+    watch = supervisor(force_cycles=2)
+    watch.check(situation(loads_N={"FF": 0.5, "TH": load_N}))
     with pytest.raises(SafetyError, match="TH: fingertip force"):
-        supervisor().check(situation(loads_N={"FF": 0.5, "TH": load_N}))
+        watch.check(situation(loads_N={"FF": 0.5, "TH": load_N}))
+
+
+def test_a_jerk_shorter_than_the_allowed_cycles_passes() -> None:
+    watch = supervisor(force_cycles=2)
+    for load_N in (9.0, 0.5, 9.0, 0.5):
+        watch.check(situation(loads_N={"FF": load_N}))
 
 
 def test_force_at_the_limit_passes() -> None:
