@@ -8,6 +8,7 @@ from pathlib import Path
 import coacd
 import numpy as np
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
@@ -16,10 +17,14 @@ MESH_PREFIX = "mesh:"
 LARGEST_m, SMALLEST_m = 0.25, 0.01
 _NEARLY_CONVEX = 0.96  # share of its hull a mesh fills when the hull alone stands for it
 _MOST_PIECES = 16
+_LEANING_rad = np.radians(15.0)  # a scan that leans by less was meant to stand
 
 
 def load_truth_mesh(name: str) -> trimesh.Trimesh:
-    """The mesh called ``mesh:<path>``, metres, its axes as in the file, its origin at the centre of volume.
+    """The mesh called ``mesh:<path>``, metres, standing, its origin at the centre of volume.
+
+    It stands as in the file, turned by the few degrees that make it stand firmly; one that cannot stand so is laid
+    down in its most probable resting pose.
 
     Raises:
         ShapeError: the file cannot be read, holds no closed surface, or its size is not that of a graspable object.
@@ -28,6 +33,7 @@ def load_truth_mesh(name: str) -> trimesh.Trimesh:
     mesh = _read(path)
     _check(mesh, str(path))
     mesh.apply_translation(-mesh.center_mass)
+    mesh.apply_transform(_standing(mesh))
     return mesh
 
 
@@ -58,6 +64,18 @@ def _decompose(vertices: bytes, faces: bytes) -> tuple[Array, ...]:
         seed=1,
     )
     return tuple(np.asarray(corners, float) for corners, _ in pieces)
+
+
+def _standing(mesh: trimesh.Trimesh) -> Array:
+    """The rotation about the origin that puts the mesh on a stable foot, shape (4, 4), without a turn about z."""
+    poses, chances = trimesh.poses.compute_stable_poses(mesh, sigma=0.0, n_samples=1, threshold=0.0)
+    down = -poses[:, 2, :3]  # the direction of the table in the file's axes
+    upright = -down[:, 2]
+    firm = upright.argmax() if upright.max() > np.cos(_LEANING_rad) else np.argmax(chances)
+    rotation, _ = Rotation.align_vectors([[0.0, 0.0, -1.0]], [down[firm]])
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation.as_matrix()
+    return matrix
 
 
 def _read(path: Path) -> trimesh.Trimesh:

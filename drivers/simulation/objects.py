@@ -83,6 +83,7 @@ class ObjectModel:
         foot_object_m: polygon of the underside, shape (n, 2), what the camera sees dark on the table.
         marker: the marker on the underside.
         rolls: the object can roll, so the contact model needs rolling friction.
+        scanned: its underside is as uneven as the scan, so that it must find its resting pose by itself.
     """
 
     name: str
@@ -92,6 +93,7 @@ class ObjectModel:
     foot_object_m: Array
     marker: UndersideMarker
     rolls: bool = False
+    scanned: bool = False
 
     @property
     def height_m(self) -> float:
@@ -193,13 +195,13 @@ def _sphere(name: str) -> ObjectModel:
 
 
 def _scanned(name: str) -> ObjectModel:
-    """A mesh from a file: axes as in the file, origin moved to the centre of volume, standing on its lowest points."""
+    """A mesh from a file: origin at the centre of volume, axes as in the file but for the turn that makes it stand."""
     mesh = load_truth_mesh(name)
     pieces = tuple(Hull(vertices) for vertices in convex_pieces(mesh))
     lowest = mesh.bounds[0, 2]
     near_table = mesh.vertices[mesh.vertices[:, 2] < lowest + _FOOT_LAYER_m, :2]
     foot = _convex_outline(near_table)
-    return ObjectModel(name, pieces, mesh, None, foot, _largest_marker(foot, lowest), rolls=True)
+    return ObjectModel(name, pieces, mesh, None, foot, _largest_marker(foot, lowest), rolls=True, scanned=True)
 
 
 def _convex_outline(points_m: Array) -> Array:

@@ -83,6 +83,10 @@ class Plant:
         """Simulated time since the beginning."""
         return self._steps * STEP_ns
 
+    def settle(self, duration_s: float) -> None:
+        """Let the object come to rest before time begins."""
+        mujoco.mj_step(self._model, self._data, round(duration_s / TIMESTEP_s))
+
     def advance(self, steps: int) -> None:
         """Move time on by a number of physics steps with the present duties and targets."""
         if steps:

@@ -32,6 +32,7 @@ from drivers.simulation.settings import SimulationSettings
 from tactile_lab.clock import VirtualClock
 from tactile_lab.geometry.contacts import FINGERS, Contact
 
+_SETTLING_s = 2.0
 _RANDOM_PARTS = ("object", "joints", "motors", "palm", "forces", "tactile", "camera")
 
 
@@ -185,7 +186,9 @@ class SimulatedWorld:
         settings = self.settings
         tips = {finger: self.calibration.tip_body(finger, settings.fingertips) for finger in FINGERS}
         mount = settings.world_T_mount.pose()
-        return Plant(build_model(self.object_model, settings.object_mass_kg, tips, mount), self._start())
+        plant = Plant(build_model(self.object_model, settings.object_mass_kg, tips, mount), self._start())
+        plant.settle(_SETTLING_s if self.object_model.scanned else 0.0)
+        return plant
 
     def _start(self) -> Pose2:
         rng, given = self._random["object"], self.settings.start

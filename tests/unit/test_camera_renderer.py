@@ -32,6 +32,7 @@ PLACES = (
     (0.1, 0.14, -0.7),
     (-0.06, 0.04, 2.2),
 )
+MARKER_PLACES = tuple((0.85 * x, 0.85 * y, yaw) for x, y, yaw in PLACES)  # the larger marker needs more room
 
 
 @lru_cache
@@ -136,8 +137,8 @@ def sightings(name: str, place: tuple[float, float, float], count: int = 4) -> t
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_every_object_is_found_by_its_marker(name: str) -> None:
     shift_m, turn_rad = sightings(name, (0.02, -0.03, 0.4))
-    limit_deg = 1.5 if name == "sphere" else 0.5
-    assert np.hypot(*shift_m[:2]) < 0.0015
+    limit_deg = 0.6 if name == "sphere" else 0.3
+    assert np.hypot(*shift_m[:2]) < 0.001
     assert abs(shift_m[2]) < 1e-6
     assert abs(np.degrees(turn_rad)) < limit_deg
 
@@ -145,8 +146,8 @@ def test_every_object_is_found_by_its_marker(name: str) -> None:
 @pytest.mark.parametrize("place", PLACES)
 def test_object_is_found_all_over_the_workspace(place: tuple[float, float, float]) -> None:
     shift_m, turn_rad = sightings("box-10x6x4", place)
-    assert np.hypot(*shift_m[:2]) < 0.0017
-    assert abs(np.degrees(turn_rad)) < 0.5
+    assert np.hypot(*shift_m[:2]) < 0.001
+    assert abs(np.degrees(turn_rad)) < 0.3
 
 
 def test_pictures_survive_the_encoding() -> None:

@@ -105,6 +105,21 @@ def test_mesh_file_becomes_an_object_about_its_centre_of_volume(tmp_path: Path) 
     assert model.outline_object_m is None
 
 
+def test_mesh_that_cannot_stand_as_given_is_laid_down(tmp_path: Path) -> None:
+    needle = trimesh.creation.box((0.02, 0.03, 0.09))
+    needle.apply_transform(trimesh.transformations.rotation_matrix(np.radians(40), [1, 0, 0]))
+    model = object_model(written(needle, tmp_path))
+    assert model.height_m == pytest.approx(0.02, abs=1e-6)
+    assert len(ConvexHull(model.foot_object_m).vertices) == 4
+
+
+def test_mesh_that_leans_a_little_is_stood_upright(tmp_path: Path) -> None:
+    block = trimesh.creation.box((0.04, 0.03, 0.06))
+    block.apply_transform(trimesh.transformations.rotation_matrix(np.radians(4), [1, 1, 0]))
+    model = object_model(written(block, tmp_path))
+    np.testing.assert_allclose(model.mesh.extents, (0.04, 0.03, 0.06), atol=2e-4)
+
+
 def test_hollow_mesh_is_cut_into_the_same_convex_pieces_every_time(tmp_path: Path) -> None:
     ring = trimesh.creation.annulus(r_min=0.02, r_max=0.035, height=0.04, sections=24)
     first, second = (object_model(written(ring, tmp_path, suffix)) for suffix in ("ply", "stl"))

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from drivers.simulation.biotac_emulator import BiotacSkin
 from drivers.simulation.calibration import SimulatedCalibration
 from drivers.simulation.geared_motors import DISTAL_COUPLING, motor_class
 from drivers.simulation.model import build_model
-from drivers.simulation.objects import object_model
+from drivers.simulation.objects import CATALOGUE, object_model
 from drivers.simulation.plant import START_BASE, Plant, TrueContact
 from drivers.simulation.rdt_emulator import RESOLUTION
 from drivers.simulation.settings import (
@@ -191,6 +192,26 @@ def test_object_starts_where_it_is_told() -> None:
     settings = SimulationSettings(object="l-block", start=ObjectStart(x_m=0.03, y_m=-0.02, yaw_rad=0.5))
     pose = SimulatedWorld(settings, 0).truth().world_T_object
     np.testing.assert_allclose(pose.matrix(), Pose3(Rot3.Yaw(0.5), np.array([0.03, -0.02, 0.025])).matrix(), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_untouched_object_stays_where_it_lies(name: str) -> None:
+    world = SimulatedWorld(SimulationSettings(object=name), 1)
+    before = world.truth().world_T_object
+    world.clock.sleep_until_ns(1000 * MS)
+    moved = before.between(world.truth().world_T_object)
+    assert np.linalg.norm(moved.translation()) < 2e-4
+    assert np.linalg.norm(Rot3.Logmap(moved.rotation())) < 2e-3
+
+
+def test_scanned_object_stands_still_from_the_beginning(lab_data: Path) -> None:
+    world = SimulatedWorld(SimulationSettings(object=f"mesh:{lab_data / 'ycb_meshes' / 'ycb_tomato_soup_can.ply'}"), 1)
+    before = world.truth().world_T_object
+    world.clock.sleep_until_ns(500 * MS)
+    moved = before.between(world.truth().world_T_object)
+    assert before.rotation().matrix()[2, 2] > np.cos(np.radians(1))
+    assert np.linalg.norm(moved.translation()) < 2e-4
+    assert np.linalg.norm(Rot3.Logmap(moved.rotation())) < 2e-3
 
 
 # --- time ------------------------------------------------------------------------------------------------------------
