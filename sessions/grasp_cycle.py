@@ -27,33 +27,39 @@ class CycleSettings(StrictModel):
         landing_tries: descents before the grasp is given up.
         closing_m_s: speed of the fingertips; it sets how far the object is pushed.
         touch_force_N: contact force at which a finger stops.
-        settle_s: rest before the capture.
+        touch_cycles: cycles in a row with that force: a lone jerk of the finger's own mass is no touch.
+        contact_force_N: force that each touching finger settles to for the capture; the thumb takes the others' sum.
+        settle_s: time for that.
+        rest_s: rest after every motion that something is measured after.
         capture_s: length of the capture (20 samples at 100 Hz).
         squeeze_force_N: force of each finger while the object is carried; the thumb holds against their sum.
         squeeze_s: time to build the squeeze up.
         squeeze_gain: fingertip speed per force error, m/s per N.
         carry_turn_rad_s, carry_m_s: speeds while the object is held.
-        open_s: time to open the hand.
+        finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind leave the path.
         finger_gap_m: the thumb stops this far from another tip's centre: they would touch each other.
     """
 
     lift_m: float = Field(default=0.12, gt=0.0)
     travel_m_s: float = Field(default=0.25, gt=0.0)
     turn_rad_s: float = Field(default=1.5, gt=0.0)
-    descent_m_s: float = Field(default=0.12, gt=0.0)
+    descent_m_s: float = Field(default=0.08, gt=0.0)
     landing_force_N: float = Field(default=0.25, gt=0.0)
     landing_shift_m: float = Field(default=0.018, gt=0.0)
     landing_tries: int = Field(default=4, ge=1)
     closing_m_s: float = Field(default=0.030, gt=0.0)
     touch_force_N: float = Field(default=0.15, gt=0.0)
-    settle_s: float = Field(default=0.2, ge=0.0)
+    touch_cycles: int = Field(default=2, ge=1)
+    contact_force_N: float = Field(default=0.4, gt=0.0)
+    settle_s: float = Field(default=0.3, ge=0.0)
+    rest_s: float = Field(default=0.2, gt=0.0)
     capture_s: float = Field(default=0.2, gt=0.0)
     squeeze_force_N: float = Field(default=0.5, gt=0.0)
     squeeze_s: float = Field(default=0.5, gt=0.0)
-    squeeze_gain: float = Field(default=0.06, gt=0.0)
+    squeeze_gain: float = Field(default=0.02, gt=0.0)
     carry_turn_rad_s: float = Field(default=0.6, gt=0.0)
     carry_m_s: float = Field(default=0.06, gt=0.0)
-    open_s: float = Field(default=0.5, gt=0.0)
+    finger_rad_s: float = Field(default=1.8, gt=0.0)
     finger_gap_m: float = Field(default=0.021, ge=0.0)
 
 
@@ -95,6 +101,7 @@ class GraspCycle:
         self._tip, self._yaw_window_rad = tip or TipEllipsoid(), yaw_window_rad
         self._plan: GraspPlan | None = None
         self._progress = dict.fromkeys(FINGERS, 0.0)
+        self._touching: frozenset[str] = frozenset()
         self.landings = 0
         """Landings on the object in the last approach."""
 
@@ -131,20 +138,27 @@ class GraspCycle:
 
     def _move_above(self) -> None:
         table, s = self._table(), self.settings
-        self._progress = {finger: table.path(finger).valid[0] for finger in FINGERS}
-        self._motion.blend_fingers(table, self._progress, s.open_s)
+        self._progress = self._opened()
+        self._motion.blend_fingers(table, self._progress, s.finger_rad_s)
         above = self._motion.base_joints(self.plan.frame, table, s.lift_m)
         self._motion.move_base(above, s.travel_m_s, s.turn_rad_s)
-        self._motion.wait(s.settle_s)
+        self._motion.wait(s.rest_s)
         self._motion.bench.tare()
 
     def _come_down(self) -> list[str]:
         """Guarded descent; the fingers that landed on something."""
         s = self.settings
         down = self._motion.base_joints(self.plan.frame, self._table())
-        if self._motion.move_base(down, s.descent_m_s, s.turn_rad_s, until=lambda: bool(self._landed())):
-            self._motion.wait(s.settle_s)
-        return self._landed()
+        hit: list[str] = []
+
+        def met() -> bool:
+            hit.extend(self._landed())
+            return bool(hit)
+
+        if self._motion.probe_base(down, s.descent_m_s, met):
+            self._motion.wait(s.rest_s)
+            met()
+        return hit
 
     def _landed(self) -> list[str]:
         return [f for f, load_N in self._motion.loads_N().items() if load_N > self.settings.landing_force_N]
@@ -169,20 +183,22 @@ class GraspCycle:
 
     def close(self) -> None:
         """Close every finger along its line until it touches, meets the thumb, or comes to the line's end."""
-        table = self._table()
-        step_m = self.settings.closing_m_s * self._motion.supervisor.speed_scale * self._motion.cycle_s
-        moving = set(FINGERS)
+        s, table = self.settings, self._table()
+        step_m = s.closing_m_s * self._motion.supervisor.speed_scale * self._motion.cycle_s
+        moving, touched = set(FINGERS), dict.fromkeys(FINGERS, 0)
         while moving:
             loads_N = self._motion.loads_N()
-            moving = {f for f in moving if self._may_close(f, loads_N.get(f, 0.0))}
+            for finger in moving:
+                touched[finger] = touched[finger] + 1 if loads_N.get(finger, 0.0) > s.touch_force_N else 0
+            moving = {f for f in moving if touched[f] < s.touch_cycles and self._may_close(f)}
             for finger in sorted(moving):
                 self._progress[finger] += step_m / table.path(finger).length_m
             self._motion.set_fingers(table, self._progress)
             self._motion.tick()
+        self._touching = frozenset(finger for finger in FINGERS if touched[finger] >= s.touch_cycles)
 
-    def _may_close(self, finger: str, load_N: float) -> bool:
-        at_end = self._progress[finger] >= self._table().path(finger).valid[1]
-        return load_N <= self.settings.touch_force_N and not at_end and not self._meets_thumb(finger)
+    def _may_close(self, finger: str) -> bool:
+        return self._progress[finger] < self._table().path(finger).valid[1] and not self._meets_thumb(finger)
 
     def _meets_thumb(self, finger: str) -> bool:
         """Whether this tip and the thumb's (any other's, for the thumb) are about to touch each other."""
@@ -192,8 +208,9 @@ class GraspCycle:
         return gap_m < self.settings.finger_gap_m
 
     def settle(self) -> None:
-        """Let hand and object come to rest."""
-        self._motion.wait(self.settings.settle_s)
+        """Bring the fingers that touch to the contact force, then let hand and object come to rest."""
+        self._build_up(self._balanced_forces_N(self._touching, self.settings.contact_force_N), self.settings.settle_s)
+        self._motion.wait(self.settings.rest_s)
 
     def capture(self) -> Grasp:
         """Gather samples, make a grasp of them, and take a picture of the object as it is held."""
@@ -208,10 +225,7 @@ class GraspCycle:
 
     def squeeze(self, touching: frozenset[str]) -> None:
         """Build up the holding force of the fingers that touch; the thumb holds against their sum."""
-        targets_N = self._holding_forces_N(touching)
-        for _ in range(self._motion.cycles(self.settings.squeeze_s)):
-            self._servo_forces(targets_N)
-            self._motion.tick()
+        self._build_up(self._balanced_forces_N(touching, self.settings.squeeze_force_N), self.settings.squeeze_s)
 
     def reorient(self, turn_rad: float, shift_world_m: Array, touching: frozenset[str]) -> Pose3:
         """Turn about the grasp's vertical axis and shift, holding the object.
@@ -225,7 +239,7 @@ class GraspCycle:
             The palm's motion in the world as measured: what carries the object along (eq. 3.8).
         """
         motion, table, start = self._motion, self._table(), self.plan.frame
-        targets_N = self._holding_forces_N(touching)
+        targets_N = self._balanced_forces_N(touching, self.settings.squeeze_force_N)
         duration_s = max(
             abs(turn_rad) / self.settings.carry_turn_rad_s,
             float(np.linalg.norm(shift_world_m)) / self.settings.carry_m_s,
@@ -238,20 +252,25 @@ class GraspCycle:
         world_T_before = motion.bench.perception.world_T_palm
         motion.bench.begin_hold()
         motion.follow(base_at, duration_s, lambda: self._servo_forces(targets_N))
-        motion.wait(self.settings.settle_s)
+        motion.wait(self.settings.rest_s)
         motion.bench.end_hold()
         dx, dy = shift_world_m
         self._plan = replace(self.plan, frame=start.moved(float(dx), float(dy), turn_rad))
         return motion.bench.perception.world_T_palm * world_T_before.inverse()
 
-    def _holding_forces_N(self, touching: frozenset[str]) -> dict[str, float]:
+    def _balanced_forces_N(self, touching: frozenset[str], force_N: float) -> dict[str, float]:
         """Force of each finger; the thumb takes the sum of what the others push along the grasp's x axis."""
-        table, force_N = self._table(), self.settings.squeeze_force_N
+        table = self._table()
         forces_N = dict.fromkeys(sorted(touching - {"TH"}), force_N)
         if "TH" in touching:
             pushed_N = sum(-force_N * float(table.path(finger).direction[0]) for finger in forces_N)
             forces_N["TH"] = max(force_N, pushed_N)
         return forces_N
+
+    def _build_up(self, targets_N: dict[str, float], duration_s: float) -> None:
+        for _ in range(self._motion.cycles(duration_s)):
+            self._servo_forces(targets_N)
+            self._motion.tick()
 
     def _servo_forces(self, targets_N: dict[str, float]) -> None:
         """One cycle of force control: a fingertip moves along its line in proportion to its force error."""
@@ -266,10 +285,13 @@ class GraspCycle:
     # --- and away ----------------------------------------------------------------------------------------------
 
     def release(self) -> None:
-        """Open the hand."""
-        table = self._table()
-        self._progress = {finger: table.path(finger).valid[0] for finger in FINGERS}
-        self._motion.blend_fingers(table, self._progress, self.settings.open_s)
+        """Open the hand, every tip back along its line: a short cut through the joints would dip into the table."""
+        table, closed = self._table(), self._progress
+        opened = self._opened()
+        for share in self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s)):
+            self._progress = {finger: u + share * (opened[finger] - u) for finger, u in closed.items()}
+            self._motion.set_fingers(table, self._progress)
+            self._motion.tick()
 
     def lift(self) -> None:
         """Straight up."""
@@ -280,6 +302,10 @@ class GraspCycle:
     def idle(self) -> None:
         """One cycle without motion."""
         self._motion.tick()
+
+    def _opened(self) -> dict[str, float]:
+        """Progress of the open hand."""
+        return {finger: self._table().path(finger).valid[0] for finger in FINGERS}
 
     def _table(self) -> Closing:
         return closing(self.plan.closing, self.plan.height_m, self._tip)

@@ -6,13 +6,13 @@ looks at it; so no verb of the grasp cycle can forget to be supervised.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from drivers.positioner import mount_joints
 from gtsam import Pose3, Rot3
 
+from drivers.positioner import mount_joints
 from drivers.shadow.closing import Closing
 from drivers.shadow.kinematics import JOINTS, forearm_T_palm
 from sessions.bench import Bench
@@ -21,6 +21,7 @@ from tactile_lab.clock import NANOSECONDS
 from tactile_lab.geometry.contacts import FINGERS, Array
 
 _STRAIGHT_WRIST = forearm_T_palm(np.zeros(len(JOINTS)))
+_WITHDRAW_s = 0.15  # a positioner follows its targets late: back by more than it is behind
 _HOLD_WRIST = {"WRJ1": 0.0, "WRJ2": 0.0}
 
 
@@ -95,6 +96,12 @@ class Motion:
         """Whole cycles in a duration, at least one."""
         return max(1, round(duration_s / self.cycle_s))
 
+    def shares(self, duration_s: float) -> Iterator[float]:
+        """One growing share of a motion for each of its cycles, the last one 1; slower while moves have to be slow."""
+        count = self.cycles(duration_s / self.supervisor.speed_scale)
+        for step in range(1, count + 1):
+            yield step / count
+
     # --- the positioner ----------------------------------------------------------------------------------------
 
     def base_joints(self, grasp: GraspFrame, closing: Closing, above_m: float = 0.0) -> Array:
@@ -109,33 +116,43 @@ class Motion:
         self._base_q = np.asarray(q, dtype=float)
         self.bench.base.set_target(self._base_q)
 
-    def move_base(self, q: Array, speed_m_s: float, turn_rad_s: float, until: Callable[[], bool] | None = None) -> bool:
-        """Straight, smooth move of the positioner's joints.
+    def move_base(self, q: Array, speed_m_s: float, turn_rad_s: float) -> None:
+        """Straight, smooth move of the positioner's joints to ``q``, shape (6,); the slower of both speeds paces it."""
+        start = self._base_q
+        for share in self.shares(self._base_time_s(q, speed_m_s, turn_rad_s)):
+            self.set_base(start + smooth(share) * (q - start))
+            self.tick()
+
+    def probe_base(self, q: Array, speed_m_s: float, met: Callable[[], bool]) -> bool:
+        """Even move toward ``q`` that turns back where something is met.
 
         Args:
             q: where to, shape (6,).
-            speed_m_s, turn_rad_s: mean speeds; the slower of the two paces the move.
-            until: asked after every cycle; a yes ends the move on the spot.
+            speed_m_s: even speed.
+            met: asked after every cycle.
 
         Returns:
-            Whether the end was reached.
+            Whether ``q`` was reached. If not, the positioner is on its way back to where it was a moment before.
         """
-        start, scale = self._base_q, self.supervisor.speed_scale
-        travel_s = float(np.linalg.norm(q[:3] - start[:3])) / (speed_m_s * scale)
-        turn_s = float(np.max(np.abs(q[3:] - start[3:]))) / (turn_rad_s * scale)
-        count = self.cycles(max(travel_s, turn_s))
-        for step in range(1, count + 1):
-            self.set_base(start + smooth(step / count) * (q - start))
+        start = self._base_q
+        steps = [start + share * (q - start) for share in self.shares(self._base_time_s(q, speed_m_s, np.inf))]
+        for count, step in enumerate(steps):
+            self.set_base(step)
             self.tick()
-            if until is not None and until():
+            if met():
+                self.set_base(steps[max(0, count - self.cycles(_WITHDRAW_s))])
+                self.tick()
                 return False
         return True
 
+    def _base_time_s(self, q: Array, speed_m_s: float, turn_rad_s: float) -> float:
+        travel_s = float(np.linalg.norm(q[:3] - self._base_q[:3])) / speed_m_s
+        return max(travel_s, float(np.max(np.abs(q[3:] - self._base_q[3:]))) / turn_rad_s)
+
     def follow(self, pose_at: Callable[[float], Array], duration_s: float, each: Callable[[], None]) -> None:
         """Positioner joints as a function of smooth progress 0..1; ``each`` acts before every cycle."""
-        count = self.cycles(duration_s / self.supervisor.speed_scale)
-        for step in range(1, count + 1):
-            self.set_base(pose_at(smooth(step / count)))
+        for share in self.shares(duration_s):
+            self.set_base(pose_at(smooth(share)))
             each()
             self.tick()
 
@@ -149,16 +166,24 @@ class Motion:
         self._targets_rad = targets
         self.bench.hand.set_targets(targets)
 
-    def blend_fingers(self, closing: Closing, progress: Mapping[str, float], duration_s: float) -> None:
+    def blend_fingers(self, closing: Closing, progress: Mapping[str, float], speed_rad_s: float) -> None:
         """From the present targets to those at ``progress``, straight in joint space."""
-        start = self._targets_rad or self._measured_targets(closing, progress)
+        start = self._present_targets(closing, progress)
+        duration_s = self.finger_time_s(closing, progress, speed_rad_s)
         self.set_fingers(closing, progress)
         end = self._targets_rad
-        count = self.cycles(duration_s / self.supervisor.speed_scale)
-        for step in range(1, count + 1):
-            share = step / count
+        for share in self.shares(duration_s):
             self.bench.hand.set_targets({name: (1 - share) * start[name] + share * end[name] for name in end})
             self.tick()
+
+    def finger_time_s(self, closing: Closing, progress: Mapping[str, float], speed_rad_s: float) -> float:
+        """How long the joint with the longest way takes to the targets at ``progress``."""
+        start = self._present_targets(closing, progress)
+        end = {name: angle for finger in FINGERS for name, angle in closing.joints(finger, progress[finger]).items()}
+        return max(abs(angle - start[name]) for name, angle in end.items()) / speed_rad_s
+
+    def _present_targets(self, closing: Closing, progress: Mapping[str, float]) -> dict[str, float]:
+        return self._targets_rad or self._measured_targets(closing, progress)
 
     def _measured_targets(self, closing: Closing, progress: Mapping[str, float]) -> dict[str, float]:
         """Where the motors stand now, for the names that ``progress`` will command."""
