@@ -97,6 +97,7 @@ class ReportContent:
         contour_m: the estimated contour or section, shape (n, 2), estimate's object frame, or None.
         contour_sigma_m: standard deviation at each point of the contour, shape (n,).
         truth: what is known of the truth, or None.
+        fitted_outline_m: the true outline laid best onto the estimate, shape (n, 2), estimate's object frame, or None.
     """
 
     facts: SessionFacts
@@ -106,6 +107,7 @@ class ReportContent:
     contour_m: Array | None = None
     contour_sigma_m: Array = field(default_factory=lambda: np.zeros(0))
     truth: TrueShape | None = None
+    fitted_outline_m: Array | None = None
 
     @property
     def estimate_T_truth(self) -> Pose3 | None:

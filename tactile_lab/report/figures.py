@@ -14,6 +14,8 @@ from tactile_lab.report.svg import Chart, Frame, tick_label
 
 MAP_WIDTH = 500.0
 NORMAL_LENGTH_mm = 6.0
+LEAST_COLUMNS = 8
+"""Width of the force map in grasps, so that a short session has no endless cells."""
 FINGER_NAMES = dict(zip(FINGERS, ("first", "middle", "ring", "little", "thumb"), strict=True))
 
 
@@ -43,6 +45,8 @@ def top_view(content: ReportContent) -> str | None:
     chart.axes("x in the object frame, mm", "y in the object frame, mm")
     if content.contour_m is not None and len(content.contour_m) > 2:
         _draw_contour(chart, content)
+    if content.fitted_outline_m is not None:
+        chart.path(1e3 * content.fitted_outline_m, "truth-fit", closed=True)
     if truth is not None:
         chart.path(1e3 * truth, "truth", closed=True)
     for grasp in contacts:
@@ -165,7 +169,9 @@ def force_map(content: ReportContent) -> str | None:
     if largest <= 0.0:
         return None
     grasps = len(forces)
-    chart = Chart(Frame(940, 196, left=64, bottom=36), (0.5, grasps + 0.5), (0.0, float(len(FINGERS))))
+    chart = Chart(
+        Frame(940, 196, left=64, bottom=36), (0.5, max(grasps, LEAST_COLUMNS) + 0.5), (0.0, float(len(FINGERS)))
+    )
     for row, finger in enumerate(reversed(FINGERS)):
         chart.label(0.45, row + 0.5, FINGER_NAMES[finger], "tick", "end", dy=3.5)
         for index, found in enumerate(forces):

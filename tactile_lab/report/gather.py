@@ -20,9 +20,13 @@ from tactile_lab.evaluation.shape import horizontal_outline
 from tactile_lab.evaluation.tables import read_contour
 from tactile_lab.evaluation.trajectory import read_trajectory
 from tactile_lab.geometry.contacts import Array
+from tactile_lab.geometry.poses import spatial, transform_points
 from tactile_lab.report.content import ReportContent, SessionFacts, Surface, TrueShape, with_plain_lids
+from tactile_lab.shape.alignment import align_contours
 from tactile_lab.shape.mesh_io import read_mesh
+from tactile_lab.shape.sampling import sample_polygon
 
+SECTION_STEP_m = 0.002
 _EVALUATE = "Run: tactile-lab evaluate"
 
 
@@ -40,6 +44,7 @@ def gather(session: Session, folder: Path) -> ReportContent:
     results = read_results(folder)
     surface = _surface(folder / "mesh.ply", results.dimension)
     contour_m, sigma_m = _outline(folder, results, surface)
+    truth = _truth(session, folder, results)
     return ReportContent(
         facts=facts(session.manifest),
         results=results,
@@ -47,7 +52,8 @@ def gather(session: Session, folder: Path) -> ReportContent:
         surface=surface,
         contour_m=contour_m,
         contour_sigma_m=sigma_m,
-        truth=_truth(session, folder, results),
+        truth=truth,
+        fitted_outline_m=_fitted(contour_m, truth),
     )
 
 
@@ -107,10 +113,11 @@ def _outline(folder: Path, results: Results, surface: Surface | None) -> tuple[A
     if surface is None:
         return None, np.zeros(0)
     mesh = trimesh.Trimesh(surface.vertices_m, surface.faces, process=False)
-    outline = horizontal_outline(mesh, 0.0)  # the object frame's origin is at the first contacts' mean height
+    # the object frame's origin is at the first contacts' mean height
+    outline = sample_polygon(horizontal_outline(mesh, 0.0), SECTION_STEP_m)
     flat = np.column_stack([outline, np.zeros(len(outline))])
-    _, nearest = cKDTree(surface.vertices_m).query(flat)
-    return outline, surface.sigma_m[nearest]
+    _, nearest = cKDTree(surface.vertices_m).query(flat, k=4)
+    return outline, surface.sigma_m[nearest].mean(axis=1)
 
 
 def _contour(path: Path, results: Results) -> tuple[Array | None, Array]:
@@ -127,3 +134,12 @@ def _truth(session: Session, folder: Path, results: Results) -> TrueShape | None
     truth = Truth(read_trajectory(path).world_T_object, read_truth_mesh(session))
     mesh = None if truth.mesh is None else (np.asarray(truth.mesh.vertices), np.asarray(truth.mesh.faces))
     return TrueShape(truth.world_T_object, mesh, true_outline(results, truth))
+
+
+def _fitted(contour_m: Array | None, truth: TrueShape | None) -> Array | None:
+    """The true outline, laid best onto the estimated one."""
+    if contour_m is None or truth is None or truth.outline_m is None:
+        return None
+    estimate_T_truth = align_contours(truth.outline_m, contour_m)
+    flat = np.column_stack([truth.outline_m, np.zeros(len(truth.outline_m))])
+    return transform_points(spatial(estimate_T_truth), flat)[:, :2]

@@ -27,14 +27,14 @@ def loops_card(content: ReportContent) -> Markup:
         return element("div", element("h3", "Similar grasps"), text, class_="card")
     born = first_in_map(content.results.trajectory.world_T_object)
     rows = [_loop_row(loop, born) for loop in loops]
-    titles = ["grasps", "faces", "test value", "limit", "verdict", "reason"]
+    titles = ["grasps", "faces", "test value", "verdict", "reason"]
     accepted = sum(bool(loop["accepted"]) for loop in loops)
     told = f"{accepted} of {len(loops)} went into the pose graph."
     return element(
         "div",
         element("h3", "Similar grasps"),
         element("p", told, class_="lead"),
-        element("div", table(titles, rows, (0, 4, 5)), class_="tall"),
+        element("div", table(titles, rows, (0, 3, 4)), class_="tall"),
         class_="card",
     )
 
@@ -45,7 +45,6 @@ def _loop_row(loop: Mapping[str, Any], born: int) -> list[str | Markup]:
         f"{born + loop['earlier'] + 1} \u2013 {born + loop['later'] + 1}",
         str(loop["faces"]),
         number(loop["test_value"]),
-        number(loop["limit"]),
         verdict,
         str(loop["reason"]),
     ]

@@ -52,7 +52,7 @@ def _badges(content: ReportContent) -> list[Markup]:
     elif content.evaluation.get("failed"):
         found.append(badge("registration above 5 mm", "bad"))
     if content.facts.status != "closed":
-        found.append(badge(f"session {content.facts.status}", "warn"))
+        found.append(badge(f"session {content.facts.status}", "bad" if content.facts.status == "failed" else "warn"))
     return found
 
 
@@ -68,8 +68,8 @@ def key_figures(content: ReportContent) -> Markup:
         ("Hausdorff distance", number(shape.get("hausdorff_mm")), "mm", _best(best.get("hausdorff_mm"))),
         ("Mean distance", number(shape.get("mean_distance_mm")), "mm", _best(best.get("mean_distance_mm"))),
         ("F-score at 5 mm", number(shape.get("fscore_5mm"), 3), "", _best(best.get("fscore_5mm"), 3, "")),
-        ("Position error", number(pose.get("rmse_mm")), "mm", f"RMS; {number(pose.get('final_mm'))} at the end"),
-        ("Rotation error", number(pose.get("rmse_deg")), "°", f"RMS; {number(pose.get('final_deg'))} at the end"),
+        ("Position error", number(pose.get("rmse_mm")), "mm", _at_end(pose, "final_mm")),
+        ("Rotation error", number(pose.get("rmse_deg")), "°", _at_end(pose, "final_deg")),
         ("Grasps", str(grasps), "", f"{placed} placed, {contacts} contacts"),
         ("SLAM step", number(time.get("step_ms_median"), 0), "ms", f"median; {number(time.get('total_s'))} s in all"),
     ]
@@ -79,6 +79,10 @@ def key_figures(content: ReportContent) -> Markup:
 def _tile(name: str, value: str, unit: str, under: str) -> Markup:
     number = element("dd", value, *([element("small", unit)] if unit and value != UNKNOWN else []))
     return element("div", element("dt", name), number, element("dd", under, class_="hint"))
+
+
+def _at_end(pose: Mapping[str, Any], key: str) -> str:
+    return f"RMS; {number(pose[key])} at the end" if pose else "needs two sightings"
 
 
 def _best(value: float | None, digits: int = 1, unit: str = " mm") -> str:
@@ -109,11 +113,13 @@ def _shape_lead(content: ReportContent) -> str:
 def _top_view_card(content: ReportContent, picture: str) -> Markup:
     keys = [("contour", "estimate"), ("contour_band", "two standard deviations"), ("contact", "contact with normal")]
     if content.truth_outline_m() is not None:
-        keys.insert(1, ("truth", "true outline"))
+        keys.insert(1, ("truth", "true outline, by the first grasp"))
+    if content.fitted_outline_m is not None:
+        keys.insert(2, ("truth-fit", "at best fit"))
     bar = _scale(content.contour_sigma_m)
     caption = (
-        "Hold the pointer over a contact to see its finger and force."
-        " The true outline is placed by the first grasp's marker pose alone."
+        "Hold the pointer over a contact to see its finger and force. The dashed outline is placed by the first"
+        " grasp's marker pose alone, the dotted one as well as it can be laid onto the estimate."
     )
     return figure(picture, caption, "Seen from above", legend(keys), bar)
 
@@ -129,6 +135,7 @@ _SAMPLES = {
     "contour": '<line class="contour" x1="3" y1="6" x2="21" y2="6" style="stroke:#21918c"/>',
     "contour_band": '<rect class="band" x="1" y="1" width="22" height="10"/>',
     "estimate": '<path class="estimate" d="M1 6H23"/>',
+    "truth-fit": '<path class="truth-fit" d="M1 6H23"/>',
     "truth": '<path class="truth" d="M1 6H23"/>',
     "contact": '<line class="normal" x1="6" y1="6" x2="21" y2="6"/><circle class="contact" cx="6" cy="6" r="4"/>',
 }

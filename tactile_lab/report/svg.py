@@ -16,6 +16,8 @@ import numpy as np
 from tactile_lab.geometry.contacts import Array
 
 Place = tuple[float, float]
+LEAST_SPAN = 20.0
+"""A map shows at least so much (millimetres), however close together its points are."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ class Chart:
         The data area is as high as the data ask for, within ``ratios`` of its width.
         """
         low, high = points.min(axis=0), points.max(axis=0)
-        centre, span = (low + high) / 2, np.maximum(high - low, 1e-3) * (1 + 2 * margin)
+        centre, span = (low + high) / 2, np.maximum(high - low, LEAST_SPAN) * (1 + 2 * margin)
         frame = Frame(width, width)
         inner = width - frame.left - frame.right
         height = inner * float(np.clip(span[1] / span[0], *ratios))
