@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -21,6 +21,8 @@ Mask: TypeAlias = NDArray[np.bool_]
 
 FIRST_MARGIN_m = 0.015
 _NEWTON_STEPS = 2
+_FOOT = 1e-3
+"""A vertex this close to the floor, in grid spacings, is part of the foot."""
 _FLATTEST_SLOPE = 1e-3
 """Below this slope the field says nothing about where its surface is; sigma is computed as if it were this."""
 
@@ -79,15 +81,27 @@ def extract_contour(gpis: Gpis, *, resolution_m: float = 0.001, largest_margin_m
     return _counter_clockwise(Contour(points, sigma, solid.is_closed))
 
 
-def extract_mesh(gpis: Gpis, *, resolution_m: float = 0.003, largest_margin_m: float = 0.060) -> SurfaceMesh:
-    """The object's surface in a spatial field, by marching cubes; arguments and errors as :func:`extract_contour`."""
+def extract_mesh(
+    gpis: Gpis, *, resolution_m: float = 0.003, largest_margin_m: float = 0.060, floor_m: float | None = None
+) -> SurfaceMesh:
+    """The object's surface in a spatial field, by marching cubes; arguments and errors as :func:`extract_contour`.
+
+    ``floor_m`` is the height of the table the object stands on, if it does: nothing of it is below, and where the
+    field would go on it ends in a flat foot.
+    """
     from skimage.measure import marching_cubes  # here, so that importing this module stays quick
 
     solid = _solid(gpis, resolution_m, largest_margin_m)
+    if floor_m is not None:
+        solid = solid.standing_on(floor_m, resolution_m)
     places, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
         solid.values_m, 0.0, gradient_direction="descent", allow_degenerate=False
     )
-    vertices, normals, sigma = _refined(gpis, solid.lower_m + resolution_m * places.astype(float), resolution_m)
+    rough = solid.lower_m + resolution_m * places.astype(float)
+    vertices, normals, sigma = _refined(gpis, rough, resolution_m)
+    if floor_m is not None:
+        foot = rough[:, 2] < floor_m + _FOOT * resolution_m
+        vertices, normals = _flat_foot(vertices, rough, normals, foot, floor_m)
     return SurfaceMesh(vertices, faces.astype(np.int64), sigma, normals, solid.is_closed)
 
 
@@ -98,6 +112,21 @@ class _Solid:
     lower_m: Array
     values_m: Array
     is_closed: bool
+
+    def standing_on(self, floor_m: float, spacing_m: float) -> _Solid:
+        """The same body without what is below a height. Raises ShapeError when nothing is left."""
+        heights = self.lower_m[2] + spacing_m * np.arange(self.values_m.shape[2])
+        values = np.maximum(self.values_m, floor_m - heights)
+        if not (values < 0).any():
+            raise ShapeError("the whole shape lies below the table", hint="Check the units and the contacts' heights")
+        return replace(self, values_m=values)
+
+
+def _flat_foot(vertices: Array, rough: Array, normals: Array, foot: Mask, floor_m: float) -> tuple[Array, Array]:
+    """Vertices of the foot stay where the grid put them, at the floor; no other vertex is below it."""
+    flat = np.where(foot[:, None], rough, vertices)
+    flat[:, 2] = np.maximum(flat[:, 2], floor_m)
+    return flat, np.where(foot[:, None], [0.0, 0.0, -1.0], normals)
 
 
 def _solid(gpis: Gpis, resolution_m: float, largest_margin_m: float) -> _Solid:

@@ -152,3 +152,20 @@ def test_mesh_vertices_lie_on_the_zero_level() -> None:
     mesh = extract_mesh(field, resolution_m=0.005)
     assert np.abs(field.mean(mesh.vertices)).max() < 1e-5
     np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1.0)
+
+
+def test_body_on_a_table_ends_in_a_flat_foot() -> None:
+    normals = np.random.default_rng(3).normal(size=(80, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    mesh = extract_mesh(Gpis.fit(0.04 * normals, normals), floor_m=-0.02)
+    whole = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    assert whole.is_watertight
+    assert mesh.vertices[:, 2].min() == pytest.approx(-0.02, abs=1e-9)
+    ball_without_cap = np.pi * 0.06**2 * (0.04 - 0.06 / 3)
+    assert whole.volume == pytest.approx(ball_without_cap, rel=0.03)
+
+
+def test_body_below_the_table_is_refused() -> None:
+    normals = np.eye(3)[[0, 1, 2, 0, 1, 2]] * np.repeat([1.0, -1.0], 3)[:, None]
+    with pytest.raises(ShapeError, match="below the table"):
+        extract_mesh(Gpis.fit(0.02 * normals, normals), floor_m=0.2)
