@@ -6,7 +6,7 @@ squeezed out gathers there; a sideways force drags the skin along. The laws are 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from gtsam import Pose3
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from drivers.biotac.biotac import BioTacCalibration
 from drivers.biotac.electrodes import electrode_layout
-from drivers.biotac.slot_codec import SLOT_BYTES, Channel, Slot, electrode_channel, encode_slot
+from drivers.biotac.slot_codec import LARGEST_COUNT, SLOT_BYTES, Channel, Slot, electrode_channel, encode_slot
 from drivers.simulation.plant import Plant, TrueContact
 from drivers.simulation.settings import BiotacSettings
 from tactile_lab.geometry.contacts import FINGERS, Array
@@ -49,27 +49,38 @@ class BiotacSkin:
         layout = electrode_layout(calibration.electrodes, skin)
         self.distal_T_sensor = calibration.distal_T_sensor.pose()
         self._electrodes_m = layout.skin.project(layout.positions_m)[0]
-        self._settings, self._rng = settings, rng
-        self._rest = rng.uniform(*_REST_ELECTRODE, len(self._electrodes_m))
-        self._rest_pdc = rng.uniform(*_REST_PDC)
+        self._rng, self._length_m = rng, settings.response_length_m
+        count = len(self._electrodes_m)
+        heat = (_REST_TAC, _REST_TDC)
+        self._rest = np.array([rng.uniform(*_REST_PDC), *heat, *rng.uniform(*_REST_ELECTRODE, count)])
+        self._noise = np.array([_PDC_NOISE, _HEAT_NOISE, _HEAT_NOISE, *[settings.noise_counts] * count])
 
-    def read(self, world_T_distal: Pose3, contacts: list[TrueContact]) -> Callable[[int], int | None]:
-        """The counts of any channel with these contacts; None for a channel this sensor lacks."""
-        squeeze = np.zeros(len(self._rest))
-        pressing_N = 0.0
-        sensor_T_world = (world_T_distal * self.distal_T_sensor).inverse() if contacts else Pose3()
+    def channels(self, world_T_distal: Pose3, contacts: Sequence[TrueContact]) -> Array:
+        """Counts of every channel with these contacts, without noise: pressure, heat flow, heat, electrodes."""
+        squeeze, pressing_N = np.zeros(len(self._electrodes_m)), 0.0
+        sensor_T_world = (world_T_distal * self.distal_T_sensor).inverse()
         for contact in contacts:
             normal_N, counts = self._press(sensor_T_world, contact)
             pressing_N += normal_N
             squeeze += counts
         limited = _SQUEEZE_LIMIT_counts * np.tanh(squeeze / _SQUEEZE_LIMIT_counts)
-        pdc = self._rest_pdc + _PRESSURE_counts_N * min(pressing_N, _SOFT_UNTIL_N)
-        return lambda channel: self._counts(channel, pdc, self._rest - limited)
+        pressure = _PRESSURE_counts_N * min(pressing_N, _SOFT_UNTIL_N)
+        return np.asarray(self._rest + np.concatenate([[pressure, 0.0, 0.0], -limited]))
 
-    def vibration(self) -> tuple[int, int]:
-        """Two readings of the vibration channel."""
-        first, second = np.rint(_REST_PAC + _PAC_NOISE * self._rng.standard_normal(2)).astype(int)
-        return int(first), int(second)
+    def slot(self, data_type: int, channels: Array | None = None) -> bytes:
+        """The answer to a request, with noise; channels as from :meth:`channels`, or untouched.
+
+        Channels that this sensor lacks are not valid in it.
+        """
+        counts = self._rest if channels is None else channels
+        known = [channel for channel in (data_type, data_type + 1) if channel <= len(counts)]
+        noise = self._rng.standard_normal(4)
+        vibration = [round(_REST_PAC + _PAC_NOISE * float(value)) for value in noise[2:]]
+        values = {
+            channel: min(max(round(float(counts[channel - 1] + self._noise[channel - 1] * fresh)), 0), LARGEST_COUNT)
+            for channel, fresh in zip(known, noise, strict=False)
+        }
+        return encode_slot(Slot((vibration[0], vibration[1]), values), data_type)
 
     def _press(self, sensor_T_world: Pose3, contact: TrueContact) -> tuple[float, Array]:
         """Normal force and squeeze of each electrode, counts, shape (n,)."""
@@ -79,23 +90,9 @@ class BiotacSkin:
         sideways = force - pressing * normal
         drag = _SKIN_DRAG_m * sideways / max(pressing, 1e-6) * min(1.0, pressing)
         point = np.asarray(sensor_T_world.transformFrom(contact.point_world_m)) + drag
-        squared = ((self._electrodes_m - point) ** 2).sum(axis=1) / self._settings.response_length_m**2
+        squared = ((self._electrodes_m - point) ** 2).sum(axis=1) / self._length_m**2
         shape = np.exp(-squared / 2) - _BULGE_SHARE * np.exp(-squared / (2 * _BULGE_WIDTH**2))
         return pressing, _SQUEEZE_counts * pressing**_SQUEEZE_POWER * shape
-
-    def _counts(self, channel: int, pdc: float, electrodes: Array) -> int | None:
-        first = electrode_channel(1)
-        if channel >= first + len(electrodes):
-            return None
-        if channel >= first:
-            value, noise = electrodes[channel - first], self._settings.noise_counts
-        else:
-            value, noise = {
-                Channel.PDC: (pdc, _PDC_NOISE),
-                Channel.TAC: (_REST_TAC, _HEAT_NOISE),
-                Channel.TDC: (_REST_TDC, _HEAT_NOISE),
-            }[Channel(channel)]
-        return int(np.clip(np.rint(value + noise * self._rng.standard_normal()), 0, 4095))
 
 
 class BiotacSection:
@@ -121,12 +118,9 @@ class BiotacSection:
 
     def _slot(self, finger: str, data_type: int, contacts: tuple[TrueContact, ...]) -> bytes:
         skin = self._skins[finger]
-        counts = skin.read(
-            self._plant.world_T_distal(finger), [contact for contact in contacts if contact.finger == finger]
-        )
-        readings = {channel: counts(channel) for channel in (data_type, data_type + 1)}
-        values = {channel: value for channel, value in readings.items() if value is not None}
-        return encode_slot(Slot(skin.vibration(), values), data_type)
+        if touches := [contact for contact in contacts if contact.finger == finger]:
+            return skin.slot(data_type, skin.channels(self._plant.world_T_distal(finger), touches))
+        return skin.slot(data_type)
 
 
 def _identity(data_type: int) -> bytes:
