@@ -20,28 +20,14 @@ from drivers.shadow.motors import DRIVEN_JOINTS
 from drivers.simulation.geared_motors import DISTAL_COUPLING, motor_class
 from drivers.simulation.hand_bodies import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Ellipsoid, Shape
 from drivers.simulation.objects import Hull, ObjectModel, Piece
+from drivers.simulation.surfaces import GLASS, HAND, OBJECT, RUBBER, TABLE, TIP, WOOD, surface
 from tactile_lab.geometry.contacts import FINGERS, Array
 
 TIMESTEP_s = 0.002
 BASE_JOINTS = ("base x", "base y", "base z", "base yaw", "base pitch", "base roll")
 """Joints of the positioner in the order of every base vector: metres, then radians."""
 
-_HAND, _TIP, _OBJECT, _TABLE = 1, 2, 4, 8  # collision classes
 _FOREARM_QUATERNION = (0.5, 0.5, 0.5, 0.5)  # R0 = [[0, 0, 1], [1, 0, 0], [0, 1, 0]], fingers along +x at zero
-
-
-class _Contact(NamedTuple):
-    """Friction (slide, twist, roll), stiffness and priority of one kind of surface."""
-
-    friction: tuple[float, float, float]
-    solref: tuple[float, float]
-    solimp: tuple[float, float, float, float, float]
-    priority: int = 0
-
-
-_RUBBER = _Contact((0.9, 0.003, 1e-4), (0.010, 1.0), (0.50, 0.90, 0.002, 0.5, 2.0), priority=2)  # harder ones chatter
-_GLASS = _Contact((0.35, 0.005, 0.002), (0.006, 1.0), (0.95, 0.99, 0.0005, 0.5, 2.0), priority=1)
-_WOOD = _Contact((0.5, 0.003, 1e-4), (0.004, 1.0), (0.95, 0.99, 0.0005, 0.5, 2.0))
 
 
 class _Axis(NamedTuple):
@@ -123,17 +109,6 @@ def _set_options(spec: Any) -> None:
     spec.option.impratio = 10
 
 
-def _surface(contact: _Contact, kind: int, touches: int) -> dict[str, Any]:
-    return {
-        "friction": contact.friction,
-        "solref": contact.solref,
-        "solimp": contact.solimp,
-        "priority": contact.priority,
-        "contype": kind,
-        "conaffinity": touches,
-    }
-
-
 def _add_table(spec: Any, *, rolling: bool) -> None:
     spec.worldbody.add_geom(
         name="table",
@@ -141,7 +116,7 @@ def _add_table(spec: Any, *, rolling: bool) -> None:
         size=[0.5, 0.5, 0.01],
         pos=[0, 0, -0.01],
         condim=6 if rolling else 3,  # rolling friction halves the speed, so only for objects that roll
-        **_surface(_GLASS, _TABLE, _HAND | _TIP | _OBJECT),
+        **surface(GLASS, TABLE, HAND | TIP | OBJECT),
     )
 
 
@@ -212,7 +187,7 @@ def _add_link(parent: Any, name: str, position_m: Any, quaternion: Any) -> Any:
 
 def _add_shapes(body: Any, shapes: tuple[Shape, ...]) -> None:
     for shape in shapes:
-        body.add_geom(mass=shape.mass_kg, contype=_HAND, conaffinity=_OBJECT | _TABLE, **_geometry(shape))
+        body.add_geom(mass=shape.mass_kg, contype=HAND, conaffinity=OBJECT | TABLE, **_geometry(shape))
 
 
 def _geometry(shape: Shape) -> dict[str, Any]:
@@ -241,7 +216,7 @@ def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody) -> None:
         type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
         size=tip.semi_axes_m,
         **_placed(tip.distal_T_skin),
-        **_surface(_RUBBER, _TIP, _OBJECT | _TABLE),
+        **surface(RUBBER, TIP, OBJECT | TABLE),
     )
     body.add_site(name=name, **_placed(tip.distal_T_sensor))
     body.add_site(name=f"{finger} distal")
@@ -284,7 +259,7 @@ def _add_object(spec: Any, target: ObjectModel, mass_kg: float) -> None:
     _set_inertia(body, target, mass_kg)
     for index, piece in enumerate(target.pieces):
         shape = _piece_geometry(spec, piece, f"object piece {index}")
-        body.add_geom(name=f"object {index}", **shape, **_surface(_WOOD, _OBJECT, _HAND | _TIP | _TABLE))
+        body.add_geom(name=f"object {index}", **shape, **surface(WOOD, OBJECT, HAND | TIP | TABLE))
 
 
 def _set_inertia(body: Any, target: ObjectModel, mass_kg: float) -> None:
