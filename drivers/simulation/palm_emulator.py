@@ -50,9 +50,6 @@ class NoTactile:
         return 0, np.zeros((5, 16), np.uint8)
 
 
-_WRIST = [index for index, joint in enumerate(JOINTS) if joint.startswith("WR")]
-
-
 class JointSensors:
     """The joint sensors: true angles to ADC counts, with this session's bias, noise and rounding.
 
@@ -66,7 +63,6 @@ class JointSensors:
         self._calibration, self._rng = calibration, rng
         spread = [settings.wrist_bias_rad if name.startswith("WR") else settings.bias_rad for name in JOINTS]
         self._bias_rad = np.array(spread) * rng.standard_normal(len(JOINTS))
-        self._bias_rad[_WRIST] = 0.0  # the forearm's calibration is taken with the wrist held, and takes its bias in
         self._noise_rad = settings.noise_rad
 
     def counts(self, joints_rad: Array) -> NDArray[np.int_]:

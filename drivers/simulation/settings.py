@@ -24,12 +24,13 @@ class JointSensorSettings(StrictModel):
 
     Attributes:
         bias_rad: constant through a session, drawn for each joint of the fingers.
-        wrist_bias_rad: the same for the wrist; small, as the forearm-to-world calibration takes up most of it.
+        wrist_bias_rad: the same for the wrist; none unless given, as the forearm-to-world calibration is taken with the
+            wrist held and takes its bias in.
         noise_rad: from reading to reading.
     """
 
     bias_rad: float = Field(default=math.radians(0.6), ge=0.0)
-    wrist_bias_rad: float = Field(default=math.radians(0.1), ge=0.0)
+    wrist_bias_rad: float = Field(default=0.0, ge=0.0)
     noise_rad: float = Field(default=math.radians(0.1), ge=0.0)
 
 
