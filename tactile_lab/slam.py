@@ -144,6 +144,11 @@ class TactileSlam:
         """What was asked for."""
         return self._settings
 
+    @property
+    def step_count(self) -> int:
+        """Grasps taken into account so far."""
+        return len(self._steps)
+
     def step(self, grasp: Grasp) -> SlamStep:
         """Take one grasp into account (algorithm 3.1, then the graph).
 
@@ -274,7 +279,9 @@ class TactileSlam:
         try:
             if self._settings.dimension == 2:
                 return extract_contour(self.surface, resolution_m=self._settings.contour_resolution_m), None
-            return None, extract_mesh(self.surface, resolution_m=self._settings.mesh_resolution_m)
+            return None, extract_mesh(
+                self.surface, resolution_m=self._settings.mesh_resolution_m, floor_m=-self._origin_height_m
+            )
         except ShapeError:  # contacts that enclose nothing: the trajectory is still a result
             return None, None
 

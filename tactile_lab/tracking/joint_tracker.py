@@ -4,6 +4,8 @@ The filter of algorithm 3.1 commits to one map grasp by grasp and can not take a
 hypothesis is a whole trajectory, and the place of a particle's weight is taken by its evidence: the likelihood
 of all contacts for these poses (:mod:`pose_evidence`), the motion model, and free space. Each grasp the best
 hypotheses branch into the poses that the measurement proposes, are smoothed, compared, and the best are kept.
+One more branch always says that the grasp can not be placed: its contacts count as explained by nothing. It wins
+where every placement would tear the shape or the motion, and is dropped when later grasps tell better.
 """
 
 from __future__ import annotations
@@ -44,6 +46,7 @@ class JointSettings(StrictModel):
         hypotheses: so many are kept from grasp to grasp.
         smoothed: so many of the branches, by evidence before smoothing, are smoothed.
         evidence_gap: hypotheses that much less likely than the best (natural logarithm) are given up.
+        unplaced_cost: negative log evidence of a contact that is left out, in the units of the field's evidence.
         iterations: of the optimiser at each grasp.
         final_iterations: of the optimiser at the end.
     """
@@ -52,6 +55,7 @@ class JointSettings(StrictModel):
     hypotheses: int = Limit(default=8, ge=1)
     smoothed: int = Limit(default=12, ge=1)
     evidence_gap: float = Limit(default=25.0, gt=0)
+    unplaced_cost: float = Limit(default=5.0, gt=0)
     iterations: int = Limit(default=25, ge=1)
     final_iterations: int = Limit(default=80, ge=1)
 
@@ -75,7 +79,7 @@ class JointTracker:
         kernel_every: int,
     ) -> None:
         self._noise, self._settings, self._kernel_every = noise, settings, kernel_every
-        self._hypotheses = [Hypothesis(first, 0.0)]
+        self._hypotheses = [self._rated(first)]
         self._branches: list[Hypothesis] = []
         self._motion = np.zeros(3)
         self.effective_count = 1.0
@@ -89,16 +93,15 @@ class JointTracker:
 
     def weigh(self, contacts: ContactSet) -> bool:
         """Branch every hypothesis into the poses proposed for this grasp, smooth the likeliest and rank them."""
-        if len(contacts) == 0:
-            self._branches = [self._predicted(hypothesis, contacts) for hypothesis in self._hypotheses]
-            return False
-        branches = [branch for hypothesis in self._hypotheses for branch in self._branched(hypothesis, contacts)]
+        branches = [self._unplaced(hypothesis, contacts) for hypothesis in self._hypotheses]
+        if len(contacts):
+            branches += [branch for hypothesis in self._hypotheses for branch in self._branched(hypothesis, contacts)]
         branches = self._likeliest(branches, self._settings.smoothed)
         smoothed = [self._smoothed(branch, self._settings.iterations) for branch in branches]
         self._branches = self._likeliest(_different(smoothed), self._settings.hypotheses)
         weights = self._weights(self._branches)
         self.effective_count = float(1 / np.sum(weights**2))
-        return True
+        return self._branches[0].map.placed[-1].used
 
     def estimate(self) -> PoseEstimate:
         """The likeliest hypothesis's pose; the covariance holds its own and the spread of the hypotheses."""
@@ -118,6 +121,7 @@ class JointTracker:
         self._hypotheses = self._branches
         if len(self.map.placed) % self._kernel_every == 0:
             self._share_kernel(self.map.with_best_kernel())
+            self._hypotheses = sorted((self._rated(one.map) for one in self._hypotheses), key=lambda one: one.cost)
 
     def adopt(self, corrected: ContactMap) -> None:
         self._hypotheses[0] = replace(self._hypotheses[0], map=corrected)
@@ -129,18 +133,18 @@ class JointTracker:
             self._hypotheses = self._likeliest(_different(smoothed), self._settings.hypotheses)
             self._share_kernel(self.map.with_best_kernel())
 
-    def _predicted(self, hypothesis: Hypothesis, contacts: ContactSet) -> Hypothesis:
+    def _unplaced(self, hypothesis: Hypothesis, contacts: ContactSet) -> Hypothesis:
         last = hypothesis.map.placed[-1]
         row, covariance = compose(self._motion, last.row), last.covariance + np.diag(self._noise.sigmas**2)
         grasp = PlacedGrasp(contacts, row, covariance, self._motion, used=False)
-        return replace(hypothesis, map=hypothesis.map.with_grasp(grasp))
+        return self._rated(hypothesis.map.with_grasp(grasp))
 
     def _branched(self, hypothesis: Hypothesis, contacts: ContactSet) -> list[Hypothesis]:
         predicted = compose(self._motion, hypothesis.map.placed[-1].row)
-        field = self._field(hypothesis.map)
-        settings = self._settings.proposals
-        rows, _ = propose(predicted, contacts, field, self._noise, settings)
-        fit = fit_poses(rows, predicted, contacts, field, self._noise, settings)
+        field, settings = self._field(hypothesis.map), self._settings.proposals
+        noise = self._noise.accumulated(1 + _trailing_unplaced(hypothesis.map))
+        rows, _ = propose(predicted, contacts, field, noise, settings)
+        fit = fit_poses(rows, predicted, contacts, field, noise, settings)
         return [
             self._rated(hypothesis.map.with_grasp(PlacedGrasp(contacts, row, covariance, self._motion, used=True)))
             for row, covariance in zip(rows, np.linalg.inv(fit.information), strict=True)
@@ -156,13 +160,18 @@ class JointTracker:
 
     def _rated(self, contact_map: ContactMap) -> Hypothesis:
         evidence = PoseEvidence(contact_map, self._noise).value(contact_map.rows)
-        return Hypothesis(contact_map, evidence + free_space_cost(contact_map))
+        return Hypothesis(contact_map, evidence + self._other_costs(contact_map))
 
     def _smoothed(self, hypothesis: Hypothesis, iterations: int) -> Hypothesis:
         evidence = PoseEvidence(hypothesis.map, self._noise)
         rows, cost = evidence.maximised(hypothesis.map.rows, iterations)
         smoothed = hypothesis.map.with_rows(rows)
-        return Hypothesis(smoothed, cost + free_space_cost(smoothed))
+        return Hypothesis(smoothed, cost + self._other_costs(smoothed))
+
+    def _other_costs(self, contact_map: ContactMap) -> float:
+        """What the poses are judged by beside the contacts in place: free space and the contacts left out."""
+        left_out = sum(len(grasp.contacts_world) for grasp in contact_map.placed if not grasp.used)
+        return free_space_cost(contact_map) + self._settings.unplaced_cost * left_out
 
     def _likeliest(self, hypotheses: list[Hypothesis], count: int) -> list[Hypothesis]:
         ranked = sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)[:count]
@@ -176,6 +185,12 @@ class JointTracker:
 
     def _share_kernel(self, best: ContactMap) -> None:
         self._hypotheses = [replace(one, map=replace(one.map, settings=best.settings)) for one in self._hypotheses]
+
+
+def _trailing_unplaced(contact_map: ContactMap) -> int:
+    """How many grasps in a row were left out last."""
+    used = [grasp.used for grasp in reversed(contact_map.placed)]
+    return used.index(True)
 
 
 def free_space_cost(contact_map: ContactMap) -> float:

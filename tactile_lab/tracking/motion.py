@@ -29,6 +29,11 @@ class MotionNoise(StrictModel):
         """Standard deviations of x, y (m) and yaw (rad)."""
         return np.array([self.translation_m, self.translation_m, self.rotation_rad])
 
+    def accumulated(self, steps: int) -> MotionNoise:
+        """The noise of several re-orientations without a measurement between them."""
+        factor = float(np.sqrt(steps))
+        return MotionNoise(translation_m=factor * self.translation_m, rotation_rad=factor * self.rotation_rad)
+
 
 def pose_row(world_T_object: Pose2) -> Array:
     """A planar pose as the row (x_m, y_m, yaw_rad)."""

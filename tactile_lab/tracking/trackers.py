@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal, Protocol
+from typing import Literal, Protocol, Self
 
 import numpy as np
 from gtsam import Pose3
 from pydantic import Field as Limit
+from pydantic import model_validator
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import FieldGrid
@@ -95,6 +96,12 @@ class TrackingSettings(StrictModel):
     kernel_every: int = Limit(default=4, ge=1)
     contour_grid_m: float = Limit(default=0.002, gt=0)
     surface_grid_m: float = Limit(default=0.005, gt=0)
+
+    @model_validator(mode="after")
+    def _normals_for_joint(self) -> Self:
+        if self.method == "joint" and self.shape is not None and self.shape.observations != "normals":
+            raise ValueError('method "joint" needs shape.observations "normals"')
+        return self
 
 
 def make_tracker(settings: TrackingSettings, first: PlacedGrasp, rng: np.random.Generator) -> Tracker:
