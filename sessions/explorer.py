@@ -2,8 +2,8 @@
 
 Candidates stand around the estimated object: every yaw of the arm's window, a few shifts across the hand, every
 closing. Where a candidate's fingers will touch is read off the estimated surface along their closing lines; the
-candidate whose predicted contacts are least known wins, among those that promise enough contacts and have room for
-the open hand.
+candidate whose predicted contacts are least known wins, among those that have room for the open hand, promise enough
+contacts, and whose contacts would also tell the object's pose (eq. 3.18): a grasp that can not be placed adds nothing.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from tactile_lab.geometry.contacts import FINGERS, Array
 from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.surface import Contour, SurfaceMesh, extract_contour, extract_mesh
 from tactile_lab.strict_yaml import StrictModel
+from tactile_lab.tracking.observability import planar_observability
 
 
 class ExplorationSettings(StrictModel):
@@ -34,6 +35,8 @@ class ExplorationSettings(StrictModel):
         yaws: how many, spread evenly over the arm's window.
         shifts_m: offsets of the grasp frame across the hand.
         least_contacts: candidates that promise fewer lose against all that promise as many.
+        least_observability: smallest eigenvalue of (3.18) that the predicted contacts should have; where no candidate
+            reaches it (a round object can not tell its turn) it does not count.
         clearance_m: distance from the estimated surface that the open fingertips' centres must keep.
         contour_resolution_m, mesh_resolution_m: of the surface that the explored share is measured on.
     """
@@ -41,6 +44,7 @@ class ExplorationSettings(StrictModel):
     yaws: int = Field(default=12, ge=1)
     shifts_m: tuple[float, ...] = Field(default=(-0.015, 0.0, 0.015), min_length=1)
     least_contacts: int = Field(default=4, ge=0)
+    least_observability: float = Field(default=0.15, ge=0.0)
     clearance_m: float = Field(default=0.012, ge=0.0)
     contour_resolution_m: float = Field(default=0.002, gt=0.0)
     mesh_resolution_m: float = Field(default=0.006, gt=0.0)
@@ -122,13 +126,25 @@ def choose_grasp(
     roomy = [candidate for candidate in ring if _has_room(candidate, known, settings.clearance_m)]
     if not roomy:
         return None
-    return _plan(_best(rate(roomy, known), settings.least_contacts), table)
+    return _plan(_best(rate(roomy, known), known, settings), table)
 
 
-def _best(rated: Sequence[RatedCandidate], least_contacts: int) -> RatedCandidate:
-    """The highest reward among the candidates with enough contacts, else the one with most contacts."""
-    enough = [item for item in rated if len(item.contacts.fingers) >= least_contacts]
+def _best(rated: Sequence[RatedCandidate], known: ModelledObject, settings: ExplorationSettings) -> RatedCandidate:
+    """The highest reward among the observable candidates with enough contacts; see the settings for what gives way."""
+    enough = [item for item in rated if len(item.contacts.fingers) >= settings.least_contacts]
+    telling = (item for item in enough if _observability(item, known) >= settings.least_observability)
+    if best := next(telling, None):
+        return best
     return enough[0] if enough else max(rated, key=lambda item: len(item.contacts.fingers))
+
+
+def _observability(item: RatedCandidate, known: ModelledObject) -> float:
+    points_m = item.contacts.points_object_m
+    if not len(points_m):
+        return 0.0
+    slopes = known.field.predict(points_m, gradient=True).gradient
+    assert slopes is not None
+    return planar_observability(points_m, slopes / np.linalg.norm(slopes, axis=1, keepdims=True)).smallest
 
 
 def _plan(best: RatedCandidate, table: Callable[[str], Closing]) -> GraspPlan:

@@ -61,6 +61,7 @@ class Motion:
         self.bench, self.supervisor = bench, supervisor
         self._base_q = bench.perception.base_q.copy()
         self._targets_rad: dict[str, float] = {}
+        self._loads_N: dict[str, float] = {}
 
     # --- time --------------------------------------------------------------------------------------------------
 
@@ -78,13 +79,9 @@ class Motion:
         """
         self.bench.cycle()
         seen = self.bench.perception
+        self._loads_N = seen.loads_N()
         self.supervisor.check(
-            Situation(
-                stamp_ns=self.bench.clock.now_ns(),
-                hand_stamp_ns=seen.hand_stamp_ns,
-                loads_N=seen.loads_N() if seen.ready else {},
-                world_T_palm=seen.world_T_palm if seen.ready else None,
-            )
+            Situation(self.bench.clock.now_ns(), seen.hand_stamp_ns, self._loads_N, seen.world_T_palm)
         )
 
     def wait(self, duration_s: float) -> None:
@@ -194,8 +191,8 @@ class Motion:
         return {name: joints[name] for name in names}
 
     def loads_N(self) -> dict[str, float]:
-        """Contact force on each fingertip, newest sample."""
-        return self.bench.perception.loads_N()
+        """Contact force on each fingertip at the end of the last cycle."""
+        return self._loads_N
 
 
 def smooth(share: float) -> float:
