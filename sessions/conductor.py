@@ -107,7 +107,7 @@ class Conductor:
         self._bench, self._slam, self._settings, self._dimension = bench, slam, settings, dimension
         self._progress = progress or NullProgress()
         self._rng = np.random.default_rng(seed)
-        self._rule = FixedRule(settings.plan, self._rng)
+        self._rule = FixedRule(settings.plan, self._rng, dimension)
         self._supervisor = SafetySupervisor(bench, settings.safety, bench.cycle_ns)
         self._tip = _tip_shape(bench)
         window = settings.plan.yaw_window_rad

@@ -24,7 +24,8 @@ class PlanSettings(StrictModel):
 
     Attributes:
         closings: closings to alternate between.
-        contact_heights_m: heights of the fingertip centres above the table, taken in turn.
+        contour_heights_m: heights of the fingertip centres above the table, taken in turn, when a contour is wanted.
+        surface_heights_m: the same when the whole surface is wanted.
         yaw_window_rad: lowest and highest yaw of the grasp frame that the arm can reach.
         start_m: where the object is expected before the first grasp, world x, y.
         turn_rad: smallest and largest re-orientation.
@@ -32,7 +33,8 @@ class PlanSettings(StrictModel):
     """
 
     closings: tuple[str, ...] = Field(default=("pinch", "radial"), min_length=1)
-    contact_heights_m: tuple[float, ...] = Field(default=(0.022,), min_length=1)
+    contour_heights_m: tuple[float, ...] = Field(default=(0.022,), min_length=1)
+    surface_heights_m: tuple[float, ...] = Field(default=(0.018, 0.026, 0.034), min_length=1)
     yaw_window_rad: tuple[float, float] = (-1.31, 1.31)
     start_m: tuple[float, float] = (0.0, 0.0)
     turn_rad: tuple[float, float] = (0.23, 0.79)
@@ -42,7 +44,7 @@ class PlanSettings(StrictModel):
     def _sensible(self) -> PlanSettings:
         if unknown := sorted(set(self.closings) - set(PRESHAPES)):
             raise ValueError(f"closings {unknown} are not known; choose from {', '.join(PRESHAPES)}")
-        if not all(0.015 <= height_m <= 0.12 for height_m in self.contact_heights_m):
+        if not all(0.015 <= height_m <= 0.12 for height_m in self.contour_heights_m + self.surface_heights_m):
             raise ValueError("contact heights lie between 0.015 and 0.12 m")
         if not self.yaw_window_rad[0] < self.yaw_window_rad[1]:
             raise ValueError("the yaw window's first value must be the smaller one")
@@ -95,10 +97,12 @@ class FixedRule:
     Args:
         settings: what may be grasped.
         rng: the session's own source of chance.
+        dimension: 2 when a contour is wanted, 3 for a surface.
     """
 
-    def __init__(self, settings: PlanSettings, rng: np.random.Generator) -> None:
+    def __init__(self, settings: PlanSettings, rng: np.random.Generator, dimension: int = 2) -> None:
         self.settings, self._rng = settings, rng
+        self._heights_m = settings.contour_heights_m if dimension == 2 else settings.surface_heights_m
         self.centre_m: Array = np.array(settings.start_m)
         """Where the object is thought to be, world x, y."""
 
@@ -116,7 +120,7 @@ class FixedRule:
 
     def height_m(self, index: int) -> float:
         """The contact height whose turn it is."""
-        return self.settings.contact_heights_m[index % len(self.settings.contact_heights_m)]
+        return self._heights_m[index % len(self._heights_m)]
 
     def turn(self, yaw_rad: float) -> float:
         """A re-orientation that keeps the hand in its yaw window."""

@@ -276,10 +276,15 @@ def rule(**content: Any) -> FixedRule:
 
 
 def test_fixed_rule_alternates_sides_closings_and_heights() -> None:
-    plans = [rule(contact_heights_m=(0.018, 0.03)).plan(index) for index in range(8)]
+    plans = [rule(contour_heights_m=(0.018, 0.03)).plan(index) for index in range(8)]
     assert [plan.closing for plan in plans] == ["pinch", "pinch", "radial", "radial"] * 2
     assert [plan.frame.yaw_rad > 0 for plan in plans] == [False, True] * 4
     assert [plan.height_m for plan in plans] == [0.018, 0.03] * 4
+
+
+def test_a_surface_is_touched_at_several_heights() -> None:
+    planner = FixedRule(PlanSettings(), np.random.default_rng(0), dimension=3)
+    assert len({planner.height_m(index) for index in range(6)}) > 1
 
 
 def test_turns_keep_the_yaw_window() -> None:
@@ -350,8 +355,8 @@ def test_rays_are_the_usable_parts_of_the_lines() -> None:
     [
         {"closings": ["scoop"]},
         {"closings": []},
-        {"contact_heights_m": []},
-        {"contact_heights_m": [0.5]},
+        {"contour_heights_m": []},
+        {"surface_heights_m": [0.5]},
         {"yaw_window_rad": [1.0, -1.0]},
         {"turn_rad": [0.5, 0.2]},
         {"unknown": 1},
