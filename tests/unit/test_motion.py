@@ -1,0 +1,82 @@
+"""Planar motion: the composition of eq. 3.8 and the noise of eq. 3.7."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gtsam import Pose2, Pose3, Rot3
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from tactile_lab.tracking.motion import (
+    MotionNoise,
+    compose,
+    deviation,
+    inverse,
+    planar_motion,
+    pose_row,
+    row_pose,
+    row_pose_in_space,
+    sample_motion,
+)
+
+rows = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-3.0, 3.0)).map(np.array)
+
+
+@given(rows, rows)
+@settings(max_examples=30, derandomize=True)
+def test_composition_agrees_with_gtsam(motion: np.ndarray, row: np.ndarray) -> None:
+    expected = row_pose(motion).compose(row_pose(row))
+    assert row_pose(compose(motion, row)).equals(expected, 1e-9)
+
+
+@given(rows)
+@settings(max_examples=20, derandomize=True)
+def test_inverse_undoes_a_pose(row: np.ndarray) -> None:
+    assert np.allclose(compose(inverse(row), row), 0.0, atol=1e-12)
+
+
+def test_many_poses_move_like_each_of_them() -> None:
+    motion = np.array([0.01, -0.02, 0.4])
+    many = np.random.default_rng(0).normal(size=(5, 3))
+    assert np.allclose(compose(motion, many), [compose(motion, row) for row in many])
+
+
+def test_hand_motion_is_projected_onto_the_table() -> None:
+    tilted = Pose3(Rot3.Ypr(0.5, 0.02, -0.01), np.array([0.01, 0.02, 0.3]))
+    assert np.allclose(planar_motion(tilted), [0.01, 0.02, 0.5], atol=1e-3)
+
+
+def test_angles_are_compared_across_the_wrap() -> None:
+    gap = deviation(np.array([0.0, 0.0, np.pi - 0.01]), np.array([0.0, 0.0, -np.pi + 0.01]))
+    assert gap[2] == pytest.approx(-0.02)
+
+
+def test_samples_spread_as_configured_about_the_predicted_pose() -> None:
+    noise = MotionNoise(translation_m=0.01, rotation_rad=0.1)
+    start = np.tile([0.1, 0.0, 0.2], (20_000, 1))
+    motion = np.array([0.0, 0.05, 0.5])
+    drawn = sample_motion(start, motion, noise, np.random.default_rng(1))
+    gaps = deviation(drawn, compose(motion, start[0]))
+    assert np.allclose(gaps.mean(axis=0), 0.0, atol=2e-3)
+    assert np.allclose(gaps.std(axis=0), noise.sigmas, rtol=0.03)
+
+
+def test_default_noise_is_the_thesis_s_hundred_percent() -> None:
+    assert np.allclose(MotionNoise().sigmas, [0.010, 0.010, np.deg2rad(20.0)])
+
+
+def test_noise_grows_with_the_root_of_the_steps() -> None:
+    assert np.allclose(MotionNoise().accumulated(4).sigmas, 2 * MotionNoise().sigmas)
+
+
+def test_noise_must_be_positive() -> None:
+    with pytest.raises(ValidationError):
+        MotionNoise(translation_m=0.0)
+
+
+def test_a_row_in_space_stands_at_the_given_height() -> None:
+    pose = row_pose_in_space(pose_row(Pose2(0.1, 0.2, 0.3)), 0.022)
+    assert np.allclose(pose.translation(), [0.1, 0.2, 0.022])
+    assert pose.rotation().yaw() == pytest.approx(0.3)

@@ -1,0 +1,170 @@
+"""The joint likelihood of all poses, and the poses that a measurement proposes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.field_grid import FieldGrid
+from tactile_lab.shape.kernels import Kernel, Matern52, SquaredExponential, ThinPlate, covariance
+from tactile_lab.shape.settings import GpisSettings
+from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.motion import MotionNoise, compose, deviation, planar_motion, row_pose_in_space
+from tactile_lab.tracking.pose_evidence import PoseEvidence, covariance_pull
+from tactile_lab.tracking.proposals import ProposalSettings, fit_poses, propose, quasi_normal
+from tests.support.planar_grasps import simulate
+
+NOISE = MotionNoise()
+
+
+def true_map(shape: str, count: int, dimension: int = 2, kernel: str = "matern52") -> ContactMap:
+    heights = (0.02, 0.04) if dimension == 3 else (0.0,)
+    data = simulate(shape, 0, count=count, heights_m=heights)
+    placed = [
+        PlacedGrasp(
+            ContactSet.of_grasp(grasp, dimension, 0.0),
+            planar_motion(pose),
+            np.eye(3) * 1e-6,
+            planar_motion(grasp.hand_motion_world),
+            used=True,
+        )
+        for grasp, pose in zip(data.grasps, data.world_T_body, strict=True)
+    ]
+    return ContactMap(tuple(placed), GpisSettings.model_validate({"kernel": kernel}))
+
+
+def disturbed(contact_map: ContactMap, scale: float, seed: int = 0) -> Array:
+    shake = np.random.default_rng(seed).normal(size=contact_map.rows.shape) * [0.004, 0.004, 0.08] * scale
+    shake[0] = 0.0
+    return contact_map.rows + shake
+
+
+@pytest.mark.parametrize(
+    ("shape", "dimension", "kernel"),
+    [
+        ("L", 2, "matern52"),
+        ("rectangle", 2, "squared_exponential"),
+        ("box", 3, "matern52"),
+        ("sphere", 3, "thin_plate"),
+    ],
+)
+def test_the_gradient_is_the_derivative_of_the_value(shape: str, dimension: int, kernel: str) -> None:
+    contact_map = true_map(shape, 4, dimension, kernel)
+    evidence, rows = PoseEvidence(contact_map, NOISE), disturbed(contact_map, 1.0)
+    value, gradient = evidence.value_and_gradient(rows)
+    assert value == pytest.approx(evidence.value(rows))
+    for index in np.ndindex(*rows.shape):
+        step = np.zeros_like(rows)
+        step[index] = 1e-6
+        slope = (evidence.value(rows + step) - evidence.value(rows - step)) / 2e-6
+        assert gradient[index] == pytest.approx(slope, rel=1e-4, abs=1e-2)
+
+
+@pytest.mark.parametrize("kernel", [Matern52(4e-4, 0.05), SquaredExponential(4e-4, 0.05), ThinPlate(0.3, 4e-4)])
+def test_the_pull_of_a_covariance_is_its_derivative(kernel: Kernel) -> None:
+    rng = np.random.default_rng(0)
+    points, weights = rng.normal(size=(5, 2)) * 0.03, rng.normal(size=(15, 15))
+    weights += weights.T
+    pull = covariance_pull(kernel, points, weights)
+    for index in np.ndindex(*points.shape):
+        step = np.zeros_like(points)
+        step[index] = 1e-7
+        change = covariance(kernel, points + step, 5) - covariance(kernel, points - step, 5)
+        assert pull[index] == pytest.approx(np.sum(weights * change) / 2e-7, rel=1e-3, abs=1e-6)
+
+
+def spread_m(contact_map: ContactMap, rows: Array) -> float:
+    """How far contacts placed by these poses stray from where the true poses place them, after the best rigid fit."""
+    points = [grasp.contacts_world.points_m for grasp in contact_map.placed]
+    spatial_points = [np.column_stack([planar_points, np.zeros(len(planar_points))]) for planar_points in points]
+    poses = [[row_pose_in_space(row, 0.0) for row in each] for each in (rows, contact_map.rows)]
+    error = registration_rms_mm(spatial_points, poses[0], poses[1], 2)
+    assert error is not None
+    return 1e-3 * error
+
+
+def test_true_poses_are_likelier_than_disturbed_ones() -> None:
+    contact_map = true_map("rectangle", 8)
+    evidence = PoseEvidence(contact_map, NOISE)
+    assert all(
+        evidence.value(contact_map.rows) < evidence.value(disturbed(contact_map, 1.0, seed)) for seed in range(5)
+    )
+
+
+def test_smoothing_finds_the_poses_again() -> None:
+    contact_map = true_map("ellipse", 10)
+    start = disturbed(contact_map, 1.0)
+    found, cost = PoseEvidence(contact_map, NOISE).maximised(start, 60)
+    assert spread_m(contact_map, found) < 0.6 * spread_m(contact_map, start)
+    assert cost == pytest.approx(PoseEvidence(contact_map, NOISE).value(found))
+
+
+def test_the_first_pose_is_given() -> None:
+    contact_map = true_map("rectangle", 3)
+    found, _ = PoseEvidence(contact_map, NOISE).maximised(disturbed(contact_map, 1.0), 10)
+    assert np.array_equal(found[0], contact_map.rows[0])
+
+
+def test_a_grasp_without_contacts_follows_the_motion_model() -> None:
+    contact_map = true_map("rectangle", 4)
+    last = contact_map.placed[-1]
+    empty = PlacedGrasp(
+        last.contacts_world.selected(np.zeros(len(last.contacts_world), dtype=bool)),
+        last.row + 0.01,
+        last.covariance,
+        last.motion,
+        used=True,
+    )
+    found, _ = PoseEvidence(contact_map_of(contact_map, empty), NOISE).maximised(
+        contact_map.rows + np.array([[0], [0], [0], [0.01]]), 60
+    )
+    assert np.allclose(found[-1], compose(last.motion, found[-2]), atol=5e-4)
+
+
+def contact_map_of(contact_map: ContactMap, last: PlacedGrasp) -> ContactMap:
+    return ContactMap((*contact_map.placed[:-1], last), contact_map.settings)
+
+
+def test_proposals_contain_the_true_pose() -> None:
+    contact_map = true_map("rectangle", 8)
+    known = ContactMap(contact_map.placed[:7], contact_map.settings)
+    last = contact_map.placed[7]
+    predicted = compose(last.motion, contact_map.rows[6])
+    for field in (known.fit(), FieldGrid.around(known.fit(), spacing_m=0.003)):
+        rows, cost = propose(predicted, last.contacts_world, field, NOISE, ProposalSettings())
+        gaps = deviation(rows, last.row)
+        assert np.any((np.hypot(gaps[:, 0], gaps[:, 1]) < 0.004) & (np.abs(gaps[:, 2]) < 0.1))
+        assert np.all(np.diff(cost) >= 0)
+
+
+def test_proposals_differ_from_each_other() -> None:
+    contact_map = true_map("ellipse", 5)
+    settings = ProposalSettings(kept=5)
+    last = contact_map.placed[-1]
+    rows, _ = propose(last.row, last.contacts_world, contact_map.fit(), NOISE, settings)
+    assert len(rows) <= 5
+    for index, row in enumerate(rows):
+        gaps = deviation(np.delete(rows, index, axis=0), row)
+        assert np.all(
+            (np.hypot(gaps[:, 0], gaps[:, 1]) >= settings.distinct_m) | (np.abs(gaps[:, 2]) >= settings.distinct_rad)
+        )
+
+
+def test_the_information_is_a_second_derivative_near_a_good_fit() -> None:
+    contact_map = true_map("rectangle", 8)
+    last = contact_map.placed[-1]
+    fit = fit_poses(last.row[None], last.row, last.contacts_world, contact_map.fit(), NOISE, ProposalSettings())
+    sigma = np.sqrt(np.diag(np.linalg.inv(fit.information[0])))
+    assert np.all(sigma[:2] < 0.004)
+    assert sigma[2] < 0.1
+
+
+def test_quasi_random_samples_are_normal_and_always_the_same() -> None:
+    drawn = quasi_normal(256)
+    assert np.allclose(drawn.mean(axis=0), 0.0, atol=0.05)
+    assert np.allclose(drawn.std(axis=0), 1.0, atol=0.05)
+    drawn[:] = 0.0
+    assert not np.any(np.all(quasi_normal(256) == 0.0, axis=1))
