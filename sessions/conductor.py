@@ -113,6 +113,7 @@ class Conductor:
         window = settings.plan.yaw_window_rad
         self._cycle = GraspCycle(Motion(bench, self._supervisor), settings.cycle, self._tip, window)
         self._guard = InterruptGuard()
+        self._interruption_told = False
         self._grasps: list[Grasp] = []
         self._known: tuple[Gpis, KnownShape] | None = None
         self._hand_motion = Pose3()
@@ -285,6 +286,9 @@ class Conductor:
 
     def _phase(self, name: str) -> None:
         self._progress.phase(len(self._grasps) + 1, name)
+        if self._guard.requested and not self._interruption_told:
+            self._interruption_told = True
+            self._progress.told("Ctrl+C: finishing this grasp, then closing the session; once more to end at once")
 
     def _tell(self, level: Level, message: str) -> None:
         self._bench.event(level, "conductor", message)

@@ -84,4 +84,7 @@ def find_session(root: Path, name: str) -> Session:
         if not readable:
             raise SessionError("no session yet", where=str(root), hint="Record one first: tactile-lab run")
         return Session.open(readable[-1].folder)
-    return Session.open(root / name if (root / name).is_dir() else Path(name))
+    folder = root / name if (root / name).is_dir() else Path(name)
+    if not folder.is_dir():
+        raise SessionError("no such session", where=name, hint=f"See: tactile-lab session list --root {root}")
+    return Session.open(folder)

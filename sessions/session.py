@@ -55,9 +55,13 @@ class Session:
 
     @property
     def results(self) -> Path:
-        """Folder of results; made when missing."""
+        """Folder of results; made when missing. Raises SessionError."""
         folder = self.folder / RESULTS
-        folder.mkdir(exist_ok=True)
+        try:
+            folder.mkdir(exist_ok=True)
+        except OSError as error:
+            hint = "Move what stands in its place"
+            raise SessionError(f"can not be made ({error.strerror})", where=str(folder), hint=hint) from error
         return folder
 
     @property

@@ -63,7 +63,8 @@ class Loss:
         """The loss in words; empty when nothing was lost."""
         parts = []
         if self.truncated:
-            parts.append(f"the file ends too early ({self.unreadable_bytes} bytes of an incomplete record)")
+            torn = f" ({self.unreadable_bytes} bytes of an incomplete record)" if self.unreadable_bytes else ""
+            parts.append(f"the file ends too early{torn}")
         if self.damaged_chunks:
             parts.append(f"{self.damaged_chunks} damaged chunks left out")
         if self.missing_messages:
@@ -132,7 +133,7 @@ class TrafficReader:
 
     def _read_preamble(self, frames: _Frames) -> None:
         if not frames.is_mcap:
-            raise SessionError("not an MCAP file", where=str(self.path), hint="Name a session's traffic.mcap")
+            raise SessionError("not an MCAP file", where=str(self.path), hint="Restore it from a copy of the session")
         try:
             for opcode, content in frames:
                 stream = ReadDataStream(BytesIO(content))
@@ -151,7 +152,7 @@ class TrafficReader:
             raise SessionError(
                 f"an MCAP file, but not one of a session (its profile is {profile!r}, not {PROFILE!r})",
                 where=str(self.path),
-                hint="Import foreign recordings first",
+                hint="Restore the session's own traffic.mcap",
             )
 
     def _check_format(self, metadata: dict[str, str]) -> None:

@@ -7,7 +7,8 @@ TactileLabError                exit 1
  |- SafetyError                exit 1   a limit of the hand or the workspace was passed: the rig has stopped
  |- SessionError               exit 1   a session folder or its traffic file
  |- ShapeError                 exit 1   a mesh, contour or model that cannot be used
- `- TrackingError              exit 1   the object can not be followed any further
+ |- TrackingError              exit 1   the object can not be followed any further
+ `- InterruptionError          exit 130 a person ended the work before it was done
 
 Each message says what happened, where (which device or file), and what to do next.
 Exit codes are those of the command line: 0 done, 1 failed, 2 usage, 3 done with data loss,
@@ -67,3 +68,9 @@ class ShapeError(TactileLabError):
 
 class TrackingError(TactileLabError):
     """The object can not be followed any further."""
+
+
+class InterruptionError(TactileLabError):
+    """A person ended the work before it was done; says what is kept."""
+
+    exit_code = 130

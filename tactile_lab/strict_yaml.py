@@ -6,16 +6,25 @@ false. Here equal keys are an error, ``1e-3`` is a number and only true/false ar
 
 from __future__ import annotations
 
+import difflib
 import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
+
 from tactile_lab.errors import ConfigurationError
 
 Model = TypeVar("Model", bound=BaseModel)
+
+_RETRY = "Correct the file and try again"
+_UNPARSED = ", unable to parse string as a number"
+_SHOWN, _LONGEST_VALUE = 5, 40
 
 
 class StrictModel(BaseModel):
@@ -66,10 +75,14 @@ def load(path: Path) -> Any:
         return yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
     except FileNotFoundError as error:
         raise ConfigurationError("file not found", where=str(path), hint="Check the path") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f"cannot be read ({error})", where=str(path)) from error
-    except yaml.YAMLError as error:
-        raise ConfigurationError(f"is not valid YAML: {' '.join(str(error).split())}", where=str(path)) from error
+    except UnicodeDecodeError as error:
+        raise ConfigurationError("is not a text file", where=str(path), hint="Name a YAML file in UTF-8") from error
+    except OSError as error:
+        raise ConfigurationError(
+            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
+        ) from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date or number out of its range
+        raise ConfigurationError(f"is not valid YAML: {_yaml_problem(error)}", where=str(path), hint=_RETRY) from error
 
 
 def load_model(path: Path, model: type[Model]) -> Model:
@@ -81,14 +94,57 @@ def load_model(path: Path, model: type[Model]) -> Model:
     return validate(load(path), model, where=str(path))
 
 
-def validate(content: Any, model: type[Model], *, where: str) -> Model:
-    """Validate plain data against a model, with errors that name the keys."""
+def validate(content: Any, model: type[Model], *, where: str, hint: str = _RETRY) -> Model:
+    """Validate plain data against a model, with errors that name the keys. Raises ConfigurationError."""
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise ConfigurationError(_explain(error), where=where, hint="Correct the file and try again") from error
+        raise ConfigurationError(_explain(error, model), where=where, hint=hint) from error
 
 
-def _explain(error: ValidationError) -> str:
-    problems = [f"{'.'.join(map(str, item['loc'])) or 'document'}: {item['msg']}" for item in error.errors()]
-    return "; ".join(problems)
+# --- errors in plain words -----------------------------------------------------------------------------------------
+
+
+def _yaml_problem(error: Exception) -> str:
+    """What a parser found, and where in the file."""
+    if not isinstance(error, yaml.MarkedYAMLError) or error.problem_mark is None:
+        return " ".join(str(error).split()) or type(error).__name__
+    mark = error.problem_mark
+    return f"line {mark.line + 1}, column {mark.column + 1}: {error.problem}"
+
+
+def _explain(error: ValidationError, model: type[BaseModel]) -> str:
+    """Up to five problems of a document, each with its key."""
+    problems = list(dict.fromkeys(_problem(item, model) for item in error.errors()))
+    more = [f"and {len(problems) - _SHOWN} more"] if len(problems) > _SHOWN else []
+    return "; ".join(problems[:_SHOWN] + more)
+
+
+def _problem(item: ErrorDetails, model: type[BaseModel]) -> str:
+    place = ".".join(map(str, item["loc"])) or "the document"
+    if item["type"] == "extra_forbidden":
+        return f"{place}: unknown key{_suggestion(item['loc'], model)}"
+    if item["type"] == "missing":
+        return f"{place}: is missing"
+    if item["type"] in {"model_type", "model_attributes_type", "dict_type"}:
+        return f"{place}: must be keys with values"
+    words = re.sub(r"^[A-Z]\w+ should", "must", item["msg"].removeprefix("Value error, "))
+    return f"{place}: {words.removesuffix(_UNPARSED)}{_given(item['input'])}"
+
+
+def _given(value: Any) -> str:
+    """The offending value where it is short enough to help."""
+    text = repr(value)
+    return f", not {text}" if isinstance(value, (str, int, float)) and len(text) <= _LONGEST_VALUE else ""
+
+
+def _suggestion(place: Sequence[str | int], model: type[BaseModel]) -> str:
+    """The known key that an unknown one resembles."""
+    known: type[BaseModel] = model
+    for key in place[:-1]:
+        field = known.model_fields.get(str(key))
+        if field is None or not (isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)):
+            return ""
+        known = field.annotation
+    alike = difflib.get_close_matches(str(place[-1]), known.model_fields, n=1)
+    return f" (did you mean {alike[0]}?)" if alike else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +21,11 @@ from sessions.interpreter import CAMERA_LINK
 from sessions.manifest import Status, write_whole
 from sessions.progress import NullProgress, Progress
 from sessions.replay import Replay
-from sessions.session import RunningSession, Session, create_session
+from sessions.session import RESULTS, RunningSession, Session, create_session
+from sessions.traffic_reader import Loss
 from tactile_lab import report
 from tactile_lab.clock import VirtualClock
-from tactile_lab.errors import SessionError, TactileLabError
+from tactile_lab.errors import ConfigurationError, InterruptionError, SessionError, TactileLabError
 from tactile_lab.evaluation.evaluation import Evaluation, evaluate
 from tactile_lab.evaluation.result_files import write_results
 from tactile_lab.evaluation.results import read_results
@@ -32,14 +33,16 @@ from tactile_lab.evaluation.session_truth import TRUTH_TRAJECTORY, Look, session
 from tactile_lab.evaluation.sweep import SweepRun
 from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
 from tactile_lab.geometry.contacts import Grasp
-from tactile_lab.rigs.build import build_bench, build_interpreter, simulated_world
-from tactile_lab.rigs.description import Rig, load_rig, rig_of_session
+from tactile_lab.rigs.build import build_bench, build_interpreter, check_calibration, simulated_world
+from tactile_lab.rigs.description import OTHER_VERSION, Rig, load_rig, rig_of_session
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.strict_yaml import validate
 
 EVALUATION = "evaluation.json"
 REPLAYABLE = ("trajectory.csv", "contacts.csv", "contour.csv", "mesh.ply", "mesh.glb", "slam.json")
 """Result files that a replay of the same session gives again, byte for byte."""
+RESULT_FILES = (*REPLAYABLE, "timing.json", TRUTH_TRAJECTORY, EVALUATION, report.REPORT)
+"""All files of a folder of results."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,8 @@ class FinishedSession:
         results: the folder of these results.
         outcome: how the autonomous part ended; None for a replay.
         evaluation: None when there was nothing to judge.
-        data_loss: what was not recorded or dropped, by kind; empty when nothing was lost.
+        data_loss: what was dropped or not recorded while the session ran, by kind.
+        unread: what of the recording could not be read, in words; "" when all of it was.
         problem: why there is no evaluation, "" when there is one.
     """
 
@@ -82,18 +86,14 @@ class FinishedSession:
     results: Path
     outcome: SessionOutcome | None = None
     evaluation: Evaluation | None = None
-    data_loss: Mapping[str, int] | None = None
+    data_loss: Mapping[str, int] = field(default_factory=dict)
+    unread: str = ""
     problem: str = ""
 
 
 def slam_settings(method: str, dimension: int) -> SlamSettings:
     """Settings of the estimation. Raises ConfigurationError for an unknown method or dimension."""
     return validate({"method": method, "dimension": dimension}, SlamSettings, where="options")
-
-
-def catalogue() -> tuple[str, ...]:
-    """Names of the simulated rig's objects."""
-    return tuple(CATALOGUE)
 
 
 # --- a session -----------------------------------------------------------------------------------------------------
@@ -106,11 +106,35 @@ def run_session(request: SessionRequest, progress: Progress) -> FinishedSession:
         ConfigurationError, ShapeError: the request can not be met; nothing was recorded.
         DeviceError: the rig is not ready; the session folder says so.
         SessionError: the session could not be recorded.
+        InterruptionError: a person ended it at once; the session folder is kept and readable.
     """
     rig = load_rig(request.rig)
+    check_calibration(rig)
     world = simulated_world(rig, request.seed, request.object_name)
     slam = TactileSlam(request.slam, request.seed)
-    with _new_session(rig, world, request) as session:
+    session = _new_session(rig, world, request)
+    try:
+        outcome = _record(session, rig, world, slam, request, progress)
+        progress.phase(len(outcome.grasps), "model and evaluation")
+        _estimate_rest(slam, outcome.grasps)
+        finished = _judge(session, rig, slam, outcome.grasps, session.results)
+    except KeyboardInterrupt:
+        hint = f"What was recorded is kept: tactile-lab session replay {session.folder}"
+        raise InterruptionError("interrupted before it was done", where=str(session.folder), hint=hint) from None
+    return replace(finished, outcome=outcome, data_loss=session.manifest.data_loss)
+
+
+def _record(
+    session: RunningSession,
+    rig: Rig,
+    world: SimulatedWorld,
+    slam: TactileSlam,
+    request: SessionRequest,
+    progress: Progress,
+) -> SessionOutcome:
+    """Connect, grasp until done, disconnect; the session is closed in any case."""
+    with session:
+        progress.phase(0, "connect")
         bench = build_bench(rig, world, session.recorder)
         bench.connect()
         settings, dimension = _conductor_settings(rig, request), request.slam.dimension
@@ -120,10 +144,7 @@ def run_session(request: SessionRequest, progress: Progress) -> FinishedSession:
         finally:
             bench.close()
         _close(session, outcome, bench.counts.overruns, bench.undecodable)
-    progress.phase(len(outcome.grasps), "model and evaluation")
-    _estimate_rest(slam, outcome.grasps)
-    finished = _judge(session, rig, slam, outcome.grasps, session.results)
-    return replace(finished, outcome=outcome, data_loss=session.manifest.data_loss)
+    return outcome
 
 
 def _new_session(rig: Rig, world: SimulatedWorld, request: SessionRequest) -> RunningSession:
@@ -161,46 +182,87 @@ def _close(session: RunningSession, outcome: SessionOutcome, overruns: int, unde
         status = "interrupted"
     elif outcome.error is not None:
         status = "failed"
+    as_asked = outcome.ending in {Ending.COMPLETE, Ending.INTERRUPTED}
     counts = {"grasps": len(outcome.grasps), "overruns": overruns}
     lost = {f"undecodable {link}": number for link, number in undecodable.items()}
-    session.close(status, counts=counts, data_loss=lost, problem=str(outcome.error or ""))
+    session.close(status, counts=counts, data_loss=lost, problem="" if as_asked else outcome.reason)
 
 
 # --- judging -------------------------------------------------------------------------------------------------------
 
 
-def evaluate_session(session: Session) -> Evaluation:
+def evaluate_session(session: Session) -> FinishedSession:
     """Judge a session's results again, against the markers in its recorded pictures and its true mesh.
 
     Raises:
         SessionError: there are no results, or the recording can not be read.
     """
-    return _write_evaluation(session, rig_of_session(session), session.results)
+    evaluation, loss = _write_evaluation(session, rig_of_session(session), session.results)
+    return FinishedSession(session.folder, session.results, evaluation=evaluation, unread=loss.describe())
 
 
-def replay_session(session: Session, settings: SlamSettings, seed: int, out: Path) -> FinishedSession:
+def replay_session(
+    session: Session, settings: SlamSettings, seed: int, out: Path, progress: Progress | None = None
+) -> FinishedSession:
     """Understand a recorded session again from its raw bytes, and judge it.
 
     Args:
         session: the recording.
         settings, seed: of the estimation; with the recorded ones the results are the session's own, byte for byte.
-        out: folder of the results.
+        out: folder of the results; those of an earlier replay in it are replaced.
+        progress: is told which grasp is being estimated.
 
     Raises:
+        ConfigurationError: ``out`` holds other files.
         SessionError: the recording can not be used at all. One that was cut off is used up to the cut.
     """
+    _check_replaceable(session, out)
     rig = rig_of_session(session)
     slam, replay = TactileSlam(settings, seed), Replay(session, build_interpreter(rig))
+    progress = progress or NullProgress()
+    progress.phase(0, "read")
     grasps = [outcome for outcome in replay.outcomes() if isinstance(outcome, Grasp)]
-    _estimate_rest(slam, grasps)
+    _estimate_rest(slam, grasps, progress)
+    progress.phase(len(grasps), "model and evaluation")
     finished = _judge(session, rig, slam, grasps, out)
-    return replace(finished, data_loss={**session.manifest.data_loss, **replay.loss.counts()})
+    unread = _unread(replay.loss, len(grasps), session.manifest.counts.get("grasps"))
+    return replace(finished, data_loss=session.manifest.data_loss, unread=unread)
+
+
+def _unread(loss: Loss, grasps: int, recorded: int | None) -> str:
+    """What a replay could not read, in words."""
+    if not loss:
+        return ""
+    known = "" if recorded is None else f" of {recorded}"
+    return f"{loss.describe()}; {grasps}{known} grasps could be read"
+
+
+def has_results(session: Session) -> bool:
+    """Whether the session's own results are complete; those of a killed session are not."""
+    return (session.folder / RESULTS / EVALUATION).is_file()
+
+
+def _check_replaceable(session: Session, out: Path) -> None:
+    """Never write over what a replay has not made."""
+    if has_results(session) and out.resolve() == session.results.resolve():
+        hint = "Choose another folder with --into"
+        raise ConfigurationError("holds the session's own results", where=str(out), hint=hint)
+    try:
+        strange = sorted(entry.name for entry in out.iterdir() if entry.name not in RESULT_FILES)
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        hint = "Choose another folder with --into"
+        raise ConfigurationError(f"can not be used ({error.strerror})", where=str(out), hint=hint) from error
+    if strange:
+        hint = "Choose a new folder with --into"
+        raise ConfigurationError(f"holds files that are no results, such as {strange[0]}", where=str(out), hint=hint)
 
 
 def recorded_slam(session: Session) -> SlamSettings:
     """The estimation's settings of a session. Raises ConfigurationError."""
     where = f"{session.folder}/session.yaml"
-    return validate(session.manifest.settings.get("slam", {}), SlamSettings, where=where)
+    return validate(session.manifest.settings.get("slam", {}), SlamSettings, where=where, hint=OTHER_VERSION)
 
 
 def recorded_seed(session: Session) -> int:
@@ -217,31 +279,44 @@ def differing_files(one: Path, other: Path) -> list[str]:
     return [name for name in REPLAYABLE if content(one, name) != content(other, name)]
 
 
-def _estimate_rest(slam: TactileSlam, grasps: Sequence[Grasp]) -> None:
+def _estimate_rest(slam: TactileSlam, grasps: Sequence[Grasp], progress: Progress | None = None) -> None:
     """Take the grasps that the estimation has not seen: all of a replay, the last one of a session cut short."""
-    for grasp in grasps[slam.step_count :]:
+    progress = progress or NullProgress()
+    for number, grasp in enumerate(grasps[slam.step_count :], slam.step_count + 1):
+        progress.phase(number, "estimate")
         slam.step(grasp)
 
 
 def _judge(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp], out: Path) -> FinishedSession:
+    _remove_results(out)
     if not grasps:
         return FinishedSession(session.folder, out, problem="no grasp was recorded")
     try:
         write_results(out, slam.finish(), grasps, slam.settings.model_dump(mode="json"))
-        evaluation = _write_evaluation(session, rig, out)
+        evaluation, _ = _write_evaluation(session, rig, out)
         report.write(session.folder, out)
     except TactileLabError as error:
         return FinishedSession(session.folder, out, problem=str(error))
     return FinishedSession(session.folder, out, evaluation=evaluation)
 
 
-def _write_evaluation(session: Session, rig: Rig, out: Path) -> Evaluation:
-    stamps_s = read_results(out).trajectory.stamps_s
-    truth = session_truth(session, len(stamps_s), _marker_detector(session, rig))
+def _remove_results(out: Path) -> None:
+    """Files of an earlier replay: what this one does not write should not look like its own."""
+    try:
+        for name in RESULT_FILES:
+            (out / name).unlink(missing_ok=True)
+    except OSError as error:
+        hint = "Choose another folder with --into"
+        raise SessionError(f"can not be replaced ({error.strerror})", where=str(out / name), hint=hint) from error
+
+
+def _write_evaluation(session: Session, rig: Rig, out: Path) -> tuple[Evaluation, Loss]:
+    stamps_s, traffic = read_results(out).trajectory.stamps_s, session.traffic()
+    truth = session_truth(session, len(stamps_s), _marker_detector(session, rig), traffic)
     write_whole(out / TRUTH_TRAJECTORY, trajectory_text(Trajectory(stamps_s, truth.world_T_object)).encode())
     evaluation = evaluate(out, truth, session.manifest.object_name)
     write_whole(out / EVALUATION, evaluation.as_text().encode())
-    return evaluation
+    return evaluation, traffic.loss
 
 
 def _marker_detector(session: Session, rig: Rig) -> Look | None:
@@ -249,7 +324,8 @@ def _marker_detector(session: Session, rig: Rig) -> Look | None:
         return None
     camera = Camera(ReplayLink(CAMERA_LINK, ()), VirtualClock())
     where = f"{session.folder}/session.yaml"
-    markers = validate(session.manifest.settings.get("markers", {}), MarkerSettings, where=where)
+    recorded = session.manifest.settings.get("markers", {})
+    markers = validate(recorded, MarkerSettings, where=where, hint=OTHER_VERSION)
     tracker = ObjectTracker(load_camera(rig.files["camera"]), markers)
 
     def look(datagram: Datagram) -> Pose3 | None:
@@ -260,6 +336,26 @@ def _marker_detector(session: Session, rig: Rig) -> Look | None:
 
 
 # --- sweeps --------------------------------------------------------------------------------------------------------
+
+
+def check_sweep(rig: str, objects: Sequence[str] | None, root: Path) -> tuple[str, ...]:
+    """The objects of a sweep, the whole catalogue when None; what would fail in every run fails here.
+
+    Raises:
+        ConfigurationError: no such rig, object or calibration.
+        ShapeError: an object's mesh can not be used.
+        SessionError: the folder of the sessions can not be made.
+    """
+    loaded = load_rig(rig)
+    check_calibration(loaded)
+    for name in objects or ():
+        simulated_world(loaded, 0, name)
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        hint = "Choose another folder with --out"
+        raise SessionError(f"can not be made ({error.strerror})", where=str(root), hint=hint) from error
+    return tuple(objects or CATALOGUE)
 
 
 def run_for_sweep(run: SweepRun, *, rig: str, method: str, grasps: int, root: Path) -> dict[str, Any]:

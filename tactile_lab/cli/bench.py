@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
+from tactile_lab.cli.options import Json, NoInput
 
 
-def bench(
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
-) -> None:
+def bench(as_json: Json = False, no_input: NoInput = False) -> None:
     """Measure the hot paths in one run, beside the thesis's figures and a plain implementation."""
-    from tactile_lab.cli.console import emit_json, people, table
+    from tactile_lab.cli.console import emit_json, show_table
     from tactile_lab.evaluation.benchmark import run_benchmarks
 
+    del no_input
     tables = run_benchmarks()
     if as_json:
         emit_json([result.as_json() for result in tables])
         return
     for result in tables:
-        columns = ["what", "ms", "ratio", "peak MB", "how"]
-        people.print(table(result.title, columns, result.rows(), right=(1, 2, 3)))
+        show_table(result.title, ["what", "ms", "ratio", "peak MB", "how"], result.rows(), right=(1, 2, 3))

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -16,7 +17,7 @@ people = Console(stderr=True, highlight=False)
 
 
 def say(text: str, style: str = "") -> None:
-    """One line for people, shown as it is (no markup)."""
+    """One line for people, shown as it is (no markup, never broken)."""
     people.print(Text(text, style=style), soft_wrap=True)
 
 
@@ -32,15 +33,32 @@ def warn(text: str) -> None:
 
 def emit_json(document: Any) -> None:
     """The one machine-readable document of a command. NaN is not JSON and is refused."""
-    json.dump(document, sys.stdout, indent=2, allow_nan=False)
-    sys.stdout.write("\n")
+    text = json.dumps(document, indent=2, allow_nan=False)
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
 
 
-def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[int] = ()) -> Table:
-    """A plain table; ``right`` lists the columns that hold numbers."""
-    grid = Table(title=Text(title), title_justify="left", title_style="bold", header_style="bold")
+def show_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[int] = ()) -> None:
+    """A table with a rule below its head; ``right`` lists the columns that hold numbers.
+
+    Cells are shown as they are. The last column takes what room is left and wraps.
+    """
+    grid = Table(box=box.SIMPLE_HEAD, title=Text(title), title_justify="left", title_style="bold", pad_edge=False)
     for index, column in enumerate(columns):
-        grid.add_column(column, justify="right" if index in right else "left")
+        last = index == len(columns) - 1
+        grid.add_column(column, justify="right" if index in right else "left", no_wrap=not last)
     for row in rows:
         grid.add_row(*map(Text, row))
-    return grid
+    people.print(grid)
+
+
+def show_facts(title: str, facts: Iterable[tuple[str, str]]) -> None:
+    """Names with values; facts without a value are left out."""
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(style="dim", no_wrap=True)
+    grid.add_column()
+    for name, value in facts:
+        if value:
+            grid.add_row(Text(name), Text(value))
+    say(title, "bold")
+    people.print(grid)

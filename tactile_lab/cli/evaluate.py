@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
+from tactile_lab.cli.options import Json, NoInput, Root, SessionName
 
 
-def evaluate(
-    session: Annotated[str, typer.Argument(help="A session's folder, its name under --root, or 'last'.")],
-    root: Annotated[Path, typer.Option(help="Folder of sessions.")] = Path("runs"),
-    as_json: Annotated[bool, typer.Option("--json", help="The evaluation as JSON on standard output.")] = False,
-) -> None:
+def evaluate(session: SessionName, root: Root = Path("runs"), as_json: Json = False, no_input: NoInput = False) -> None:
     """Judge a session's results against the markers in its recorded pictures and the object's true mesh."""
     from sessions.listing import find_session
-    from tactile_lab.cli.results import show_evaluation
+    from tactile_lab.cli.results import conclude
     from tactile_lab.workflow import evaluate_session
 
-    show_evaluation(evaluate_session(find_session(root, session)), as_json)
+    del no_input
+    conclude(evaluate_session(find_session(root, session)), as_json)

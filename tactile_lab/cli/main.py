@@ -6,36 +6,34 @@ ready, 130 interrupted.
 
 from __future__ import annotations
 
+import signal
 import sys
+from types import FrameType
 
-import typer
-
-from tactile_lab.cli import bench, evaluate, report, rig, run, session, sweep
-from tactile_lab.cli.console import complain
 from tactile_lab.errors import TactileLabError
 
-app = typer.Typer(
-    help="Tactile SLAM in the laboratory: the shape and pose of an unknown object from a few fingertip contacts.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
-app.command("run")(run.run)
-app.command("evaluate")(evaluate.evaluate)
-app.command("report")(report.report)
-app.command("sweep")(sweep.sweep)
-app.command("bench")(bench.bench)
-app.add_typer(session.app, name="session")
-app.add_typer(rig.app, name="rig")
+INTERRUPTED = 130
 
 
 def main() -> None:
     """Run the command line; every error a person can cause ends here as one line."""
+    signal.signal(signal.SIGTERM, _end_like_ctrl_c)
     try:
+        from tactile_lab.cli.app import app  # here, so that Ctrl+C while it loads ends without a traceback
+
         app(prog_name="tactile-lab")
     except TactileLabError as error:
+        from tactile_lab.cli.console import complain
+
         complain(str(error))
         sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+
+
+def _end_like_ctrl_c(number: int, frame: FrameType | None) -> None:
+    """Whoever asks the program to end gets the same careful ending as a person at the keyboard."""
+    signal.raise_signal(signal.SIGINT)
 
 
 if __name__ == "__main__":

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
+from tactile_lab.cli.options import Json, NoInput, Root, SessionName
 
 
-def report(
-    session: Annotated[str, typer.Argument(help="A session's folder, its name under --root, or 'last'.")],
-    root: Annotated[Path, typer.Option(help="Folder of sessions.")] = Path("runs"),
-    as_json: Annotated[bool, typer.Option("--json", help="The report's path as JSON on standard output.")] = False,
-) -> None:
+def report(session: SessionName, root: Root = Path("runs"), as_json: Json = False, no_input: NoInput = False) -> None:
     """Write the one-file HTML report of a session from its results."""
     from sessions.listing import find_session
     from tactile_lab import report as html_report
     from tactile_lab.cli.console import emit_json, say
 
+    del no_input
     path = html_report.write(find_session(root, session).folder)
     if as_json:
         emit_json({"report": str(path)})
     else:
-        say(str(path))
+        say(f"report  {path}")

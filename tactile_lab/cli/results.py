@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Mapping
+from typing import Any
 
 import typer
 
-from tactile_lab.cli.console import complain, emit_json, people, say, table, warn
-from tactile_lab.evaluation.evaluation import Evaluation
-from tactile_lab.evaluation.table import evaluation_rows
+from sessions.conductor import Ending, SessionOutcome
+from tactile_lab.cli.console import complain, emit_json, say, warn
+from tactile_lab.cli.evaluation_table import show_evaluation
 from tactile_lab.workflow import FinishedSession
 
 FILES = (
     ("mesh.ply", "mesh"),
-    ("mesh.glb", "mesh for viewers"),
+    ("mesh.glb", "for viewers"),
     ("contour.csv", "contour"),
     ("trajectory.csv", "trajectory"),
     ("evaluation.json", "evaluation"),
@@ -21,55 +22,64 @@ FILES = (
 )
 
 
-def conclude(finished: FinishedSession, as_json: bool) -> None:
-    """Show the outcome, the evaluation and the files; raise the exit code that fits (see :mod:`cli.main`)."""
-    _tell_ending(finished)
-    if finished.evaluation is not None:
-        show_evaluation(finished.evaluation, as_json)
+def conclude(finished: FinishedSession, as_json: bool, extra: Mapping[str, Any] | None = None) -> None:
+    """Show the outcome, the evaluation and the files; raise the exit code that fits (see :mod:`cli.main`).
+
+    With ``as_json`` there is always one document: the evaluation (with ``extra`` behind it), or
+    ``{"error": ..., "session": ...}`` when there is none.
+    """
+    _tell_outcome(finished.outcome)
+    if as_json:
+        emit_json({**_document(finished), **(extra or {})})
+    elif finished.evaluation is not None:
+        show_evaluation(finished.evaluation.as_json())
     _tell_files(finished)
-    if finished.data_loss:
-        losses = ", ".join(f"{number} {kind}" for kind, number in finished.data_loss.items())
-        warn(f"data were lost: {losses}")
+    _tell_losses(finished)
+    if finished.problem:
+        complain(f"no evaluation: {finished.problem}")
     if code := _exit_code(finished):
         raise typer.Exit(code)
 
 
-def show_evaluation(evaluation: Evaluation, as_json: bool) -> None:
-    """The evaluation as a table for people, or as the JSON document."""
-    content = evaluation.as_json()
-    if as_json:
-        emit_json(content)
-        return
-    rows = [(row.label, row.value, row.unit, row.note) for row in evaluation_rows(content)]
-    people.print(table(f"Evaluation: {evaluation.object}", ["figure", "value", "unit", "meaning"], rows, right=(1,)))
+def _document(finished: FinishedSession) -> dict[str, Any]:
+    if finished.evaluation is not None:
+        return finished.evaluation.as_json()
+    return {"error": finished.problem, "session": str(finished.folder)}
 
 
-def _tell_ending(finished: FinishedSession) -> None:
-    outcome = finished.outcome
+def _tell_outcome(outcome: SessionOutcome | None) -> None:
     if outcome is None:
         return
     if outcome.error is not None:
         complain(outcome.reason)
+    elif outcome.ending is Ending.COMPLETE:
+        say(f"session complete: {outcome.reason}", "bold")
     else:
-        say(f"session {outcome.ending}: {outcome.reason}", "bold")
+        warn(f"session ended early, {outcome.ending}: {outcome.reason}")
 
 
 def _tell_files(finished: FinishedSession) -> None:
-    if finished.problem:
-        warn(f"no evaluation: {finished.problem}")
-    say(f"session     {finished.folder}")
+    say(f"{'session':<13}{finished.folder}")
     for name, what in FILES:
-        path: Path = finished.results / name
+        path = finished.results / name
         if path.is_file():
-            say(f"{what:<18}{path}")
+            say(f"{what:<13}{path}")
+
+
+def _tell_losses(finished: FinishedSession) -> None:
+    if finished.data_loss:
+        losses = ", ".join(f"{number} {kind.replace('_', ' ')}" for kind, number in finished.data_loss.items())
+        warn(f"data were lost while recording: {losses}")
+    if finished.unread:
+        warn(f"the recording is damaged: {finished.unread}")
 
 
 def _exit_code(finished: FinishedSession) -> int:
     outcome = finished.outcome
     if outcome is not None and outcome.error is not None:
         return outcome.error.exit_code
-    if outcome is not None and outcome.ending == "interrupted":
+    if outcome is not None and outcome.ending is Ending.INTERRUPTED:
         return 130
-    if finished.problem:
+    if finished.problem or (outcome is not None and outcome.ending is Ending.OBJECT_LOST):
         return 1
-    return 3 if finished.data_loss else 0
+    return 3 if finished.data_loss or finished.unread else 0

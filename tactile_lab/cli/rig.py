@@ -6,44 +6,48 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.console import emit_json, people, say, table
+from tactile_lab.cli.options import Json, NoInput
 
-app = typer.Typer(help="Rigs: the devices of a laboratory.", no_args_is_help=True)
+app = typer.Typer(help="Rigs: the devices of a laboratory, and their calibration.", no_args_is_help=True)
 
 
 @app.command("list")
-def list_rigs(
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
-) -> None:
+def list_rigs(as_json: Json = False, no_input: NoInput = False) -> None:
     """List the rigs that come with the program."""
+    from tactile_lab.cli.console import emit_json, show_table
     from tactile_lab.rigs.description import load_rig, shipped_rigs
 
+    del no_input
     rigs = [load_rig(name).description for name in shipped_rigs()]
     if as_json:
         emit_json([rig.model_dump(mode="json", include={"name", "summary", "kind", "fingertips"}) for rig in rigs])
         return
-    people.print(table("Rigs", ["name", "fingertips", "summary"], [[r.name, r.fingertips, r.summary] for r in rigs]))
+    show_table("Rigs", ["name", "fingertips", "summary"], [[rig.name, rig.fingertips, rig.summary] for rig in rigs])
 
 
 @app.command("check")
 def check(
-    rig: Annotated[str, typer.Argument(help="Name of a shipped rig, or a rig file.")],
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="Name of a shipped rig, or a rig file.")],
+    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
+    as_json: Json = False,
+    no_input: NoInput = False,
 ) -> None:
     """Read a rig file and its calibration, connect every device, and tell what each one says.
 
     Nothing moves. Exit code 0: all well; 2: the files; 4: a device is not ready.
     """
+    from tactile_lab.cli.console import emit_json, say, show_table
     from tactile_lab.rigs.check import check_rig
 
-    findings = check_rig(rig)
+    del no_input
+    findings = check_rig(rig, seed)
     ready = all(finding.ok for finding in findings)
     if as_json:
         devices = [{"device": f.device, "ok": f.ok, "detail": f.detail} for f in findings]
         emit_json({"rig": rig, "ready": ready, "devices": devices})
     else:
         rows = [[finding.device, "ok" if finding.ok else "NOT READY", finding.detail] for finding in findings]
-        people.print(table(f"Rig {rig}", ["device", "state", "detail"], rows))
+        show_table(f"Rig {rig}", ["device", "state", "detail"], rows)
         say("ready" if ready else "not ready", "bold green" if ready else "bold red")
     if not ready:
         raise typer.Exit(4)

@@ -7,20 +7,24 @@ from typing import Annotated
 
 import typer
 
+from tactile_lab.cli.options import METHOD_HELP, Json, Method, NoInput, RigName
+
 
 def run(
-    rig: Annotated[str, typer.Option(help="Name of a shipped rig, or a rig file.")] = "sim",
+    rig: RigName = "sim",
     object_name: Annotated[
-        str, typer.Option("--object", help="Object of the simulated rig's catalogue, or mesh:FILE.")
+        str, typer.Option("--object", help="Object of the simulated rig's catalogue, or mesh:FILE (metres).")
     ] = "box-10x6x4",
-    grasps: Annotated[int | None, typer.Option(min=1, help="Number of grasps [default: the rig's].")] = None,
+    grasps: Annotated[
+        int | None, typer.Option(min=1, help="Number of grasps.", show_default="the rig's, 16 on sim")
+    ] = None,
     dimension: Annotated[int, typer.Option(min=2, max=3, help="2: horizontal contour; 3: surface.")] = 2,
-    method: Annotated[str, typer.Option(help="particle (calibrated) or thesis (as printed there).")] = "particle",
+    method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.PARTICLE,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder in which the session's folder is made.")] = Path("runs"),
     notes: Annotated[str, typer.Option(help="The operator's notes, kept with the session.")] = "",
-    as_json: Annotated[bool, typer.Option("--json", help="The evaluation as JSON on standard output.")] = False,
-    no_input: Annotated[bool, typer.Option("--no-input", help="Never ask.")] = False,
+    as_json: Json = False,
+    no_input: NoInput = False,
 ) -> None:
     """Run an autonomous session: grasp, estimate, choose the next grasp, and judge the result.
 
@@ -30,9 +34,9 @@ def run(
     from tactile_lab.cli.results import conclude
     from tactile_lab.workflow import SessionRequest, run_session, slam_settings
 
-    del no_input  # an autonomous session asks nothing; the option is there for every command
+    del no_input  # an autonomous session asks nothing; the option is there so that scripts can always give it
     settings = slam_settings(method, dimension)
     request = SessionRequest(rig, object_name, out, settings, seed, grasps, notes)
-    with LiveProgress(f"{object_name} on rig {rig}, {dimension}-D, seed {seed}") as progress:
+    with LiveProgress(f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}") as progress:
         finished = run_session(request, progress)
     conclude(finished, as_json)

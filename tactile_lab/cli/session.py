@@ -4,83 +4,99 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.console import emit_json, people, say, table, warn
+from tactile_lab.cli.options import METHOD_HELP, Json, Method, NoInput, Root, SessionName
 
-app = typer.Typer(help="Recorded sessions.", no_args_is_help=True)
+if TYPE_CHECKING:
+    from sessions.session import Session
 
-Root = Annotated[Path, typer.Option(help="Folder of sessions.")]
-Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
-Name = Annotated[str, typer.Argument(help="A session's folder, its name under --root, or 'last'.")]
+app = typer.Typer(help="Recorded sessions: list them, look at one, understand one again.", no_args_is_help=True)
 
 
 @app.command("list")
-def list_all(root: Root = Path("runs"), as_json: Json = False) -> None:
+def list_all(root: Root = Path("runs"), as_json: Json = False, no_input: NoInput = False) -> None:
     """List the sessions in a folder, oldest first."""
     from sessions.listing import list_sessions
+    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.cli.session_tables import show_sessions
 
+    del no_input
     summaries = list_sessions(root)
     if as_json:
         emit_json([asdict(summary) | {"folder": str(summary.folder)} for summary in summaries])
-        return
-    rows = [
-        (s.name, s.status, s.object_name, "" if s.grasps is None else str(s.grasps), f"{s.traffic_bytes / 1e6:.1f}")
-        for s in summaries
-    ]
-    people.print(table(f"Sessions in {root}", ["name", "status", "object", "grasps", "MB"], rows, right=(3, 4)))
+    elif summaries:
+        show_sessions(root, summaries)
+    else:
+        say(f"no sessions in {root}; record one with: tactile-lab run --out {root}")
 
 
 @app.command("show")
-def show(session: Name, root: Root = Path("runs"), as_json: Json = False) -> None:
+def show(session: SessionName, root: Root = Path("runs"), as_json: Json = False, no_input: NoInput = False) -> None:
     """Show what a session was done with, how it ended and what it recorded."""
     from sessions.listing import find_session
+    from tactile_lab.cli.console import emit_json
+    from tactile_lab.cli.session_tables import show_session
 
-    manifest = find_session(root, session).manifest
+    del no_input
+    found = find_session(root, session)
     if as_json:
-        emit_json(manifest.model_dump(mode="json"))
-        return
-    facts = [
-        ("status", manifest.status + (f": {manifest.problem}" if manifest.problem else "")),
-        ("rig", manifest.rig),
-        ("object", manifest.object_name),
-        ("started, ended", f"{manifest.started_utc}, {manifest.ended_utc or '-'}"),
-        ("seeds", ", ".join(f"{name} {seed}" for name, seed in manifest.seeds.items())),
-        ("notes", manifest.notes),
-        ("versions", ", ".join(f"{name} {number}" for name, number in manifest.versions.items())),
-        *((f"calibration {role}", f"{copy.file}  {copy.sha256[:12]}") for role, copy in manifest.calibration.items()),
-        *((name, str(number)) for name, number in manifest.counts.items()),
-        *((f"lost: {kind}", str(number)) for kind, number in manifest.data_loss.items()),
-    ]
-    people.print(table(manifest.name, ["", ""], facts))
+        emit_json(found.manifest.model_dump(mode="json"))
+    else:
+        show_session(found)
 
 
 @app.command("replay")
 def replay(
-    session: Name,
+    session: SessionName,
     root: Root = Path("runs"),
-    into: Annotated[Path | None, typer.Option(help="Folder of the new results [default: SESSION/replay].")] = None,
-    method: Annotated[str | None, typer.Option(help="Another method than the session's own.")] = None,
-    dimension: Annotated[int | None, typer.Option(min=2, max=3, help="Another dimension.")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Another seed.")] = None,
+    into: Annotated[Path | None, typer.Option(help="Folder of the new results.", show_default="SESSION/replay")] = None,
+    method: Annotated[Method | None, typer.Option(help=METHOD_HELP, show_default="the session's")] = None,
+    dimension: Annotated[int | None, typer.Option(min=2, max=3, help="2 or 3.", show_default="the session's")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the estimation.", show_default="the session's")
+    ] = None,
     as_json: Json = False,
+    no_input: NoInput = False,
 ) -> None:
-    """Understand a session again from its raw bytes; by default the result is identical, byte for byte."""
-    from sessions.listing import find_session
-    from tactile_lab.cli.results import conclude
-    from tactile_lab.workflow import differing_files, recorded_seed, recorded_slam, replay_session, slam_settings
+    """Understand a session again from its raw bytes; by default the result is identical, byte for byte.
 
+    A session that was killed before it had results gets them by its first replay, in its own folder of results.
+    """
+    from sessions.listing import find_session
+    from tactile_lab.cli.progress import LiveProgress
+    from tactile_lab.cli.results import conclude
+    from tactile_lab.workflow import has_results, recorded_seed, recorded_slam, replay_session, slam_settings
+
+    del no_input
     recorded = find_session(root, session)
     own = recorded_slam(recorded)
     same = method is None and dimension is None and seed is None
     settings = own if same else slam_settings(method or own.method, dimension or own.dimension)
-    out = into or recorded.folder / "replay"
-    finished = replay_session(recorded, settings, recorded_seed(recorded) if seed is None else seed, out)
-    if same:
-        if differing := differing_files(recorded.results, out):
-            warn(f"differs from the recorded results: {', '.join(differing)}")
-        else:
-            say("identical to the recorded results, byte for byte", "green")
-    conclude(finished, as_json)
+    comparable = same and has_results(recorded)
+    out = into or (recorded.folder / "replay" if comparable or not same else recorded.results)
+    with LiveProgress(f"replay of {recorded.folder}") as progress:
+        finished = replay_session(recorded, settings, recorded_seed(recorded) if seed is None else seed, out, progress)
+    identical = _tell_identity(recorded, out) if comparable and not finished.unread else None
+    conclude(finished, as_json, {"identical": identical})
+
+
+def _tell_identity(recorded: Session, out: Path) -> bool:
+    """Whether a replay gave the session's own results; tells people."""
+    from sessions.manifest import installed_versions
+    from tactile_lab.cli.console import say, warn
+    from tactile_lab.workflow import differing_files
+
+    differing = differing_files(recorded.results, out)
+    if not differing:
+        say("identical to the recorded results, byte for byte", "green")
+        return True
+    then, now = recorded.manifest.versions, installed_versions()
+    changed = [
+        f"{name} {then.get(name)} then, {number} now" for name, number in now.items() if then.get(name) != number
+    ]
+    reason = f" ({'; '.join(changed)})" if changed else ""
+    warn(f"differs from the recorded results: {', '.join(differing)}{reason}")
+    return False

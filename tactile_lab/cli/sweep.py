@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from tactile_lab.cli.options import METHOD_HELP, Json, Method, NoInput, RigName
 
 
 def sweep(
     objects: Annotated[str, typer.Option(help="Comma-separated object names, or 'all'.")] = "all",
     seeds: Annotated[str, typer.Option(help="Comma-separated seeds.")] = "1,2,3",
     dimensions: Annotated[str, typer.Option(help="2, 3 or 2,3.")] = "2,3",
-    method: Annotated[str, typer.Option(help="particle or thesis.")] = "particle",
+    method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.PARTICLE,
     grasps: Annotated[int, typer.Option(min=1, help="Grasps a session.")] = 16,
-    rig: Annotated[str, typer.Option(help="Name of a simulated rig, or a rig file.")] = "sim",
+    rig: RigName = "sim",
     jobs: Annotated[int, typer.Option(min=1, help="Sessions side by side.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the sessions and of table.md.")] = Path("runs/sweep"),
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")] = False,
+    as_json: Json = False,
+    no_input: NoInput = False,
 ) -> None:
     """Run a session for every object, seed and dimension, and tabulate errors with spread and failures."""
     from concurrent.futures import ProcessPoolExecutor
     from functools import partial
 
     from sessions.manifest import write_whole
-    from tactile_lab.cli.console import emit_json, people, say, table
+    from tactile_lab.cli.console import emit_json, say, show_table
     from tactile_lab.evaluation.sweep import (
         markdown_table,
         planned_runs,
@@ -33,27 +37,39 @@ def sweep(
         summary_titles,
         sweep,
     )
-    from tactile_lab.workflow import catalogue, run_for_sweep, slam_settings
+    from tactile_lab.workflow import check_sweep, run_for_sweep
 
-    names = catalogue() if objects == "all" else tuple(objects.split(","))
-    runs = planned_runs(names, _numbers(dimensions, "--dimensions"), _numbers(seeds, "--seeds"))
-    slam_settings(method, 2)  # a wrong method ends here, not in every run
-    job = partial(run_for_sweep, rig=rig, method=method, grasps=grasps, root=out)
-    with ProcessPoolExecutor(jobs) as pool:
+    del no_input
+    names = None if objects == "all" else tuple(name.strip() for name in objects.split(","))
+    chosen = _numbers(dimensions, "--dimensions", smallest=2, largest=3)
+    runs = planned_runs(check_sweep(rig, names, out), chosen, _numbers(seeds, "--seeds"))
+    job = partial(run_for_sweep, rig=rig, method=str(method), grasps=grasps, root=out)
+    with ProcessPoolExecutor(jobs, initializer=_leave_ctrl_c_to_the_parent) as pool:
         rows = sweep(runs, job, lambda row: say(row.line()), pool.map)
     found = summaries(rows)
     if as_json:
         emit_json([row.as_json() for row in rows])
     else:
-        people.print(table("median / p90 / maximum", summary_titles(), map(summary_cells, found)))
+        show_table("Median / 90 % below / maximum", summary_titles(), map(summary_cells, found))
     write_whole(out / "table.md", markdown_table(found).encode())
     say(f"table  {out / 'table.md'}")
+    if all(row.evaluation is None for row in rows):
+        raise typer.Exit(1)
 
 
-def _numbers(text: str, option: str) -> tuple[int, ...]:
+def _leave_ctrl_c_to_the_parent() -> None:
+    """Ctrl+C reaches every process of a terminal: outside a session's own guard only the parent answers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _numbers(text: str, option: str, smallest: int = 0, largest: int | None = None) -> tuple[int, ...]:
+    """Whole numbers from a comma-separated list. Raises BadParameter."""
+    wanted = f"of {smallest} to {largest}" if largest is not None else f"not below {smallest}"
     try:
-        return tuple(int(part) for part in text.split(","))
-    except ValueError as error:
-        raise typer.BadParameter(
-            f"{text!r} is not a comma-separated list of whole numbers", param_hint=option
-        ) from error
+        numbers = tuple(int(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if not numbers or any(number < smallest or (largest is not None and number > largest) for number in numbers):
+        problem = f"{text!r} is not a comma-separated list of whole numbers {wanted}"
+        raise typer.BadParameter(problem, param_hint=f"'{option}'")
+    return numbers

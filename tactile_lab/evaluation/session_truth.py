@@ -16,7 +16,7 @@ from sessions.interpreter import CAMERA_LINK
 from sessions.marks import Mark, MarkKind
 from sessions.schemas import MARKS_TOPIC, received_topic
 from sessions.session import Session
-from sessions.traffic_reader import TrafficMessage
+from sessions.traffic_reader import TrafficMessage, TrafficReader
 from tactile_lab.evaluation.evaluation import Truth
 from tactile_lab.shape.mesh_io import read_mesh
 
@@ -27,19 +27,20 @@ Look = Callable[[Datagram], Pose3 | None]
 """Finds the object in one recorded camera datagram: ``world_T_object``, or None where it is not seen."""
 
 
-def session_truth(session: Session, grasp_count: int, look: Look | None) -> Truth:
+def session_truth(session: Session, grasp_count: int, look: Look | None, traffic: TrafficReader | None = None) -> Truth:
     """The true pose of each grasp and the true mesh.
 
     Args:
         session: the recorded session.
         grasp_count: number of grasps.
         look: the marker detector; None for a rig without a camera.
+        traffic: reader of the session's traffic, for a caller who asks it afterwards what was lost.
 
     Raises:
         SessionError: the traffic file or a mark in it cannot be read.
         ShapeError: the mesh cannot be used.
     """
-    pictures = {} if look is None else marked_pictures(session.traffic().messages())
+    pictures = {} if look is None else marked_pictures((traffic or session.traffic()).messages())
     poses = [look(pictures[index]) if look and index in pictures else None for index in range(grasp_count)]
     return Truth(tuple(poses), read_truth_mesh(session))
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from calibration.forearm import load_forearm
 from drivers.ati.nano17 import Nano17
 from drivers.biotac.biotac import BioTac, load_biotacs
+from drivers.camera.calibration import load_camera
 from drivers.camera.camera import Camera
+from drivers.camera.markers import MarkerSettings
 from drivers.fingertip import FingertipCalibration, load_fingertips
 from drivers.links import Link, ReplayLink, TappedLink
 from drivers.positioner import Positioner, mount_T_forearm
@@ -21,6 +23,20 @@ from sessions.recorder import Recorder
 from tactile_lab.clock import NANOSECONDS, Clock, VirtualClock
 from tactile_lab.geometry.contacts import FINGERS
 from tactile_lab.rigs.description import Rig
+from tactile_lab.strict_yaml import load_model
+
+
+def check_calibration(rig: Rig) -> None:
+    """Read every calibration file of a rig, so that a broken one shows before anything moves or is recorded.
+
+    Raises:
+        ConfigurationError: a file that does not fit; names it.
+    """
+    build_interpreter(rig)
+    MotorMap.load(rig.files["motors"])
+    if "camera" in rig.files:
+        load_camera(rig.files["camera"])
+        load_model(rig.files["markers"], MarkerSettings)
 
 
 def simulated_world(rig: Rig, seed: int, object_name: str) -> SimulatedWorld:

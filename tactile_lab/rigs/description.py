@@ -20,6 +20,9 @@ from sessions.session import Session
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.strict_yaml import StrictModel, load_model, validate
 
+OTHER_VERSION = "Use the version of tactile-lab that recorded it; tactile-lab session show names it"
+"""Advice for a recorded description that does not fit this version."""
+
 
 class CalibrationFiles(StrictModel):
     """Calibration files, relative to the rig file.
@@ -112,7 +115,7 @@ def rig_of_session(session: Session) -> Rig:
         SessionError: a calibration copy is missing or was changed.
     """
     where = f"{session.folder}/session.yaml"
-    description = validate(session.manifest.rig_description, RigDescription, where=where)
+    description = validate(session.manifest.rig_description, RigDescription, where=where, hint=OTHER_VERSION)
     files = {role: session.calibration_file(role) for role in session.manifest.calibration}
     return Rig(description, files, where)
 

@@ -1,0 +1,41 @@
+"""All commands of ``tactile-lab`` in one place."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from tactile_lab.cli import bench, evaluate, report, rig, run, session, sweep
+
+app = typer.Typer(
+    help="Tactile SLAM in the laboratory: the shape and pose of an unknown object from a few fingertip contacts.",
+    epilog="Exit codes: 0 done, 1 failed, 2 usage, 3 done with data loss, 4 hardware not ready, 130 interrupted.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command("run")(run.run)
+app.command("evaluate")(evaluate.evaluate)
+app.command("report")(report.report)
+app.command("sweep")(sweep.sweep)
+app.command("bench")(bench.bench)
+app.add_typer(session.app, name="session")
+app.add_typer(rig.app, name="rig")
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"tactile-lab {version('tactile-lab')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Options of the program itself."""

@@ -1,0 +1,28 @@
+"""Options and arguments that several commands share, so that they mean the same everywhere."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+class Method(StrEnum):
+    """Ways to estimate, by the names :class:`tactile_lab.slam.SlamSettings` knows."""
+
+    PARTICLE = "particle"
+    THESIS = "thesis"
+    JOINT = "joint"
+
+
+METHOD_HELP = "particle: calibrated filter; thesis: as printed there; joint: shape and trajectory together."
+
+Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
+Root = Annotated[Path, typer.Option(help="Folder of sessions.")]
+SessionName = Annotated[
+    str, typer.Argument(metavar="SESSION", help="A session's folder, its name under --root, or 'last'.")
+]
+RigName = Annotated[str, typer.Option("--rig", help="Name of a shipped rig, or a rig file.")]
+NoInput = Annotated[bool, typer.Option("--no-input", help="Never ask (no command does so far).")]

@@ -1,0 +1,90 @@
+"""Sessions as tables for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+
+from sessions.listing import SessionSummary
+from sessions.manifest import Manifest
+from sessions.session import TRAFFIC, Session
+from tactile_lab.cli.console import say, show_facts, show_table
+
+NEVER_CLOSED = "open: still running, or killed before it was closed"
+
+
+def show_sessions(root: Path, summaries: Sequence[SessionSummary]) -> None:
+    """A line a session; problems below the table, where there is room for them."""
+    rows = [
+        (
+            summary.folder.name,
+            summary.status + (" !" if summary.data_loss else ""),
+            "" if summary.grasps is None else str(summary.grasps),
+            f"{summary.traffic_bytes / 1e6:.1f}",
+            summary.object_name,
+        )
+        for summary in summaries
+    ]
+    show_table(f"Sessions in {root}", ["session", "status", "grasps", "MB", "object"], rows, right=(2, 3))
+    if any(summary.data_loss for summary in summaries):
+        say("! with data loss: see tactile-lab session show", "yellow")
+    for summary in summaries:
+        if summary.problem:
+            say(f"{summary.folder.name}: {summary.problem}", "yellow")
+
+
+def show_session(session: Session) -> None:
+    """What a session was done with, how it ended and what it recorded."""
+    manifest = session.manifest
+    slam = manifest.settings.get("slam")
+    estimation = slam if isinstance(slam, dict) else {}
+    traffic = session.folder / TRAFFIC
+    size = f", {traffic.stat().st_size / 1e6:.1f} MB" if traffic.is_file() else ", traffic.mcap is missing"
+    facts = [
+        ("folder", str(session.folder)),
+        ("status", _status(manifest)),
+        ("lost", ", ".join(f"{number} {kind.replace('_', ' ')}" for kind, number in manifest.data_loss.items())),
+        ("object", manifest.object_name),
+        ("rig", manifest.rig),
+        ("notes", manifest.notes),
+        ("started", _moment(manifest.started_utc)),
+        ("ended", _moment(manifest.ended_utc)),
+        ("seeds", ", ".join(f"{name} {seed}" for name, seed in manifest.seeds.items())),
+        (
+            "estimation",
+            ", ".join(f"{name} {estimation[name]}" for name in ("method", "dimension") if name in estimation),
+        ),
+        ("grasps", _grasps(manifest)),
+        ("recorded", f"{_messages(manifest)}{size}"),
+        ("results", ", ".join(sorted(path.name for path in session.results.iterdir())) or "none yet"),
+        ("versions", ", ".join(f"{name} {number}" for name, number in manifest.versions.items())),
+        ("calibration", "\n".join(f"{copy.file}  {copy.sha256[:12]}" for copy in manifest.calibration.values())),
+    ]
+    show_facts(manifest.name, facts)
+
+
+def _status(manifest: Manifest) -> str:
+    if manifest.status == "open":
+        return NEVER_CLOSED
+    return manifest.status + (f": {manifest.problem}" if manifest.problem else "")
+
+
+def _moment(iso: str | None) -> str:
+    """A time as people write it; as it stands where it is none."""
+    try:
+        return "" if iso is None else f"{datetime.fromisoformat(iso):%Y-%m-%d %H:%M:%S %Z}"
+    except ValueError:
+        return str(iso)
+
+
+def _grasps(manifest: Manifest) -> str:
+    planned, done = manifest.settings.get("grasps"), manifest.counts.get("grasps")
+    if done is None:
+        return f"{planned} planned" if planned is not None else ""
+    return f"{done} of {planned}" if planned is not None else str(done)
+
+
+def _messages(manifest: Manifest) -> str:
+    topics = [number for name, number in manifest.counts.items() if name.startswith("/")]
+    return f"{sum(topics)} messages of {len(topics)} topics" if topics else "not counted"
