@@ -16,11 +16,9 @@ from collections.abc import Mapping
 from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
-from typing import IO, Any, cast
-
-from mcap.writer import CompressionType, Writer
 
 from sessions import schemas
+from sessions.mcap_writer import McapWriter
 from tactile_lab.errors import SessionError
 
 PROFILE = "tactile-lab"
@@ -56,11 +54,8 @@ class TrafficWriter:
         self._file = _CutBackFile(path)
         self._guard = _Guard(self)
         self._syncer: _Syncer | None = None
-        self._writer: Any = Writer(
-            cast(IO[bytes], self._file), chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD
-        )
         with self._guard:
-            self._writer.start(profile=PROFILE, library=f"tactile-lab {version('tactile-lab')}")
+            self._writer = McapWriter(self._file, CHUNK_BYTES, PROFILE, f"tactile-lab {version('tactile-lab')}")
             self._writer.add_metadata(PROFILE, {**(info or {}), "format": FORMAT})
         self._syncer = _Syncer(self._file)
         self._syncer.start()
@@ -113,9 +108,9 @@ class TrafficWriter:
         schema = schemas.SCHEMAS.get(topic)
         if schema is None:
             encoding = "json" if topic == schemas.MARKS_TOPIC else schemas.RAW_ENCODING
-            return int(self._writer.register_channel(topic, encoding, 0))
-        schema_id = self._writer.register_schema(schema.name, "jsonschema", schema.to_bytes())
-        return int(self._writer.register_channel(topic, "json", schema_id))
+            return self._writer.add_channel(topic, encoding)
+        number = self._writer.add_schema(schema.name, "jsonschema", schema.to_bytes())
+        return self._writer.add_channel(topic, "json", number)
 
     def _flush_when_due(self) -> None:
         if self._flushed_ns is None:
@@ -193,9 +188,6 @@ class _CutBackFile:
 
     def tell(self) -> int:
         return self._position
-
-    def flush(self) -> None:
-        """Nothing is buffered."""
 
     def keep(self) -> None:
         self.kept = self._position
