@@ -12,21 +12,19 @@ import numpy as np
 from gtsam import Pose3
 from pydantic import Field
 
-from drivers.shadow.closing import Closing, closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.bench import Bench
-from sessions.explorer import ExplorationSettings, KnownShape, choose_grasp, known_shape
+from sessions.explorer import ExplorationSettings
 from sessions.grasp_cycle import CycleSettings, GraspCycle, GraspPlan
 from sessions.motion import Motion
-from sessions.next_grasp import FixedRule, PlanSettings, contact_centre
+from sessions.next_grasp import FixedRule, PlanSettings
+from sessions.planner import Planner
 from sessions.progress import GraspReport, NullProgress, Progress
 from sessions.recorder import Level
 from sessions.safety import InterruptGuard, SafetySettings, SafetySupervisor
 from tactile_lab.clock import VirtualClock
 from tactile_lab.errors import TactileLabError, TrackingError
 from tactile_lab.geometry.contacts import Grasp
-from tactile_lab.geometry.poses import planar
-from tactile_lab.shape.gpis import Gpis
 from tactile_lab.slam import SlamStep, TactileSlam
 from tactile_lab.strict_yaml import StrictModel
 
@@ -104,19 +102,16 @@ class Conductor:
         dimension: int = 2,
         progress: Progress | None = None,
     ) -> None:
-        self._bench, self._slam, self._settings, self._dimension = bench, slam, settings, dimension
+        self._bench, self._slam, self._settings = bench, slam, settings
         self._progress = progress or NullProgress()
-        self._rng = np.random.default_rng(seed)
-        self._rule = FixedRule(settings.plan, self._rng, dimension)
         self._supervisor = SafetySupervisor(bench, settings.safety, bench.cycle_ns)
-        self._tip = _tip_shape(bench)
-        window = settings.plan.yaw_window_rad
-        self._cycle = GraspCycle(Motion(bench, self._supervisor), settings.cycle, self._tip, window)
+        tip, window = _tip_shape(bench), settings.plan.yaw_window_rad
+        self._cycle = GraspCycle(Motion(bench, self._supervisor), settings.cycle, tip, window)
+        rule = FixedRule(settings.plan, np.random.default_rng(seed), dimension)
+        self._planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension)
         self._guard = InterruptGuard()
         self._interruption_told = False
         self._grasps: list[Grasp] = []
-        self._known: tuple[Gpis, KnownShape] | None = None
-        self._hand_motion = Pose3()
         self._misses = 0
 
     # --- the session -------------------------------------------------------------------------------------------
@@ -151,7 +146,7 @@ class Conductor:
             return Ending.OBJECT_LOST, f"no way down to the table in {self._misses} approaches"
         if reason := self._supervisor.time_over(self._bench.clock.now_ns()):
             return Ending.LIMIT, reason
-        if reason := self._supervisor.object_lost(*self._rule.centre_m):
+        if reason := self._supervisor.object_lost(*self._planner.centre_m):
             return Ending.OBJECT_LOST, reason
         return None
 
@@ -165,8 +160,9 @@ class Conductor:
 
     def _one_grasp(self, index: int) -> None:
         """Descend, close, settle, capture, squeeze, re-orient, release, lift; then estimate."""
-        cycle, plan = self._cycle, self._plan(index)
+        cycle = self._cycle
         self._phase("descend")
+        plan = self._think(lambda: self._planner.plan(index))
         if not self._arrive(plan):
             return
         self._phase("close")
@@ -187,26 +183,25 @@ class Conductor:
 
     def _arrive(self, plan: GraspPlan) -> bool:
         arrived = self._cycle.descend(plan)
+        self._planner.landed(self._cycle.landings_world_m)
         self._misses = 0 if arrived else self._misses + 1
         if not arrived:
-            self._tell(Level.WARNING, f"the hand came down on the object {self._cycle.landings} times: another grasp")
+            landings = len(self._cycle.landings_world_m)
+            self._tell(Level.WARNING, f"the hand came down on the object {landings} times: another grasp")
         return arrived
 
     def _carry(self, grasp: Grasp) -> None:
         """Squeeze, and re-orient the object, unless too few fingers hold it or no grasp will follow."""
-        cycle, plan = self._cycle, self._cycle.plan
-        centre_m = contact_centre(grasp, plan) if grasp.contacts else self._rule.centre_m
-        touching = frozenset(contact.finger for contact in grasp.contacts)
+        cycle, touching = self._cycle, frozenset(contact.finger for contact in grasp.contacts)
         self._supervisor.count_contacts(len(touching))
-        self._hand_motion = Pose3()
+        wanted, hand_motion = self._planner.grasped(grasp, cycle.plan), Pose3()
         last = len(self._grasps) >= self._settings.grasps or self._guard.requested
         if _holds(touching) and not last:
             self._phase("squeeze")
             cycle.squeeze(touching)
             self._phase("re-orient")
-            turn_rad, shift_m = self._rule.turn(plan.frame.yaw_rad), self._rule.step_back(centre_m)
-            self._hand_motion = cycle.reorient(turn_rad, shift_m, touching)
-        self._rule.carried(centre_m, self._hand_motion)
+            hand_motion = cycle.reorient(wanted.turn_rad, wanted.shift_world_m, touching)
+        self._planner.carried(hand_motion)
 
     def _let_go(self) -> None:
         self._phase("release")
@@ -214,7 +209,7 @@ class Conductor:
         self._phase("lift")
         self._cycle.lift()
 
-    # --- estimation and choice ---------------------------------------------------------------------------------
+    # --- estimation --------------------------------------------------------------------------------------------
 
     def _estimate(self, grasp: Grasp) -> SlamStep | None:
         """One step of the estimation; a grasp that it refuses is told and left out."""
@@ -223,36 +218,10 @@ class Conductor:
         except TrackingError as error:
             self._tell(Level.ERROR, str(error))
             return None
+        self._think(lambda: self._planner.estimated(grasp.index))
         state = {"index": step.index, "verdict": step.verdict, "reason": step.reason, "seconds": step.seconds}
         self._bench.recorder.slam(self._bench.clock.now_ns(), step.world_T_object, state, step.covariance)
         return step
-
-    def _plan(self, index: int) -> GraspPlan:
-        """The next grasp: by the estimate where there is one, else by the fixed rule."""
-        known = self._known_shape() if index >= self._settings.fixed_grasps and not self._misses else None
-        pose = self._slam.world_T_object
-        if known is None or pose is None or self._slam.is_lost:
-            return self._rule.plan(index + self._misses)
-        expected = planar(self._hand_motion * pose)
-        height_m, plan = self._rule.height_m(index), self._settings.plan
-
-        def table(name: str) -> Closing:
-            return closing(name, height_m, self._tip)
-
-        chosen = self._think(
-            lambda: choose_grasp(known, expected, plan.closings, table, plan.yaw_window_rad, self._settings.exploration)
-        )
-        return chosen or self._rule.plan(index)
-
-    def _known_shape(self) -> KnownShape | None:
-        """The shape as estimated now; None before there is one."""
-        field = self._slam.surface
-        if field is None:
-            return None
-        if self._known is None or self._known[0] is not field:
-            height_m, settings = self._slam.origin_height_m, self._settings.exploration
-            self._known = (field, self._think(lambda: known_shape(field, self._dimension, height_m, settings)))
-        return self._known[1]
 
     def _think(self, question: Callable[[], Answer]) -> Answer:
         """Compute without starving the devices: simulated time waits, real time is spent in cycles."""
@@ -268,7 +237,7 @@ class Conductor:
 
     def _report(self, grasp: Grasp, plan: GraspPlan, step: SlamStep | None, missing: dict[str, str]) -> GraspReport:
         covariance = None if step is None else step.covariance
-        known = self._known_shape()
+        known = self._planner.known_shape()
         return GraspReport(
             number=len(self._grasps),
             planned=self._settings.grasps,
@@ -276,7 +245,7 @@ class Conductor:
             reason=plan.reason,
             forces_N={contact.finger: contact.force_N for contact in grasp.contacts},
             missing=missing,
-            landings=self._cycle.landings,
+            landings=len(self._cycle.landings_world_m),
             position_sigma_m=None if covariance is None else float(np.sqrt(np.trace(covariance[:2, :2]) / 2)),
             yaw_sigma_rad=None if covariance is None else float(np.sqrt(covariance[2, 2])),
             explored=None if known is None else known.explored,

@@ -9,7 +9,7 @@ contacts, and whose contacts would also tell the object's pose (eq. 3.18): a gra
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from gtsam import Pose2
@@ -107,6 +107,7 @@ def choose_grasp(
     table: Callable[[str], Closing],
     yaw_window_rad: tuple[float, float],
     settings: ExplorationSettings,
+    has_room: Callable[[GraspPlan], bool] = lambda plan: True,
 ) -> GraspPlan | None:
     """The most promising grasp around an object at ``world_T_object``; None when no candidate has room.
 
@@ -117,16 +118,19 @@ def choose_grasp(
         table: gives the closing of a name at the height of this grasp.
         yaw_window_rad: what the arm can reach.
         settings: the candidates.
+        has_room: what else stands against a grasp (where the hand has just landed on the object).
     """
     known = ModelledObject(shape.field, shape.dimension, world_T_object, shape.origin_height_m)
     rays = {name: closing_rays(table(name)) for name in closings}
     yaws_rad = np.linspace(*yaw_window_rad, settings.yaws)
     centre_world_m = np.asarray(world_T_object.transformFrom(shape.centre_m))
     ring = ring_of_candidates(centre_world_m, yaws_rad, np.array(settings.shifts_m), rays)
-    roomy = [candidate for candidate in ring if _has_room(candidate, known, settings.clearance_m)]
+    free = [candidate for candidate in ring if has_room(_plan(candidate, table))]
+    roomy = [candidate for candidate in free if _is_clear(candidate, known, settings.clearance_m)]
     if not roomy:
         return None
-    return _plan(_best(rate(roomy, known), known, settings), table)
+    best = _best(rate(roomy, known), known, settings)
+    return replace(_plan(best.candidate, table), reason=_reason(best))
 
 
 def _best(rated: Sequence[RatedCandidate], known: ModelledObject, settings: ExplorationSettings) -> RatedCandidate:
@@ -147,15 +151,18 @@ def _observability(item: RatedCandidate, known: ModelledObject) -> float:
     return planar_observability(points_m, slopes / np.linalg.norm(slopes, axis=1, keepdims=True)).smallest
 
 
-def _plan(best: RatedCandidate, table: Callable[[str], Closing]) -> GraspPlan:
-    pose, name = best.candidate.world_T_grasp, best.candidate.closing
-    sigma_mm = 1e3 * float(np.sqrt(np.mean(best.contacts.variances_m2))) if best.contacts.fingers else 0.0
-    reason = f"{len(best.contacts.fingers)} contacts expected where the surface is known to {sigma_mm:.1f} mm"
+def _plan(candidate: Candidate, table: Callable[[str], Closing]) -> GraspPlan:
+    pose = candidate.world_T_grasp
     frame = GraspFrame(float(pose.x()), float(pose.y()), float(pose.theta()))
-    return GraspPlan(frame, name, table(name).height_m, reason)
+    return GraspPlan(frame, candidate.closing, table(candidate.closing).height_m)
 
 
-def _has_room(candidate: Candidate, known: ModelledObject, clearance_m: float) -> bool:
+def _reason(best: RatedCandidate) -> str:
+    sigma_mm = 1e3 * float(np.sqrt(np.mean(best.contacts.variances_m2))) if best.contacts.fingers else 0.0
+    return f"{len(best.contacts.fingers)} contacts expected where the surface is known to {sigma_mm:.1f} mm"
+
+
+def _is_clear(candidate: Candidate, known: ModelledObject, clearance_m: float) -> bool:
     """Whether the open fingertips are all clear of the estimated surface."""
     starts_world_m = _to_world(candidate, candidate.rays.starts_m[:, :2])
     starts_m = np.array([known.world_T_object.transformTo(point) for point in starts_world_m])

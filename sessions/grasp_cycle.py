@@ -102,8 +102,8 @@ class GraspCycle:
         self._plan: GraspPlan | None = None
         self._progress = dict.fromkeys(FINGERS, 0.0)
         self._touching: frozenset[str] = frozenset()
-        self.landings = 0
-        """Landings on the object in the last approach."""
+        self.landings_world_m: list[Array] = []
+        """Where the tips' centres stood, (3,) each, at each landing on the object in the last approach."""
 
     @property
     def plan(self) -> GraspPlan:
@@ -122,7 +122,7 @@ class GraspCycle:
         Returns:
             Whether the hand is down around the object, fingers open.
         """
-        self._plan, self.landings = plan, 0
+        self._plan, self.landings_world_m = plan, []
         landed: set[str] = set()
         for _ in range(self.settings.landing_tries):
             self._move_above()
@@ -130,7 +130,6 @@ class GraspCycle:
             if not hit:
                 self._motion.supervisor.approached()
                 return True
-            self.landings += 1
             landed.update(hit)
             self.lift()
             self._plan = self._evade(plan, hit, landed)
@@ -152,16 +151,15 @@ class GraspCycle:
         hit: list[str] = []
 
         def met() -> bool:
-            hit.extend(self._landed())
+            hit.extend(f for f, load_N in self._motion.loads_N().items() if load_N > s.landing_force_N)
+            if hit:
+                self.landings_world_m.append(self._motion.tip_centre_world_m(hit[0], self._tip))
             return bool(hit)
 
         if self._motion.probe_base(down, s.descent_m_s, met):
             self._motion.wait(s.rest_s)
             met()
         return hit
-
-    def _landed(self) -> list[str]:
-        return [f for f, load_N in self._motion.loads_N().items() if load_N > self.settings.landing_force_N]
 
     def _evade(self, plan: GraspPlan, hit: list[str], landed: set[str]) -> GraspPlan:
         """The plan after a landing: shifted toward the fingers that landed, or turned when both sides did."""

@@ -15,6 +15,7 @@ from gtsam import Pose3, Rot3
 from drivers.positioner import mount_joints
 from drivers.shadow.closing import Closing
 from drivers.shadow.kinematics import JOINTS, forearm_T_palm
+from drivers.shadow.posture import TipEllipsoid
 from sessions.bench import Bench
 from sessions.safety import SafetySupervisor, Situation
 from tactile_lab.clock import NANOSECONDS
@@ -193,6 +194,10 @@ class Motion:
     def loads_N(self) -> dict[str, float]:
         """Contact force on each fingertip at the end of the last cycle."""
         return self._loads_N
+
+    def tip_centre_world_m(self, finger: str, tip: TipEllipsoid) -> Array:
+        """Where a fingertip's centre is now, world frame, shape (3,)."""
+        return np.asarray(self.bench.perception.world_T_distal[finger].transformFrom(np.array(tip.centre_distal_m)))
 
 
 def smooth(share: float) -> float:

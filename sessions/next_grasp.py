@@ -7,15 +7,16 @@ the closings alternate too. :mod:`sessions.explorer` chooses better once there i
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from gtsam import Pose3
 from pydantic import Field, model_validator
 
 from drivers.shadow.closing import PRESHAPES
 from sessions.grasp_cycle import GraspPlan
 from sessions.motion import GraspFrame
 from tactile_lab.geometry.contacts import Array, Grasp
-from tactile_lab.geometry.poses import planar, transform_points
+from tactile_lab.geometry.poses import transform_points
 from tactile_lab.strict_yaml import StrictModel
 
 
@@ -53,6 +54,7 @@ class PlanSettings(StrictModel):
         return self
 
 
+_OTHER_YAWS = 12
 _TYPICAL_HALF_WIDTH_m = 0.030  # between one side's contacts and the middle, where only one side touches
 _MISSED_SIDE_m = {"FF": -0.012, "MF": -0.004, "RF": 0.004, "LF": 0.012}  # a finger that met nothing: object is aside
 
@@ -106,13 +108,22 @@ class FixedRule:
         self.centre_m: Array = np.array(settings.start_m)
         """Where the object is thought to be, world x, y."""
 
-    def plan(self, index: int) -> GraspPlan:
-        """The grasp number ``index``, from 0."""
-        low, high = self.settings.yaw_window_rad
+    def plan(self, index: int, has_room: Callable[[GraspPlan], bool] = lambda plan: True) -> GraspPlan:
+        """The grasp number ``index``, from 0: on the side whose turn it is, or wherever else there is room."""
         side = 0.53 if index % 2 else -0.53
-        yaw = (low + high) / 2 + (side + self._rng.uniform(-0.19, 0.19)) * (high - low) / 2
+        plan = self._at(index, side + self._rng.uniform(-0.19, 0.19), "alternating yaw")
+        for _ in range(_OTHER_YAWS):
+            if has_room(plan):
+                break
+            plan = self._at(index, self._rng.uniform(-1.0, 1.0), "a yaw with room for the hand")
+        return plan
+
+    def _at(self, index: int, place: float, reason: str) -> GraspPlan:
+        """A grasp at a place in the yaw window, from -1 to 1."""
+        low, high = self.settings.yaw_window_rad
+        yaw = (low + high) / 2 + place * (high - low) / 2
         frame = GraspFrame(float(self.centre_m[0]), float(self.centre_m[1]), float(yaw))
-        return GraspPlan(frame, self.closing(index), self.height_m(index), "alternating yaw")
+        return GraspPlan(frame, self.closing(index), self.height_m(index), reason)
 
     def closing(self, index: int) -> str:
         """The closing whose turn it is: each twice, so that it meets both sides of the window."""
@@ -139,8 +150,3 @@ class FixedRule:
         step_m = np.array(self.settings.start_m) - centre_m
         size_m = float(np.linalg.norm(step_m))
         return np.asarray(step_m * min(1.0, self.settings.return_m / size_m)) if size_m > 0 else step_m
-
-    def carried(self, centre_m: Array, hand_motion_world: Pose3) -> None:
-        """Take note of where the object's middle was before the hand carried it."""
-        motion = planar(hand_motion_world)
-        self.centre_m = np.asarray(motion.transformFrom(centre_m))
