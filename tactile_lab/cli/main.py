@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from collections.abc import Sequence
 from types import FrameType
 
 from tactile_lab.errors import TactileLabError
@@ -15,13 +16,20 @@ from tactile_lab.errors import TactileLabError
 INTERRUPTED = 130
 
 
-def main() -> None:
-    """Run the command line; every error a person can cause ends here as one line."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line; every error a person can cause ends here as one line.
+
+    Args:
+        arguments: the words behind ``tactile-lab``; those of the process when None.
+
+    Raises:
+        SystemExit: always, with the exit code.
+    """
     signal.signal(signal.SIGTERM, _end_like_ctrl_c)
     try:
         from tactile_lab.cli.app import app  # here, so that Ctrl+C while it loads ends without a traceback
 
-        app(prog_name="tactile-lab")
+        app(arguments, prog_name="tactile-lab")
     except TactileLabError as error:
         from tactile_lab.cli.console import complain
 

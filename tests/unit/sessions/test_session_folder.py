@@ -152,7 +152,7 @@ def test_values_that_yaml_can_not_hold_are_refused(tmp_path):
     [
         ("format: tactile-session/2\n", "format"),
         ("name: [\n", "not valid YAML"),
-        ("", "valid dictionary"),
+        ("", "must be keys with values"),
         ("surprise: 1\n", "surprise"),
     ],
 )

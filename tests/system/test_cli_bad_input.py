@@ -1,0 +1,142 @@
+"""Bad input, typed as a person would: one clear line, the right exit code, nothing recorded."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from importlib import resources
+from pathlib import Path
+
+import pytest
+import trimesh
+
+RIGS = Path(str(resources.files("tactile_lab.rigs")))
+CALIBRATION = "calibrations/simulated-hand"
+
+
+@pytest.fixture
+def rig_file(tmp_path: Path) -> Path:
+    """A rig file of one's own, with calibration beside it."""
+    shutil.copytree(RIGS / "calibrations", tmp_path / "calibrations")
+    return Path(shutil.copy(RIGS / "sim.yaml", tmp_path / "mine.yaml"))
+
+
+def one_line(answer, code: int, *words: str) -> None:
+    """The command refused with one line that holds the words, and printed nothing for programs."""
+    assert (answer.code, answer.out) == (code, "")
+    errors = [line for line in answer.err.splitlines() if line.startswith("error: ")]
+    assert len(errors) == 1, answer.err
+    assert answer.err.splitlines()[-1] == errors[0]
+    for word in words:
+        assert word in errors[0]
+
+
+@pytest.mark.parametrize(
+    ("pattern", "replacement", "words"),
+    [
+        (r"\Z", "colour: red\n", ("colour: unknown key",)),
+        (r"^cycle_s", "cycle_z", ("cycle_z: unknown key (did you mean cycle_s?)", "cycle_s: is missing")),
+        (r"cycle_s: .*", "cycle_s: .nan", ("cycle_s: must be a finite number, not nan",)),
+        (r"cycle_s: .*", "cycle_s: .inf", ("cycle_s: must be a finite number",)),
+        (r"cycle_s: .*", "cycle_s: fast", ("cycle_s: must be a valid number, not 'fast'",)),
+        (r"cycle_s: .*", "cycle_s: 5.0", ("cycle_s: must be less than or equal to 0.02, not 5.0",)),
+        (r"^kind: .*", "kind: real", ("kind: must be 'simulated', not 'real'",)),
+        (r"\Z", "cycle_s: 0.01\n", ("line 14", "key 'cycle_s' appears twice")),
+        (r"\Z", "hand: [1, 2\n", ("is not valid YAML", "line")),
+        (r"\Z", "conductor: {grasps: 0, cycle: {grip: 1}}\n", ("conductor.grasps", "conductor.cycle.grip")),
+        (r"joints: .*", "joints: nowhere.yaml", ("joints calibration that is missing", "calibration.joints")),
+        (r"(?s)\A.*\Z", "", ("the document: must be keys with values",)),
+    ],
+)
+def test_a_rig_file_that_does_not_fit(inside, rig_file, pattern, replacement, words):
+    rig_file.write_text(re.sub(pattern, replacement, rig_file.read_text(), count=1, flags=re.M))
+    one_line(inside("rig", "check", rig_file), 2, "mine.yaml", *words)
+
+
+def test_a_rig_that_does_not_exist(inside, tmp_path):
+    one_line(inside("rig", "check", "simm"), 2, "simm: no such rig", "sim-biotac")
+    one_line(inside("rig", "check", tmp_path / "none.yaml"), 2, "none.yaml: file not found")
+    one_line(inside("run", "--rig", "simm", "--out", tmp_path / "runs"), 2, "simm: no such rig")
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_rig_file_that_is_no_text(inside, tmp_path):
+    (tmp_path / "photo.yaml").write_bytes(b"\xff\xd8\xff\xe0")
+    one_line(inside("rig", "check", tmp_path / "photo.yaml"), 2, "photo.yaml: is not a text file")
+    (tmp_path / "folder.yaml").mkdir()
+    one_line(inside("rig", "check", tmp_path / "folder.yaml"), 2, "folder.yaml: cannot be read")
+
+
+@pytest.mark.parametrize(
+    ("file", "pattern", "replacement", "words"),
+    [
+        ("joints.yaml", r"\[2673, 22.5\]", "[3673, 22.5]", ("FFJ1", "not monotonic")),
+        ("joints.yaml", "FFJ1", "FFJ9", ("misses FFJ1", "unknown FFJ9")),
+        ("fingertips.yaml", "MF:", "XX:", ("unknown finger XX",)),
+        ("fingertips.yaml", "mass_kg: .*", "mass_kg: .nan", ("fingertips.FF.mass_kg: must be a finite number",)),
+        ("motors.yaml", "FFJ3: 1$", "FFJ3: 55", ("motor numbers",)),
+        ("camera.yaml", "size_px: .*", "size_px: [640]", ("size_px",)),
+        ("markers.yaml", "world_side_m: .*", "world_side_m: wide", ("world_side_m", "not 'wide'")),
+        ("forearm.yaml", "translation_sigma_m: .*", "translation_sigma_m: -1.0", ("translation_sigma_m",)),
+    ],
+)
+def test_a_broken_calibration_is_found_before_anything_is_recorded(inside, rig_file, file, pattern, replacement, words):
+    calibration = rig_file.parent / CALIBRATION / file
+    calibration.write_text(re.sub(pattern, replacement, calibration.read_text(), count=1, flags=re.M))
+    one_line(inside("rig", "check", rig_file), 2, file, *words)
+    one_line(inside("run", "--rig", rig_file, "--out", rig_file.parent / "runs"), 2, file, *words)
+    assert not (rig_file.parent / "runs").exists()
+
+
+def test_a_finger_without_a_calibrated_tip_is_told(inside, rig_file):
+    fingertips = rig_file.parent / CALIBRATION / "fingertips.yaml"
+    fingertips.write_text(fingertips.read_text().replace("  MF: *tip\n", ""))
+    answer = inside("rig", "check", rig_file)
+    assert answer.code == 0
+    assert re.search(r"fingertip MF +ok +none", answer.err)
+
+
+@pytest.fixture
+def mesh_folder(tmp_path: Path) -> Path:
+    block = trimesh.creation.box((0.06, 0.06, 0.06))
+    block.copy().apply_scale(1000.0).export(tmp_path / "millimetres.stl")
+    block.copy().apply_scale(0.01).export(tmp_path / "tiny.stl")
+    block.update_faces([index > 0 for index in range(len(block.faces))])
+    block.export(tmp_path / "open.stl")
+    (tmp_path / "noise.stl").write_bytes(b"no mesh at all" * 20)
+    (tmp_path / "empty.ply").write_bytes(b"")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        ("missing.stl", ("file not found",)),
+        ("noise.stl", ("noise.stl",)),
+        ("empty.ply", ("can", "not", "read")),
+        ("open.stl", ("closed surface",)),
+        ("millimetres.stl", ("millimetres?",)),
+        ("tiny.stl", ("twice?",)),
+    ],
+)
+def test_a_mesh_that_can_not_be_used(inside, mesh_folder, file, words):
+    out = mesh_folder / "runs"
+    one_line(inside("run", "--object", f"mesh:{mesh_folder / file}", "--out", out), 1, file, *words)
+    assert not out.exists()
+
+
+def test_an_object_that_is_not_in_the_catalogue(inside, tmp_path):
+    one_line(inside("run", "--object", "boxx", "--out", tmp_path / "runs"), 2, "'boxx'", "box-10x6x4", "mesh:")
+    one_line(inside("sweep", "--objects", "boxx", "--out", tmp_path / "sweep"), 2, "'boxx'", "box-10x6x4")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_for_sessions_that_is_a_file(inside, tmp_path):
+    (tmp_path / "file").write_text("")
+    for command in ("run", "sweep"):
+        one_line(inside(command, "--out", tmp_path / "file"), 1, str(tmp_path / "file"), "Choose another folder")
+
+
+def test_a_list_of_sessions_in_a_file(inside, tmp_path):
+    (tmp_path / "file").write_text("")
+    one_line(inside("session", "list", "--root", tmp_path / "file"), 1, "can not be read")

@@ -1,0 +1,165 @@
+"""Session folders as they look after accidents: what can be read is read, what is lost is told."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+from mcap.writer import Writer
+
+EVERY = ("session show", "session replay", "evaluate", "report")
+
+
+def refused(answer, *words: str) -> None:
+    assert (answer.code, answer.out) == (1, ""), answer
+    errors = [line for line in answer.err.splitlines() if line.startswith("error: ")]
+    assert len(errors) == 1, answer.err
+    for word in words:
+        assert word in errors[0]
+
+
+def foreign_mcap(path) -> None:
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2", library="another program")
+        channel = writer.register_channel("/chatter", "json", 0)
+        writer.add_message(channel, 1, b"{}", 1)
+        writer.finish()
+
+
+@pytest.mark.parametrize("command", EVERY)
+def test_a_folder_that_is_no_session(inside, tmp_path, command):
+    refused(inside(*command.split(), tmp_path), "not a session folder")
+
+
+@pytest.mark.parametrize("share", [0.95, 0.6])
+def test_a_recording_cut_off_is_replayed_up_to_the_cut(inside, session_copy, share):
+    traffic = session_copy / "traffic.mcap"
+    whole = traffic.read_bytes()
+    traffic.write_bytes(whole[: int(share * len(whole))])
+    answer = inside("session", "replay", session_copy, "--json")
+    assert answer.code == 3
+    assert "the file ends too early" in answer.err
+    assert "of 3 grasps could be read" in answer.err
+    assert "differs" not in answer.err
+    document = json.loads(answer.out)
+    assert 1 <= document["grasps"] <= 3
+    recorded = (session_copy / "results" / "trajectory.csv").read_text().splitlines()
+    replayed = (session_copy / "replay" / "trajectory.csv").read_text().splitlines()
+    assert recorded[: 1 + document["grasps"]][0] == replayed[0]
+    assert recorded[1] == replayed[1]
+
+
+@pytest.mark.parametrize("size", [0, 5, 20, 300, 100_000])
+def test_a_recording_cut_off_before_the_first_grasp(inside, session_copy, size):
+    traffic = session_copy / "traffic.mcap"
+    traffic.write_bytes(traffic.read_bytes()[:size])
+    answer = inside("session", "replay", session_copy)
+    assert answer.code == 1
+    assert "no grasp was recorded" in answer.err
+    assert "the file ends too early" in answer.err
+    assert "0 of 3 grasps could be read" in answer.err
+
+
+def test_a_recording_damaged_in_the_middle(inside, session_copy):
+    traffic = session_copy / "traffic.mcap"
+    content = bytearray(traffic.read_bytes())
+    middle = int(0.7 * len(content))
+    content[middle : middle + 50] = bytes(50)
+    traffic.write_bytes(content)
+    answer = inside("session", "replay", session_copy)
+    assert answer.code == 3
+    assert "the recording is damaged" in answer.err
+
+
+def test_traffic_that_is_not_the_sessions(inside, session_copy):
+    traffic = session_copy / "traffic.mcap"
+    foreign_mcap(traffic)
+    refused(inside("session", "replay", session_copy), "not one of a session", "'ros2'")
+    refused(inside("evaluate", session_copy), "not one of a session")
+    traffic.write_bytes(b"hello" * 1000)
+    refused(inside("session", "replay", session_copy), "not an MCAP file")
+    traffic.unlink()
+    refused(inside("session", "replay", session_copy), "can not be opened")
+    assert inside("session", "show", session_copy).code == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: text + "colour: red\n", "colour: unknown key"),
+        (lambda text: text.replace("grasps: 3\n", "grasps: .nan\n").replace("session: 1", "session: .nan"), "session"),
+        (lambda text: text[: len(text) // 2], "session.yaml"),
+        (lambda text: "", "must be keys with values"),
+        (lambda text: text + "status: closed\n", "appears twice"),
+    ],
+)
+def test_a_description_that_can_not_be_read(inside, session_copy, change, words):
+    manifest = session_copy / "session.yaml"
+    manifest.write_text(change(manifest.read_text()))
+    for command in EVERY:
+        refused(inside(*command.split(), session_copy), "session.yaml", words)
+    listed = inside("session", "list", "--root", session_copy.parent)
+    assert listed.code == 0
+    assert "unreadable" in listed.err
+    assert words in listed.err
+
+
+def test_settings_of_another_version(inside, session_copy):
+    manifest = session_copy / "session.yaml"
+    manifest.write_text(manifest.read_text().replace("method: particle", "method: magic"))
+    answer = inside("session", "replay", session_copy)
+    assert answer.code == 2
+    assert "not 'magic'" in answer.err
+    assert "the version of tactile-lab that recorded it" in answer.err
+
+
+def test_a_calibration_copy_changed_or_missing(inside, session_copy):
+    joints = session_copy / "calibration" / "joints.yaml"
+    joints.write_text(joints.read_text() + "# a remark\n")
+    refused(inside("session", "replay", session_copy), "joints.yaml", "changed since it was recorded")
+    joints.unlink()
+    refused(inside("session", "replay", session_copy), "joints.yaml", "can not be read")
+
+
+def test_deleted_results_are_made_again_by_a_replay(inside, session_copy):
+    before = {path.name: path.read_bytes() for path in (session_copy / "results").iterdir()}
+    shutil.rmtree(session_copy / "results")
+    refused(inside("evaluate", session_copy), "trajectory", "replay it")
+    refused(inside("report", session_copy), "trajectory", "replay it")
+    answer = inside("session", "replay", session_copy)
+    assert answer.code == 0
+    assert {path.name for path in (session_copy / "results").iterdir()} == set(before)
+    assert (session_copy / "results" / "mesh.ply").read_bytes() == before["mesh.ply"]
+    assert inside("evaluate", session_copy).code == 0
+
+
+def test_results_replaced_by_a_file(inside, session_copy):
+    shutil.rmtree(session_copy / "results")
+    (session_copy / "results").write_text("in the way")
+    for command in ("evaluate", "session replay"):
+        refused(inside(*command.split(), session_copy), "results", "Move what stands in its place")
+
+
+def test_results_that_can_not_be_read(inside, session_copy):
+    (session_copy / "results" / "slam.json").write_text("{}")
+    refused(inside("evaluate", session_copy), "slam.json")
+    (session_copy / "results" / "trajectory.csv").write_text("a,b\n1,2\n")
+    refused(inside("report", session_copy), "trajectory.csv")
+
+
+def test_evaluating_a_damaged_recording_warns(inside, session_copy):
+    traffic = session_copy / "traffic.mcap"
+    traffic.write_bytes(traffic.read_bytes()[:1_000_000])
+    answer = inside("evaluate", session_copy, "--json")
+    assert answer.code == 3
+    assert "the recording is damaged" in answer.err
+    json.loads(answer.out)
+
+
+def test_a_session_never_closed_is_shown_and_replayed(inside, session_copy):
+    manifest = session_copy / "session.yaml"
+    manifest.write_text(manifest.read_text().replace("status: closed", "status: open"))
+    assert "killed before it was closed" in inside("session", "show", session_copy).err
+    assert inside("session", "replay", session_copy).code == 0
