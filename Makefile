@@ -9,7 +9,6 @@ READY  := $(VENV)/ready
 # Small matrices get slower with several BLAS threads, and results must not depend on their number.
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
-export MPLBACKEND := Agg
 
 .PHONY: demo test check bench lock clean
 
