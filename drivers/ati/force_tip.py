@@ -95,6 +95,7 @@ class ForceTip:
         self.sequences = SequenceMonitor()
         self.tare_record: Tare | None = None
         self.newest: WrenchSample | None = None
+        self._newest_usable = False
         self._settings = settings
         self._bias = np.zeros(6)
         self._recent: deque[Array] = deque(maxlen=settings.tare_samples)
@@ -112,8 +113,8 @@ class ForceTip:
         for sample in samples:
             if not self.sequences.is_new(sample.rdt_sequence, sample.ft_sequence):
                 continue
-            self.newest = sample
-            if self._usable(sample):
+            self.newest, self._newest_usable = sample, self._usable(sample)
+            if self._newest_usable:
                 self._recent.append(sample.wrench)
                 self._capture.append(sample.wrench)
             else:
@@ -149,9 +150,10 @@ class ForceTip:
         """Contact force of the newest sample; 0 before the first, infinite when it is void, so that motion stops."""
         if self.newest is None:
             return 0.0
-        if not self._usable(self.newest):
+        if not self._newest_usable:
             return math.inf
-        return float(np.linalg.norm(self.load(self.newest.wrench, world_R_distal)[:3]))
+        force_N = self.load(self.newest.wrench, world_R_distal)[:3]
+        return math.sqrt(force_N @ force_N)
 
     def begin_capture(self) -> None:
         """From here on samples are gathered for :meth:`contact`."""
@@ -198,7 +200,7 @@ class ForceTip:
 
     def _usable(self, sample: WrenchSample) -> bool:
         healthy = describe_status(sample.status).severity < Severity.FAULT if sample.status else True
-        return healthy and not self.sequences.stuck and bool(np.all(np.abs(sample.wrench) <= self._range))
+        return healthy and not self.sequences.stuck and bool((np.abs(sample.wrench) <= self._range).all())
 
     def _weight(self, world_R_distal: Array) -> Array:
         """The tip's own weight as the sensor feels it, shape (6,), sensor frame."""

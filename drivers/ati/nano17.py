@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 
+import numpy as np
 from pydantic import Field
 
 from drivers.ati import rdt_codec
@@ -41,6 +42,7 @@ class Nano17(ForceTip):
         super().__init__(finger, calibration, settings)
         self.foreign_datagrams = 0
         self._link, self._clock, self._box = link, clock, settings
+        self._counts_per_unit = np.repeat([settings.counts_per_N, settings.counts_per_Nm], 3)
         self._connected = False
 
     def connect(self) -> None:
@@ -89,13 +91,9 @@ class Nano17(ForceTip):
         Raises:
             CodecError: it holds no RDT records.
         """
-        records = rdt_codec.decode_records(datagram.payload)
-        wrenches = rdt_codec.wrenches(records, self._box.counts_per_N, self._box.counts_per_Nm)
         return [
-            WrenchSample(
-                datagram.stamp_ns, wrench, int(row["rdt_sequence"]), int(row["ft_sequence"]), int(row["status"])
-            )
-            for row, wrench in zip(records, wrenches, strict=True)
+            WrenchSample(datagram.stamp_ns, np.array(counts) / self._counts_per_unit, rdt_sequence, ft_sequence, status)
+            for rdt_sequence, ft_sequence, status, *counts in rdt_codec.records(datagram.payload)
         ]
 
     def health(self) -> tuple[str, ...]:

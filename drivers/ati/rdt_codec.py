@@ -7,6 +7,7 @@ newtons and newton metres by the box's own counts per force and counts per torqu
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -15,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import CodecError
-from tactile_lab.geometry.contacts import Array
 
 PORT = 49152
 HEADER = 0x1234
 RECORD = np.dtype([("rdt_sequence", ">u4"), ("ft_sequence", ">u4"), ("status", ">u4"), ("counts", ">i4", (6,))])
 """One record: force x, y, z then torque x, y, z in counts."""
 
+_RECORD = struct.Struct(">III6i")
 _REQUEST = struct.Struct(">HHI")
 SATURATION = 1 << 17
 _SUMMARY = 1 << 31
@@ -129,13 +130,29 @@ def decode_records(payload: bytes) -> NDArray[Any]:
     Raises:
         CodecError: the length is not a whole number of records.
     """
+    _check_length(payload)
+    return np.frombuffer(payload, RECORD)
+
+
+def records(payload: bytes) -> Iterator[tuple[int, ...]]:
+    """As :func:`decode_records`, in plain numbers: RDT sequence, FT sequence, status and six counts of each record.
+
+    For datagrams of a few records this takes a fraction of the time.
+
+    Raises:
+        CodecError: as :func:`decode_records`.
+    """
+    _check_length(payload)
+    return _RECORD.iter_unpack(payload)
+
+
+def _check_length(payload: bytes) -> None:
     if not payload or len(payload) % RECORD.itemsize:
         raise CodecError(
             f"{len(payload)} bytes are not a whole number of {RECORD.itemsize}-byte records",
             where="RDT record",
             hint="Check that this port receives from the force sensor's box only",
         )
-    return np.frombuffer(payload, RECORD)
 
 
 def encode_records(
@@ -149,22 +166,13 @@ def encode_records(
     rows = np.atleast_2d(np.asarray(counts))
     if rows.ndim != 2 or rows.shape[1] != 6:
         raise CodecError(f"counts of shape {rows.shape} where (n, 6) is needed", where="RDT record")
-    if np.any(np.abs(rows.astype(np.float64)) > 2**31 - 1):
+    if (np.abs(rows.astype(np.float64)) > 2**31 - 1).any():
         raise CodecError("a count does not fit 32 bits", where="RDT record")
-    records = np.zeros(len(rows), RECORD)
-    records["counts"] = rows
-    for name, values in (("rdt_sequence", rdt_sequence), ("ft_sequence", ft_sequence), ("status", status)):
-        words = np.atleast_1d(np.asarray(values, np.int64))
-        if len(words) != len(rows):
-            raise CodecError(f"{len(words)} values of {name} for {len(rows)} records", where="RDT record")
-        records[name] = words & 0xFFFFFFFF
-    return records.tobytes()
-
-
-def wrenches(records: NDArray[Any], counts_per_N: float, counts_per_Nm: float) -> Array:
-    """Force in newtons and torque in newton metres, shape (n, 6), sensor frame."""
-    scale = np.array([counts_per_N] * 3 + [counts_per_Nm] * 3)
-    return np.asarray(records["counts"] / scale, np.float64)
+    columns = [np.asarray(words, np.int64) & 0xFFFFFFFF for words in (rdt_sequence, ft_sequence, status)]
+    if any(words.shape != (len(rows),) for words in columns):
+        raise CodecError(f"sequences or status not one for each of {len(rows)} records", where="RDT record")
+    words = zip(*(words.tolist() for words in columns), rows.astype(np.int64).tolist(), strict=True)
+    return b"".join(_RECORD.pack(rdt, ft, state, *counts) for rdt, ft, state, counts in words)
 
 
 def describe_status(status: int) -> StatusReport:
