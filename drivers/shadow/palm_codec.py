@@ -33,6 +33,8 @@ SENSORS: tuple[str, ...] = (
 OPTIONAL_CHANNELS = range(26, 32)
 """Accelerometer and gyroscope: a channel without hardware keeps its own index as its value."""
 
+_WORD = np.dtype("<u2")
+_SLOTS = (5, 16)
 CAN_BRIDGE = np.dtype([("bus", "u1"), ("length", "u1"), ("id", "<u2"), ("data", "u1", 8)])
 
 COMMAND_0220 = np.dtype(
@@ -59,7 +61,7 @@ STATUS_0220 = np.dtype(
         ("motor_data_packet", [("torque", "<i2"), ("misc", "<u2")], MOTORS_PER_STATUS),
         ("tactile_data_type", "<u4"),
         ("tactile_data_valid", "<u2"),
-        ("tactile", "u1", (5, 16)),
+        ("tactile", "u1", _SLOTS),
         ("idle_time_us", "<u2"),
         ("can", CAN_BRIDGE),
     ]
@@ -68,6 +70,8 @@ STATUS_0220 = np.dtype(
 
 
 _COMMAND_FORMAT = struct.Struct("<IIhI20hI BBH8s")
+_STATUS_SCALARS = struct.Struct("<I 74x IhII 40x IH 80x HBBH8s")  # without its arrays, which stand at:
+_SENSORS_AT, _PACKETS_AT, _TACTILE_AT = 4, 92, 138
 _STATUS_FORMAT = struct.Struct(f"<I37HIhII {'hH' * MOTORS_PER_STATUS} IH80sH BBH8s")
 
 
@@ -209,9 +213,9 @@ def decode_command(payload: bytes) -> PalmCommand:
     Raises:
         CodecError: wrong length.
     """
-    record = _record(payload, COMMAND_0220, "command")
-    edc_command, from_type, which_motors, to_type, motor_data, tactile_type, can = record.item()
-    return PalmCommand(edc_command, from_type, which_motors, to_type, motor_data, tactile_type, _can_frame(can))
+    edc_command, from_type, which_motors, to_type, *rest = _unpack(_COMMAND_FORMAT, payload, "command")
+    motor_data, tactile_type, can = tuple(rest[:MOTORS]), rest[MOTORS], CanFrame(*rest[MOTORS + 1 :])
+    return PalmCommand(edc_command, from_type, which_motors, to_type, motor_data, tactile_type, can)
 
 
 def encode_status(status: PalmStatus) -> bytes:
@@ -243,38 +247,34 @@ def decode_status(payload: bytes) -> PalmStatus:
     Raises:
         CodecError: wrong length.
     """
-    record = _record(payload, STATUS_0220, "status")
-    packets = record["motor_data_packet"]
+    scalars = _unpack(_STATUS_SCALARS, payload, "status")
+    edc_command, kind, which_motors, arrived, had_errors, tactile_type, tactile_valid, idle_time_us, *can = scalars
+    packets = np.frombuffer(payload, _WORD, 2 * MOTORS_PER_STATUS, _PACKETS_AT)
     return PalmStatus(
-        edc_command=int(record["edc_command"]),
-        sensors=record["sensors"],
-        motor_data_type=int(record["motor_data_type"]),
-        which_motors=int(record["which_motors"]),
-        arrived=int(record["which_motor_data_arrived"]),
-        had_errors=int(record["which_motor_data_had_errors"]),
-        torque=packets["torque"],
-        misc=packets["misc"],
-        tactile_data_type=int(record["tactile_data_type"]),
-        tactile_valid=int(record["tactile_data_valid"]),
-        tactile=record["tactile"],
-        idle_time_us=int(record["idle_time_us"]),
-        can=_can_frame(record["can"].item()),
+        edc_command=edc_command,
+        sensors=np.frombuffer(payload, _WORD, len(SENSORS), _SENSORS_AT),
+        motor_data_type=kind,
+        which_motors=which_motors,
+        arrived=arrived,
+        had_errors=had_errors,
+        torque=packets[::2].view(np.int16),
+        misc=packets[1::2],
+        tactile_data_type=tactile_type,
+        tactile_valid=tactile_valid,
+        tactile=np.frombuffer(payload, np.uint8, _SLOTS[0] * _SLOTS[1], _TACTILE_AT).reshape(_SLOTS),
+        idle_time_us=idle_time_us,
+        can=CanFrame(*can),
     )
 
 
-def _record(payload: bytes, layout: np.dtype[np.void], what: str) -> Any:
-    if len(payload) != layout.itemsize:
+def _unpack(image: struct.Struct, payload: bytes, what: str) -> tuple[Any, ...]:
+    if len(payload) != image.size:
         raise CodecError(
-            f"a palm {what} of {len(payload)} bytes instead of {layout.itemsize}",
+            f"a palm {what} of {len(payload)} bytes instead of {image.size}",
             where="palm 0220",
             hint="Check that the palm is a 0220 (product code 6)",
         )
-    return np.frombuffer(payload, layout)[0]
-
-
-def _can_frame(fields: tuple[int, int, int, Sequence[int]]) -> CanFrame:
-    bus, length, identifier, data = fields
-    return CanFrame(bus, length, identifier, bytes(data))
+    return image.unpack(payload)
 
 
 def _can_fields(can: CanFrame) -> tuple[int, int, int, bytes]:
