@@ -83,30 +83,30 @@ class _Segments:
     def __init__(self, curves: Sequence[tuple[Array, Array]]) -> None:
         longest = max((len(x) for x, _ in curves), default=2) - 1
         self._inner = np.full((len(curves), longest - 1), np.inf)
-        self._start = np.zeros((2, len(curves), longest))
-        self._slope = np.zeros((len(curves), longest))
-        self._rows = np.arange(len(curves))
+        start_x, start_y, slope = np.zeros((3, len(curves), longest))
         for row, (x, y) in enumerate(curves):
             segments = len(x) - 1
             self._inner[row, : segments - 1] = x[1:-1]
-            self._start[:, row, :segments] = x[:-1], y[:-1]
-            self._slope[row, :segments] = np.diff(y) / np.diff(x)
+            start_x[row, :segments], start_y[row, :segments] = x[:-1], y[:-1]
+            slope[row, :segments] = np.diff(y) / np.diff(x)
+        self._first = longest * np.arange(len(curves))
+        self._start_x, self._start_y, self._slope = start_x.ravel(), start_y.ravel(), slope.ravel()
 
     def __call__(self, x: Array) -> Array:
-        segment = (x[:, None] >= self._inner).sum(axis=1)
-        start_x, start_y = self._start[:, self._rows, segment]
-        return np.asarray(start_y + self._slope[self._rows, segment] * (x - start_x))
+        segment = self._first + (x[:, None] >= self._inner).sum(axis=1)
+        return np.asarray(self._start_y[segment] + self._slope[segment] * (x - self._start_x[segment]))
 
 
 class _TriangleMap:
     def __init__(self, source: Array, target: Array, triangles: NDArray[np.intp], beyond: Array) -> None:
         corners = np.concatenate([source[triangles], np.ones((*triangles.shape, 1))], axis=2)
-        self._weights = np.linalg.inv(corners.transpose(0, 2, 1))
+        weights = np.linalg.inv(corners.transpose(0, 2, 1))
+        self._turn, self._shift = weights[:, :, :2], weights[:, :, 2]
         self._targets = target[triangles]
         self._beyond = beyond
 
     def __call__(self, point: Array) -> Array:
-        weights = self._weights[:, :, :2] @ point + self._weights[:, :, 2]
+        weights = self._turn @ point + self._shift
         smallest = weights.min(axis=1)
         triangle = smallest.argmax()
         if smallest[triangle] < _INSIDE:

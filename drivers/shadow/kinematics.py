@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from gtsam import Pose3, Rot3
@@ -90,6 +91,10 @@ TIP_OFFSET_m: Mapping[str, float] = {"FF": 0.026, "MF": 0.026, "RF": 0.026, "LF"
 """Distance of the model's nominal fingertip point from the J1 axis, along z of the distal frame, metres."""
 
 
+_Terms: TypeAlias = tuple[Array, Array, Array]
+"""Factors of 1, sin q and cos q in a joint's transform, each (..., 4, 4)."""
+
+
 def joint_vector(joints_rad: Mapping[str, float]) -> Array:
     """Named joint angles as a vector, shape (24,), radians; joints not named are zero.
 
@@ -111,17 +116,17 @@ def palm_T_distal_matrices(joints_rad: Array) -> Array:
     Returns:
         Homogeneous matrices, shape (..., 5, 4, 4), in the order FF, MF, RF, LF, TH, metres.
     """
-    local = _parent_T_child(joints_rad)
-    frames = local[..., _CHAINS[0], :, :]
-    for joints in _CHAINS[1:]:
-        frames = frames @ local[..., joints, :, :]
+    links = _parent_T_child(joints_rad)[..., _CHAINS, :, :]
+    frames = links[..., 0, :, :, :]
+    for number in range(1, len(_CHAINS)):
+        frames = frames @ links[..., number, :, :, :]
     return np.asarray(frames)
 
 
 def forearm_T_palm_matrix(joints_rad: Array) -> Array:
     """The palm in the forearm frame, shape (..., 4, 4), from WRJ2 and WRJ1 of joint vectors (..., 24)."""
-    local = _parent_T_child(joints_rad)
-    return np.asarray(local[..., JOINT_INDEX["WRJ2"], :, :] @ local[..., JOINT_INDEX["WRJ1"], :, :])
+    local = _rotated(joints_rad[..., _WRIST], _WRIST_TERMS)
+    return np.asarray(local[..., 0, :, :] @ local[..., 1, :, :])
 
 
 def link_T_matrices(joints_rad: Array) -> Array:
@@ -149,8 +154,16 @@ def forearm_T_palm(joints_rad: Array) -> Pose3:
 
 def _parent_T_child(joints_rad: Array) -> Array:
     """All joint transforms at once, shape (..., 25, 4, 4); the last is the identity that pads short chains."""
-    angles = np.concatenate([joints_rad, np.zeros_like(joints_rad[..., :1])], axis=-1)[..., None, None]
-    return np.asarray(_CONSTANT + np.sin(angles) * _SINE + np.cos(angles) * _COSINE)
+    padded = np.zeros((*joints_rad.shape[:-1], len(JOINTS) + 1))
+    padded[..., :-1] = joints_rad
+    return _rotated(padded, _TERMS)
+
+
+def _rotated(angles_rad: Array, terms: _Terms) -> Array:
+    """The transforms of joints at angles (..., n), from the joints' terms (n, 4, 4)."""
+    constant, sine, cosine = terms
+    sines, cosines = np.sin(angles_rad)[..., None, None], np.cos(angles_rad)[..., None, None]
+    return np.asarray(constant + sines * sine + cosines * cosine)
 
 
 def _origin_matrix(joint: Joint) -> Array:
@@ -165,7 +178,7 @@ def _origin_matrix(joint: Joint) -> Array:
     return matrix
 
 
-def _rodrigues_terms(joint: Joint) -> tuple[Array, Array, Array]:
+def _rodrigues_terms(joint: Joint) -> _Terms:
     """``origin * rotation(q)`` split into a constant, a factor of sin q and a factor of cos q, each (4, 4)."""
     x, y, z = np.array(joint.axis) / np.linalg.norm(joint.axis)
     cross = np.zeros((4, 4))
@@ -175,14 +188,16 @@ def _rodrigues_terms(joint: Joint) -> tuple[Array, Array, Array]:
     return origin @ (np.eye(4) + squared), origin @ cross, -origin @ squared
 
 
-def _stacked_terms() -> tuple[Array, Array, Array]:
+def _stacked_terms() -> _Terms:
     terms = [_rodrigues_terms(joint) for joint in JOINT_TABLE]
     terms.append((np.eye(4), np.zeros((4, 4)), np.zeros((4, 4))))
     constant, sine, cosine = (np.array(term) for term in zip(*terms, strict=True))
     return constant, sine, cosine
 
 
-_CONSTANT, _SINE, _COSINE = _stacked_terms()
+_TERMS = _stacked_terms()
+_WRIST = [JOINT_INDEX["WRJ2"], JOINT_INDEX["WRJ1"]]
+_WRIST_TERMS = (_TERMS[0][_WRIST], _TERMS[1][_WRIST], _TERMS[2][_WRIST])
 _CHAINS = np.array(
     [[JOINT_INDEX.get(f"{finger}J{number}", len(JOINTS)) for finger in FINGERS] for number in (5, 4, 3, 2, 1)]
 )
