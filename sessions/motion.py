@@ -82,7 +82,7 @@ class Motion:
         seen = self.bench.perception
         self._loads_N = seen.loads_N()
         self.supervisor.check(
-            Situation(self.bench.clock.now_ns(), seen.hand_stamp_ns, self._loads_N, seen.world_T_palm)
+            Situation(self.bench.clock.now_ns(), seen.hand_stamp_ns, self._loads_N, seen.palm_world_m)
         )
 
     def wait(self, duration_s: float) -> None:

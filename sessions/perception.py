@@ -165,6 +165,11 @@ class Perception:
         return Pose3(self._current().world_T_palm)
 
     @property
+    def palm_world_m(self) -> Array:
+        """Origin of the palm, shape (3,), from the newest samples. Raises DeviceError before the first."""
+        return np.asarray(self._current().world_T_palm[:3, 3])
+
+    @property
     def world_T_distal(self) -> dict[str, Pose3]:
         """The distal frame of each finger, from the newest samples. Raises DeviceError before the first."""
         return {finger: Pose3(self._current().world_T_distal[i]) for i, finger in enumerate(FINGERS)}
@@ -180,7 +185,8 @@ class Perception:
     def loads_N(self) -> dict[str, float]:
         """Contact force on each fingertip of the rig; infinite where the newest sample is void."""
         if self._loads_N is None:
-            self._loads_N = {finger: tip.load_N(self.world_R_distal(finger)) for finger, tip in self.fingertips.items()}
+            rotations = dict(zip(FINGERS, self._current().world_T_distal[:, :3, :3], strict=True))
+            self._loads_N = {finger: tip.load_N(rotations[finger]) for finger, tip in self.fingertips.items()}
         return dict(self._loads_N)
 
     def problems(self) -> tuple[str, ...]:

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from types import FrameType, TracebackType
 from typing import Any, Protocol
 
-from gtsam import Pose3
 from pydantic import Field
 
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import SafetyError, TactileLabError
+from tactile_lab.geometry.contacts import Array
 from tactile_lab.strict_yaml import StrictModel
 
 
@@ -60,13 +60,13 @@ class Situation:
         stamp_ns: session clock.
         hand_stamp_ns: arrival of the newest fresh hand status; None before the first.
         loads_N: contact force on each fingertip.
-        world_T_palm: the palm; None before the first status.
+        palm_world_m: origin of the palm, shape (3,), world; None before the first status.
     """
 
     stamp_ns: int
     hand_stamp_ns: int | None
     loads_N: Mapping[str, float]
-    world_T_palm: Pose3 | None
+    palm_world_m: Array | None
 
 
 class Stoppable(Protocol):
@@ -111,8 +111,8 @@ class SafetySupervisor:
             self._start_ns = situation.stamp_ns
         self._check_freshness(situation)
         self._check_forces(situation.loads_N)
-        if situation.world_T_palm is not None:
-            self._check_workspace(situation.world_T_palm)
+        if situation.palm_world_m is not None:
+            self._check_workspace(situation.palm_world_m)
 
     def _check_freshness(self, situation: Situation) -> None:
         last_ns = self._start_ns if situation.hand_stamp_ns is None else situation.hand_stamp_ns
@@ -132,12 +132,11 @@ class SafetySupervisor:
                     hint="Look at the hand and the object before going on",
                 )
 
-    def _check_workspace(self, world_T_palm: Pose3) -> None:
-        if (height_m := float(world_T_palm.z())) < self.settings.palm_minimum_height_m:
+    def _check_workspace(self, palm_world_m: Array) -> None:
+        x_m, y_m, height_m = palm_world_m.tolist()
+        if height_m < self.settings.palm_minimum_height_m:
             raise SafetyError(f"palm only {height_m * 1e3:.0f} mm above the table", where="base", hint="Lift the arm")
-        if (out_m := self._from_centre_m(float(world_T_palm.x()), float(world_T_palm.y()))) > (
-            self.settings.workspace_radius_m
-        ):
+        if (out_m := self._from_centre_m(x_m, y_m)) > self.settings.workspace_radius_m:
             raise SafetyError(f"palm {out_m * 1e3:.0f} mm from the workspace centre", where="base", hint="Move it back")
 
     # --- between cycles ----------------------------------------------------------------------------------------

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from gtsam import Pose3, Rot3
 
 from sessions.safety import InterruptGuard, SafetySettings, SafetySupervisor, Situation
 from tactile_lab.errors import DeviceError, SafetyError
+from tactile_lab.geometry.contacts import Array
 
 CYCLE_ns = 10_000_000
 
@@ -37,17 +37,17 @@ def supervisor(**settings: object) -> SafetySupervisor:
     return SafetySupervisor(StoppableBench(), SafetySettings(**settings), CYCLE_ns)  # type: ignore[arg-type]
 
 
-def palm_at(x: float, y: float, z: float) -> Pose3:
-    return Pose3(Rot3(), np.array([x, y, z]))
+def palm_at(x: float, y: float, z: float) -> Array:
+    return np.array([x, y, z])
 
 
 def situation(
     stamp_ns: int = 0,
     hand_stamp_ns: int | None = 0,
     loads_N: dict[str, float] | None = None,
-    palm: Pose3 | None = None,
+    palm: Array | None = None,
 ) -> Situation:
-    return Situation(stamp_ns, hand_stamp_ns, loads_N or {}, palm or palm_at(0, 0, 0.2))
+    return Situation(stamp_ns, hand_stamp_ns, loads_N or {}, palm_at(0, 0, 0.2) if palm is None else palm)
 
 
 def test_an_ordinary_cycle_passes() -> None:
