@@ -187,7 +187,7 @@ class Positioner:
         if target.shape != (6,) or not np.isfinite(target).all():
             raise DeviceError("a target is not six finite numbers", where=self._link.name, hint="Check the path")
         if not self._stopped and self._fault is None:
-            self._target = np.clip(target, *self._range)
+            self._target = np.minimum(np.maximum(target, self._range[0]), self._range[1])
 
     def stop(self) -> None:
         """Stay here until :meth:`resume`. Never raises."""
@@ -250,7 +250,7 @@ class Positioner:
 
     def _step_towards_target(self, duration_s: float) -> Array:
         distance = self._target - self._sent
-        cycles_needed = np.max(np.abs(distance) / self._speed) / max(min(duration_s, _LONGEST_STEP_s), _SHORTEST_STEP_s)
+        cycles_needed = (np.abs(distance) / self._speed).max() / max(min(duration_s, _LONGEST_STEP_s), _SHORTEST_STEP_s)
         return self._target if cycles_needed <= 1.0 else self._sent + distance / cycles_needed
 
     def _take(self, datagrams: list[Datagram]) -> PositionerSample | None:

@@ -81,7 +81,7 @@ class Closing:
     def angles_rad(self, finger: str, u: float) -> dict[str, float]:
         """Joint angles of one finger at progress ``u``, clipped to the valid range."""
         low, high = self.paths[finger].valid
-        position = float(np.clip(u, low, high)) * (NODES - 1)
+        position = min(max(u, low), high) * (NODES - 1)
         index = min(int(position), NODES - 2)
         fraction = position - index
         table = self.tables[finger]

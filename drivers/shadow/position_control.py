@@ -45,7 +45,8 @@ class PositionControl:
         wanted_rad = np.array(list(targets_rad.values()), dtype=float)
         if not np.isfinite(wanted_rad).all():
             raise DeviceError("a joint target is not a finite number", where="hand", hint="Check the planned path")
-        self._targets_rad[numbers] = np.clip(wanted_rad, *self._motors.limits_rad[numbers].T)
+        lowest_rad, highest_rad = self._motors.limits_rad[numbers].T
+        self._targets_rad[numbers] = np.minimum(np.maximum(wanted_rad, lowest_rad), highest_rad)
         self._is_set[numbers] = True
 
     def clear(self) -> None:

@@ -122,12 +122,12 @@ class MotorBank:
 
     def _gauge_difference(self) -> Array:
         noise = _GAUGE_NOISE * self._rng.standard_normal(MOTORS)
-        return np.clip(np.rint(self._torque_Nm * GAUGE_COUNTS_PER_Nm + noise), -32768, 32767)
+        return np.minimum(np.maximum(np.rint(self._torque_Nm * GAUGE_COUNTS_PER_Nm + noise), -32768), 32767)
 
     def _demand(self, words: NDArray[np.int_]) -> None:
         self._flags &= ~int(MotorFlag.NO_DEMAND)
         self._halts_at_ns = self._plant.stamp_ns + DEMAND_TIMEOUT_ns
-        self._turn(np.clip(words, -self._max_pwm, self._max_pwm))
+        self._turn(np.minimum(np.maximum(words, -self._max_pwm), self._max_pwm))
 
     def _turn(self, pwm: Array | NDArray[np.int_]) -> None:
         self._pwm = np.where(self._flags & int(MotorFlag.OVER_TEMPERATURE), 0.0, pwm)
@@ -155,4 +155,5 @@ class MotorBank:
         self._warmed_at_ns = self._plant.stamp_ns
         final = _AMBIENT_C + _STALL_RISE_C * self._load**2
         self._celsius += (final - self._celsius) * (1 - np.exp(-elapsed_s / _THERMAL_TIME_s))
-        self._flags[self._celsius > _HALT_C] |= int(MotorFlag.OVER_TEMPERATURE)
+        if (hot := self._celsius > _HALT_C).any():
+            self._flags[hot] |= int(MotorFlag.OVER_TEMPERATURE)

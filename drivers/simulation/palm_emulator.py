@@ -65,11 +65,11 @@ class JointSensors:
         self._bias_rad = np.array(spread) * rng.standard_normal(len(JOINTS))
         self._noise_rad = settings.noise_rad
 
-    def counts(self, joints_rad: Array) -> NDArray[np.int_]:
+    def counts(self, joints_rad: Array) -> NDArray[np.uint16]:
         """One reading of all 37 channels for true angles of shape (24,)."""
         noise_rad = self._noise_rad * self._rng.standard_normal(len(joints_rad))
         counts = self._calibration.raw_counts(joints_rad + self._bias_rad + noise_rad)
-        return np.clip(np.rint(counts), 0, _ADC_FULL_SCALE).astype(int)
+        return np.minimum(np.maximum(np.rint(counts), 0.0), _ADC_FULL_SCALE).astype(np.uint16)
 
 
 class PalmEmulator:
@@ -111,7 +111,7 @@ class PalmEmulator:
         asked = command.from_motor_data_type != FromMotor.INVALID
         status = PalmStatus(
             edc_command=EdcCommand.SENSOR_DATA,
-            sensors=self._joints.counts(self._plant.joints_rad).astype(np.uint16),
+            sensors=self._joints.counts(self._plant.joints_rad),
             motor_data_type=command.from_motor_data_type,
             which_motors=parity,
             arrived=_ALL_OF[parity] if asked else 0,

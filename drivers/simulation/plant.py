@@ -21,6 +21,7 @@ STEP_ns = round(TIMESTEP_s * NANOSECONDS)
 START_BASE = np.array([-0.32, 0.0, 0.36, 0.0, 0.0, 0.0])
 """Where the positioner starts: the hand open, flat and well above the middle of the table."""
 
+_BASE_LOWEST, _BASE_HIGHEST = BASE_LIMITS.T
 _START_HAND_rad = {"THJ5": 0.9, "THJ4": 1.0}  # thumb turned to the palm's side, fingers straight
 
 
@@ -56,8 +57,8 @@ class Plant:
         self._steps = 0
         self._joints = _addresses(model, JOINTS)
         self._base = _addresses(model, BASE_JOINTS)
-        self._motors = [model.actuator(name).id for name in DRIVEN_JOINTS]
-        self._servos = [model.actuator(name).id for name in BASE_JOINTS]
+        self._motors = np.array([model.actuator(name).id for name in DRIVEN_JOINTS])
+        self._servos = np.array([model.actuator(name).id for name in BASE_JOINTS])
         self._wrench = _sensor_addresses(model)
         self._distal = [model.site(f"{finger} distal").id for finger in FINGERS]
         self._tips = {model.geom(f"{finger} tip").id: finger for finger in FINGERS}
@@ -95,11 +96,11 @@ class Plant:
 
     def drive(self, duty: Array) -> None:
         """Set the duty of each motor, shape (20,), -1 to 1, order of :data:`DRIVEN_JOINTS`."""
-        self._data.ctrl[self._motors] = np.clip(duty, -1.0, 1.0)
+        self._data.ctrl[self._motors] = np.minimum(np.maximum(duty, -1.0), 1.0)
 
     def move_base(self, target: Array) -> None:
         """Set the positioner's targets, shape (6,), metres and radians; clipped to its range."""
-        self._data.ctrl[self._servos] = np.clip(target, *BASE_LIMITS.T)
+        self._data.ctrl[self._servos] = np.minimum(np.maximum(target, _BASE_LOWEST), _BASE_HIGHEST)
 
     @property
     def joints_rad(self) -> Array:
