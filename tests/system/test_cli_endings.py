@@ -1,0 +1,139 @@
+"""Sessions that do not end by themselves: Ctrl+C, termination, a kill, a full disk. Each leaves a readable session."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from sessions import traffic
+
+COMMAND = [sys.executable, "-m", "tactile_lab.cli.main", "run"]
+ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+
+
+def start(root: Path, grasps: int = 8) -> subprocess.Popen[str]:
+    words = [*COMMAND, "--grasps", str(grasps), "--seed", "1", "--out", str(root)]
+    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
+
+
+def read_until(process: subprocess.Popen[str], pattern: str) -> str:
+    assert process.stderr is not None
+    told = ""
+    for line in process.stderr:
+        told += line
+        if re.search(pattern, line):
+            return told
+    raise AssertionError(told)
+
+
+def finish(process: subprocess.Popen[str]) -> str:
+    out, told = process.communicate(timeout=120)
+    assert "Traceback" not in told
+    assert out == ""
+    return told
+
+
+def only_session(root: Path) -> Path:
+    (folder,) = root.iterdir()
+    return folder
+
+
+def status(folder: Path) -> str:
+    return re.findall(r"^status: (\w+)$", (folder / "session.yaml").read_text(), re.M)[0]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_one_request_to_end_finishes_the_grasp_and_judges_what_there_is(tmp_path, number):
+    process = start(tmp_path)
+    read_until(process, r"^ +2/8 ")
+    process.send_signal(number)
+    told = finish(process)
+    assert process.returncode == 130
+    assert "interrupted" in told
+    folder = only_session(tmp_path)
+    assert status(folder) == "interrupted"
+    evaluation = json.loads((folder / "results" / "evaluation.json").read_text())
+    assert 2 <= evaluation["grasps"] <= 3
+
+
+def test_two_requests_end_at_once_and_the_recording_replays(tmp_path, inside):
+    process = start(tmp_path)
+    read_until(process, r"^ +2/8 ")
+    process.send_signal(signal.SIGINT)
+    time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    told = finish(process)
+    assert process.returncode == 130
+    folder = only_session(tmp_path)
+    assert status(folder) == "interrupted"
+    assert f"tactile-lab session replay {folder}" in told
+    answer = inside("session", "replay", folder, "--json")
+    assert answer.code in (0, 3)
+    assert json.loads(answer.out)["grasps"] >= 2
+
+
+def test_a_killed_session_is_open_and_replays_up_to_the_end(tmp_path, inside):
+    process = start(tmp_path)
+    read_until(process, r"^ +2/8 ")
+    process.kill()
+    process.communicate()
+    folder = only_session(tmp_path)
+    (listed,) = json.loads(inside("session", "list", "--root", tmp_path, "--json").out)
+    assert listed["status"] == "open"
+    answer = inside("session", "replay", folder)
+    assert answer.code in (0, 3)
+    assert answer.code == 0 or "the file ends too early" in answer.err
+    assert (folder / "results" / "evaluation.json").is_file()
+    assert inside("report", folder).code == 0
+
+
+@pytest.mark.parametrize("delay_s", [0.3, 1.0, 2.0])
+def test_ctrl_c_at_the_beginning(tmp_path, delay_s):
+    process = start(tmp_path)
+    time.sleep(delay_s)
+    process.send_signal(signal.SIGINT)
+    finish(process)
+    assert process.returncode in (130, -signal.SIGINT)  # Python's own ending, which a shell calls 130 too
+
+
+def test_ctrl_c_while_the_result_is_judged_keeps_the_session(tmp_path, inside):
+    process = start(tmp_path, grasps=1)
+    read_until(process, r"^ +1/1 ")
+    while status(folder := only_session(tmp_path)) == "open":
+        time.sleep(0.005)
+    process.send_signal(signal.SIGINT)
+    told = finish(process)
+    assert process.returncode == 130 or "report" in told  # it may have been ready already
+    assert status(folder) == "closed"
+    assert inside("session", "replay", folder).code == 0
+
+
+def test_a_full_disk_ends_the_session_and_the_recorded_part_replays(tmp_path, inside, monkeypatch):
+    room, write = [900_000], os.write
+
+    def write_while_there_is_room(descriptor: int, data: bytes) -> int:
+        room[0] -= len(data)
+        if room[0] < 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write(descriptor, data)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(traffic.os, "write", write_while_there_is_room)
+        answer = inside("run", "--grasps", 4, "--seed", 1, "--out", tmp_path)
+    assert answer.code == 1
+    assert "the disk is full" in answer.err
+    folder = only_session(tmp_path)
+    assert status(folder) == "failed"
+    assert "the disk is full" in inside("session", "show", folder).err
+    answer = inside("session", "replay", folder)
+    assert answer.code in (1, 3)
+    assert "grasps could be read" in answer.err
