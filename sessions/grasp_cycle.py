@@ -54,7 +54,7 @@ class CycleSettings(StrictModel):
     settle_s: float = Field(default=0.3, ge=0.0)
     rest_s: float = Field(default=0.2, gt=0.0)
     capture_s: float = Field(default=0.2, gt=0.0)
-    squeeze_force_N: float = Field(default=0.5, gt=0.0)
+    squeeze_force_N: float = Field(default=0.8, gt=0.0)
     squeeze_s: float = Field(default=0.5, gt=0.0)
     squeeze_gain: float = Field(default=0.02, gt=0.0)
     carry_turn_rad_s: float = Field(default=0.6, gt=0.0)

@@ -101,6 +101,22 @@ def test_hand_motion_carries_the_object_and_goes_into_the_next_grasp() -> None:
     assert 0.2 < abs(motion.rotation().yaw()) < 0.8
 
 
+def test_thumb_holds_against_the_fingers() -> None:
+    """Fingers at the squeeze force, the thumb at the sum of what they push along the hand's axis."""
+    loads: list[dict[str, float]] = []
+
+    def listen(world: DiscWorld) -> None:
+        if world.marks and world.marks[-1] is MarkKind.HOLD_BEGIN:
+            loads.append(world.perception.loads_N())
+
+    run(DiscWorld(disc(), before_cycle=listen), grasps=2, cycle={"squeeze_force_N": 0.5, "squeeze_s": 1.0})
+    held = loads[0]
+    for finger in ("FF", "MF", "RF", "LF"):
+        assert held[finger] == pytest.approx(0.5, abs=0.1) or held[finger] == 0.0
+    pushing = sum(held[finger] > 0 for finger in ("FF", "MF", "RF", "LF"))
+    assert held["TH"] == pytest.approx(0.5 * pushing, rel=0.25)
+
+
 def test_object_is_brought_back_toward_the_middle() -> None:
     target = disc(0.03, 0.02)
     run(DiscWorld(target), grasps=3)
