@@ -23,7 +23,7 @@ from sessions.progress import GraspReport, NullProgress, Progress
 from sessions.recorder import Level
 from sessions.safety import InterruptGuard, SafetySettings, SafetySupervisor
 from tactile_lab.clock import VirtualClock
-from tactile_lab.errors import TactileLabError, TrackingError
+from tactile_lab.errors import TactileLabError
 from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.slam import SlamStep, TactileSlam
 from tactile_lab.strict_yaml import StrictModel
@@ -113,6 +113,7 @@ class Conductor:
         self._interruption_told = False
         self._grasps: list[Grasp] = []
         self._misses = 0
+        self._number = 0
 
     # --- the session -------------------------------------------------------------------------------------------
 
@@ -160,7 +161,7 @@ class Conductor:
 
     def _one_grasp(self, index: int) -> None:
         """Descend, close, settle, capture, squeeze, re-orient, release, lift; then estimate."""
-        cycle = self._cycle
+        cycle, self._number = self._cycle, index + 1
         self._phase("descend")
         plan = self._think(lambda: self._planner.plan(index))
         if not self._arrive(plan):
@@ -211,13 +212,9 @@ class Conductor:
 
     # --- estimation --------------------------------------------------------------------------------------------
 
-    def _estimate(self, grasp: Grasp) -> SlamStep | None:
-        """One step of the estimation; a grasp that it refuses is told and left out."""
-        try:
-            step = self._think(lambda: self._slam.step(grasp))
-        except TrackingError as error:
-            self._tell(Level.ERROR, str(error))
-            return None
+    def _estimate(self, grasp: Grasp) -> SlamStep:
+        """One step of the estimation."""
+        step = self._think(lambda: self._slam.take(grasp))
         self._think(lambda: self._planner.estimated(grasp.index))
         state = {"index": step.index, "verdict": step.verdict, "reason": step.reason, "seconds": step.seconds}
         self._bench.recorder.slam(self._bench.clock.now_ns(), step.world_T_object, state, step.covariance)
@@ -235,8 +232,8 @@ class Conductor:
 
     # --- telling -----------------------------------------------------------------------------------------------
 
-    def _report(self, grasp: Grasp, plan: GraspPlan, step: SlamStep | None, missing: dict[str, str]) -> GraspReport:
-        covariance = None if step is None else step.covariance
+    def _report(self, grasp: Grasp, plan: GraspPlan, step: SlamStep, missing: dict[str, str]) -> GraspReport:
+        covariance = step.covariance
         known = self._planner.known_shape()
         return GraspReport(
             number=len(self._grasps),
@@ -249,12 +246,12 @@ class Conductor:
             position_sigma_m=None if covariance is None else float(np.sqrt(np.trace(covariance[:2, :2]) / 2)),
             yaw_sigma_rad=None if covariance is None else float(np.sqrt(covariance[2, 2])),
             explored=None if known is None else known.explored,
-            verdict="refused" if step is None else f"{step.verdict}: {step.reason}",
+            verdict=f"{step.verdict}: {step.reason}",
             stamp_ns=grasp.stamp_ns,
         )
 
     def _phase(self, name: str) -> None:
-        self._progress.phase(len(self._grasps) + 1, name)
+        self._progress.phase(self._number, name)
         if self._guard.requested and not self._interruption_told:
             self._interruption_told = True
             self._progress.told("Ctrl+C: finishing this grasp, then closing the session; once more to end at once")

@@ -20,14 +20,14 @@ A session is lost when the last ``lost_after`` grasps were untracked, or more th
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from gtsam import Pose3
 from pydantic import Field
 
-from tactile_lab.errors import ShapeError
+from tactile_lab.errors import ShapeError, TrackingError
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.graph.pose_graph import LoopReport
@@ -168,6 +168,15 @@ class TactileSlam:
         self._tracker.adopt(self._back_end.close_loops(self._tracker.map))
         return self._record(grasp, contacts, verdict, reason, started)
 
+    def take(self, grasp: Grasp) -> SlamStep:
+        """As :meth:`step`, but a grasp that is refused counts as one without contacts; its step says why."""
+        try:
+            return self.step(grasp)
+        except TrackingError as error:
+            step = self.step(replace(grasp, contacts=()))
+            self._steps[-1] = replace(step, reason=str(error))
+            return self._steps[-1]
+
     def finish(self) -> SlamResult:
         """Correct all poses a last time, and build the final shape with the best kernel parameters."""
         if self._tracker is not None:
@@ -231,7 +240,7 @@ class TactileSlam:
         self._origin_height_m = float(grasp.points_world_m[:, 2].mean())
         contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
         row = np.array([*contacts.points_m[:, :2].mean(axis=0), palm_heading(grasp.world_T_palm)])
-        first = PlacedGrasp(contacts, row, FIRST_COVARIANCE, np.zeros(3), used=True)
+        first = PlacedGrasp(contacts, row, FIRST_COVARIANCE, np.zeros(3))
         self._tracker = make_tracker(self._settings, first, self._rng)
         return self._record(grasp, contacts, "first", "object frame born", started)
 
@@ -256,7 +265,7 @@ class TactileSlam:
             verdict=verdict,
             reason=reason,
             contacts=len(contacts),
-            contacts_used=len(contacts) if placed and placed.used else 0,
+            contacts_used=len(placed.kept) if placed else 0,
             seconds=time.perf_counter() - started,
         )
         self._steps.append(step)

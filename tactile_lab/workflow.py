@@ -284,7 +284,7 @@ def _estimate_rest(slam: TactileSlam, grasps: Sequence[Grasp], progress: Progres
     progress = progress or NullProgress()
     for number, grasp in enumerate(grasps[slam.step_count :], slam.step_count + 1):
         progress.phase(number, "estimate")
-        slam.step(grasp)
+        slam.take(grasp)
 
 
 def _judge(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp], out: Path) -> FinishedSession:

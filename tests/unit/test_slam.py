@@ -205,3 +205,13 @@ def test_the_back_end_reports_its_loops() -> None:
 def test_the_joint_method_needs_normals_in_the_field() -> None:
     with pytest.raises(ValidationError, match="normals"):
         settings(method="joint", shape={"observations": "offsurface"})
+
+
+def test_refused_grasp_is_taken_as_one_without_contacts() -> None:
+    slam = TactileSlam(settings())
+    slam.take(FOUR.grasps[0])
+    bad = replace(FOUR.grasps[1].contacts[0], point_world_m=np.full(3, np.nan))
+    step = slam.take(replace(FOUR.grasps[1], contacts=(bad,)))
+    assert slam.step_count == 2
+    assert step.contacts == 0
+    assert "grasp 1" in step.reason
