@@ -12,12 +12,12 @@ import typer
 class Method(StrEnum):
     """Ways to estimate, by the names :class:`tactile_lab.slam.SlamSettings` knows."""
 
+    JOINT = "joint"
     PARTICLE = "particle"
     THESIS = "thesis"
-    JOINT = "joint"
 
 
-METHOD_HELP = "particle: calibrated filter; thesis: as printed there; joint: shape and trajectory together."
+METHOD_HELP = "joint: shape and trajectory together; particle: calibrated filter; thesis: as printed there."
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
 Root = Annotated[Path, typer.Option(help="Folder of sessions.")]

@@ -19,7 +19,7 @@ def run(
         int | None, typer.Option(min=1, help="Number of grasps.", show_default="the rig's, 16 on sim")
     ] = None,
     dimension: Annotated[int, typer.Option(min=2, max=3, help="2: horizontal contour; 3: surface.")] = 2,
-    method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.PARTICLE,
+    method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder in which the session's folder is made.")] = Path("runs"),
     notes: Annotated[str, typer.Option(help="The operator's notes, kept with the session.")] = "",

@@ -15,7 +15,7 @@ def sweep(
     objects: Annotated[str, typer.Option(help="Comma-separated object names, or 'all'.")] = "all",
     seeds: Annotated[str, typer.Option(help="Comma-separated seeds.")] = "1,2,3",
     dimensions: Annotated[str, typer.Option(help="2, 3 or 2,3.")] = "2,3",
-    method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.PARTICLE,
+    method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
     grasps: Annotated[int, typer.Option(min=1, help="Grasps a session.")] = 16,
     rig: RigName = "sim",
     jobs: Annotated[int, typer.Option(min=1, help="Sessions side by side.")] = 2,

@@ -108,7 +108,7 @@ def test_a_description_that_can_not_be_read(inside, session_copy, change, words)
 
 def test_settings_of_another_version(inside, session_copy):
     manifest = session_copy / "session.yaml"
-    manifest.write_text(manifest.read_text().replace("method: particle", "method: magic"))
+    manifest.write_text(manifest.read_text().replace("method: joint", "method: magic"))
     answer = inside("session", "replay", session_copy)
     assert answer.code == 2
     assert "not 'magic'" in answer.err
