@@ -163,7 +163,7 @@ def contacts(items: Iterable[Contact]) -> list[Json]:
 def encode(content: Json) -> bytes:
     """Compact JSON. Numbers that JSON has no word for (NaN) become null."""
     try:
-        return json.dumps(content, separators=(",", ":"), allow_nan=False, default=_plain).encode()
+        return _ENCODER.encode(content).encode()
     except ValueError:
         return json.dumps(_without_nan(content), separators=(",", ":")).encode()
 
@@ -172,6 +172,9 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} has no JSON form")
+
+
+_ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False, default=_plain)
 
 
 def _without_nan(value: Any) -> Any:

@@ -166,11 +166,13 @@ def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Clos
     return Closing(name, height_m, postures.grasp_T_palm, paths, postures.tables_rad)
 
 
+_COUPLED = {f"{finger}{joint}": f"{finger}J0" for finger in LONG_FINGERS for joint in ("J1", "J2")}
+
+
 def motor_targets(angles_rad: Mapping[str, float]) -> dict[str, float]:
     """Joint angles as motor targets: J1 and J2 of the four fingers share the tendon J0."""
     targets: dict[str, float] = {}
     for name, angle in angles_rad.items():
-        coupled = name[:2] in LONG_FINGERS and name[2:] in ("J1", "J2")
-        motor = f"{name[:2]}J0" if coupled else name
+        motor = _COUPLED.get(name, name)
         targets[motor] = targets.get(motor, 0.0) + angle
     return targets

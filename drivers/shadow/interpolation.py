@@ -100,18 +100,18 @@ class _Segments:
 class _TriangleMap:
     def __init__(self, source: Array, target: Array, triangles: NDArray[np.intp], beyond: Array) -> None:
         corners = np.concatenate([source[triangles], np.ones((*triangles.shape, 1))], axis=2)
-        weights = np.linalg.inv(corners.transpose(0, 2, 1))
-        self._turn, self._shift = weights[:, :, :2], weights[:, :, 2]
+        weights = np.linalg.inv(corners.transpose(0, 2, 1)).transpose(1, 0, 2)  # corner by triangle by (x, y, 1)
+        self._turn, self._shift = weights[:, :, :2].reshape(-1, 2), weights[:, :, 2].copy()
         self._targets = target[triangles]
         self._beyond = beyond
 
     def __call__(self, point: Array) -> Array:
-        weights = self._turn @ point + self._shift
-        smallest = weights.min(axis=1)
+        weights = (self._turn @ point).reshape(self._shift.shape) + self._shift
+        smallest = weights.min(axis=0)
         triangle = smallest.argmax()
         if smallest[triangle] < _INSIDE:
             return np.asarray(point @ self._beyond[:2] + self._beyond[2])
-        return np.asarray(weights[triangle] @ self._targets[triangle])
+        return np.asarray(weights[:, triangle] @ self._targets[triangle])
 
 
 def _swapped(table: Array) -> tuple[Array, Array]:
