@@ -11,7 +11,7 @@ def evaluate(session: SessionName, root: Root = Path("runs"), as_json: Json = Fa
     """Judge a session's results against the markers in its recorded pictures and the object's true mesh."""
     from sessions.listing import find_session
     from tactile_lab.cli.results import conclude
-    from tactile_lab.workflow import evaluate_session
+    from tactile_lab.workflow.judging import evaluate_session
 
     del no_input
     conclude(evaluate_session(find_session(root, session)), as_json)

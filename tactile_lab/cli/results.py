@@ -10,7 +10,7 @@ import typer
 from sessions.conductor import Ending, SessionOutcome
 from tactile_lab.cli.console import complain, emit_json, say, warn
 from tactile_lab.cli.evaluation_table import show_evaluation
-from tactile_lab.workflow import FinishedSession
+from tactile_lab.workflow.judging import FinishedSession
 
 FILES = (
     ("mesh.ply", "mesh"),

@@ -32,7 +32,7 @@ def run(
     """
     from tactile_lab.cli.progress import LiveProgress
     from tactile_lab.cli.results import conclude
-    from tactile_lab.workflow import SessionRequest, run_session, slam_settings
+    from tactile_lab.workflow.running import SessionRequest, run_session, slam_settings
 
     del no_input  # an autonomous session asks nothing; the option is there so that scripts can always give it
     settings = slam_settings(method, dimension)

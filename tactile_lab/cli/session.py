@@ -68,7 +68,9 @@ def replay(
     from sessions.listing import find_session
     from tactile_lab.cli.progress import LiveProgress
     from tactile_lab.cli.results import conclude
-    from tactile_lab.workflow import has_results, recorded_seed, recorded_slam, replay_session, slam_settings
+    from tactile_lab.workflow.judging import has_results
+    from tactile_lab.workflow.replaying import recorded_seed, recorded_slam, replay_session
+    from tactile_lab.workflow.running import slam_settings
 
     del no_input
     recorded = find_session(root, session)
@@ -87,7 +89,7 @@ def _tell_identity(recorded: Session, out: Path) -> bool:
     """Whether a replay gave the session's own results; tells people."""
     from sessions.manifest import installed_versions
     from tactile_lab.cli.console import say, warn
-    from tactile_lab.workflow import differing_files
+    from tactile_lab.workflow.judging import differing_files
 
     differing = differing_files(recorded.results, out)
     if not differing:

@@ -37,7 +37,7 @@ def sweep(
         summary_titles,
         sweep,
     )
-    from tactile_lab.workflow import check_sweep, run_for_sweep
+    from tactile_lab.workflow.sweeping import check_sweep, run_for_sweep
 
     del no_input
     names = None if objects == "all" else tuple(name.strip() for name in objects.split(","))

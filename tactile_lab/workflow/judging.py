@@ -1,0 +1,143 @@
+"""From a session and its estimation to a folder of results: model, evaluation, report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from gtsam import Pose3
+
+from drivers.camera.aruco import ObjectTracker
+from drivers.camera.calibration import load_camera
+from drivers.camera.camera import Camera
+from drivers.camera.markers import MarkerSettings
+from drivers.links import Datagram, ReplayLink
+from sessions.conductor import SessionOutcome
+from sessions.interpreter import CAMERA_LINK
+from sessions.manifest import write_whole
+from sessions.progress import NullProgress, Progress
+from sessions.session import RESULTS, Session
+from sessions.traffic_reader import Loss
+from tactile_lab import report
+from tactile_lab.clock import VirtualClock
+from tactile_lab.errors import SessionError, TactileLabError
+from tactile_lab.evaluation.evaluation import Evaluation, evaluate
+from tactile_lab.evaluation.result_files import write_results
+from tactile_lab.evaluation.results import read_results
+from tactile_lab.evaluation.session_truth import TRUTH_TRAJECTORY, Look, session_truth
+from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
+from tactile_lab.geometry.contacts import Grasp
+from tactile_lab.rigs.description import OTHER_VERSION, Rig, rig_of_session
+from tactile_lab.slam import TactileSlam
+from tactile_lab.strict_yaml import validate
+
+EVALUATION = "evaluation.json"
+REPLAYABLE = ("trajectory.csv", "contacts.csv", "contour.csv", "mesh.ply", "mesh.glb", "slam.json")
+"""Result files that a replay of the same session gives again, byte for byte."""
+RESULT_FILES = (*REPLAYABLE, "timing.json", TRUTH_TRAJECTORY, EVALUATION, report.REPORT)
+"""All files of a folder of results."""
+
+
+@dataclass(frozen=True)
+class FinishedSession:
+    """A session with its results.
+
+    Attributes:
+        folder: the session's.
+        results: the folder of these results.
+        outcome: how the autonomous part ended; None for a replay.
+        evaluation: None when there was nothing to judge.
+        data_loss: what was dropped or not recorded while the session ran, by kind.
+        unread: what of the recording could not be read, in words; "" when all of it was.
+        problem: why there is no evaluation, "" when there is one.
+    """
+
+    folder: Path
+    results: Path
+    outcome: SessionOutcome | None = None
+    evaluation: Evaluation | None = None
+    data_loss: Mapping[str, int] = field(default_factory=dict)
+    unread: str = ""
+    problem: str = ""
+
+
+def evaluate_session(session: Session) -> FinishedSession:
+    """Judge a session's results again, against the markers in its recorded pictures and its true mesh.
+
+    Raises:
+        SessionError: there are no results, or the recording can not be read.
+    """
+    evaluation, loss = _write_evaluation(session, rig_of_session(session), session.results)
+    return FinishedSession(session.folder, session.results, evaluation=evaluation, unread=loss.describe())
+
+
+def has_results(session: Session) -> bool:
+    """Whether the session's own results are complete; those of a killed session are not."""
+    return (session.folder / RESULTS / EVALUATION).is_file()
+
+
+def differing_files(one: Path, other: Path) -> list[str]:
+    """Names of replayable result files that are not the same, byte for byte, in two folders."""
+
+    def content(folder: Path, name: str) -> bytes | None:
+        return (folder / name).read_bytes() if (folder / name).is_file() else None
+
+    return [name for name in REPLAYABLE if content(one, name) != content(other, name)]
+
+
+def estimate_rest(slam: TactileSlam, grasps: Sequence[Grasp], progress: Progress | None = None) -> None:
+    """Take the grasps that the estimation has not seen: all of a replay, the last one of a session cut short."""
+    progress = progress or NullProgress()
+    for number, grasp in enumerate(grasps[slam.step_count :], slam.step_count + 1):
+        progress.phase(number, "estimate")
+        slam.take(grasp)
+
+
+def judge(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp], out: Path) -> FinishedSession:
+    """Finish the estimation and write model, evaluation and report; what stands in the way is told in the record."""
+    _remove_results(out)
+    if not grasps:
+        return FinishedSession(session.folder, out, problem="no grasp was recorded")
+    try:
+        write_results(out, slam.finish(), grasps, slam.settings.model_dump(mode="json"))
+        evaluation, _ = _write_evaluation(session, rig, out)
+        report.write(session.folder, out)
+    except TactileLabError as error:
+        return FinishedSession(session.folder, out, problem=str(error))
+    return FinishedSession(session.folder, out, evaluation=evaluation)
+
+
+def _remove_results(out: Path) -> None:
+    """Files of an earlier replay: what this one does not write should not look like its own."""
+    try:
+        for name in RESULT_FILES:
+            (out / name).unlink(missing_ok=True)
+    except OSError as error:
+        hint = "Choose another folder with --into"
+        raise SessionError(f"can not be replaced ({error.strerror})", where=str(out / name), hint=hint) from error
+
+
+def _write_evaluation(session: Session, rig: Rig, out: Path) -> tuple[Evaluation, Loss]:
+    stamps_s, traffic = read_results(out).trajectory.stamps_s, session.traffic()
+    truth = session_truth(session, len(stamps_s), _marker_detector(session, rig), traffic)
+    write_whole(out / TRUTH_TRAJECTORY, trajectory_text(Trajectory(stamps_s, truth.world_T_object)).encode())
+    evaluation = evaluate(out, truth, session.manifest.object_name)
+    write_whole(out / EVALUATION, evaluation.as_text().encode())
+    return evaluation, traffic.loss
+
+
+def _marker_detector(session: Session, rig: Rig) -> Look | None:
+    if "camera" not in rig.files:
+        return None
+    camera = Camera(ReplayLink(CAMERA_LINK, ()), VirtualClock())
+    where = f"{session.folder}/session.yaml"
+    recorded = session.manifest.settings.get("markers", {})
+    markers = validate(recorded, MarkerSettings, where=where, hint=OTHER_VERSION)
+    tracker = ObjectTracker(load_camera(rig.files["camera"]), markers)
+
+    def look(datagram: Datagram) -> Pose3 | None:
+        sighting = tracker.object_pose(camera.receive(datagram))
+        return None if sighting is None else sighting.world_T_object
+
+    return look

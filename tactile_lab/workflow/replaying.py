@@ -1,0 +1,82 @@
+"""A recorded session, estimated again from its raw bytes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from sessions.progress import NullProgress, Progress
+from sessions.replay import Replay
+from sessions.session import Session
+from sessions.traffic_reader import Loss
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.geometry.contacts import Grasp
+from tactile_lab.rigs.build import build_interpreter
+from tactile_lab.rigs.description import OTHER_VERSION, rig_of_session
+from tactile_lab.slam import SlamSettings, TactileSlam
+from tactile_lab.strict_yaml import validate
+from tactile_lab.workflow.judging import RESULT_FILES, FinishedSession, estimate_rest, has_results, judge
+
+
+def replay_session(
+    session: Session, settings: SlamSettings, seed: int, out: Path, progress: Progress | None = None
+) -> FinishedSession:
+    """Understand a recorded session again from its raw bytes, and judge it.
+
+    Args:
+        session: the recording.
+        settings, seed: of the estimation; with the recorded ones the results are the session's own, byte for byte.
+        out: folder of the results; those of an earlier replay in it are replaced.
+        progress: is told which grasp is being estimated.
+
+    Raises:
+        ConfigurationError: ``out`` holds other files.
+        SessionError: the recording can not be used at all. One that was cut off is used up to the cut.
+    """
+    _check_replaceable(session, out)
+    rig = rig_of_session(session)
+    slam, replay = TactileSlam(settings, seed), Replay(session, build_interpreter(rig))
+    progress = progress or NullProgress()
+    progress.phase(0, "read")
+    grasps = [outcome for outcome in replay.outcomes() if isinstance(outcome, Grasp)]
+    estimate_rest(slam, grasps, progress)
+    progress.phase(len(grasps), "model and evaluation")
+    finished = judge(session, rig, slam, grasps, out)
+    unread = _unread(replay.loss, len(grasps), session.manifest.counts.get("grasps"))
+    return replace(finished, data_loss=session.manifest.data_loss, unread=unread)
+
+
+def _unread(loss: Loss, grasps: int, recorded: int | None) -> str:
+    """What a replay could not read, in words."""
+    if not loss:
+        return ""
+    known = "" if recorded is None else f" of {recorded}"
+    return f"{loss.describe()}; {grasps}{known} grasps could be read"
+
+
+def _check_replaceable(session: Session, out: Path) -> None:
+    """Never write over what a replay has not made."""
+    if has_results(session) and out.resolve() == session.results.resolve():
+        hint = "Choose another folder with --into"
+        raise ConfigurationError("holds the session's own results", where=str(out), hint=hint)
+    try:
+        strange = sorted(entry.name for entry in out.iterdir() if entry.name not in RESULT_FILES)
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        hint = "Choose another folder with --into"
+        raise ConfigurationError(f"can not be used ({error.strerror})", where=str(out), hint=hint) from error
+    if strange:
+        hint = "Choose a new folder with --into"
+        raise ConfigurationError(f"holds files that are no results, such as {strange[0]}", where=str(out), hint=hint)
+
+
+def recorded_slam(session: Session) -> SlamSettings:
+    """The estimation's settings of a session. Raises ConfigurationError."""
+    where = f"{session.folder}/session.yaml"
+    return validate(session.manifest.settings.get("slam", {}), SlamSettings, where=where, hint=OTHER_VERSION)
+
+
+def recorded_seed(session: Session) -> int:
+    """The seed a session was run with."""
+    return session.manifest.seeds.get("session", 0)

@@ -1,0 +1,136 @@
+"""The main job: an autonomous session on a rig, recorded and judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from drivers.simulation.world import SimulatedWorld
+from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome
+from sessions.manifest import Status
+from sessions.progress import Progress
+from sessions.session import RunningSession, create_session
+from tactile_lab.errors import InterruptionError
+from tactile_lab.rigs.build import build_bench, check_calibration, simulated_world
+from tactile_lab.rigs.description import Rig, load_rig
+from tactile_lab.slam import SlamSettings, TactileSlam
+from tactile_lab.strict_yaml import validate
+from tactile_lab.workflow.judging import FinishedSession, estimate_rest, judge
+
+
+@dataclass(frozen=True)
+class SessionRequest:
+    """What a person asks for.
+
+    Attributes:
+        rig: name of a shipped rig, or a rig file.
+        object_name: of the simulated rig's catalogue, or ``mesh:FILE``.
+        root: folder in which the session's folder is made.
+        slam: the estimation's settings.
+        seed: of everything that is left to chance.
+        grasps: how many; the rig's own number when None.
+        notes: the operator's.
+    """
+
+    rig: str
+    object_name: str
+    root: Path
+    slam: SlamSettings
+    seed: int = 0
+    grasps: int | None = None
+    notes: str = ""
+
+
+def slam_settings(method: str, dimension: int) -> SlamSettings:
+    """Settings of the estimation. Raises ConfigurationError for an unknown method or dimension."""
+    return validate({"method": method, "dimension": dimension}, SlamSettings, where="options")
+
+
+def run_session(request: SessionRequest, progress: Progress) -> FinishedSession:
+    """Run an autonomous session on a rig, and judge it.
+
+    Raises:
+        ConfigurationError, ShapeError: the request can not be met; nothing was recorded.
+        DeviceError: the rig is not ready; the session folder says so.
+        SessionError: the session could not be recorded.
+        InterruptionError: a person ended it at once; the session folder is kept and readable.
+    """
+    rig = load_rig(request.rig)
+    check_calibration(rig)
+    world = simulated_world(rig, request.seed, request.object_name)
+    slam = TactileSlam(request.slam, request.seed)
+    session = _new_session(rig, world, request)
+    try:
+        outcome = _record(session, rig, world, slam, request, progress)
+        progress.phase(len(outcome.grasps), "model and evaluation")
+        estimate_rest(slam, outcome.grasps)
+        finished = judge(session, rig, slam, outcome.grasps, session.results)
+    except KeyboardInterrupt:
+        hint = f"What was recorded is kept: tactile-lab session replay {session.folder}"
+        raise InterruptionError("interrupted before it was done", where=str(session.folder), hint=hint) from None
+    return replace(finished, outcome=outcome, data_loss=session.manifest.data_loss)
+
+
+def _record(
+    session: RunningSession,
+    rig: Rig,
+    world: SimulatedWorld,
+    slam: TactileSlam,
+    request: SessionRequest,
+    progress: Progress,
+) -> SessionOutcome:
+    """Connect, grasp until done, disconnect; the session is closed in any case."""
+    with session:
+        progress.phase(0, "connect")
+        bench = build_bench(rig, world, session.recorder)
+        bench.connect()
+        settings, dimension = _conductor_settings(rig, request), request.slam.dimension
+        try:
+            conductor = Conductor(bench, slam, settings, seed=request.seed, dimension=dimension, progress=progress)
+            outcome = conductor.run()
+        finally:
+            bench.close()
+        _close(session, outcome, bench.counts.overruns, bench.undecodable)
+    return outcome
+
+
+def _new_session(rig: Rig, world: SimulatedWorld, request: SessionRequest) -> RunningSession:
+    return create_session(
+        request.root,
+        rig=rig.description.name,
+        rig_description=rig.plain(),
+        object_name=request.object_name,
+        calibration_files=rig.files,
+        seeds={"session": request.seed},
+        settings={
+            "slam": request.slam.model_dump(mode="json"),
+            "grasps": _conductor_settings(rig, request).grasps,
+            "markers": world.marker_settings.model_dump(mode="json"),
+        },
+        notes=request.notes,
+        truth_mesh_ply=_ply(world),
+    )
+
+
+def _ply(world: SimulatedWorld) -> bytes:
+    text = world.object_model.mesh.export(file_type="ply")
+    assert isinstance(text, bytes)
+    return text
+
+
+def _conductor_settings(rig: Rig, request: SessionRequest) -> ConductorSettings:
+    changes = {} if request.grasps is None else {"grasps": request.grasps}
+    return rig.description.conductor.model_copy(update=changes)
+
+
+def _close(session: RunningSession, outcome: SessionOutcome, overruns: int, undecodable: Mapping[str, int]) -> None:
+    status: Status = "closed"
+    if outcome.ending is Ending.INTERRUPTED:
+        status = "interrupted"
+    elif outcome.error is not None:
+        status = "failed"
+    as_asked = outcome.ending in {Ending.COMPLETE, Ending.INTERRUPTED}
+    counts = {"grasps": len(outcome.grasps), "overruns": overruns}
+    lost = {f"undecodable {link}": number for link, number in undecodable.items()}
+    session.close(status, counts=counts, data_loss=lost, problem="" if as_asked else outcome.reason)

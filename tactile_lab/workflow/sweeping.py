@@ -1,0 +1,45 @@
+"""Many sessions, for one table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from drivers.simulation.objects import CATALOGUE
+from sessions.progress import NullProgress
+from tactile_lab.errors import SessionError
+from tactile_lab.evaluation.sweep import SweepRun
+from tactile_lab.rigs.build import check_calibration, simulated_world
+from tactile_lab.rigs.description import load_rig
+from tactile_lab.workflow.running import SessionRequest, run_session, slam_settings
+
+
+def check_sweep(rig: str, objects: Sequence[str] | None, root: Path) -> tuple[str, ...]:
+    """The objects of a sweep, the whole catalogue when None; what would fail in every run fails here.
+
+    Raises:
+        ConfigurationError: no such rig, object or calibration.
+        ShapeError: an object's mesh can not be used.
+        SessionError: the folder of the sessions can not be made.
+    """
+    loaded = load_rig(rig)
+    check_calibration(loaded)
+    for name in objects or ():
+        simulated_world(loaded, 0, name)
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        hint = "Choose another folder with --out"
+        raise SessionError(f"can not be made ({error.strerror})", where=str(root), hint=hint) from error
+    return tuple(objects or CATALOGUE)
+
+
+def run_for_sweep(run: SweepRun, *, rig: str, method: str, grasps: int, root: Path) -> dict[str, Any]:
+    """One session of a sweep: the content of its ``evaluation.json``. Raises TactileLabError."""
+    settings = slam_settings(method, run.dimension)
+    request = SessionRequest(rig, run.object_name, root, settings, run.seed, grasps)
+    finished = run_session(request, NullProgress())
+    if finished.evaluation is None:
+        raise SessionError(finished.problem, where=str(finished.folder))
+    return finished.evaluation.as_json()
