@@ -22,14 +22,28 @@ class PlacedGrasp:
         row: pose ``world_T_object`` as (x_m, y_m, yaw_rad).
         covariance: of the pose, shape (3, 3).
         motion: the hand's motion since the grasp before, as a row.
-        used: its contacts are part of the shape; otherwise they are kept aside.
+        left_out: indices of the contacts that are kept aside; the others are part of the shape.
     """
 
     contacts_world: ContactSet
     row: Array
     covariance: Array
     motion: Array
-    used: bool
+    left_out: frozenset[int] = frozenset()
+
+    @property
+    def kept(self) -> NDArray[np.intp]:
+        """Indices of the contacts that are part of the shape."""
+        return np.array([i for i in range(len(self.contacts_world)) if i not in self.left_out], dtype=np.intp)
+
+    @property
+    def used(self) -> bool:
+        """Some of its contacts are part of the shape."""
+        return len(self.left_out) < len(self.contacts_world)
+
+    def put_aside(self) -> PlacedGrasp:
+        """The same with none of its contacts in the shape."""
+        return replace(self, left_out=frozenset(range(len(self.contacts_world))))
 
 
 @dataclass(frozen=True)
@@ -52,15 +66,31 @@ class ContactMap:
     @property
     def contacts(self) -> ContactSet:
         """Contacts that make up the shape, object frame."""
-        return ContactSet.concatenated(
-            [grasp.contacts_world.in_object_frame(grasp.row) for grasp in self.placed if grasp.used]
-        )
+        seen = [grasp.contacts_world.selected(grasp.kept).in_object_frame(grasp.row) for grasp in self.placed]
+        return ContactSet.concatenated(seen)
+
+    @property
+    def contacts_world(self) -> ContactSet:
+        """The same contacts where they were touched, world frame."""
+        return ContactSet.concatenated([grasp.contacts_world.selected(grasp.kept) for grasp in self.placed])
 
     @property
     def grasp_indices(self) -> NDArray[np.intp]:
         """The grasp that each of :attr:`contacts` comes from, shape (n,)."""
-        counts = [len(grasp.contacts_world) if grasp.used else 0 for grasp in self.placed]
-        return np.repeat(np.arange(len(self.placed)), counts)
+        return np.repeat(np.arange(len(self.placed)), [len(grasp.kept) for grasp in self.placed])
+
+    @property
+    def left_out_count(self) -> int:
+        """Number of contacts that are kept aside."""
+        return sum(len(grasp.left_out) for grasp in self.placed)
+
+    def without_contact(self, position: int) -> ContactMap:
+        """The map without one of :attr:`contacts`."""
+        index = int(self.grasp_indices[position])
+        grasp = self.placed[index]
+        within = position - int(np.searchsorted(self.grasp_indices, index))
+        emptier = replace(grasp, left_out=grasp.left_out | {int(grasp.kept[within])})
+        return replace(self, placed=(*self.placed[:index], emptier, *self.placed[index + 1 :]))
 
     def seen_by(self, index: int) -> ContactSet:
         """Contacts of one grasp, object frame."""

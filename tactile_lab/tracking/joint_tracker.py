@@ -4,12 +4,14 @@ The filter of algorithm 3.1 commits to one map grasp by grasp and can not take a
 hypothesis is a whole trajectory, and the place of a particle's weight is taken by its evidence: the likelihood
 of all contacts for these poses (:mod:`pose_evidence`), the motion model, and free space. Each grasp the best
 hypotheses branch into the poses that the measurement proposes, are smoothed, compared, and the best are kept.
-One more branch always says that the grasp can not be placed: its contacts count as explained by nothing. It wins
-where every placement would tear the shape or the motion, and is dropped when later grasps tell better.
+A contact that fits worse than a contact explained by nothing is left out; one more branch always leaves out all
+contacts of a grasp. It wins where every placement would tear the shape or the motion, and is dropped when later
+grasps tell better.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,7 +48,6 @@ class JointSettings(StrictModel):
         hypotheses: so many are kept from grasp to grasp.
         smoothed: so many of the branches, by evidence before smoothing, are smoothed.
         evidence_gap: hypotheses that much less likely than the best (natural logarithm) are given up.
-        unplaced_cost: negative log evidence of a contact that is left out, in the units of the field's evidence.
         iterations: of the optimiser at each grasp.
         final_iterations: of the optimiser at the end.
     """
@@ -55,7 +56,6 @@ class JointSettings(StrictModel):
     hypotheses: int = Limit(default=8, ge=1)
     smoothed: int = Limit(default=12, ge=1)
     evidence_gap: float = Limit(default=25.0, gt=0)
-    unplaced_cost: float = Limit(default=5.0, gt=0)
     iterations: int = Limit(default=25, ge=1)
     final_iterations: int = Limit(default=80, ge=1)
 
@@ -93,10 +93,8 @@ class JointTracker:
 
     def weigh(self, contacts: ContactSet) -> bool:
         """Branch every hypothesis into the poses proposed for this grasp, smooth the likeliest and rank them."""
-        branches = [self._unplaced(hypothesis, contacts) for hypothesis in self._hypotheses]
-        if len(contacts):
-            branches += [branch for hypothesis in self._hypotheses for branch in self._branched(hypothesis, contacts)]
-        branches = self._likeliest(branches, self._settings.smoothed)
+        unplaced = [self._unplaced(hypothesis, contacts) for hypothesis in self._hypotheses]
+        branches = self._likeliest(unplaced + self._branched(contacts), self._settings.smoothed)
         smoothed = [self._smoothed(branch, self._settings.iterations) for branch in branches]
         self._branches = self._likeliest(_different(smoothed), self._settings.hypotheses)
         weights = self._weights(self._branches)
@@ -136,18 +134,32 @@ class JointTracker:
     def _unplaced(self, hypothesis: Hypothesis, contacts: ContactSet) -> Hypothesis:
         last = hypothesis.map.placed[-1]
         row, covariance = compose(self._motion, last.row), last.covariance + np.diag(self._noise.sigmas**2)
-        grasp = PlacedGrasp(contacts, row, covariance, self._motion, used=False)
+        grasp = PlacedGrasp(contacts, row, covariance, self._motion).put_aside()
         return self._rated(hypothesis.map.with_grasp(grasp))
 
-    def _branched(self, hypothesis: Hypothesis, contacts: ContactSet) -> list[Hypothesis]:
+    def _branched(self, contacts: ContactSet) -> list[Hypothesis]:
+        """The likeliest continuations of all hypotheses, contacts that do not fit them left out."""
+        if len(contacts) == 0:
+            return []
+        proposed = [each for hypothesis in self._hypotheses for each in self._proposed(hypothesis, contacts)]
+        promising = self._likeliest(proposed, 2 * self._settings.smoothed)
+        latest = len(self.map.placed)
+        return [self._rated(self._without_outliers(branch.map, [latest])) for branch in promising]
+
+    def _proposed(self, hypothesis: Hypothesis, contacts: ContactSet) -> list[Hypothesis]:
+        """Continuations of a hypothesis, rated contact by contact only."""
         predicted = compose(self._motion, hypothesis.map.placed[-1].row)
         field, settings = self._field(hypothesis.map), self._settings.proposals
         noise = self._noise.accumulated(1 + _trailing_unplaced(hypothesis.map))
-        rows, _ = propose(predicted, contacts, field, noise, settings)
+        rows, costs = propose(predicted, contacts, field, noise, settings)
         fit = fit_poses(rows, predicted, contacts, field, noise, settings)
-        return [
-            self._rated(hypothesis.map.with_grasp(PlacedGrasp(contacts, row, covariance, self._motion, used=True)))
+        grasps = [
+            PlacedGrasp(contacts, row, covariance, self._motion)
             for row, covariance in zip(rows, np.linalg.inv(fit.information), strict=True)
+        ]
+        return [
+            Hypothesis(hypothesis.map.with_grasp(grasp), hypothesis.cost + float(cost))
+            for grasp, cost in zip(grasps, costs, strict=True)
         ]
 
     @staticmethod
@@ -163,15 +175,29 @@ class JointTracker:
         return Hypothesis(contact_map, evidence + self._other_costs(contact_map))
 
     def _smoothed(self, hypothesis: Hypothesis, iterations: int) -> Hypothesis:
-        evidence = PoseEvidence(hypothesis.map, self._noise)
-        rows, cost = evidence.maximised(hypothesis.map.rows, iterations)
+        """The poses of largest evidence nearby; once more if contacts turn out not to fit them."""
+        rows, cost = PoseEvidence(hypothesis.map, self._noise).maximised(hypothesis.map.rows, iterations)
         smoothed = hypothesis.map.with_rows(rows)
+        cleaned = self._without_outliers(smoothed, range(len(rows)))
+        if cleaned is not smoothed:
+            rows, cost = PoseEvidence(cleaned, self._noise).maximised(cleaned.rows, iterations)
+            smoothed = cleaned.with_rows(rows)
         return Hypothesis(smoothed, cost + self._other_costs(smoothed))
+
+    def _without_outliers(self, contact_map: ContactMap, grasps: Sequence[int]) -> ContactMap:
+        """Leave out contacts of some grasps, the worst first, while they cost more than being explained by nothing."""
+        while len(contact_map.contacts) > 1:
+            costs = PoseEvidence(contact_map, self._noise).leave_one_out_costs(contact_map.rows)
+            costs[~np.isin(contact_map.grasp_indices, grasps)] = -np.inf
+            worst = int(costs.argmax())
+            if costs[worst] <= self._settings.proposals.unexplained_cost:
+                break
+            contact_map = contact_map.without_contact(worst)
+        return contact_map
 
     def _other_costs(self, contact_map: ContactMap) -> float:
         """What the poses are judged by beside the contacts in place: free space and the contacts left out."""
-        left_out = sum(len(grasp.contacts_world) for grasp in contact_map.placed if not grasp.used)
-        return free_space_cost(contact_map) + self._settings.unplaced_cost * left_out
+        return free_space_cost(contact_map) + self._settings.proposals.unexplained_cost * contact_map.left_out_count
 
     def _likeliest(self, hypotheses: list[Hypothesis], count: int) -> list[Hypothesis]:
         ranked = sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)[:count]

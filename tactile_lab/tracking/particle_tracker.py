@@ -66,8 +66,8 @@ class ParticleTracker:
 
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
         estimate = self.estimate()
-        grasp = PlacedGrasp(contacts, estimate.row, estimate.covariance, self._motion, used=certain)
-        self._map = self._map.with_grasp(grasp)
+        grasp = PlacedGrasp(contacts, estimate.row, estimate.covariance, self._motion)
+        self._map = self._map.with_grasp(grasp if certain else grasp.put_aside())
         if certain and len(self._map.placed) % self._kernel_every == 0:
             self._map = self._map.with_best_kernel()
 

@@ -19,7 +19,6 @@ from tactile_lab.shape.kernels import Kernel, Matern52, Profile, SquaredExponent
 from tactile_lab.shape.priors import PriorMean
 from tactile_lab.shape.settings import initial_kernel, observe, prior_mean
 from tactile_lab.tracking.contact_map import ContactMap
-from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.motion import MotionNoise, compose, deviation
 
 STIFF_BEYOND_SIGMA = 3.2
@@ -42,7 +41,7 @@ class PoseEvidence:
             noise: of the motion model.
         """
         self._map, self._noise = contact_map, noise
-        self._world = ContactSet.concatenated([grasp.contacts_world for grasp in contact_map.placed if grasp.used])
+        self._world = contact_map.contacts_world
         self._grasp_of = contact_map.grasp_indices
         self._motions = np.array([grasp.motion for grasp in contact_map.placed])
         contacts = contact_map.contacts
@@ -68,6 +67,20 @@ class PoseEvidence:
         return self._misfit(factor, residual, weights) + cost, gradient + self._by_poses(
             rows, points, normals, by_points, by_normals
         )
+
+    def leave_one_out_costs(self, rows: Array) -> Array:
+        """For each contact the negative log probability density given all others, shape (n,).
+
+        The marginal likelihood of all contacts is that of the others times this, so these costs tell what would be
+        gained by leaving a contact out. They follow from the blocks of the inverse covariance alone.
+        """
+        points, normals = self._in_object_frame(rows)
+        factor, _, weights = self._factorised(points, normals)
+        count, rows_each = len(points), points.shape[1] + 1
+        blocks = np.einsum("aibi->iab", _inverse(factor).reshape(rows_each, count, rows_each, count))
+        own = weights.reshape(rows_each, count).T
+        misfits = np.einsum("ia,ia->i", own, np.linalg.solve(blocks, own[..., None])[..., 0])
+        return np.asarray(0.5 * (misfits - np.linalg.slogdet(blocks)[1]))
 
     def maximised(self, rows: Array, max_iterations: int) -> tuple[Array, float]:
         """Poses of largest posterior near the given ones, and the negative log posterior there (L-BFGS)."""
@@ -115,10 +128,8 @@ class PoseEvidence:
     def _contact_gradient(self, points: Array, factor: Array, weights: Array) -> tuple[Array, Array]:
         """Derivatives of the misfit by each contact's point and normal, shape (n, d) each."""
         count, dimension = points.shape
-        inverse, _ = lapack.dpotri(factor, lower=1)
-        inverse = np.tril(inverse) + np.tril(inverse, -1).T
         by_normals = weights[count:].reshape(dimension, count).T
-        by_points = covariance_pull(self._kernel, points, inverse - np.outer(weights, weights)) / 2
+        by_points = covariance_pull(self._kernel, points, _inverse(factor) - np.outer(weights, weights)) / 2
         by_points -= weights[:count, None] * self._prior.gradient(points)
         by_points -= _directional_change(self._prior, points, by_normals)
         return by_points, by_normals
@@ -150,6 +161,12 @@ class PoseEvidence:
         gradient[:-1, 1] -= cosine * pull[:, 1] - sine * pull[:, 0]
         gradient[:-1, 2] -= pull[:, 2]
         return float(cost), gradient
+
+
+def _inverse(factor: Array) -> Array:
+    """Inverse of the matrix with this lower Cholesky factor."""
+    lower, _ = lapack.dpotri(factor, lower=1)
+    return np.asarray(np.tril(lower) + np.tril(lower, -1).T)
 
 
 def covariance_pull(kernel: Kernel, points: Array, weights: Array) -> Array:

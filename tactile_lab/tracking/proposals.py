@@ -37,6 +37,8 @@ class ProposalSettings(StrictModel):
         steps: Gauss-Newton steps.
         kept: at most so many different proposals.
         distinct_m, distinct_rad: proposals closer than both are the same.
+        unexplained_cost: negative log likelihood of a contact that nothing explains (wrong part of a finger, another
+            object); no contact costs more.
         normal_length_m: a map uncertain by sigma predicts normals to ``sigma / normal_length_m`` radians.
     """
 
@@ -45,6 +47,7 @@ class ProposalSettings(StrictModel):
     kept: int = Limit(default=12, ge=1)
     distinct_m: float = Limit(default=0.0025, gt=0)
     distinct_rad: float = Limit(default=0.08, gt=0)
+    unexplained_cost: float = Limit(default=5.0, gt=0)
     normal_length_m: float = Limit(default=0.018, gt=0)
 
 
@@ -111,7 +114,8 @@ def fit_poses(
     tilt = np.einsum("nmd,nmd->nm", tilts, tilts) / normal_variance
     distance = values**2 / value_variance
     away = deviation(rows, predicted) / noise.sigmas
-    cost = 0.5 * (distance + np.log(value_variance) + tilt + contacts.dimension * np.log(normal_variance)).sum(axis=1)
+    each = 0.5 * (distance + np.log(value_variance) + tilt + contacts.dimension * np.log(normal_variance))
+    cost = -np.logaddexp(-each, -settings.unexplained_cost).sum(axis=1)
     by_pose = _value_rows(rows, points, slopes)
     turned = np.stack([normals[..., 1], -normals[..., 0]], axis=-1)
     pull = values / (value_variance * (1 + distance / _ROBUST_SQUARED))

@@ -29,7 +29,6 @@ def true_map(shape: str, count: int, dimension: int = 2, kernel: str = "matern52
             planar_motion(pose),
             np.eye(3) * 1e-6,
             planar_motion(grasp.hand_motion_world),
-            used=True,
         )
         for grasp, pose in zip(data.grasps, data.world_T_body, strict=True)
     ]
@@ -116,7 +115,6 @@ def test_a_grasp_without_contacts_follows_the_motion_model() -> None:
         last.row + 0.01,
         last.covariance,
         last.motion,
-        used=True,
     )
     found, _ = PoseEvidence(contact_map_of(contact_map, empty), NOISE).maximised(
         contact_map.rows + np.array([[0], [0], [0], [0.01]]), 60

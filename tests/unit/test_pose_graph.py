@@ -29,7 +29,6 @@ def true_map(seed: int = 0, count: int = 8) -> ContactMap:
             planar_motion(pose),
             np.diag(DRIFT_SIGMAS**2) if grasp.index else np.eye(3) * 1e-10,
             planar_motion(grasp.hand_motion_world),
-            used=True,
         )
         for grasp, pose in zip(data.grasps, data.world_T_body, strict=True)
     ]
@@ -145,7 +144,7 @@ def test_a_back_end_that_is_switched_off_does_nothing() -> None:
 
 def test_grasps_kept_aside_make_no_loops() -> None:
     contact_map = true_map()
-    aside = replace(contact_map.placed[-1], used=False)
+    aside = contact_map.placed[-1].put_aside()
     estimate = replace(contact_map, placed=(*contact_map.placed[:-1], aside))
     assert BackEnd(BackEndSettings()).close_loops(estimate) is estimate
     loops = find_loops(estimate, rectangle_faces(estimate), PoseGraphSettings(), [7])
