@@ -53,10 +53,10 @@ class JointSettings(StrictModel):
     """
 
     proposals: ProposalSettings = ProposalSettings()
-    hypotheses: int = Limit(default=8, ge=1)
-    smoothed: int = Limit(default=12, ge=1)
+    hypotheses: int = Limit(default=4, ge=1)
+    smoothed: int = Limit(default=6, ge=1)
     evidence_gap: float = Limit(default=25.0, gt=0)
-    iterations: int = Limit(default=25, ge=1)
+    iterations: int = Limit(default=15, ge=1)
     final_iterations: int = Limit(default=80, ge=1)
 
 
@@ -138,13 +138,17 @@ class JointTracker:
         return self._rated(hypothesis.map.with_grasp(grasp))
 
     def _branched(self, contacts: ContactSet) -> list[Hypothesis]:
-        """The likeliest continuations of all hypotheses, contacts that do not fit them left out."""
+        """The likeliest continuations of all hypotheses, contacts that do not fit them left out.
+
+        A grasp is only placed if most of its contacts fit: the rest could be anywhere by chance.
+        """
         if len(contacts) == 0:
             return []
         proposed = [each for hypothesis in self._hypotheses for each in self._proposed(hypothesis, contacts)]
         promising = self._likeliest(proposed, 2 * self._settings.smoothed)
         latest = len(self.map.placed)
-        return [self._rated(self._without_outliers(branch.map, [latest])) for branch in promising]
+        cleaned = [self._without_outliers(branch.map, [latest]) for branch in promising]
+        return [self._rated(each) for each in cleaned if 2 * len(each.placed[-1].kept) > len(contacts)]
 
     def _proposed(self, hypothesis: Hypothesis, contacts: ContactSet) -> list[Hypothesis]:
         """Continuations of a hypothesis, rated contact by contact only."""

@@ -35,9 +35,6 @@ GRID_MARGIN_m = 0.040
 THESIS_SHAPE = GpisSettings(observations="offsurface", kernel="squared_exponential", prior_mean="zero")
 """The thesis's shape model (section 2.2)."""
 
-JOINT_IN_SPACE = JointSettings(hypotheses=4, smoothed=6, iterations=15)
-"""A solid's contacts tell more about the pose than a contour's, and each hypothesis costs more."""
-
 
 class Tracker(Protocol):
     """Follows the object from grasp to grasp; the calls of one step come in this order."""
@@ -83,7 +80,7 @@ class TrackingSettings(StrictModel):
         shape: the shape model; None for the method's own.
         gate: of the thesis's measurement model.
         likelihood: of the calibrated one.
-        joint: parameters of the hypotheses; None for those that suit the dimension.
+        joint: parameters of the hypotheses.
         kernel_every: kernel parameters are estimated anew after so many grasps.
         contour_grid_m, surface_grid_m: spacing of the grid that particles look the field up in.
     """
@@ -95,7 +92,7 @@ class TrackingSettings(StrictModel):
     shape: GpisSettings | None = None
     gate: GateSettings = GateSettings()
     likelihood: CalibratedSettings = CalibratedSettings()
-    joint: JointSettings | None = None
+    joint: JointSettings = JointSettings()
     kernel_every: int = Limit(default=4, ge=1)
     contour_grid_m: float = Limit(default=0.002, gt=0)
     surface_grid_m: float = Limit(default=0.005, gt=0)
@@ -123,8 +120,7 @@ def make_tracker(settings: TrackingSettings, first: PlacedGrasp, rng: np.random.
     if calibrated:
         measurement = CalibratedMeasurement(settings.likelihood)
     if settings.method == "joint":
-        joint = settings.joint or (JointSettings() if settings.dimension == 2 else JOINT_IN_SPACE)
-        return JointTracker(ContactMap((first,), shape), settings.motion, joint, settings.kernel_every)
+        return JointTracker(ContactMap((first,), shape), settings.motion, settings.joint, settings.kernel_every)
     return ParticleTracker(
         first=ContactMap((first,), shape),
         measurement=measurement,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -99,6 +101,34 @@ def test_smoothing_finds_the_poses_again() -> None:
     found, cost = PoseEvidence(contact_map, NOISE).maximised(start, 60)
     assert spread_m(contact_map, found) < 0.6 * spread_m(contact_map, start)
     assert cost == pytest.approx(PoseEvidence(contact_map, NOISE).value(found))
+
+
+def test_leaving_one_contact_out_changes_the_evidence_by_its_cost() -> None:
+    contact_map = true_map("hexagon", 3)
+    contact_map = replace(contact_map, settings=contact_map.settings.model_copy(update={"prior_mean": "zero"}))
+    costs = PoseEvidence(contact_map, NOISE).leave_one_out_costs(contact_map.rows)
+    assert costs.shape == (len(contact_map.contacts),)
+    value = PoseEvidence(contact_map, NOISE).value(contact_map.rows)
+    for position, cost in enumerate(costs):
+        without = PoseEvidence(contact_map.without_contact(position), NOISE).value(contact_map.rows)
+        assert cost == pytest.approx(value - without, abs=1e-6)
+
+
+def test_a_torn_contact_costs_most() -> None:
+    contact_map = true_map("ellipse", 6)
+    grasp = contact_map.placed[3]
+    normals = grasp.contacts_world.normals.copy()
+    normals[2] *= -1.0
+    torn = replace(grasp, contacts_world=replace(grasp.contacts_world, normals=normals))
+    spoiled = replace(contact_map, placed=(*contact_map.placed[:3], torn, *contact_map.placed[4:]))
+    costs = PoseEvidence(spoiled, NOISE).leave_one_out_costs(spoiled.rows)
+    worst = int(costs.argmax())
+    assert spoiled.grasp_indices[worst] == 3
+    cleaned = spoiled.without_contact(worst)
+    assert cleaned.placed[3].left_out == frozenset({2})
+    assert cleaned.left_out_count == 1
+    assert len(cleaned.contacts) == len(spoiled.contacts) - 1
+    assert np.array_equal(cleaned.grasp_indices, np.delete(spoiled.grasp_indices, worst))
 
 
 def test_the_first_pose_is_given() -> None:

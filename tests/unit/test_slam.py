@@ -160,6 +160,16 @@ def test_few_contacts_leave_a_large_uncertainty_and_are_survived(method: str) ->
     assert registration_mm(data, result) < 8.0
 
 
+def test_a_tenth_of_torn_contacts_is_survived() -> None:
+    data = simulate("ellipse", 1, count=10, outlier_share=0.1)
+    result = run(data)
+    assert sum(step.contacts - step.contacts_used for step in result.steps) > 0
+    assert result.contour is not None
+    body_T_object = data.world_T_body[0].between(result.world_T_object[0])
+    fit = Pose2(body_T_object.x(), body_T_object.y(), body_T_object.rotation().yaw())
+    assert contour_errors(result.contour.points_m, data.outline_m, fit).mean_distance_m < 0.006
+
+
 def test_an_object_that_jumps_away_does_not_spoil_the_shape() -> None:
     data = simulate("ellipse", 1, count=9)
     slam = TactileSlam(settings(), 0)
@@ -167,8 +177,8 @@ def test_an_object_that_jumps_away_does_not_spoil_the_shape() -> None:
         away = [replace(one, point_world_m=one.point_world_m + np.array([0.1, 0, 0])) for one in grasp.contacts]
         slam.step(replace(grasp, contacts=tuple(away)) if grasp.index >= 6 else grasp)
     result = slam.finish()
-    assert "tracked" not in {step.verdict for step in result.steps[6:]}
-    assert result.steps[7].covariance[0, 0] > 1.9e-4
+    assert result.steps[6].verdict in {"uncertain", "untracked"}
+    assert result.steps[6].covariance[0, 0] > 10 * result.steps[5].covariance[0, 0]
     assert result.contour is not None
     assert np.ptp(result.contour.points_m, axis=0).max() < 0.11
 
