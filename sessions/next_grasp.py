@@ -24,7 +24,8 @@ class PlanSettings(StrictModel):
     """What may be grasped, and how.
 
     Attributes:
-        closings: closings to alternate between.
+        closings: closings to alternate between; radial first, as its contacts tell the pose of the object frame
+            that is born then, while a pinch leaves the place along the fingers open.
         contour_heights_m: heights of the fingertip centres above the table, taken in turn, when a contour is wanted.
         surface_heights_m: the same when the whole surface is wanted.
         yaw_window_rad: lowest and highest yaw of the grasp frame that the arm can reach.
@@ -33,7 +34,7 @@ class PlanSettings(StrictModel):
         return_m: largest step back toward ``start_m`` while the object is carried.
     """
 
-    closings: tuple[str, ...] = Field(default=("pinch", "radial"), min_length=1)
+    closings: tuple[str, ...] = Field(default=("radial", "pinch"), min_length=1)
     contour_heights_m: tuple[float, ...] = Field(default=(0.022,), min_length=1)
     surface_heights_m: tuple[float, ...] = Field(default=(0.018, 0.026, 0.034), min_length=1)
     yaw_window_rad: tuple[float, float] = (-1.31, 1.31)

@@ -293,7 +293,7 @@ def rule(**content: Any) -> FixedRule:
 
 def test_fixed_rule_alternates_sides_closings_and_heights() -> None:
     plans = [rule(contour_heights_m=(0.018, 0.03)).plan(index) for index in range(8)]
-    assert [plan.closing for plan in plans] == ["pinch", "pinch", "radial", "radial"] * 2
+    assert [plan.closing for plan in plans] == ["radial", "radial", "pinch", "pinch"] * 2
     assert [plan.frame.yaw_rad > 0 for plan in plans] == [False, True] * 4
     assert [plan.height_m for plan in plans] == [0.018, 0.03] * 4
 
