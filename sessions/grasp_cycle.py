@@ -14,6 +14,9 @@ from sessions.motion import GraspFrame, Motion
 from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
 from tactile_lab.strict_yaml import StrictModel
 
+_FALL_BEHIND_s = 0.2
+"""How late the motors follow a fingertip's path, on the safe side."""
+
 
 class CycleSettings(StrictModel):
     """Speeds, forces and times of the grasp cycle.
@@ -36,11 +39,12 @@ class CycleSettings(StrictModel):
         squeeze_s: time to build the squeeze up.
         squeeze_gain: fingertip speed per force error, m/s per N.
         carry_turn_rad_s, carry_m_s: speeds while the object is held.
+        caught_force_N: a fingertip that opens against this force is caught behind the object.
         finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind leave the path.
         finger_gap_m: the thumb stops this far from another tip's centre: they would touch each other.
     """
 
-    lift_m: float = Field(default=0.12, gt=0.0)
+    lift_m: float = Field(default=0.10, gt=0.0)
     travel_m_s: float = Field(default=0.25, gt=0.0)
     turn_rad_s: float = Field(default=1.5, gt=0.0)
     descent_m_s: float = Field(default=0.08, gt=0.0)
@@ -59,6 +63,7 @@ class CycleSettings(StrictModel):
     squeeze_gain: float = Field(default=0.02, gt=0.0)
     carry_turn_rad_s: float = Field(default=0.6, gt=0.0)
     carry_m_s: float = Field(default=0.06, gt=0.0)
+    caught_force_N: float = Field(default=0.6, gt=0.0)
     finger_rad_s: float = Field(default=1.8, gt=0.0)
     finger_gap_m: float = Field(default=0.021, ge=0.0)
 
@@ -283,13 +288,25 @@ class GraspCycle:
     # --- and away ----------------------------------------------------------------------------------------------
 
     def release(self) -> None:
-        """Open the hand, every tip back along its line: a short cut through the joints would dip into the table."""
-        table, closed = self._table(), self._progress
-        opened = self._opened()
-        for share in self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s)):
-            self._progress = {finger: u + share * (opened[finger] - u) for finger, u in closed.items()}
-            self._motion.set_fingers(table, self._progress)
-            self._motion.tick()
+        """Open the hand, every tip back along its line: a short cut through the joints would dip into the table.
+
+        A tip that has let go and then meets something behind it (the object has turned in the hand) comes forward
+        again a little and stays there; the lift takes it away.
+        """
+        table, opened, motion = self._table(), self._opened(), self._motion
+        rate = {f: opened[f] - u for f, u in self._progress.items()}
+        shares = list(motion.shares(motion.finger_time_s(table, opened, self.settings.finger_rad_s)))
+        moving, holding = set(FINGERS), set(FINGERS)
+        for _ in shares:
+            for finger in moving:
+                self._progress[finger] += rate[finger] / len(shares)
+            motion.set_fingers(table, self._progress)
+            motion.tick()
+            loads_N = motion.loads_N()
+            for finger in [f for f in moving - holding if loads_N.get(f, 0.0) > self.settings.caught_force_N]:
+                moving.discard(finger)
+                self._progress[finger] -= rate[finger] / len(shares) * motion.cycles(_FALL_BEHIND_s)
+            holding -= {f for f in FINGERS if loads_N.get(f, 0.0) < self.settings.touch_force_N}
 
     def lift(self) -> None:
         """Straight up."""
