@@ -14,8 +14,9 @@ from pydantic import Field
 
 from drivers.shadow.posture import TipEllipsoid
 from sessions.bench import Bench
+from sessions.cycle_settings import CycleSettings
 from sessions.explorer import ExplorationSettings
-from sessions.grasp_cycle import CycleSettings, GraspCycle, GraspPlan
+from sessions.grasp_cycle import GraspCycle, GraspPlan
 from sessions.motion import Motion
 from sessions.next_grasp import FixedRule, PlanSettings
 from sessions.planner import Planner

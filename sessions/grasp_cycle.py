@@ -6,66 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from gtsam import Pose3
-from pydantic import Field
 
 from drivers.shadow.closing import Closing, closing
 from drivers.shadow.posture import TipEllipsoid
+from sessions.cycle_settings import CycleSettings
 from sessions.motion import GraspFrame, Motion
 from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
-from tactile_lab.strict_yaml import StrictModel
 
 _FALL_BEHIND_s = 0.2
 """How late the motors follow a fingertip's path, on the safe side."""
-
-
-class CycleSettings(StrictModel):
-    """Speeds, forces and times of the grasp cycle.
-
-    Attributes:
-        lift_m: how far above a grasp the hand travels.
-        travel_m_s, turn_rad_s: speeds above the object.
-        descent_m_s: speed of the guarded descent.
-        landing_force_N: a fingertip force during the descent that means the object is under it.
-        landing_shift_m: how far the grasp moves toward the finger that landed.
-        landing_tries: descents before the grasp is given up.
-        closing_m_s: speed of the fingertips; it sets how far the object is pushed.
-        touch_force_N: contact force at which a finger stops.
-        touch_cycles: cycles in a row with that force: a lone jerk of the finger's own mass is no touch.
-        contact_force_N: force that each touching finger settles to for the capture; the thumb takes the others' sum.
-        settle_s: time for that.
-        rest_s: rest after every motion that something is measured after.
-        capture_s: length of the capture (20 samples at 100 Hz).
-        squeeze_force_N: force of each finger while the object is carried; the thumb holds against their sum.
-        squeeze_s: time to build the squeeze up.
-        squeeze_gain: fingertip speed per force error, m/s per N.
-        carry_turn_rad_s, carry_m_s: speeds while the object is held.
-        caught_force_N: a fingertip that opens against this force is caught behind the object.
-        finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind leave the path.
-        finger_gap_m: the thumb stops this far from another tip's centre: they would touch each other.
-    """
-
-    lift_m: float = Field(default=0.10, gt=0.0)
-    travel_m_s: float = Field(default=0.25, gt=0.0)
-    turn_rad_s: float = Field(default=1.5, gt=0.0)
-    descent_m_s: float = Field(default=0.08, gt=0.0)
-    landing_force_N: float = Field(default=0.25, gt=0.0)
-    landing_shift_m: float = Field(default=0.018, gt=0.0)
-    landing_tries: int = Field(default=4, ge=1)
-    closing_m_s: float = Field(default=0.030, gt=0.0)
-    touch_force_N: float = Field(default=0.15, gt=0.0)
-    touch_cycles: int = Field(default=2, ge=1)
-    contact_force_N: float = Field(default=0.4, gt=0.0)
-    settle_s: float = Field(default=0.3, ge=0.0)
-    rest_s: float = Field(default=0.2, gt=0.0)
-    capture_s: float = Field(default=0.2, gt=0.0)
-    squeeze_force_N: float = Field(default=0.8, gt=0.0)
-    squeeze_s: float = Field(default=0.5, gt=0.0)
-    squeeze_gain: float = Field(default=0.02, gt=0.0)
-    carry_turn_rad_s: float = Field(default=0.6, gt=0.0)
-    carry_m_s: float = Field(default=0.06, gt=0.0)
-    caught_force_N: float = Field(default=0.6, gt=0.0)
-    finger_rad_s: float = Field(default=1.8, gt=0.0)
-    finger_gap_m: float = Field(default=0.021, ge=0.0)
 
 
 @dataclass(frozen=True)

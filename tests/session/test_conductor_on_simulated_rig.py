@@ -189,12 +189,12 @@ def test_reports_tell_what_happened(session: Session) -> None:
 
 def test_hand_is_without_demand_at_the_end(session: Session) -> None:
     for command in session.sink.commands[-5:]:
-        assert not decode_command(command).motor_data.any()
+        assert not any(decode_command(command).motor_data)
 
 
 def test_pulled_cable_stops_the_session_and_keeps_its_grasps() -> None:
     def pull(world: SimulatedWorld, number: int, name: str) -> None:
-        if (number, name) == (2, "squeeze"):
+        if (number, name) == (1, "squeeze"):
             world.unplug("hand")
 
     session = run(3, pull)
