@@ -28,7 +28,6 @@ class CycleSettings(StrictModel):
         squeeze_s: time to build the squeeze up.
         squeeze_gain: fingertip speed per force error, m/s per N.
         carry_turn_rad_s, carry_m_s: speeds while the object is held.
-        caught_force_N: a fingertip that opens against this force is caught behind the object.
         finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind leave the path.
         finger_gap_m: the thumb stops this far from another tip's centre: they would touch each other.
     """
@@ -52,6 +51,5 @@ class CycleSettings(StrictModel):
     squeeze_gain: float = Field(default=0.02, gt=0.0)
     carry_turn_rad_s: float = Field(default=0.6, gt=0.0)
     carry_m_s: float = Field(default=0.06, gt=0.0)
-    caught_force_N: float = Field(default=0.6, gt=0.0)
     finger_rad_s: float = Field(default=1.8, gt=0.0)
     finger_gap_m: float = Field(default=0.021, ge=0.0)

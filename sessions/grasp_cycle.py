@@ -13,9 +13,6 @@ from sessions.cycle_settings import CycleSettings
 from sessions.motion import GraspFrame, Motion
 from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
 
-_FALL_BEHIND_s = 0.2
-"""How late the motors follow a fingertip's path, on the safe side."""
-
 
 @dataclass(frozen=True)
 class GraspPlan:
@@ -237,25 +234,12 @@ class GraspCycle:
     # --- and away ----------------------------------------------------------------------------------------------
 
     def release(self) -> None:
-        """Open the hand, every tip back along its line: a short cut through the joints would dip into the table.
-
-        A tip that has let go and then meets something behind it (the object has turned in the hand) comes forward
-        again a little and stays there; the lift takes it away.
-        """
-        table, opened, motion = self._table(), self._opened(), self._motion
-        rate = {f: opened[f] - u for f, u in self._progress.items()}
-        shares = list(motion.shares(motion.finger_time_s(table, opened, self.settings.finger_rad_s)))
-        moving, holding = set(FINGERS), set(FINGERS)
-        for _ in shares:
-            for finger in moving:
-                self._progress[finger] += rate[finger] / len(shares)
-            motion.set_fingers(table, self._progress)
-            motion.tick()
-            loads_N = motion.loads_N()
-            for finger in [f for f in moving - holding if loads_N.get(f, 0.0) > self.settings.caught_force_N]:
-                moving.discard(finger)
-                self._progress[finger] -= rate[finger] / len(shares) * motion.cycles(_FALL_BEHIND_s)
-            holding -= {f for f in FINGERS if loads_N.get(f, 0.0) < self.settings.touch_force_N}
+        """Open the hand, every tip back along its line: a short cut through the joints would dip into the table."""
+        table, closed, opened = self._table(), self._progress, self._opened()
+        for share in self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s)):
+            self._progress = {finger: u + share * (opened[finger] - u) for finger, u in closed.items()}
+            self._motion.set_fingers(table, self._progress)
+            self._motion.tick()
 
     def lift(self) -> None:
         """Straight up."""
