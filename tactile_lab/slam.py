@@ -133,7 +133,7 @@ class TactileSlam:
         self._settings = settings or SlamSettings()
         self._seed = seed
         self._rng = np.random.default_rng(seed)
-        self._back_end = BackEnd(self._settings.back_end)
+        self._back_end = BackEnd(self._settings.back_end, each_grasp=self._settings.method != "joint")
         self._tracker: Tracker | None = None
         self._origin_height_m = 0.0
         self._steps: list[SlamStep] = []

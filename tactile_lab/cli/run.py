@@ -32,11 +32,10 @@ def run(
     """
     from tactile_lab.cli.progress import LiveProgress
     from tactile_lab.cli.results import conclude
-    from tactile_lab.workflow.running import SessionRequest, run_session, slam_settings
+    from tactile_lab.workflow.running import SessionRequest, run_session
 
     del no_input  # an autonomous session asks nothing; the option is there so that scripts can always give it
-    settings = slam_settings(method, dimension)
-    request = SessionRequest(rig, object_name, out, settings, seed, grasps, notes)
+    request = SessionRequest(rig, object_name, out, method, dimension, seed, grasps, notes)
     with LiveProgress(f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}") as progress:
         finished = run_session(request, progress)
     conclude(finished, as_json)

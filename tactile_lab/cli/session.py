@@ -76,7 +76,7 @@ def replay(
     recorded = find_session(root, session)
     own = recorded_slam(recorded)
     same = method is None and dimension is None and seed is None
-    settings = own if same else slam_settings(method or own.method, dimension or own.dimension)
+    settings = own if same else slam_settings(method or own.method, dimension or own.dimension, own.motion)
     comparable = same and has_results(recorded)
     out = into or (recorded.folder / "replay" if comparable or not same else recorded.results)
     with LiveProgress(f"replay of {recorded.folder}") as progress:

@@ -38,8 +38,13 @@ class BackEndSettings(StrictModel):
 class BackEnd:
     """Loops found so far and their verdicts."""
 
-    def __init__(self, settings: BackEndSettings) -> None:
-        self._settings = settings
+    def __init__(self, settings: BackEndSettings, *, each_grasp: bool = True) -> None:
+        """
+        Args:
+            settings: see there.
+            each_grasp: correct after every grasp; without, only at the end (trackers that smooth by themselves).
+        """
+        self._settings, self._each_grasp = settings, each_grasp
         self._loops: list[Loop] = []
 
     @property
@@ -50,7 +55,8 @@ class BackEnd:
     def close_loops(self, contact_map: ContactMap) -> ContactMap:
         """Look for loops of the latest grasp; the corrected map if one was found and it explains the contacts."""
         latest = len(contact_map.placed) - 1
-        if not self._settings.enabled or not contact_map.placed[latest].used:
+        idle = not (self._settings.enabled and self._each_grasp)
+        if idle or not contact_map.placed[latest].used:
             return contact_map
         found = find_loops(contact_map, self._faces(contact_map), self._settings.graph, [latest])
         self._loops += found

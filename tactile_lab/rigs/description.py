@@ -19,6 +19,7 @@ from sessions.perception import PerceptionSettings
 from sessions.session import Session
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.strict_yaml import StrictModel, load_model, validate
+from tactile_lab.tracking.motion import MotionNoise
 
 OTHER_VERSION = "Use the version of tactile-lab that recorded it; tactile-lab session show names it"
 """Advice for a recorded description that does not fit this version."""
@@ -59,6 +60,7 @@ class RigDescription(StrictModel):
         fingertips: the kind of fingertip on all fingers.
         calibration: files to use.
         hand, nano17, base, perception, conductor: settings of the parts.
+        motion: how far a re-oriented object strays from the hand's motion on this rig, one standard deviation.
         simulation: the simulated world (its fingertips follow ``fingertips``).
     """
 
@@ -73,6 +75,7 @@ class RigDescription(StrictModel):
     base: PositionerSettings = PositionerSettings()
     perception: PerceptionSettings = PerceptionSettings()
     conductor: ConductorSettings = ConductorSettings()
+    motion: MotionNoise = MotionNoise()
     simulation: SimulationSettings = SimulationSettings()
 
 

@@ -148,7 +148,7 @@ class JointTracker:
         promising = self._likeliest(proposed, 2 * self._settings.smoothed)
         latest = len(self.map.placed)
         cleaned = [self._without_outliers(branch.map, [latest]) for branch in promising]
-        return [self._rated(each) for each in cleaned if 2 * len(each.placed[-1].kept) > len(contacts)]
+        return [each for each in cleaned if 2 * len(each.map.placed[-1].kept) > len(contacts)]
 
     def _proposed(self, hypothesis: Hypothesis, contacts: ContactSet) -> list[Hypothesis]:
         """Continuations of a hypothesis, rated contact by contact only."""
@@ -180,24 +180,25 @@ class JointTracker:
 
     def _smoothed(self, hypothesis: Hypothesis, iterations: int) -> Hypothesis:
         """The poses of largest evidence nearby; once more if contacts turn out not to fit them."""
-        rows, cost = PoseEvidence(hypothesis.map, self._noise).maximised(hypothesis.map.rows, iterations)
-        smoothed = hypothesis.map.with_rows(rows)
-        cleaned = self._without_outliers(smoothed, range(len(rows)))
-        if cleaned is not smoothed:
-            rows, cost = PoseEvidence(cleaned, self._noise).maximised(cleaned.rows, iterations)
-            smoothed = cleaned.with_rows(rows)
-        return Hypothesis(smoothed, cost + self._other_costs(smoothed))
+        smoothed = hypothesis.map.with_rows(
+            PoseEvidence(hypothesis.map, self._noise).maximised(hypothesis.map.rows, iterations)[0]
+        )
+        cleaned = self._without_outliers(smoothed, range(len(smoothed.placed)))
+        if cleaned.map is smoothed:
+            return cleaned
+        rows, cost = PoseEvidence(cleaned.map, self._noise).maximised(smoothed.rows, iterations)
+        again = cleaned.map.with_rows(rows)
+        return Hypothesis(again, cost + self._other_costs(again))
 
-    def _without_outliers(self, contact_map: ContactMap, grasps: Sequence[int]) -> ContactMap:
+    def _without_outliers(self, contact_map: ContactMap, grasps: Sequence[int]) -> Hypothesis:
         """Leave out contacts of some grasps, the worst first, while they cost more than being explained by nothing."""
-        while len(contact_map.contacts) > 1:
-            costs = PoseEvidence(contact_map, self._noise).leave_one_out_costs(contact_map.rows)
+        while True:
+            value, costs = PoseEvidence(contact_map, self._noise).value_and_leave_one_out_costs(contact_map.rows)
             costs[~np.isin(contact_map.grasp_indices, grasps)] = -np.inf
             worst = int(costs.argmax())
-            if costs[worst] <= self._settings.proposals.unexplained_cost:
-                break
+            if costs[worst] <= self._settings.proposals.unexplained_cost or len(costs) == 1:
+                return Hypothesis(contact_map, value + self._other_costs(contact_map))
             contact_map = contact_map.without_contact(worst)
-        return contact_map
 
     def _other_costs(self, contact_map: ContactMap) -> float:
         """What the poses are judged by beside the contacts in place: free space and the contacts left out."""

@@ -68,22 +68,30 @@ class PoseEvidence:
             rows, points, normals, by_points, by_normals
         )
 
-    def leave_one_out_costs(self, rows: Array) -> Array:
-        """For each contact the negative log probability density given all others, shape (n,).
+    def value_and_leave_one_out_costs(self, rows: Array) -> tuple[float, Array]:
+        """The negative log posterior, and for each contact that of its density given all others, shape (n,).
 
         The marginal likelihood of all contacts is that of the others times this, so these costs tell what would be
         gained by leaving a contact out. They follow from the blocks of the inverse covariance alone.
         """
         points, normals = self._in_object_frame(rows)
-        factor, _, weights = self._factorised(points, normals)
+        factor, residual, weights = self._factorised(points, normals)
+        value = self._misfit(factor, residual, weights) + self._motion_cost(rows)[0]
         count, rows_each = len(points), points.shape[1] + 1
         blocks = np.einsum("aibi->iab", _inverse(factor).reshape(rows_each, count, rows_each, count))
         own = weights.reshape(rows_each, count).T
         misfits = np.einsum("ia,ia->i", own, np.linalg.solve(blocks, own[..., None])[..., 0])
-        return np.asarray(0.5 * (misfits - np.linalg.slogdet(blocks)[1]))
+        return value, np.asarray(0.5 * (misfits - np.linalg.slogdet(blocks)[1]))
 
-    def maximised(self, rows: Array, max_iterations: int) -> tuple[Array, float]:
-        """Poses of largest posterior near the given ones, and the negative log posterior there (L-BFGS)."""
+    def maximised(self, rows: Array, max_iterations: int, accuracy: float = 0.01) -> tuple[Array, float]:
+        """Poses of largest posterior near the given ones, and the negative log posterior there (L-BFGS).
+
+        Args:
+            rows: where to start, shape (k, 3).
+            max_iterations: of the optimiser.
+            accuracy: steps that gain less end it.
+        """
+        scale = max(abs(self.value(rows)), 1.0)
 
         def objective(variables: Array) -> tuple[float, Array]:
             value, gradient = self.value_and_gradient(moved(variables))
@@ -97,7 +105,7 @@ class PoseEvidence:
             np.zeros(3 * (len(rows) - 1)),
             jac=True,
             method="L-BFGS-B",
-            options={"maxiter": max_iterations, "ftol": 1e-7, "gtol": 1e-3, "maxcor": 20},
+            options={"maxiter": max_iterations, "ftol": accuracy / scale, "gtol": 1e-3, "maxcor": 20},
         )
         return moved(found.x), float(found.fun)
 

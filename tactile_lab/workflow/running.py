@@ -16,6 +16,7 @@ from tactile_lab.rigs.build import build_bench, check_calibration, simulated_wor
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.strict_yaml import validate
+from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.workflow.judging import FinishedSession, estimate_rest, judge
 
 
@@ -27,7 +28,7 @@ class SessionRequest:
         rig: name of a shipped rig, or a rig file.
         object_name: of the simulated rig's catalogue, or ``mesh:FILE``.
         root: folder in which the session's folder is made.
-        slam: the estimation's settings.
+        method, dimension: of the estimation; how far objects stray is the rig's affair.
         seed: of everything that is left to chance.
         grasps: how many; the rig's own number when None.
         notes: the operator's.
@@ -36,15 +37,17 @@ class SessionRequest:
     rig: str
     object_name: str
     root: Path
-    slam: SlamSettings
+    method: str = "joint"
+    dimension: int = 2
     seed: int = 0
     grasps: int | None = None
     notes: str = ""
 
 
-def slam_settings(method: str, dimension: int) -> SlamSettings:
+def slam_settings(method: str, dimension: int, motion: MotionNoise) -> SlamSettings:
     """Settings of the estimation. Raises ConfigurationError for an unknown method or dimension."""
-    return validate({"method": method, "dimension": dimension}, SlamSettings, where="options")
+    wanted = {"method": method, "dimension": dimension, "motion": motion.model_dump()}
+    return validate(wanted, SlamSettings, where="options")
 
 
 def run_session(request: SessionRequest, progress: Progress) -> FinishedSession:
@@ -59,8 +62,8 @@ def run_session(request: SessionRequest, progress: Progress) -> FinishedSession:
     rig = load_rig(request.rig)
     check_calibration(rig)
     world = simulated_world(rig, request.seed, request.object_name)
-    slam = TactileSlam(request.slam, request.seed)
-    session = _new_session(rig, world, request)
+    slam = TactileSlam(slam_settings(request.method, request.dimension, rig.description.motion), request.seed)
+    session = _new_session(rig, world, slam, request)
     try:
         outcome = _record(session, rig, world, slam, request, progress)
         progress.phase(len(outcome.grasps), "model and evaluation")
@@ -85,7 +88,7 @@ def _record(
         progress.phase(0, "connect")
         bench = build_bench(rig, world, session.recorder)
         bench.connect()
-        settings, dimension = _conductor_settings(rig, request), request.slam.dimension
+        settings, dimension = _conductor_settings(rig, request), request.dimension
         try:
             conductor = Conductor(bench, slam, settings, seed=request.seed, dimension=dimension, progress=progress)
             outcome = conductor.run()
@@ -95,7 +98,7 @@ def _record(
     return outcome
 
 
-def _new_session(rig: Rig, world: SimulatedWorld, request: SessionRequest) -> RunningSession:
+def _new_session(rig: Rig, world: SimulatedWorld, slam: TactileSlam, request: SessionRequest) -> RunningSession:
     return create_session(
         request.root,
         rig=rig.description.name,
@@ -104,7 +107,7 @@ def _new_session(rig: Rig, world: SimulatedWorld, request: SessionRequest) -> Ru
         calibration_files=rig.files,
         seeds={"session": request.seed},
         settings={
-            "slam": request.slam.model_dump(mode="json"),
+            "slam": slam.settings.model_dump(mode="json"),
             "grasps": _conductor_settings(rig, request).grasps,
             "markers": world.marker_settings.model_dump(mode="json"),
         },

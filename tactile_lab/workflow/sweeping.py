@@ -12,7 +12,7 @@ from tactile_lab.errors import SessionError
 from tactile_lab.evaluation.sweep import SweepRun
 from tactile_lab.rigs.build import check_calibration, simulated_world
 from tactile_lab.rigs.description import load_rig
-from tactile_lab.workflow.running import SessionRequest, run_session, slam_settings
+from tactile_lab.workflow.running import SessionRequest, run_session
 
 
 def check_sweep(rig: str, objects: Sequence[str] | None, root: Path) -> tuple[str, ...]:
@@ -37,8 +37,7 @@ def check_sweep(rig: str, objects: Sequence[str] | None, root: Path) -> tuple[st
 
 def run_for_sweep(run: SweepRun, *, rig: str, method: str, grasps: int, root: Path) -> dict[str, Any]:
     """One session of a sweep: the content of its ``evaluation.json``. Raises TactileLabError."""
-    settings = slam_settings(method, run.dimension)
-    request = SessionRequest(rig, run.object_name, root, settings, run.seed, grasps)
+    request = SessionRequest(rig, run.object_name, root, method, run.dimension, run.seed, grasps)
     finished = run_session(request, NullProgress())
     if finished.evaluation is None:
         raise SessionError(finished.problem, where=str(finished.folder))

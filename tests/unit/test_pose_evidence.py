@@ -106,9 +106,9 @@ def test_smoothing_finds_the_poses_again() -> None:
 def test_leaving_one_contact_out_changes_the_evidence_by_its_cost() -> None:
     contact_map = true_map("hexagon", 3)
     contact_map = replace(contact_map, settings=contact_map.settings.model_copy(update={"prior_mean": "zero"}))
-    costs = PoseEvidence(contact_map, NOISE).leave_one_out_costs(contact_map.rows)
+    value, costs = PoseEvidence(contact_map, NOISE).value_and_leave_one_out_costs(contact_map.rows)
     assert costs.shape == (len(contact_map.contacts),)
-    value = PoseEvidence(contact_map, NOISE).value(contact_map.rows)
+    assert value == pytest.approx(PoseEvidence(contact_map, NOISE).value(contact_map.rows))
     for position, cost in enumerate(costs):
         without = PoseEvidence(contact_map.without_contact(position), NOISE).value(contact_map.rows)
         assert cost == pytest.approx(value - without, abs=1e-6)
@@ -121,7 +121,7 @@ def test_a_torn_contact_costs_most() -> None:
     normals[2] *= -1.0
     torn = replace(grasp, contacts_world=replace(grasp.contacts_world, normals=normals))
     spoiled = replace(contact_map, placed=(*contact_map.placed[:3], torn, *contact_map.placed[4:]))
-    costs = PoseEvidence(spoiled, NOISE).leave_one_out_costs(spoiled.rows)
+    _, costs = PoseEvidence(spoiled, NOISE).value_and_leave_one_out_costs(spoiled.rows)
     worst = int(costs.argmax())
     assert spoiled.grasp_indices[worst] == 3
     cleaned = spoiled.without_contact(worst)
