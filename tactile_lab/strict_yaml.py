@@ -119,8 +119,9 @@ def _yaml_problem(error: Exception) -> str:
 
 
 def _explain(error: ValidationError, model: type[BaseModel]) -> str:
-    """Up to five problems of a document, each with its key."""
-    problems = list(dict.fromkeys(_problem(item, model) for item in error.errors()))
+    """Up to five problems of a document, each with its key; unknown keys first, as they often explain the others."""
+    found = sorted(error.errors(), key=lambda item: item["type"] != "extra_forbidden")
+    problems = list(dict.fromkeys(_problem(item, model) for item in found))
     more = [f"and {len(problems) - _SHOWN} more"] if len(problems) > _SHOWN else []
     return "; ".join(problems[:_SHOWN] + more)
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from tactile_lab.cli.loading import interruptions_held
 from tactile_lab.cli.options import METHOD_HELP, Json, Method, NoInput, RigName
 
 
@@ -30,9 +31,10 @@ def run(
 
     Ctrl+C once finishes the step in hand and closes the session; twice ends at once. Both leave a readable session.
     """
-    from tactile_lab.cli.progress import LiveProgress
-    from tactile_lab.cli.results import conclude
-    from tactile_lab.workflow.running import SessionRequest, run_session
+    with interruptions_held():
+        from tactile_lab.cli.progress import LiveProgress
+        from tactile_lab.cli.results import conclude
+        from tactile_lab.workflow.running import SessionRequest, run_session
 
     del no_input  # an autonomous session asks nothing; the option is there so that scripts can always give it
     request = SessionRequest(rig, object_name, out, method, dimension, seed, grasps, notes)

@@ -147,7 +147,7 @@ def test_a_grasp_without_contacts_follows_the_motion_model() -> None:
         last.motion,
     )
     found, _ = PoseEvidence(contact_map_of(contact_map, empty), NOISE).maximised(
-        contact_map.rows + np.array([[0], [0], [0], [0.01]]), 60
+        contact_map.rows + np.array([[0], [0], [0], [0.01]]), 300, accuracy=1e-9
     )
     assert np.allclose(found[-1], compose(last.motion, found[-2]), atol=5e-4)
 

@@ -188,7 +188,7 @@ def test_sessions_are_found_by_path_name_and_last(tmp_path):
         pass
     assert find_session(tmp_path, session.folder.name).folder == session.folder
     assert find_session(tmp_path / "elsewhere", str(session.folder)).folder == session.folder
-    with pytest.raises(SessionError, match="not a session folder"):
+    with pytest.raises(SessionError, match="no such session"):
         find_session(tmp_path, "nothing")
 
 
