@@ -10,10 +10,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from drivers.positioner import mount_T_forearm
 from gtsam import Pose3
 
 from drivers.fingertip import TipContact
+from drivers.positioner import mount_T_forearm
 from drivers.shadow.kinematics import JOINT_INDEX, JOINTS
 from sessions.marks import Mark, MarkKind
 from sessions.perception import Perception, TareReport
