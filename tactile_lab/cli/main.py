@@ -6,6 +6,7 @@ ready, 130 interrupted.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -14,6 +15,10 @@ from types import FrameType
 from tactile_lab.errors import TactileLabError
 
 INTERRUPTED = 130
+
+# Sums of several BLAS threads come out in another order, and a replay must give the same bytes on any machine.
+# The libraries read this when they are loaded, which is later; small matrices are faster with one thread anyway.
+os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
