@@ -37,6 +37,23 @@ class Contact:
 
 
 @dataclass(frozen=True)
+class ClosingLine:
+    """The straight way of one fingertip's contact point while it closed: free space, as far as it got.
+
+    Attributes:
+        finger: one of :data:`FINGERS`.
+        start_world_m: where it began, shape (3,), world frame, metres.
+        end_world_m: where it touched, or where it stopped without a touch, shape (3,).
+        touched: it ended at a contact.
+    """
+
+    finger: str
+    start_world_m: Array
+    end_world_m: Array
+    touched: bool
+
+
+@dataclass(frozen=True)
 class Grasp:
     """The contacts of one closing, and how the hand carried the object since the last one.
 
@@ -48,6 +65,7 @@ class Grasp:
         hand_motion_world: how the hand moved while it held the object since the previous grasp, so that
             predicted ``world_T_object = hand_motion_world * previous world_T_object`` (eq. 3.8); identity
             in the first grasp.
+        closing_lines: the fingers' ways to their contacts, and of those that met nothing; empty if not known.
     """
 
     index: int
@@ -55,6 +73,7 @@ class Grasp:
     contacts: tuple[Contact, ...]
     world_T_palm: Pose3
     hand_motion_world: Pose3 = field(default_factory=Pose3)
+    closing_lines: tuple[ClosingLine, ...] = ()
 
     @property
     def points_world_m(self) -> Array:
