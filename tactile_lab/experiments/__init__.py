@@ -1,0 +1,1 @@
+"""Experiments on simulated contacts: the figures of the thesis, and the methods compared over many seeds."""
