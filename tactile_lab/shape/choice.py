@@ -1,0 +1,107 @@
+"""Which model describes an object best: the smooth field or sharp faces, by what the contacts say.
+
+Never by the object's name. The models' evidence is compared (Bayesian information criterion of the faces against the
+marginal likelihood of the field), and a sharp shape is only taken if it contradicts nothing known: its contacts lie on
+it, and places where fingertips were are outside.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactile_lab.errors import ShapeError
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.model import FittedShape
+from tactile_lab.shape.outlines import encloses
+from tactile_lab.shape.polygon import Polygon
+from tactile_lab.shape.polygon_segmentation import PlanarContacts, segment
+from tactile_lab.shape.sampling import distances_to_polygon
+from tactile_lab.shape.surface import Contour, SurfaceMesh, extract_contour, extract_mesh
+
+FINGERTIP_RADIUS_m = 0.006
+"""Each contact's fingertip was at least this thick, so that the place this far outside of it is free."""
+
+_TOLERANCE_SIGMAS = 3.0
+_ON_OUTLINE_SIGMAS = 5.0
+
+
+class GpisShape:
+    """A field as a :class:`FittedShape`.
+
+    Attributes:
+        name: "gpis".
+        gpis: the field.
+    """
+
+    name = "gpis"
+
+    def __init__(self, gpis: Gpis) -> None:
+        self.gpis = gpis
+
+    @property
+    def log_evidence(self) -> float | None:
+        """The log marginal likelihood; None for off-surface points, which no other model explains."""
+        return self.gpis.log_marginal_likelihood() if self.gpis.settings.observations == "normals" else None
+
+    def contour(self, resolution_m: float = 0.001) -> Contour:
+        return extract_contour(self.gpis, resolution_m=resolution_m)
+
+    def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
+        return extract_mesh(self.gpis, resolution_m=resolution_m, floor_m=floor_m)
+
+
+def best_shape(gpis: Gpis, free_points_m: Array | None = None) -> FittedShape:
+    """The field itself, or the facet model of its contacts if that is the more probable one.
+
+    Args:
+        gpis: a field with its kernel at a maximum of the marginal likelihood, else the comparison favours faces.
+        free_points_m: places known to be outside, shape (q, d), for example on the ways of fingertips; those at each
+            contact's own fingertip are always looked at.
+    """
+    field = GpisShape(gpis)
+    if field.log_evidence is None or gpis.contacts_m.shape[1] != 2:
+        return field
+    try:
+        provisional = field.contour()
+        polygon = polygon_of(gpis, provisional)
+    except ShapeError:  # no outline, or no polygon in it: the field says what can be said
+        return field
+    if polygon.log_evidence <= field.log_evidence:
+        return field
+    free = _free_points(gpis, free_points_m)
+    sharp = polygon.contour()
+    if _intrusions(sharp, free) > _intrusions(provisional, free) or not _holds_contacts(polygon):
+        return field
+    return polygon
+
+
+def polygon_of(gpis: Gpis, provisional: Contour) -> Polygon:
+    """The facet model of a planar field's contacts, whatever its evidence. Raises ShapeError if there is none."""
+    seen = gpis.observations
+    contacts = PlanarContacts.of(gpis.contacts_m, gpis.normals, seen.value_sigma_m, seen.gradient_sigma)
+    faces = segment(
+        gpis.contacts_m, gpis.normals, contacts.point_sigma_m, contacts.normal_sigma_rad, provisional.points_m
+    )
+    return Polygon.of(contacts, faces)
+
+
+def _free_points(gpis: Gpis, free_points_m: Array | None) -> Array:
+    at_contacts = gpis.contacts_m + FINGERTIP_RADIUS_m * gpis.normals
+    return at_contacts if free_points_m is None else np.vstack([at_contacts, free_points_m])
+
+
+def _intrusions(contour: Contour, free_points_m: Array) -> int:
+    """How many places known to be free lie clearly inside an outline."""
+    inside = free_points_m[encloses(contour.points_m, free_points_m)]
+    if len(inside) == 0:
+        return 0
+    nearest = np.linalg.norm(inside[:, None] - contour.points_m[None], axis=2).argmin(axis=1)
+    depth = distances_to_polygon(inside, contour.points_m)
+    return int(np.sum(depth > _TOLERANCE_SIGMAS * contour.sigma_m[nearest]))
+
+
+def _holds_contacts(polygon: Polygon) -> bool:
+    """All contacts but a few lie on the outline itself, not only on the lines of its faces."""
+    away = distances_to_polygon(polygon.contacts.points_m, polygon.corners_m)
+    return bool(np.mean(away > _ON_OUTLINE_SIGMAS * polygon.contacts.point_sigma_m) <= 0.05)
