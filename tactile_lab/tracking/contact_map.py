@@ -11,6 +11,7 @@ from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.pose_rows import PLANAR, PoseRows
 
 
 @dataclass(frozen=True)
@@ -53,21 +54,29 @@ class ContactMap:
     Attributes:
         placed: the grasps in order, the first one fixes the object frame.
         settings: of the shape model, with the current kernel parameters.
+        space: what the rows of poses mean.
     """
 
     placed: tuple[PlacedGrasp, ...]
     settings: GpisSettings
+    space: PoseRows = PLANAR
 
     @property
     def rows(self) -> Array:
-        """Poses of all grasps, shape (n, 3)."""
+        """Poses of all grasps, shape (n, size)."""
         return np.array([grasp.row for grasp in self.placed])
+
+    @property
+    def motions(self) -> Array:
+        """The hand's motions before each grasp, shape (n, size)."""
+        return np.array([grasp.motion for grasp in self.placed])
 
     @property
     def contacts(self) -> ContactSet:
         """Contacts that make up the shape, object frame."""
-        seen = [grasp.contacts_world.selected(grasp.kept).in_object_frame(grasp.row) for grasp in self.placed]
-        return ContactSet.concatenated(seen)
+        world = self.contacts_world
+        points, normals = self.space.to_object(self.rows[self.grasp_indices], world.points_m, world.normals)
+        return replace(world, points_m=points, normals=normals)
 
     @property
     def contacts_world(self) -> ContactSet:
@@ -94,7 +103,9 @@ class ContactMap:
 
     def seen_by(self, index: int) -> ContactSet:
         """Contacts of one grasp, object frame."""
-        return self.placed[index].contacts_world.in_object_frame(self.placed[index].row)
+        world = self.placed[index].contacts_world
+        points, normals = self.space.to_object(self.placed[index].row, world.points_m, world.normals)
+        return replace(world, points_m=points, normals=normals)
 
     def with_grasp(self, grasp: PlacedGrasp) -> ContactMap:
         """The map with one more grasp."""

@@ -20,13 +20,17 @@ from numpy.typing import NDArray
 from pydantic import Field as Limit
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.field_grid import Field
+from tactile_lab.shape.field_grid import Field, FieldGrid
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.observability import SCALE_m
 
 SMALLEST_SLOPE = 0.3
 """Far from all data the field flattens; distances are not divided by less than this slope."""
+
+
+COMPILED_FROM = 2000
+"""Fewer contacts than this, over all particles, are weighed before compiled code is even loaded."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +135,8 @@ class CalibratedMeasurement:
     settings: CalibratedSettings
 
     def log_likelihood(self, rows: Array, contacts: ContactSet, known: Known) -> Array:
+        if isinstance(known.field, FieldGrid) and len(rows) * len(contacts) >= COMPILED_FROM:
+            return self._compiled(rows, contacts, known.field)
         points, normals = placed(rows, contacts)
         found = known.field.predict(points.reshape(-1, contacts.dimension), gradient=True, variance=True)
         assert found.gradient is not None
@@ -141,6 +147,14 @@ class CalibratedMeasurement:
             found.mean_m.reshape(shape), gradient, found.variance_m2.reshape(shape), normals, contacts
         )
         return np.asarray(per_contact.sum(axis=1))
+
+    def _compiled(self, rows: Array, contacts: ContactSet, grid: FieldGrid) -> Array:
+        """The same from a tabulated field, several times faster."""
+        from tactile_lab.tracking.grid_weighting import LikelihoodConstants, log_likelihood_from_grid
+
+        outlier_density = float(np.exp(self._log_outlier_density(contacts.dimension - 1)))
+        constants = LikelihoodConstants(SMALLEST_SLOPE, self.settings.normal_length_m, outlier_density)
+        return log_likelihood_from_grid(rows, contacts, grid, constants)
 
     def _contact_terms(
         self, values: Array, gradient: Array, variance: Array, normals: Array, contacts: ContactSet

@@ -8,27 +8,42 @@ while poses are corrected, and its derivative by every contact is known in close
 
 from __future__ import annotations
 
-from functools import singledispatch
+from dataclasses import dataclass
+from functools import cache, singledispatch
+from importlib import import_module
+from types import ModuleType
 
 import numpy as np
 from scipy.linalg import lapack
 from scipy.optimize import minimize
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.kernels import Kernel, Matern52, Profile, SquaredExponential, ThinPlate, covariance, differences
+from tactile_lab.shape.kernels import Kernel, Matern52, Profile, SquaredExponential, ThinPlate
 from tactile_lab.shape.priors import PriorMean
 from tactile_lab.shape.settings import initial_kernel, observe, prior_mean
 from tactile_lab.tracking.contact_map import ContactMap
-from tactile_lab.tracking.motion import MotionNoise, compose, deviation
-
-STIFF_BEYOND_SIGMA = 3.2
-_STIFFNESS = 10.0
-"""Slips are bounded by the hand's grip: beyond some sigma the motion prior gets stiffer than a Gaussian."""
-
-_UNITS = np.array([1e-3, 1e-3, 1e-3 / 0.035])
-"""Millimetres, and the angle that moves a contact 35 mm from the origin by one: the optimiser's variables."""
+from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.motion_cost import MotionCost
 
 _JITTER = 1e-9
+_LEAST_INFORMATION = 1e-9
+"""Added to the information relative to its diagonal: nothing is known of a pose that no contact touches."""
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """Contacts in the object frame for some poses, and the factorised covariance of what they observe."""
+
+    points: Array
+    normals: Array
+    factor: Array
+    residual: Array
+    weights: Array
+
+    @property
+    def misfit(self) -> float:
+        """Negative log likelihood up to a constant (2.16)."""
+        return float(0.5 * self.residual @ self.weights + np.log(np.diag(self.factor)).sum())
 
 
 class PoseEvidence:
@@ -40,10 +55,10 @@ class PoseEvidence:
             contact_map: grasps, motions, kernel parameters; the present poses place the prior mean.
             noise: of the motion model.
         """
-        self._map, self._noise = contact_map, noise
+        self._space = contact_map.space
+        self._motion = MotionCost(contact_map.motions, noise, contact_map.space)
         self._world = contact_map.contacts_world
         self._grasp_of = contact_map.grasp_indices
-        self._motions = np.array([grasp.motion for grasp in contact_map.placed])
         contacts = contact_map.contacts
         seen = observe(
             contacts.points_m, contacts.normals, contacts.point_sigma_m, contacts.normal_sigma_rad, contact_map.settings
@@ -53,20 +68,39 @@ class PoseEvidence:
         self._prior: PriorMean = prior_mean(contacts.points_m, contact_map.settings)
 
     def value(self, rows: Array) -> float:
-        """The negative log posterior at poses of shape (k, 3)."""
-        points, normals = self._in_object_frame(rows)
-        factor, residual, weights = self._factorised(points, normals)
-        return self._misfit(factor, residual, weights) + self._motion_cost(rows)[0]
+        """The negative log posterior at poses of shape (k, size)."""
+        return self._placed(rows).misfit + self._motion.value(rows)
 
     def value_and_gradient(self, rows: Array) -> tuple[float, Array]:
-        """The negative log posterior and its derivative by each pose, shape (k, 3)."""
-        points, normals = self._in_object_frame(rows)
-        factor, residual, weights = self._factorised(points, normals)
-        by_points, by_normals = self._contact_gradient(points, factor, weights)
-        cost, gradient = self._motion_cost(rows)
-        return self._misfit(factor, residual, weights) + cost, gradient + self._by_poses(
-            rows, points, normals, by_points, by_normals
-        )
+        """The negative log posterior and its derivative by each pose, shape (k, size)."""
+        placed = self._placed(rows)
+        cost, gradient = self._motion.value_and_gradient(rows)
+        np.add.at(gradient, self._grasp_of, self._by_contacts(rows, placed))
+        return placed.misfit + cost, gradient
+
+    def information(self, rows: Array) -> Array:
+        """Approximate second derivative of the negative log posterior by all poses but the first.
+
+        A contact that moves along its normal does to the field what another observed value would do where it was
+        (Gauss-Newton); the inverse is the poses' joint covariance.
+
+        Returns:
+            Shape ((k - 1) size, (k - 1) size), positive definite.
+        """
+        placed, size = self._placed(rows), self._space.size
+        count, dimension = placed.points.shape
+        seen = np.zeros(((dimension + 1) * count, len(rows), size))
+        contact = np.arange(count)
+        poses, still = rows[self._grasp_of], np.zeros_like(placed.normals)
+        seen[contact, self._grasp_of] = -self._space.by_row(poses, placed.points, placed.normals, placed.normals, still)
+        for axis in range(dimension):
+            unit = np.broadcast_to(np.eye(dimension)[axis], placed.normals.shape)
+            turned = self._space.by_row(poses, placed.points, placed.normals, still, unit)
+            seen[(axis + 1) * count + contact, self._grasp_of] = turned
+        whitened, _ = lapack.dtrtrs(placed.factor, seen.reshape(len(seen), -1)[:, size:], lower=1)
+        total = whitened.T @ whitened + self._motion.information(rows)
+        total[np.diag_indices_from(total)] *= 1 + _LEAST_INFORMATION
+        return np.asarray(total)
 
     def value_and_leave_one_out_costs(self, rows: Array) -> tuple[float, Array]:
         """The negative log posterior, and for each contact that of its density given all others, shape (n,).
@@ -74,136 +108,89 @@ class PoseEvidence:
         The marginal likelihood of all contacts is that of the others times this, so these costs tell what would be
         gained by leaving a contact out. They follow from the blocks of the inverse covariance alone.
         """
-        points, normals = self._in_object_frame(rows)
-        factor, residual, weights = self._factorised(points, normals)
-        value = self._misfit(factor, residual, weights) + self._motion_cost(rows)[0]
-        count, rows_each = len(points), points.shape[1] + 1
-        blocks = np.einsum("aibi->iab", _inverse(factor).reshape(rows_each, count, rows_each, count))
-        own = weights.reshape(rows_each, count).T
+        placed = self._placed(rows)
+        count, rows_each = len(placed.points), placed.points.shape[1] + 1
+        blocks = np.einsum("aibi->iab", _inverse(placed.factor).reshape(rows_each, count, rows_each, count))
+        own = placed.weights.reshape(rows_each, count).T
         misfits = np.einsum("ia,ia->i", own, np.linalg.solve(blocks, own[..., None])[..., 0])
-        return value, np.asarray(0.5 * (misfits - np.linalg.slogdet(blocks)[1]))
+        costs = 0.5 * (misfits - np.linalg.slogdet(blocks)[1])
+        return placed.misfit + self._motion.value(rows), np.asarray(costs)
 
-    def maximised(self, rows: Array, max_iterations: int, accuracy: float = 0.01) -> tuple[Array, float]:
-        """Poses of largest posterior near the given ones, and the negative log posterior there (L-BFGS).
+    def maximised(self, rows: Array, max_iterations: int, accuracy: float = 0.1) -> tuple[Array, float]:
+        """Poses of largest posterior near the given ones, and the negative log posterior there.
+
+        L-BFGS on variables that are uncorrelated and of unit variance by :meth:`information`: half the iterations
+        of millimetres and degrees.
 
         Args:
-            rows: where to start, shape (k, 3).
+            rows: where to start, shape (k, size).
             max_iterations: of the optimiser.
-            accuracy: steps that gain less end it.
+            accuracy: iterations that gain less end it.
         """
+        if len(rows) == 1:
+            return rows, self.value(rows)
+        spread = np.linalg.inv(np.linalg.cholesky(self.information(rows))).T
         scale = max(abs(self.value(rows)), 1.0)
+
+        def moved(variables: Array) -> Array:
+            steps = (spread @ variables).reshape(-1, self._space.size)
+            return self._space.moved(rows, np.vstack([np.zeros(self._space.size), steps]))
 
         def objective(variables: Array) -> tuple[float, Array]:
             value, gradient = self.value_and_gradient(moved(variables))
-            return value, (gradient[1:] * _UNITS).ravel()
-
-        def moved(variables: Array) -> Array:
-            return np.asarray(rows + np.vstack([np.zeros(3), variables.reshape(-1, 3) * _UNITS]))
+            return value, spread.T @ gradient[1:].ravel()
 
         found = minimize(
             objective,
-            np.zeros(3 * (len(rows) - 1)),
+            np.zeros(len(spread)),
             jac=True,
             method="L-BFGS-B",
             options={"maxiter": max_iterations, "ftol": accuracy / scale, "gtol": 1e-3, "maxcor": 20},
         )
         return moved(found.x), float(found.fun)
 
-    def _in_object_frame(self, rows: Array) -> tuple[Array, Array]:
-        cosine, sine = np.cos(rows[self._grasp_of, 2]), np.sin(rows[self._grasp_of, 2])
-        points, normals = self._world.points_m.copy(), self._world.normals.copy()
-        points[:, :2] -= rows[self._grasp_of, :2]
-        for vectors in (points, normals):
-            x, y = vectors[:, 0].copy(), vectors[:, 1].copy()
-            vectors[:, 0], vectors[:, 1] = cosine * x + sine * y, cosine * y - sine * x
-        return points, normals
-
-    def _factorised(self, points: Array, normals: Array) -> tuple[Array, Array, Array]:
-        matrix = covariance(self._kernel, points, len(points))
-        diagonal = np.diag(matrix) * (1 + _JITTER) + self._noise_variance
-        np.fill_diagonal(matrix, diagonal)
+    def _placed(self, rows: Array) -> _Placed:
+        points, normals = self._space.to_object(rows[self._grasp_of], self._world.points_m, self._world.normals)
+        phi = self._kernel.profile(_squared_distances(points))
+        matrix = evidence_kernels().assemble(points, *phi, self._noise_variance, _JITTER)
+        diagonal = np.diag(matrix).copy()
         factor, problem = lapack.dpotrf(matrix.T, lower=1, clean=1, overwrite_a=1)
         if problem:  # contacts thrown onto each other by a wild step of the line search
             factor, _ = lapack.dpotrf(np.diag(diagonal), lower=1)
         residual = np.concatenate([-self._prior.value(points), (normals - self._prior.gradient(points)).T.ravel()])
         weights, _ = lapack.dpotrs(factor, residual, lower=1)
-        return factor, residual, np.asarray(weights)
+        return _Placed(points, normals, factor, residual, np.asarray(weights))
 
-    @staticmethod
-    def _misfit(factor: Array, residual: Array, weights: Array) -> float:
-        return float(0.5 * residual @ weights + np.log(np.diag(factor)).sum())
-
-    def _contact_gradient(self, points: Array, factor: Array, weights: Array) -> tuple[Array, Array]:
-        """Derivatives of the misfit by each contact's point and normal, shape (n, d) each."""
+    def _by_contacts(self, rows: Array, placed: _Placed) -> Array:
+        """Derivative of the misfit by the pose of each contact's grasp, shape (n, size)."""
+        points, normals, weights = placed.points, placed.normals, placed.weights
         count, dimension = points.shape
-        by_normals = weights[count:].reshape(dimension, count).T
-        by_points = covariance_pull(self._kernel, points, _inverse(factor) - np.outer(weights, weights)) / 2
+        by_normals = np.ascontiguousarray(weights[count:].reshape(dimension, count).T)
+        squared = _squared_distances(points)
+        phi = self._kernel.profile(squared)
+        third = third_derivative(self._kernel, squared, phi)
+        inverse, _ = lapack.dpotri(placed.factor, lower=1)
+        by_points = evidence_kernels().pull(points, phi.first, phi.second, third, inverse, weights)
         by_points -= weights[:count, None] * self._prior.gradient(points)
         by_points -= _directional_change(self._prior, points, by_normals)
-        return by_points, by_normals
+        return self._space.by_row(rows[self._grasp_of], points, normals, by_points, by_normals)
 
-    def _by_poses(self, rows: Array, points: Array, normals: Array, by_points: Array, by_normals: Array) -> Array:
-        """Chain rule from contacts in the object frame to poses in the world."""
-        cosine, sine = np.cos(rows[self._grasp_of, 2]), np.sin(rows[self._grasp_of, 2])
-        each = np.empty((len(points), 3))
-        each[:, 0] = -(cosine * by_points[:, 0] - sine * by_points[:, 1])
-        each[:, 1] = -(sine * by_points[:, 0] + cosine * by_points[:, 1])
-        each[:, 2] = by_points[:, 0] * points[:, 1] - by_points[:, 1] * points[:, 0]
-        each[:, 2] += by_normals[:, 0] * normals[:, 1] - by_normals[:, 1] * normals[:, 0]
-        gradient = np.zeros_like(rows)
-        np.add.at(gradient, self._grasp_of, each)
-        return gradient
 
-    def _motion_cost(self, rows: Array) -> tuple[float, Array]:
-        """The motion model (3.7), negative log and derivative."""
-        scaled = deviation(rows[1:], compose(self._motions[1:], rows[:-1])) / self._noise.sigmas
-        slip = np.column_stack([np.hypot(scaled[:, 0], scaled[:, 1]), np.abs(scaled[:, 2])])
-        excess = np.maximum(slip - STIFF_BEYOND_SIGMA, 0.0)
-        cost = 0.5 * np.sum(slip**2) + 0.5 * _STIFFNESS * np.sum(excess**2)
-        stretch = 1 + _STIFFNESS * excess / np.maximum(slip, 1e-12)
-        pull = scaled * stretch[:, [0, 0, 1]] / self._noise.sigmas
-        gradient = np.zeros_like(rows)
-        gradient[1:] += pull
-        cosine, sine = np.cos(self._motions[1:, 2]), np.sin(self._motions[1:, 2])
-        gradient[:-1, 0] -= cosine * pull[:, 0] + sine * pull[:, 1]
-        gradient[:-1, 1] -= cosine * pull[:, 1] - sine * pull[:, 0]
-        gradient[:-1, 2] -= pull[:, 2]
-        return float(cost), gradient
+@cache
+def evidence_kernels() -> ModuleType:
+    """The compiled loops; loaded when first needed, because the compiler takes half a second to import."""
+    return import_module("tactile_lab.tracking.evidence_kernels")
+
+
+def _squared_distances(points: Array) -> Array:
+    deltas = points.T[:, :, None] - points.T[:, None, :]
+    return np.asarray(np.einsum("dnm,dnm->nm", deltas, deltas))
 
 
 def _inverse(factor: Array) -> Array:
     """Inverse of the matrix with this lower Cholesky factor."""
     lower, _ = lapack.dpotri(factor, lower=1)
     return np.asarray(np.tril(lower) + np.tril(lower, -1).T)
-
-
-def covariance_pull(kernel: Kernel, points: Array, weights: Array) -> Array:
-    """Derivative of ``sum(weights * K)`` by each point, K being the covariance of values and gradients at all.
-
-    Every pair of contacts contributes ``A phi + (B . d) phi' + (d^T C d) phi'' + D phi'`` with d the vector
-    between them and A to D picked from the symmetric weights; its derivative by d needs one more derivative of phi.
-
-    Args:
-        kernel: the covariance function.
-        points: shape (n, d).
-        weights: symmetric, of the covariance's shape.
-
-    Returns:
-        Shape (n, d).
-    """
-    count, dimension = points.shape
-    blocks = weights.reshape(dimension + 1, count, dimension + 1, count).transpose(0, 2, 1, 3)
-    on_values, cross, on_gradients = blocks[0, 0], -4 * blocks[0, 1:], -4 * blocks[1:, 1:]
-    deltas = differences(points, points)
-    squared = np.einsum("dnm,dnm->nm", deltas, deltas)
-    phi = kernel.profile(squared)
-    turned = np.einsum("ijnm,jnm->inm", on_gradients + on_gradients.transpose(1, 0, 2, 3), deltas)
-    quadratic = np.einsum("inm,inm->nm", turned, deltas) / 2
-    trace = np.einsum("iinm->nm", on_gradients) / 2
-    linear = np.einsum("dnm,dnm->nm", cross, deltas)
-    radial = on_values * phi.first + (linear + trace) * phi.second + quadratic * third_derivative(kernel, squared, phi)
-    slopes = 2 * deltas * radial + cross * phi.first + turned * phi.second
-    return np.asarray((slopes.sum(axis=2) - slopes.sum(axis=1)).T)
 
 
 @singledispatch

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import cdist
 
 from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.geometry.contacts import Array
@@ -14,17 +15,16 @@ from tactile_lab.shape.kernels import Kernel, Matern52, SquaredExponential, Thin
 from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.evidence_kernels import assemble, pull
 from tactile_lab.tracking.motion import MotionNoise, compose, deviation, planar_motion, row_pose_in_space
-from tactile_lab.tracking.pose_evidence import PoseEvidence, covariance_pull
+from tactile_lab.tracking.pose_evidence import PoseEvidence, third_derivative
 from tactile_lab.tracking.proposals import ProposalSettings, fit_poses, propose, quasi_normal
-from tests.support.planar_grasps import simulate
 
 NOISE = MotionNoise()
 
 
 def true_map(shape: str, count: int, dimension: int = 2, kernel: str = "matern52") -> ContactMap:
-    heights = (0.02, 0.04) if dimension == 3 else (0.0,)
-    data = simulate(shape, 0, count=count, heights_m=heights)
+    data = (planar_data if dimension == 2 else spatial_data).simulate(shape, 0, count=count)
     placed = [
         PlacedGrasp(
             ContactSet.of_grasp(grasp, dimension, 0.0),
@@ -48,7 +48,7 @@ def disturbed(contact_map: ContactMap, scale: float, seed: int = 0) -> Array:
     [
         ("L", 2, "matern52"),
         ("rectangle", 2, "squared_exponential"),
-        ("box", 3, "matern52"),
+        ("box-12x6x6", 3, "matern52"),
         ("sphere", 3, "thin_plate"),
     ],
 )
@@ -64,17 +64,40 @@ def test_the_gradient_is_the_derivative_of_the_value(shape: str, dimension: int,
         assert gradient[index] == pytest.approx(slope, rel=1e-4, abs=1e-2)
 
 
-@pytest.mark.parametrize("kernel", [Matern52(4e-4, 0.05), SquaredExponential(4e-4, 0.05), ThinPlate(0.3, 4e-4)])
-def test_the_pull_of_a_covariance_is_its_derivative(kernel: Kernel) -> None:
+KERNELS = [Matern52(4e-4, 0.05), SquaredExponential(4e-4, 0.05), ThinPlate(0.3, 4e-4)]
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_the_compiled_covariance_is_that_of_the_shape_model(kernel: Kernel, dimension: int) -> None:
+    points = np.random.default_rng(1).normal(size=(6, dimension)) * 0.03
+    phi = kernel.profile(cdist(points, points, "sqeuclidean"))
+    noise = np.linspace(0, 1, 6 * (dimension + 1))
+    compiled = np.triu(assemble(points, *phi, noise, 0.0))
+    np.testing.assert_allclose(compiled, np.triu(covariance(kernel, points, 6)) + np.diag(noise), atol=1e-15)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_the_pull_on_contacts_is_the_derivative_of_their_covariance(kernel: Kernel, dimension: int) -> None:
     rng = np.random.default_rng(0)
-    points, weights = rng.normal(size=(5, 2)) * 0.03, rng.normal(size=(15, 15))
-    weights += weights.T
-    pull = covariance_pull(kernel, points, weights)
+    count = 5 * (dimension + 1)
+    points, inverse, weights = (
+        rng.normal(size=(5, dimension)) * 0.03,
+        rng.normal(size=(count, count)),
+        rng.normal(size=count),
+    )
+    inverse += inverse.T
+    squared = cdist(points, points, "sqeuclidean")
+    phi = kernel.profile(squared)
+    third = third_derivative(kernel, squared, phi)
+    found = pull(points, phi.first, phi.second, third, np.asfortranarray(inverse), weights)
+    factors = inverse - np.outer(weights, weights)
     for index in np.ndindex(*points.shape):
         step = np.zeros_like(points)
         step[index] = 1e-7
         change = covariance(kernel, points + step, 5) - covariance(kernel, points - step, 5)
-        assert pull[index] == pytest.approx(np.sum(weights * change) / 2e-7, rel=1e-3, abs=1e-6)
+        assert found[index] == pytest.approx(np.sum(factors * change) / 4e-7, rel=1e-3, abs=1e-6)
 
 
 def spread_m(contact_map: ContactMap, rows: Array) -> float:

@@ -1,0 +1,114 @@
+"""The registration baseline: each grasp's contacts are matched to those placed before, starting at odometry.
+
+Generalised ICP by small-gicp knows points with a local plane. A contact has its plane from its normal, not from
+its neighbours, so it is handed over as a small disc of points; everything else is the library's.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gtsam import Pose3
+from pydantic import Field as Limit
+
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.geometry.poses import planar
+from tactile_lab.strict_yaml import StrictModel
+from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.motion import MotionNoise, pose_row, row_pose_in_space
+from tactile_lab.tracking.odometry_tracker import OdometryTracker
+from tactile_lab.tracking.particle_filter import PoseEstimate
+
+_DISC_POINTS = 6
+_DISC_RADIUS_m = 0.0015
+_ROTATION_STEP_rad, _TRANSLATION_STEP_m = 1e-5, 1e-6
+
+
+class IcpSettings(StrictModel):
+    """Parameters of the registration baseline.
+
+    Attributes:
+        reach: contacts farther from the map than so many standard deviations of the motion are not matched.
+        iterations: at most so many a grasp.
+        least_matched: share of a grasp's contacts that must find a partner; below it odometry stands.
+    """
+
+    reach: float = Limit(default=3.0, gt=0)
+    iterations: int = Limit(default=60, ge=1)
+    least_matched: float = Limit(default=0.5, ge=0, le=1)
+
+
+class IcpTracker(OdometryTracker):
+    """Odometry, corrected by registration to the contacts placed so far."""
+
+    def __init__(self, first: ContactMap, noise: MotionNoise, settings: IcpSettings) -> None:
+        super().__init__(first, noise)
+        self._settings = settings
+
+    def weigh(self, contacts: ContactSet) -> bool:
+        """Register the contacts; False when too few find a partner, and the predicted pose stands."""
+        if len(contacts) == 0:
+            return False
+        row = self._registered(contacts)
+        if row is None:
+            return False
+        self._now = PoseEstimate(row, self._covariance_at(row, contacts))
+        return True
+
+    def _registered(self, contacts: ContactSet) -> Array | None:
+        """The pose that lays the contacts onto the map, or None."""
+        import small_gicp  # here: only this baseline needs it
+
+        target, tree = _cloud(self._map.contacts)
+        source, _ = _cloud(contacts)
+        start = row_pose_in_space(self._now.row, 0.0)
+        found = small_gicp.align(
+            target,
+            source,
+            tree,
+            init_T_target_source=start.inverse().matrix(),
+            registration_type="GICP",
+            max_correspondence_distance=self._settings.reach * self._noise.translation_m,
+            num_threads=1,
+            max_iterations=self._settings.iterations,
+            rotation_epsilon=_ROTATION_STEP_rad,
+            translation_epsilon=_TRANSLATION_STEP_m,
+        )
+        object_T_world = np.asarray(found.T_target_source)
+        enough = found.num_inliers >= self._settings.least_matched * source.size()
+        if not enough or not np.isfinite(object_T_world).all():
+            return None
+        return pose_row(planar(Pose3(object_T_world).inverse()))
+
+    def _covariance_at(self, row: Array, contacts: ContactSet) -> Array:
+        """What distances along the normals to equally uncertain partners tell, and odometry for the rest."""
+        arms = contacts.points_m[:, :2] - row[:2]
+        normals = contacts.normals[:, :2]
+        lever = arms[:, 0] * normals[:, 1] - arms[:, 1] * normals[:, 0]
+        rows = np.column_stack([normals, lever]) / (np.sqrt(2.0) * contacts.point_sigma_m[:, None])
+        return np.asarray(np.linalg.inv(rows.T @ rows + np.linalg.inv(self._now.covariance)))
+
+
+def _cloud(contacts: ContactSet) -> tuple[Any, Any]:
+    """A small-gicp point cloud with the contacts' planes, and its search tree."""
+    import small_gicp
+
+    cloud = small_gicp.PointCloud(_discs(contacts))
+    tree = small_gicp.KdTree(cloud)
+    small_gicp.estimate_normals_covariances(cloud, tree, _DISC_POINTS + 1)
+    return cloud, tree
+
+
+def _discs(contacts: ContactSet) -> Array:
+    """Each contact with six points around it in its tangent plane, shape (7 n, 3)."""
+    missing = ((0, 0), (0, 3 - contacts.dimension))
+    points, normals = np.pad(contacts.points_m, missing), np.pad(contacts.normals, missing)
+    least = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(normals, least)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(normals, first)
+    angles = np.linspace(0.0, 2 * np.pi, _DISC_POINTS, endpoint=False)[:, None, None]
+    ring = _DISC_RADIUS_m * (np.cos(angles) * first + np.sin(angles) * second)
+    return np.concatenate([points[None], points + ring]).reshape(-1, 3)
