@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.compiled import compiled
 
 _NEWTON_STEPS = 12
 _LARGEST_TURN_rad = 0.3
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled
 def fit_direction(xx: float, xy: float, yy: float, gx: float, gy: float) -> float:
     """The angle a of ``u = (cos a, sin a)`` that makes ``u' S u - 2 u' g`` least, near the direction of g.
 
@@ -34,7 +34,7 @@ def fit_direction(xx: float, xy: float, yy: float, gx: float, gy: float) -> floa
     return float(angle)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled
 def run_costs(points: Array, normals: Array, point_weights: Array, normal_weights: Array) -> tuple[Array, Array, Array]:
     """Chi-square, direction and offset of every run of successive contacts as one face, in O(n^2).
 
@@ -64,7 +64,7 @@ def run_costs(points: Array, normals: Array, point_weights: Array, normal_weight
     return costs, angles, offsets
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled
 def cheapest_division(costs: Array, price: float) -> tuple[float, NDArray[Any]]:
     """Divide 0..n-1 into runs of the least total cost, each run costing ``price`` more (dynamic programming).
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.polygon_runs import cheapest_division, run_costs
 from tactile_lab.shape.sampling import polygon_area, sample_polygon
 
 PARAMETERS_PER_FACE = 3
@@ -59,7 +58,7 @@ class Faces:
 
     def members(self, face: int) -> NDArray[np.int64]:
         """The contacts of a face in their order along the outline."""
-        return self.order[self.labels[self.order] == face]
+        return np.asarray(self.order[self.labels[self.order] == face])
 
 
 @dataclass(frozen=True)
@@ -202,6 +201,8 @@ def divide(contacts: PlanarContacts, order: NDArray[np.int64]) -> Faces:
 
 
 def _divide_opened(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[Faces, NDArray[np.int64]]:
+    from tactile_lab.shape.polygon_runs import cheapest_division, run_costs  # here: compiled loops are slow to import
+
     centre = contacts.points_m.mean(axis=0)
     costs, angles, offsets = run_costs(
         np.ascontiguousarray(contacts.points_m[order] - centre),
