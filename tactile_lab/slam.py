@@ -20,6 +20,7 @@ A session is lost when the last ``lost_after`` grasps were untracked, or more th
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -27,7 +28,7 @@ import numpy as np
 from gtsam import Pose3
 from pydantic import Field
 
-from tactile_lab.errors import ShapeError, TrackingError
+from tactile_lab.errors import ConfigurationError, ShapeError, TrackingError
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.graph.pose_graph import LoopReport
@@ -38,7 +39,14 @@ from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.motion import planar_motion, row_pose_in_space
 from tactile_lab.tracking.observability import planar_observability
 from tactile_lab.tracking.particle_filter import PoseEstimate
-from tactile_lab.tracking.trackers import FIRST_COVARIANCE, Tracker, TrackingSettings, make_tracker, palm_heading
+from tactile_lab.tracking.trackers import (
+    FIRST_COVARIANCE,
+    GRAPH_METHODS,
+    Tracker,
+    TrackingSettings,
+    make_tracker,
+    palm_heading,
+)
 
 Verdict = Literal["first", "tracked", "uncertain", "untracked"]
 
@@ -129,11 +137,29 @@ class SlamResult:
 class TactileSlam:
     """The method, grasp by grasp. The same settings, seed and grasps give the same result."""
 
-    def __init__(self, settings: SlamSettings | None = None, seed: int = 0) -> None:
+    def __init__(
+        self,
+        settings: SlamSettings | None = None,
+        seed: int = 0,
+        known_poses: Sequence[Pose3 | None] | None = None,
+    ) -> None:
+        """
+        Args:
+            settings: see there.
+            seed: of all that is left to chance.
+            known_poses: true ``world_T_object`` of every grasp, in order, for method "known-pose" and no other.
+
+        Raises:
+            ConfigurationError: the method needs poses and has none, or is given poses that it must not know.
+        """
         self._settings = settings or SlamSettings()
+        self._known_poses = _only_for_known_pose(self._settings.method, known_poses)
         self._seed = seed
         self._rng = np.random.default_rng(seed)
-        self._back_end = BackEnd(self._settings.back_end, each_grasp=self._settings.method != "joint")
+        back_end = self._settings.back_end
+        if self._settings.method not in GRAPH_METHODS:
+            back_end = back_end.model_copy(update={"enabled": False})
+        self._back_end = BackEnd(back_end, each_grasp=self._settings.method != "joint")
         self._tracker: Tracker | None = None
         self._origin_height_m = 0.0
         self._steps: list[SlamStep] = []
@@ -237,11 +263,14 @@ class TactileSlam:
         if len(contacts) < least:
             reason = f"{len(contacts)} contacts, the object frame needs {least}"
             return self._record(grasp, contacts, "untracked", reason, started)
+        following = None if self._known_poses is None else self._known_poses[len(self._steps) :]
+        if following is not None and (not following or following[0] is None):
+            return self._record(grasp, contacts, "untracked", "its true pose is not known", started)
         self._origin_height_m = float(grasp.points_world_m[:, 2].mean())
         contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
         row = np.array([*contacts.points_m[:, :2].mean(axis=0), palm_heading(grasp.world_T_palm)])
         first = PlacedGrasp(contacts, row, FIRST_COVARIANCE, np.zeros(3))
-        self._tracker = make_tracker(self._settings, first, self._rng)
+        self._tracker = make_tracker(self._settings, first, self._rng, following)
         return self._record(grasp, contacts, "first", "object frame born", started)
 
     def _judge(self, contacts: ContactSet, estimate: PoseEstimate, explained: bool) -> tuple[Verdict, str]:
@@ -293,6 +322,16 @@ class TactileSlam:
             )
         except ShapeError:  # contacts that enclose nothing: the trajectory is still a result
             return None, None
+
+
+def _only_for_known_pose(method: str, poses: Sequence[Pose3 | None] | None) -> tuple[Pose3 | None, ...] | None:
+    """Truth reaches the one method that is about it, and no other."""
+    if method == "known-pose" and (poses is None or all(pose is None for pose in poses)):
+        hint = "Take data with the true poses, or another method"
+        raise ConfigurationError("needs the object's true poses, and there are none", where="known-pose", hint=hint)
+    if method != "known-pose" and poses is not None:
+        raise ConfigurationError("must not be given the true poses", where=method)
+    return None if poses is None else tuple(poses)
 
 
 def placement_sigma_m(contacts: ContactSet, estimate: PoseEstimate) -> float:

@@ -14,10 +14,17 @@ class Method(StrEnum):
 
     JOINT = "joint"
     PARTICLE = "particle"
-    THESIS = "thesis"
+    THESIS_PF = "thesis-pf"
+    THESIS_PF_GRAPH = "thesis-pf-graph"
+    KNOWN_POSE = "known-pose"
+    ODOMETRY = "odometry"
+    ICP = "icp"
 
 
-METHOD_HELP = "joint: shape and trajectory together; particle: calibrated filter; thesis: as printed there."
+METHOD_HELP = (
+    "joint: shape and trajectory together; particle: calibrated filter; thesis-pf: the filter as printed, "
+    "-graph with its pose graph; baselines: known-pose (the true poses), odometry, icp."
+)
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
 Root = Annotated[Path, typer.Option(help="Folder of sessions.")]

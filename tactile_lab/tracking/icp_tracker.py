@@ -49,13 +49,11 @@ class IcpTracker(OdometryTracker):
 
     def weigh(self, contacts: ContactSet) -> bool:
         """Register the contacts; False when too few find a partner, and the predicted pose stands."""
-        if len(contacts) == 0:
-            return False
-        row = self._registered(contacts)
-        if row is None:
-            return False
-        self._now = PoseEstimate(row, self._covariance_at(row, contacts))
-        return True
+        row = self._registered(contacts) if len(contacts) else None
+        self._trusted = row is not None
+        if row is not None:
+            self._now = PoseEstimate(row, self._covariance_at(row, contacts))
+        return self._trusted
 
     def _registered(self, contacts: ContactSet) -> Array | None:
         """The pose that lays the contacts onto the map, or None."""

@@ -29,7 +29,7 @@ class OdometryTracker:
 
     def __init__(self, first: ContactMap, noise: MotionNoise) -> None:
         self._map, self._noise = first, noise
-        self._motion = np.zeros(3)
+        self._motion, self._trusted = np.zeros(3), True
         self._now = PoseEstimate(first.placed[-1].row, first.placed[-1].covariance)
 
     @property
@@ -45,14 +45,16 @@ class OdometryTracker:
         self._now = PoseEstimate(compose(motion, self._now.row), covariance)
 
     def weigh(self, contacts: ContactSet) -> bool:
-        return len(contacts) > 0
+        self._trusted = len(contacts) > 0
+        return self._trusted
 
     def estimate(self) -> PoseEstimate:
         return self._now
 
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
-        """All contacts enter the shape where the pose puts them: nothing tells which of them are misplaced."""
-        self._map = self._map.with_grasp(PlacedGrasp(contacts, self._now.row, self._now.covariance, self._motion))
+        """Contacts enter the shape where the pose puts them, however uncertain: a baseline judges nothing."""
+        placed = PlacedGrasp(contacts, self._now.row, self._now.covariance, self._motion)
+        self._map = self._map.with_grasp(placed if self._trusted else placed.put_aside())
 
     def resample(self) -> None:
         """There is one belief only."""
@@ -90,9 +92,6 @@ class KnownPoseTracker(OdometryTracker):
             self._now = PoseEstimate(self._given, KNOWN_COVARIANCE)
 
     def weigh(self, contacts: ContactSet) -> bool:
-        return self._given is not None and len(contacts) > 0
-
-    def update_shape(self, contacts: ContactSet, certain: bool) -> None:
         """Grasps whose pose is not known stay out of the shape."""
-        placed = PlacedGrasp(contacts, self._now.row, self._now.covariance, self._motion)
-        self._map = self._map.with_grasp(placed if self._given is not None else placed.put_aside())
+        self._trusted = self._given is not None and len(contacts) > 0
+        return self._trusted

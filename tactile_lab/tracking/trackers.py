@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal, Protocol, Self
+from collections.abc import Sequence
+from typing import Literal, Protocol, Self, TypeAlias
 
 import numpy as np
 from gtsam import Pose3
@@ -15,6 +16,7 @@ from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.icp_tracker import IcpSettings, IcpTracker
 from tactile_lab.tracking.joint_tracker import JointSettings, JointTracker
 from tactile_lab.tracking.measurement import (
     CalibratedMeasurement,
@@ -24,6 +26,7 @@ from tactile_lab.tracking.measurement import (
     ThesisMeasurement,
 )
 from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.odometry_tracker import KnownPoseTracker, OdometryTracker
 from tactile_lab.tracking.particle_filter import PoseEstimate
 from tactile_lab.tracking.particle_tracker import ParticleTracker
 
@@ -31,6 +34,13 @@ FIRST_COVARIANCE = np.diag([1e-10, 1e-10, 1e-10])
 """The first grasp defines the object frame: its pose is certain up to rounding."""
 
 GRID_MARGIN_m = 0.040
+
+Method: TypeAlias = Literal["joint", "particle", "thesis-pf", "thesis-pf-graph", "known-pose", "odometry", "icp"]
+"""The ways to follow the object, by the names that settings, command line and tables use; see TrackingSettings."""
+
+THESIS_METHODS: tuple[Method, ...] = ("thesis-pf", "thesis-pf-graph")
+GRAPH_METHODS: tuple[Method, ...] = ("joint", "particle", "thesis-pf-graph")
+"""Methods whose poses the pose graph corrects."""
 
 THESIS_SHAPE = GpisSettings(observations="offsurface", kernel="squared_exponential", prior_mean="zero")
 """The thesis's shape model (section 2.2)."""
@@ -72,8 +82,10 @@ class TrackingSettings(StrictModel):
     """What concerns following the object.
 
     Attributes:
-        method: "thesis" is algorithm 3.1 with (3.9) and the gate; "particle" the same filter with the calibrated
-            likelihood; "joint" keeps several trajectories, proposed by the measurement and smoothed with the shape.
+        method: "joint" keeps several trajectories, proposed by the measurement and smoothed with the shape;
+            "thesis-pf" is algorithm 3.1 with (3.9) and the gate, "thesis-pf-graph" the same with the pose graph behind;
+            "particle" is that filter with the calibrated likelihood. Baselines: "known-pose" is given the true poses,
+            "odometry" believes the hand's motion, "icp" registers each grasp to those before.
         dimension: 2 for the horizontal contour, 3 for the surface.
         motion: what the object does beside the hand's motion.
         particles: their number.
@@ -81,11 +93,12 @@ class TrackingSettings(StrictModel):
         gate: of the thesis's measurement model.
         likelihood: of the calibrated one.
         joint: parameters of the hypotheses.
+        icp: parameters of the registration baseline.
         kernel_every: kernel parameters are estimated anew after so many grasps.
         contour_grid_m, surface_grid_m: spacing of the grid that particles look the field up in.
     """
 
-    method: Literal["thesis", "particle", "joint"] = "joint"
+    method: Method = "joint"
     dimension: Literal[2, 3] = 2
     motion: MotionNoise = MotionNoise()
     particles: int = Limit(default=20_000, ge=100)
@@ -93,6 +106,7 @@ class TrackingSettings(StrictModel):
     gate: GateSettings = GateSettings()
     likelihood: CalibratedSettings = CalibratedSettings()
     joint: JointSettings = JointSettings()
+    icp: IcpSettings = IcpSettings()
     kernel_every: int = Limit(default=4, ge=1)
     contour_grid_m: float = Limit(default=0.002, gt=0)
     surface_grid_m: float = Limit(default=0.005, gt=0)
@@ -104,10 +118,37 @@ class TrackingSettings(StrictModel):
         return self
 
 
-def make_tracker(settings: TrackingSettings, first: PlacedGrasp, rng: np.random.Generator) -> Tracker:
-    """The tracker that the settings ask for, started at the first grasp."""
-    shape = settings.shape or (THESIS_SHAPE if settings.method == "thesis" else GpisSettings())
-    calibrated = settings.method != "thesis"
+def make_tracker(
+    settings: TrackingSettings,
+    first: PlacedGrasp,
+    rng: np.random.Generator,
+    known_poses: Sequence[Pose3 | None] | None = None,
+) -> Tracker:
+    """The tracker that the settings ask for, started at the first grasp.
+
+    Args:
+        settings: see there.
+        first: the grasp in which the object frame is born.
+        rng: source of all random numbers.
+        known_poses: for "known-pose": true ``world_T_object`` of the first grasp and of all that follow.
+    """
+    shape = settings.shape or (THESIS_SHAPE if settings.method in THESIS_METHODS else GpisSettings())
+    start = ContactMap((first,), shape)
+    match settings.method:
+        case "joint":
+            return JointTracker(start, settings.motion, settings.joint, settings.kernel_every)
+        case "odometry":
+            return OdometryTracker(start, settings.motion)
+        case "icp":
+            return IcpTracker(start, settings.motion, settings.icp)
+        case "known-pose":
+            return KnownPoseTracker(start, settings.motion, known_poses or ())
+        case _:
+            return _particle_tracker(settings, start, rng)
+
+
+def _particle_tracker(settings: TrackingSettings, start: ContactMap, rng: np.random.Generator) -> ParticleTracker:
+    calibrated = settings.method not in THESIS_METHODS
     spacing_m = settings.contour_grid_m if settings.dimension == 2 else settings.surface_grid_m
 
     def field_of(contact_map: ContactMap) -> FieldGrid:
@@ -116,13 +157,11 @@ def make_tracker(settings: TrackingSettings, first: PlacedGrasp, rng: np.random.
             fitted, margin_m=GRID_MARGIN_m, spacing_m=spacing_m, gradient=calibrated, variance=calibrated
         )
 
-    measurement: Measurement = ThesisMeasurement(settings.gate, shape.offsurface_distance_m)
+    measurement: Measurement = ThesisMeasurement(settings.gate, start.settings.offsurface_distance_m)
     if calibrated:
         measurement = CalibratedMeasurement(settings.likelihood)
-    if settings.method == "joint":
-        return JointTracker(ContactMap((first,), shape), settings.motion, settings.joint, settings.kernel_every)
     return ParticleTracker(
-        first=ContactMap((first,), shape),
+        first=start,
         measurement=measurement,
         noise=settings.motion,
         particles=settings.particles,

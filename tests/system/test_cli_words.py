@@ -63,7 +63,7 @@ def test_help_loads_nothing_heavy():
     [
         ("bogus", "No such command"),
         ("run --nope", "--nope"),
-        ("run --method guess", "'joint', 'particle', 'thesis'"),
+        ("run --method guess", "'joint', 'particle', 'thesis-pf'"),
         ("run --dimension 4", "--dimension"),
         ("run --seed -1", "--seed"),
         ("run --seed one", "--seed"),

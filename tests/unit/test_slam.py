@@ -11,12 +11,14 @@ from pydantic import ValidationError
 
 from tactile_lab.errors import TrackingError
 from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.experiments import spatial_data
+from tactile_lab.experiments.planar_data import simulate
+from tactile_lab.experiments.sensing import SimulatedGrasps
 from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.geometry.poses import spatial
 from tactile_lab.shape.metrics import contour_errors
 from tactile_lab.slam import SlamResult, SlamSettings, TactileSlam
 from tactile_lab.tracking.trackers import palm_heading
-from tests.support.planar_grasps import SimulatedGrasps, simulate
 
 
 def settings(**changes: object) -> SlamSettings:
@@ -64,8 +66,8 @@ def test_the_calibrated_filter_tracks_at_the_slip_of_the_rig() -> None:
 
 
 def test_the_thesis_s_filter_runs_and_says_which_grasps_it_could_not_place() -> None:
-    result = run(simulate("rectangle", 0, count=6), method="thesis", particles=5_000)
-    assert result.method == "thesis"
+    result = run(simulate("rectangle", 0, count=6), method="thesis-pf", particles=5_000)
+    assert result.method == "thesis-pf"
     verdicts = {step.verdict for step in result.steps}
     assert verdicts <= {"first", "tracked", "uncertain", "untracked"}
     for step in result.steps:
@@ -74,7 +76,7 @@ def test_the_thesis_s_filter_runs_and_says_which_grasps_it_could_not_place() -> 
 
 
 def test_a_solid_is_followed_and_meshed() -> None:
-    data = simulate("box", 1, count=8, heights_m=(0.02, 0.03, 0.045))
+    data = spatial_data.simulate("box-12x6x6", 1, count=8)
     result = run(data, dimension=3, mesh_resolution_m=0.005)
     assert registration_mm(data, result) < 6.0
     assert result.mesh is not None
@@ -136,7 +138,7 @@ def test_a_session_without_any_contact_is_lost_but_finishes() -> None:
     assert TactileSlam(settings()).finish().status == "lost"
 
 
-@pytest.mark.parametrize("method", ["joint", "particle", "thesis"])
+@pytest.mark.parametrize("method", ["joint", "particle", "thesis-pf-graph"])
 def test_a_grasp_that_met_nothing_keeps_the_prediction_and_grows_uncertain(method: str) -> None:
     slam = TactileSlam(settings(method=method, particles=2_000, back_end={"enabled": False}))
     slam.step(FOUR.grasps[0])
