@@ -16,9 +16,9 @@ from tactile_lab.errors import ConfigurationError
 from tactile_lab.experiments.outlines import OUTLINES_m, first_crossing, random_boundary_points
 from tactile_lab.experiments.sensing import (
     IN_PLANE,
+    SimulatedGrasps,
     SLIP_SIGMA_m,
     SLIP_SIGMA_rad,
-    SimulatedGrasps,
     line_to_contact,
     measured_contact,
 )
@@ -152,8 +152,6 @@ def _close(
             continue
         point, normal = (np.append(value, 0.0) for value in hit)
         pose = spatial(world_T_body)
-        contacts.append(
-            measured_contact(finger, point, normal, pose, rng, axes=IN_PLANE, outlier_share=outlier_share)
-        )
+        contacts.append(measured_contact(finger, point, normal, pose, rng, axes=IN_PLANE, outlier_share=outlier_share))
         lines.append(line_to_contact(start_world, contacts[-1]))
     return tuple(contacts), tuple(lines)

@@ -54,7 +54,7 @@ class Solid:
         return float(self.mesh.bounds[1, 2] - self.mesh.bounds[0, 2])
 
     def touch(self, starts_m: Array, ways: Array, longest_m: float) -> list[tuple[Array, Array] | None]:
-        """For each ray (starts and unit directions of shape (n, 3)) the first point met and the outward normal there."""
+        """For each ray (starts, unit directions: shape (n, 3)) the first point met and the outward normal there."""
         distances_m, faces = first_hits(self._corners, starts_m, ways, longest_m)
         return [
             None if face < 0 else (start + distance * way, self._normals[face])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tactile_lab.experiments.outlines import OUTLINES_m
 from tactile_lab.graph.faces import (
     NO_FACE,
     FaceSettings,
@@ -16,7 +17,6 @@ from tactile_lab.graph.faces import (
 )
 from tactile_lab.graph.similarity import SimilaritySettings, shared_contacts
 from tactile_lab.tracking.contact_set import ContactSet
-from tests.support.planar_grasps import OUTLINES_m
 
 SETTINGS = FaceSettings()
 

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tactile_lab.experiments.outlines import OUTLINES_m
+from tactile_lab.experiments.planar_data import simulate
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.graph.faces import assign_to_segments, contour_segments
@@ -15,7 +17,6 @@ from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.motion import compose, deviation, inverse, planar_motion, pose_row, row_pose
-from tests.support.planar_grasps import OUTLINES_m, simulate
 
 DRIFT_SIGMAS = np.array([0.0015, 0.0015, 0.03])
 
