@@ -19,7 +19,14 @@ from tactile_lab.shape.field_grid import Field, FieldGrid
 from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.measurement import CalibratedMeasurement, CalibratedSettings, Known, Measurement
+from tactile_lab.tracking.measurement import (
+    CalibratedMeasurement,
+    CalibratedSettings,
+    GateSettings,
+    Known,
+    Measurement,
+    ThesisMeasurement,
+)
 
 PARTICLES = 20_000
 MAP_CONTACTS = 100
@@ -90,6 +97,7 @@ class WeightingCase:
 
     rows: Array
     grasp: ContactSet
+    previous: ContactSet
     contacts: ContactSet
     field: Gpis
 
@@ -104,6 +112,7 @@ def weighting_table(clock: Clock | None = None, *, particles: int = PARTICLES, r
     case = weighting_case(particles)
     grid = FieldGrid.around(case.field)
     calibrated = CalibratedMeasurement(CalibratedSettings())
+    thesis = ThesisMeasurement(GateSettings(), label_distance_m=0.005)
     points = _particle_points(case)
     regressor = _regressor(case)
     sizes = f"{particles} particles, {GRASP_CONTACTS} contacts, map of {MAP_CONTACTS} contacts"
@@ -111,23 +120,32 @@ def weighting_table(clock: Clock | None = None, *, particles: int = PARTICLES, r
         f"Weighting of {sizes}",
         (
             watch("ours, from the grid", lambda: _weigh(calibrated, case, grid), "distance, normal and variance"),
-            watch("tabulating the grid", lambda: FieldGrid.around(case.field), "once a grasp, 2 mm nodes"),
-            watch("ours, without the grid", lambda: case.field.mean(points), "field value alone"),
+            watch("tabulating the grid", lambda: FieldGrid.around(case.field), _grid_note(grid)),
+            watch(
+                "ours, thesis's likelihood", lambda: _weigh(thesis, case, grid), "(3.9) behind the four-contact gate"
+            ),
+            watch("ours, without the grid", lambda: _weigh(calibrated, case, case.field), "the same from all contacts"),
             watch("scikit-learn", lambda: regressor(points), "GaussianProcessRegressor.predict, value alone"),
             Timing("thesis", THESIS_WEIGHTING_ms, 0, None, "as printed: MATLAB on a desktop PC"),
         ),
     )
 
 
+def _grid_note(grid: FieldGrid) -> str:
+    table = grid.interleaved()
+    nodes = " x ".join(map(str, grid.values_m.shape))
+    return f"once a grasp, {nodes} nodes of {1e3 * grid.spacing_m:g} mm, {table.nbytes / 1e6:.2f} MB kept"
+
+
 def weighting_case(particles: int = PARTICLES) -> WeightingCase:
     """An ellipse touched a hundred times, and particles spread by the motion noise around the truth."""
     rng = np.random.default_rng(0)
     contacts = ellipse_contacts(MAP_CONTACTS, rng)
-    grasp = ellipse_contacts(GRASP_CONTACTS, rng)
+    grasp, previous = ellipse_contacts(GRASP_CONTACTS, rng), ellipse_contacts(GRASP_CONTACTS, rng)
     rows = rng.normal(size=(particles, 3)) * [0.010, 0.010, np.radians(20.0)]
     settings = GpisSettings(kernel="squared_exponential", observations="normals")
     field = Gpis.fit(contacts.points_m, contacts.normals, contacts.point_sigma_m, contacts.normal_sigma_rad, settings)
-    return WeightingCase(rows, grasp, contacts, field)
+    return WeightingCase(rows, grasp, previous, contacts, field)
 
 
 def ellipse_contacts(count: int, rng: np.random.Generator) -> ContactSet:
@@ -142,7 +160,7 @@ def ellipse_contacts(count: int, rng: np.random.Generator) -> ContactSet:
 
 
 def _weigh(measurement: Measurement, case: WeightingCase, field: Field) -> Array:
-    return measurement.log_likelihood(case.rows, case.grasp, Known(field, case.contacts))
+    return measurement.log_likelihood(case.rows, case.grasp, Known(field, case.previous))
 
 
 def _particle_points(case: WeightingCase) -> Array:

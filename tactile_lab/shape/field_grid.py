@@ -49,6 +49,7 @@ class FieldGrid:
         self.lower_m, self.spacing_m, self.values_m = lower_m, spacing_m, values_m
         self._gradient_columns = None if gradients is None else list(np.ascontiguousarray(gradients.T))
         self._variances_m2 = variances_m2
+        self._interleaved: Array | None = None
 
     @classmethod
     def tabulate(
@@ -60,8 +61,12 @@ class FieldGrid:
         *,
         gradient: bool = False,
         variance: bool = False,
+        variance_step: int = 1,
     ) -> Self:
         """Evaluate a field on the grid from ``lower_m`` to at least ``upper_m`` (both of shape (d,)).
+
+        ``variance_step`` evaluates variances, which cost most and change least, on a grid coarser by this factor and
+        interpolates them to the nodes.
 
         Raises:
             ShapeError: the grid would have more than :data:`LARGEST_NODE_COUNT` nodes.
@@ -73,11 +78,12 @@ class FieldGrid:
                 f"a grid of {' x '.join(map(str, shape))} nodes is too large", hint="Choose a coarser resolution"
             )
         nodes = lower_m + spacing_m * np.moveaxis(np.indices(shape), 0, -1).reshape(-1, len(shape))
-        found = field.predict(nodes, gradient=gradient, variance=variance)
-        values = found.mean_m.reshape(shape)
-        return cls(
-            lower_m, spacing_m, values, found.gradient if gradient else None, found.variance_m2 if variance else None
-        )
+        found = field.predict(nodes, gradient=gradient, variance=variance and variance_step == 1)
+        spread = found.variance_m2 if variance else None
+        if variance and variance_step > 1:
+            coarse = cls.tabulate(field, lower_m, nodes[-1], variance_step * spacing_m, variance=True)
+            spread = coarse.predict(nodes, variance=True).variance_m2
+        return cls(lower_m, spacing_m, found.mean_m.reshape(shape), found.gradient if gradient else None, spread)
 
     @classmethod
     def around(
@@ -88,10 +94,13 @@ class FieldGrid:
         spacing_m: float = 0.002,
         gradient: bool = True,
         variance: bool = True,
+        variance_step: int = 2,
     ) -> Self:
-        """Tabulate a fitted field over its contacts and a margin around them."""
+        """Tabulate a fitted field over its contacts and a margin around them; see :meth:`tabulate`."""
         lower_m, upper_m = gpis.contacts_m.min(axis=0) - margin_m, gpis.contacts_m.max(axis=0) + margin_m
-        return cls.tabulate(gpis, lower_m, upper_m, spacing_m, gradient=gradient, variance=variance)
+        return cls.tabulate(
+            gpis, lower_m, upper_m, spacing_m, gradient=gradient, variance=variance, variance_step=variance_step
+        )
 
     def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
         """Interpolate at points of shape (q, d).
@@ -108,6 +117,18 @@ class FieldGrid:
         if variance:
             spread = _interpolate(_tabulated(self._variances_m2, "variances"), corners)
         return Prediction(mean, slope, spread)
+
+    def interleaved(self) -> Array:
+        """Value, gradient and variance node by node, shape (nodes, 2 + d): one cell's numbers lie together in memory.
+
+        Raises:
+            ShapeError: the grid was tabulated without gradients or variances.
+        """
+        if self._interleaved is None:
+            columns = _tabulated(self._gradient_columns, "gradients")
+            variances = _tabulated(self._variances_m2, "variances")
+            self._interleaved = np.column_stack([self.values_m.ravel(), *columns, variances])
+        return self._interleaved
 
     def _locate(self, points_m: Array) -> tuple[list[tuple[Indices, Array]], Array]:
         """Node index and weight of the corners of each point's cell, and the distance to the grid from beyond it.

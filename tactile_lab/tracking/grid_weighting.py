@@ -7,7 +7,7 @@ for any field; a test keeps both equal. Import it late, see :mod:`tactile_lab.sh
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,8 @@ from tactile_lab.shape.field_grid import FieldGrid
 from tactile_lab.tracking.contact_set import ContactSet
 
 
-class LikelihoodConstants(NamedTuple):
+@dataclass(frozen=True)
+class LikelihoodConstants:
     """Numbers of the calibrated likelihood.
 
     Attributes:
@@ -32,15 +33,6 @@ class LikelihoodConstants(NamedTuple):
     outlier_density: float
 
 
-class _Nodes(NamedTuple):
-    """A tabulated field: one row of value, gradient and variance a node."""
-
-    table: Array
-    counts: NDArray[np.int64]
-    lower: Array
-    spacing: float
-
-
 def log_likelihood_from_grid(
     rows: Array, contacts: ContactSet, grid: FieldGrid, constants: LikelihoodConstants
 ) -> Array:
@@ -50,7 +42,6 @@ def log_likelihood_from_grid(
         ShapeError: the grid was tabulated without gradients or variances.
     """
     counts = np.array(grid.values_m.shape, dtype=np.int64)
-    nodes = _Nodes(grid.interleaved(), counts, grid.lower_m, float(grid.spacing_m))
     result = np.empty(len(rows))
     _weigh(
         np.ascontiguousarray(rows, dtype=float),
@@ -58,8 +49,13 @@ def log_likelihood_from_grid(
         np.ascontiguousarray(contacts.normals),
         contacts.point_sigma_m**2,
         contacts.normal_sigma_rad**2,
-        nodes,
-        constants,
+        grid.interleaved(),
+        counts,
+        np.ascontiguousarray(grid.lower_m),
+        float(grid.spacing_m),
+        float(constants.smallest_slope),
+        float(constants.normal_length_m),
+        float(constants.outlier_density),
         result,
     )
     return result
@@ -72,8 +68,13 @@ def _weigh(
     normals: Array,
     point_variance: Array,
     normal_variance: Array,
-    nodes: _Nodes,
-    constants: LikelihoodConstants,
+    nodes: Array,
+    counts: NDArray[np.int64],
+    lower: Array,
+    spacing: float,
+    smallest_slope: float,
+    normal_length: float,
+    outlier_density: float,
     result: Array,
 ) -> None:
     dimension = points.shape[1]
@@ -90,52 +91,68 @@ def _weigh(
             normal[1] = cosine * normals[contact, 1] - sine * normals[contact, 0]
             if dimension == 3:
                 point[2], normal[2] = points[contact, 2], normals[contact, 2]
-            _look_up(point, nodes, share, cell, field)
-            density *= _density(field, normal, point_variance[contact], normal_variance[contact], constants)
+            _look_up(point, nodes, counts, lower, spacing, share, cell, field)
+            density *= outlier_density + _density(
+                field, normal, point_variance[contact], normal_variance[contact], smallest_slope, normal_length
+            )
             if not 1e-100 < density < 1e100:
                 log_sum, density = log_sum + math.log(density), 1.0
         result[particle] = log_sum + math.log(density)
 
 
 @compiled
-def _look_up(point: Array, nodes: _Nodes, share: Array, cell: NDArray[np.int64], field: Array) -> None:
+def _look_up(
+    point: Array,
+    nodes: Array,
+    counts: NDArray[np.int64],
+    lower: Array,
+    spacing: float,
+    share: Array,
+    cell: NDArray[np.int64],
+    field: Array,
+) -> None:
     """Write the field at a point, linear between the nodes; beyond them the distance to the grid is added."""
     dimension, columns = len(point), len(field)
     beyond, first = 0.0, 0
     for axis in range(dimension):
-        place = (point[axis] - nodes.lower[axis]) / nodes.spacing
-        inside = min(place, nodes.counts[axis] - 1.0) if place > 0.0 else 0.0  # never an index from NaN
-        cell[axis] = min(int(inside), nodes.counts[axis] - 2)
+        place = (point[axis] - lower[axis]) / spacing
+        inside = min(place, counts[axis] - 1.0) if place > 0.0 else 0.0  # never an index from NaN
+        cell[axis] = min(int(inside), counts[axis] - 2)
         share[axis] = inside - cell[axis]
         beyond += (place - inside) ** 2
-        first = first * nodes.counts[axis] + cell[axis]
+        first = first * counts[axis] + cell[axis]
     field[:] = 0.0
     for corner in range(1 << dimension):
         weight, step = 1.0, 0
         for axis in range(dimension):
             side = (corner >> axis) & 1
             weight *= share[axis] if side else 1.0 - share[axis]
-            step = step * nodes.counts[axis] + side
+            step = step * counts[axis] + side
         for column in range(columns):
-            field[column] += weight * nodes.table[first + step, column]
-    field[0] += nodes.spacing * math.sqrt(beyond)
+            field[column] += weight * nodes[first + step, column]
+    field[0] += spacing * math.sqrt(beyond)
 
 
 @compiled
 def _density(
-    field: Array, normal: Array, point_variance: float, normal_variance: float, constants: LikelihoodConstants
+    field: Array,
+    normal: Array,
+    point_variance: float,
+    normal_variance: float,
+    smallest_slope: float,
+    normal_length: float,
 ) -> float:
-    """Density of one contact's distance and angle to the surface, outliers included."""
+    """Density of one contact's distance and angle to the surface."""
     dimension = len(normal)
     squared, along = 0.0, 0.0
     for axis in range(dimension):
         squared += field[1 + axis] ** 2
         along += field[1 + axis] * normal[axis]
     slope = math.sqrt(squared)
-    scale = max(slope, constants.smallest_slope)
+    scale = max(slope, smallest_slope)
     variance = field[dimension + 1]
     distance_variance = point_variance + variance / (scale * scale)
-    angle_variance = normal_variance + min(variance / constants.normal_length_m**2, 1.0)
+    angle_variance = normal_variance + min(variance / normal_length**2, 1.0)
     misfit = 0.5 * (field[0] / scale) ** 2 / distance_variance + (1 - along / max(slope, 1e-9)) / angle_variance
     spread = distance_variance * angle_variance * (angle_variance if dimension == 3 else 1.0)
-    return math.exp(-misfit) / math.sqrt(spread) + constants.outlier_density
+    return math.exp(-misfit) / math.sqrt(spread)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import FieldGrid
 from tactile_lab.shape.gpis import Gpis, Prediction
@@ -129,6 +130,35 @@ def test_both_models_do_not_depend_on_where_the_world_is() -> None:
         here = model.log_likelihood(rows, CORNERS, Known(Disc(), CORNERS))
         there = model.log_likelihood(compose(move, rows), world, Known(Disc(), CORNERS))
         assert np.allclose(here, there)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_compiled_weighting_equals_the_readable_one(dimension: int) -> None:
+    rng = np.random.default_rng(1)
+    normals = rng.normal(size=(9, dimension))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    contacts = ContactSet(RADIUS_m * normals, normals, np.full(9, 1e-3), np.linspace(0.05, 0.2, 9))
+    grid = FieldGrid.around(Gpis.fit(contacts.points_m, contacts.normals), margin_m=0.01, spacing_m=0.005)
+    rows = rng.normal(size=(300, 3)) * [0.02, 0.02, 2.0]
+    model = CalibratedMeasurement(CalibratedSettings())
+    in_one = model.log_likelihood(rows, contacts, Known(grid, contacts))
+    in_parts = [model.log_likelihood(part, contacts, Known(grid, contacts)) for part in np.array_split(rows, 10)]
+    np.testing.assert_allclose(in_one, np.concatenate(in_parts), rtol=1e-12, atol=1e-10)
+
+
+def test_compiled_weighting_keeps_its_range_with_very_many_contacts() -> None:
+    many = disc_contacts(list(np.linspace(0, 6, 600)))
+    grid = FieldGrid.around(Gpis.fit(AROUND.points_m, AROUND.normals))
+    model = CalibratedMeasurement(CalibratedSettings())
+    found = model.log_likelihood(np.zeros((5, 3)), many, Known(grid, AROUND))
+    assert np.isfinite(found).all()
+    assert found[0] == pytest.approx(model.log_likelihood(np.zeros((1, 3)), many, Known(grid, AROUND))[0])
+
+
+def test_a_grid_without_variances_can_not_weigh() -> None:
+    grid = FieldGrid.around(Gpis.fit(AROUND.points_m, AROUND.normals), variance=False)
+    with pytest.raises(ShapeError, match="without variances"):
+        CalibratedMeasurement(CalibratedSettings()).log_likelihood(np.zeros((1000, 3)), AROUND, Known(grid, AROUND))
 
 
 def test_a_grid_weighs_like_the_field_itself() -> None:

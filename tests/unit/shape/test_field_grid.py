@@ -23,11 +23,12 @@ class LinearField:
         return Prediction(points_m @ self._slope + 1, np.tile(self._slope, (count, 1)), spread)
 
 
+@pytest.mark.parametrize("variance_step", [1, 2, 3])
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_linear_fields_are_looked_up_exactly(dimension: int) -> None:
+def test_linear_fields_are_looked_up_exactly(dimension: int, variance_step: int) -> None:
     field = LinearField(np.array([1.0, -2.0, 0.5])[:dimension])
     lower, upper = np.full(dimension, -1.0), np.linspace(0.5, 1.0, dimension)
-    grid = FieldGrid.tabulate(field, lower, upper, 0.25, gradient=True, variance=True)
+    grid = FieldGrid.tabulate(field, lower, upper, 0.25, gradient=True, variance=True, variance_step=variance_step)
     queries = np.random.default_rng(0).uniform(lower, upper, (200, dimension))
     queries = np.vstack([queries, lower, upper])
     found, expected = (f.predict(queries, gradient=True, variance=True) for f in (grid, field))
