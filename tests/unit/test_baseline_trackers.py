@@ -10,11 +10,11 @@ from gtsam import Pose2, Pose3
 
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.evaluation.registration import registration_rms_mm
-from tactile_lab.geometry.poses import planar, spatial
-from tactile_lab.slam import SlamResult, SlamSettings, TactileSlam
 from tactile_lab.experiments import spatial_data
 from tactile_lab.experiments.planar_data import simulate
 from tactile_lab.experiments.sensing import SimulatedGrasps
+from tactile_lab.geometry.poses import planar, spatial
+from tactile_lab.slam import SlamResult, SlamSettings, TactileSlam
 
 
 def run(data: SimulatedGrasps, method: str, known=None, **changes: object) -> SlamResult:
