@@ -8,6 +8,7 @@ it, and places where fingertips were are outside.
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
@@ -22,7 +23,7 @@ from tactile_lab.shape.surface import Contour, SurfaceMesh, extract_contour, ext
 FINGERTIP_RADIUS_m = 0.006
 """Each contact's fingertip was at least this thick, so that the place this far outside of it is free."""
 
-_TOLERANCE_SIGMAS = 3.0
+_FREE_WEIGHT = 0.5
 _ON_OUTLINE_SIGMAS = 5.0
 
 
@@ -67,13 +68,10 @@ def best_shape(gpis: Gpis, free_points_m: Array | None = None) -> FittedShape:
         polygon = polygon_of(gpis, provisional)
     except ShapeError:  # no outline, or no polygon in it: the field says what can be said
         return field
-    if polygon.log_evidence <= field.log_evidence:
-        return field
     free = _free_points(gpis, free_points_m)
-    sharp = polygon.contour()
-    if _intrusions(sharp, free) > _intrusions(provisional, free) or not _holds_contacts(polygon):
-        return field
-    return polygon
+    advantage = polygon.log_evidence - field.log_evidence
+    advantage += _free_evidence(polygon.contour(), free, gpis) - _free_evidence(provisional, free, gpis)
+    return polygon if advantage > 0 and _holds_contacts(polygon) else field
 
 
 def polygon_of(gpis: Gpis, provisional: Contour) -> Polygon:
@@ -91,14 +89,17 @@ def _free_points(gpis: Gpis, free_points_m: Array | None) -> Array:
     return at_contacts if free_points_m is None else np.vstack([at_contacts, free_points_m])
 
 
-def _intrusions(contour: Contour, free_points_m: Array) -> int:
-    """How many places known to be free lie clearly inside an outline."""
-    inside = free_points_m[encloses(contour.points_m, free_points_m)]
-    if len(inside) == 0:
-        return 0
-    nearest = np.linalg.norm(inside[:, None] - contour.points_m[None], axis=2).argmin(axis=1)
-    depth = distances_to_polygon(inside, contour.points_m)
-    return int(np.sum(depth > _TOLERANCE_SIGMAS * contour.sigma_m[nearest]))
+def _free_evidence(contour: Contour, free_points_m: Array, gpis: Gpis) -> float:
+    """Logarithm of the probability that places known to be free are outside of an outline.
+
+    Places are known as well as contacts are, the outline by its own sigma. Neighbouring places tell nearly the same,
+    hence a weight below one.
+    """
+    nearest = np.linalg.norm(free_points_m[:, None] - contour.points_m[None], axis=2).argmin(axis=1)
+    outward = distances_to_polygon(free_points_m, contour.points_m)
+    outward = np.where(encloses(contour.points_m, free_points_m), -outward, outward)
+    sigma = np.hypot(contour.sigma_m[nearest], gpis.observations.value_sigma_m.mean())
+    return float(_FREE_WEIGHT * log_ndtr(outward / sigma).sum())
 
 
 def _holds_contacts(polygon: Polygon) -> bool:

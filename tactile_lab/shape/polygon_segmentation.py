@@ -2,7 +2,9 @@
 
 The contacts are ordered along a provisional outline and divided into runs by dynamic programming. A run costs the
 chi-square of its points against one line and of its normals against the line's; every face costs what the Bayesian
-information criterion (BIC) asks for its three parameters: direction, offset and where it begins.
+information criterion (BIC) asks for its three parameters: direction, offset and where it begins. The criterion's usual
+form takes for granted that a parameter was known beforehand as well as one contact tells it. A face may point anywhere
+and lie anywhere within the reach of a hand, so the price holds the widths of these priors as well.
 """
 
 from __future__ import annotations
@@ -18,6 +20,9 @@ from tactile_lab.shape.sampling import polygon_area, sample_polygon
 
 PARAMETERS_PER_FACE = 3
 """Direction, offset, and the place along the outline where it begins."""
+
+PRIOR_REACH_m = 0.100
+"""A face lies somewhere within a range of this width."""
 
 _ORDER_STEP_m = 0.0005
 _REORDERINGS = 3
@@ -119,20 +124,26 @@ def segment(
     faces = divide(contacts, order_along(contacts, contour_m))
     for _ in range(_REORDERINGS):
         again = divide(contacts, order_along_faces(contacts, faces))
-        if description_length(again) >= description_length(faces) - 1e-9:
+        if description_length(contacts, again) >= description_length(contacts, faces) - 1e-9:
             break
         faces = again
     return faces
 
 
-def price_of_face(count: int) -> float:
-    """Chi-square that one face more must save among so many contacts."""
-    return float(PARAMETERS_PER_FACE * np.log(max(count, 2)))
+def price_of_face(point_sigma_m: Array, normal_sigma_rad: Array) -> float:
+    """Chi-square that one face more must save among contacts of these standard deviations, each of shape (n,).
+
+    Twice the negative logarithm of how much the contacts narrow the priors, ``sqrt(n) width / (sqrt(2 pi) sigma)`` for
+    direction and offset each, and of one among n places to begin at.
+    """
+    widths = np.array([2 * np.pi / np.median(normal_sigma_rad), PRIOR_REACH_m / np.median(point_sigma_m)])
+    narrowing = np.log(np.maximum(widths / np.sqrt(2 * np.pi), 1.0)).sum()
+    return float(PARAMETERS_PER_FACE * np.log(max(len(point_sigma_m), 2)) + 2 * narrowing)
 
 
-def description_length(faces: Faces) -> float:
+def description_length(contacts: PlanarContacts, faces: Faces) -> float:
     """Chi-square and the price of the faces: the smaller, the better."""
-    return faces.chi_square + faces.count * price_of_face(len(faces.labels))
+    return faces.chi_square + faces.count * price_of_face(contacts.point_sigma_m, contacts.normal_sigma_rad)
 
 
 def log_evidence(chi_square: float, face_count: int, point_sigma_m: Array, normal_sigma_rad: Array) -> float:
@@ -148,7 +159,8 @@ def log_evidence(chi_square: float, face_count: int, point_sigma_m: Array, norma
     """
     count = len(point_sigma_m)
     scale = np.log(point_sigma_m).sum() + 2 * np.log(normal_sigma_rad).sum() + 1.5 * count * np.log(2 * np.pi)
-    return float(-0.5 * (chi_square + face_count * price_of_face(count)) - scale)
+    price = price_of_face(point_sigma_m, normal_sigma_rad)
+    return float(-0.5 * (chi_square + face_count * price) - scale)
 
 
 def order_along(contacts: PlanarContacts, contour_m: Array) -> NDArray[np.int64]:
@@ -197,7 +209,7 @@ def divide(contacts: PlanarContacts, order: NDArray[np.int64]) -> Faces:
     if opposite in (0, len(order)):
         return first
     second, _ = _divide_opened(contacts, np.roll(order, -opening - opposite))
-    return min(first, second, key=description_length)
+    return min(first, second, key=lambda faces: description_length(contacts, faces))
 
 
 def _divide_opened(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[Faces, NDArray[np.int64]]:
@@ -210,7 +222,7 @@ def _divide_opened(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[
         contacts.point_sigma_m[order] ** -2.0,
         contacts.normal_sigma_rad[order] ** -2.0,
     )
-    _, firsts = cheapest_division(costs, price_of_face(len(order)))
+    _, firsts = cheapest_division(costs, price_of_face(contacts.point_sigma_m, contacts.normal_sigma_rad))
     borders = [len(order)]
     while borders[-1] > 0:
         borders.append(int(firsts[borders[-1]]))
