@@ -1,8 +1,8 @@
 """The exchange form ``tactile-contacts/1``: grasps as one JSON file, for other people's data and programs.
 
-Lengths in metres, angles in radians; dimension 2 keeps three-component vectors with z = 0. The form knows one point
-and one normal uncertainty for all contacts, and no forces; truth (the object and its poses) is optional and meant
-for evaluation only.
+Lengths in metres, angles in radians; dimension 2 keeps three-component vectors with z = 0. One point and one normal
+uncertainty hold for all contacts that do not state their own; truth (the object and its poses) is optional and meant
+for evaluation only. What is written is read back as it was, to the last bit.
 """
 
 from __future__ import annotations
@@ -11,102 +11,24 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal
 
 import numpy as np
-from gtsam import Pose3
-from pydantic import AfterValidator, Field, model_validator
+from gtsam import Pose2, Pose3
 
+from sessions.contact_form import FORMAT, ContactEntry, Document, GraspEntry, LineEntry, MotionSigma, ObjectTruth
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import ConfigurationError, SessionError
-from tactile_lab.geometry.contacts import Array, Contact, Grasp
+from tactile_lab.geometry.contacts import Array, ClosingLine, Contact, Grasp
 from tactile_lab.geometry.poses import planar, spatial
-from tactile_lab.strict_yaml import StrictModel, validate
+from tactile_lab.strict_yaml import validate
+from tactile_lab.tracking.contact_checks import opposing_pairs
+from tactile_lab.tracking.contact_set import LARGEST_SLOPE
+from tactile_lab.tracking.trackers import palm_heading
 
-FORMAT = "tactile-contacts/1"
+__all__ = ["FORMAT", "ContactLog", "MotionSigma", "ObjectTruth", "read_contact_log", "write_contact_log"]
 
-_LARGEST_GRASP_m = 1.0
-"""No hand spans more; larger numbers are millimetres."""
-
-
-def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    length = float(np.linalg.norm(vector))
-    if abs(length - 1.0) > 0.01:
-        raise ValueError(f"a normal has length 1, this one {length:.3g}")
-    return vector
-
-
-def _rigid(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
-    matrix = np.array(rows)
-    rotation = matrix[:3, :3]
-    bottom = np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0], atol=1e-6)
-    if not bottom or not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4) or np.linalg.det(rotation) < 0:
-        raise ValueError("not a rigid motion (rotation, translation, last row 0 0 0 1)")
-    return rows
-
-
-_Vector = tuple[float, float, float]
-_Row = tuple[float, float, float, float]
-_Motion = Annotated[tuple[_Row, _Row, _Row, _Row], AfterValidator(_rigid)]
-
-
-class MotionSigma(StrictModel):
-    """Standard deviations of one re-orientation, per axis."""
-
-    translation_m: float = Field(ge=0.0)
-    rotation_rad: float = Field(ge=0.0)
-
-
-class ObjectTruth(StrictModel):
-    """The true object in its own coordinates: an outline, or the name of a mesh file beside the log."""
-
-    name: str = "object"
-    polygon_m: tuple[tuple[float, float], ...] | None = Field(default=None, min_length=3)
-    mesh: str | None = None
-
-
-class _ContactEntry(StrictModel):
-    finger: str
-    point_world_m: _Vector
-    normal_world: Annotated[_Vector, AfterValidator(_unit)]
-
-
-class _GraspEntry(StrictModel):
-    stamp_s: float = 0.0
-    contacts: tuple[_ContactEntry, ...]
-    hand_motion_world: _Motion
-    world_T_object: _Motion | None = None
-
-
-class _Document(StrictModel):
-    format: Literal["tactile-contacts/1"]
-    dimension: Literal[2, 3]
-    point_sigma_m: float = Field(gt=0.0)
-    normal_sigma_rad: float = Field(gt=0.0)
-    motion_sigma: MotionSigma
-    object: ObjectTruth | None = None
-    grasps: tuple[_GraspEntry, ...] = Field(min_length=1)
-
-    @model_validator(mode="after")
-    def _makes_sense(self) -> Self:
-        if not any(grasp.contacts for grasp in self.grasps):
-            raise ValueError("no grasp has a contact")
-        for index, grasp in enumerate(self.grasps):
-            _check_size(index, np.array([contact.point_world_m for contact in grasp.contacts]).reshape(-1, 3))
-        if self.dimension == 2:
-            _check_planar(self.grasps)
-        return self
-
-
-def _check_size(index: int, points_m: Array) -> None:
-    if len(points_m) and (extent := float(np.ptp(points_m, axis=0).max())) > _LARGEST_GRASP_m:
-        raise ValueError(f"contacts of grasp {index} lie {extent:.4g} m apart; are the lengths in millimetres?")
-
-
-def _check_planar(grasps: Sequence[_GraspEntry]) -> None:
-    vectors = [v for grasp in grasps for c in grasp.contacts for v in (c.point_world_m, c.normal_world)]
-    if any(vector[2] != 0.0 for vector in vectors):
-        raise ValueError("dimension 2 needs z = 0 in every point and normal")
+_FLAT = np.array([1.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True)
@@ -115,9 +37,10 @@ class ContactLog:
 
     Attributes:
         dimension: 2 or 3.
-        point_sigma_m, normal_sigma_rad: standard deviation of all points and normals, per axis.
-        motion_sigma: of one re-orientation.
-        grasps: forces are not part of the form and read as 0; the palm's place is taken at the contacts' centre with
+        point_sigma_m, normal_sigma_rad: standard deviation of all points and normals, per axis, where a contact does
+            not state its own.
+        motion_sigma: of one re-orientation; None where it is not known.
+        grasps: a force that is not given is read as 0, a palm that is not given as being at the contacts' centre with
             its axes along the world's.
         truth: the object, or None; for evaluation only.
         true_poses: world_T_object at each grasp, None where not given; for evaluation only.
@@ -126,7 +49,7 @@ class ContactLog:
     dimension: Literal[2, 3]
     point_sigma_m: float
     normal_sigma_rad: float
-    motion_sigma: MotionSigma
+    motion_sigma: MotionSigma | None
     grasps: tuple[Grasp, ...]
     truth: ObjectTruth | None = None
     true_poses: tuple[Pose3 | None, ...] = ()
@@ -137,7 +60,8 @@ def read_contact_log(path: Path) -> ContactLog:
 
     Raises:
         SessionError: the file can not be read or is no JSON.
-        ConfigurationError: its content does not fit the form; the message names each entry.
+        ConfigurationError: its content does not fit the form, or its normals point into the object; the message names
+            each entry.
     """
     content = _load_json(path)
     tag = content.get("format") if isinstance(content, dict) else None
@@ -145,13 +69,15 @@ def read_contact_log(path: Path) -> ContactLog:
         raise ConfigurationError(
             f"its format is {tag!r}, not {FORMAT!r}", where=str(path), hint="Name a contact log of this form"
         )
-    document = validate(content, _Document, where=str(path))
+    document = validate(content, Document, where=str(path))
+    grasps = tuple(_grasp(index, entry, document) for index, entry in enumerate(document.grasps))
+    _check_normals(grasps, path)
     return ContactLog(
         dimension=document.dimension,
         point_sigma_m=document.point_sigma_m,
         normal_sigma_rad=document.normal_sigma_rad,
         motion_sigma=document.motion_sigma,
-        grasps=tuple(_grasp(index, entry, document) for index, entry in enumerate(document.grasps)),
+        grasps=grasps,
         truth=document.object,
         true_poses=tuple(_optional_pose(entry.world_T_object) for entry in document.grasps),
     )
@@ -173,17 +99,18 @@ def write_contact_log(path: Path, log: ContactLog) -> None:
         "dimension": log.dimension,
         "point_sigma_m": log.point_sigma_m,
         "normal_sigma_rad": log.normal_sigma_rad,
-        "motion_sigma": log.motion_sigma.model_dump(),
+        **({"motion_sigma": log.motion_sigma.model_dump()} if log.motion_sigma else {}),
         **({"object": log.truth.model_dump(exclude_none=True)} if log.truth else {}),
-        "grasps": [
-            _grasp_entry(grasp, pose, flat=log.dimension == 2) for grasp, pose in zip(log.grasps, poses, strict=True)
-        ],
+        "grasps": [_grasp_entry(grasp, pose, log) for grasp, pose in zip(log.grasps, poses, strict=True)],
     }
-    validate(document, _Document, where=str(path))
+    validate(document, Document, where=str(path))
     try:
         path.write_text(json.dumps(document, indent=1, allow_nan=False), encoding="utf-8")
     except OSError as error:
         raise SessionError(f"can not be written ({error.strerror})", where=str(path), hint="Check the disk") from error
+
+
+# --- reading -------------------------------------------------------------------------------------------------------
 
 
 def _load_json(path: Path) -> Any:
@@ -202,53 +129,110 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return content
 
 
-def _grasp(index: int, entry: _GraspEntry, document: _Document) -> Grasp:
+def _check_normals(grasps: Sequence[Grasp], path: Path) -> None:
+    found = opposing_pairs(grasps)
+    if found.point_in:
+        what = f"normals point into the object, in {found.inward} of {found.pairs} pairs of opposing contacts"
+        raise ConfigurationError(what, where=str(path), hint="The form wants normals that point out of it: negate them")
+
+
+def _grasp(index: int, entry: GraspEntry, document: Document) -> Grasp:
     contacts = tuple(_contact(contact, document) for contact in entry.contacts)
-    centre = np.mean([contact.point_world_m for contact in contacts], axis=0) if contacts else np.zeros(3)
     return Grasp(
         index=index,
         stamp_ns=round(entry.stamp_s * NANOSECONDS),
         contacts=contacts,
-        world_T_palm=Pose3(np.block([[np.eye(3), centre[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])),
+        world_T_palm=_optional_pose(entry.world_T_palm) or _assumed_palm(entry.points_m),
         hand_motion_world=Pose3(np.array(entry.hand_motion_world)),
+        closing_lines=tuple(_closing_line(line) for line in entry.closing_lines),
     )
 
 
-def _contact(entry: _ContactEntry, document: _Document) -> Contact:
+def _assumed_palm(points_m: Array) -> Pose3:
+    """The palm where it is not given: at the contacts' centre, its axes along the world's."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = points_m.mean(axis=0) if len(points_m) else 0.0
+    return Pose3(matrix)
+
+
+def _contact(entry: ContactEntry, document: Document) -> Contact:
     normal = np.array(entry.normal_world)
+    length = float(np.linalg.norm(normal))
+    own = entry.point_covariance_m2
+    sigma_m = entry.point_sigma_m or document.point_sigma_m
     return Contact(
         finger=entry.finger,
         point_world_m=np.array(entry.point_world_m),
-        normal_world=normal / np.linalg.norm(normal),
-        point_covariance_m2=document.point_sigma_m**2 * np.eye(3),
-        normal_sigma_rad=document.normal_sigma_rad,
-        force_N=0.0,
+        normal_world=normal if abs(length - 1.0) < 1e-12 else normal / length,
+        point_covariance_m2=sigma_m**2 * np.eye(3) if own is None else np.array(own),
+        normal_sigma_rad=entry.normal_sigma_rad or document.normal_sigma_rad,
+        force_N=entry.force_N or 0.0,
     )
 
 
-def _optional_pose(motion: tuple[_Row, ...] | None) -> Pose3 | None:
+def _closing_line(entry: LineEntry) -> ClosingLine:
+    return ClosingLine(entry.finger, np.array(entry.start_world_m), np.array(entry.end_world_m), entry.touched)
+
+
+def _optional_pose(motion: tuple[tuple[float, ...], ...] | None) -> Pose3 | None:
     return None if motion is None else Pose3(np.array(motion))
 
 
-def _grasp_entry(grasp: Grasp, world_T_object: Pose3 | None, *, flat: bool) -> dict[str, Any]:
-    entries = [_contact_entry(contact, flat=flat) for contact in grasp.contacts]
+# --- writing -------------------------------------------------------------------------------------------------------
+
+
+def _grasp_entry(grasp: Grasp, world_T_object: Pose3 | None, log: ContactLog) -> dict[str, Any]:
+    flat = log.dimension == 2
+    contacts = [contact for contact in grasp.contacts if not flat or _horizontal(contact) >= LARGEST_SLOPE]
+    scale = _FLAT if flat else np.ones(3)
+    points = np.array([scale * contact.point_world_m for contact in contacts]).reshape(-1, 3)
+    palm = spatial(Pose2(grasp.world_T_palm.x(), grasp.world_T_palm.y(), palm_heading(grasp.world_T_palm)))
+    palm = palm if flat else grasp.world_T_palm
     entry: dict[str, Any] = {
         "stamp_s": grasp.stamp_ns / NANOSECONDS,
-        "contacts": [contact for contact in entries if contact is not None],
+        "contacts": [_contact_entry(contact, log, scale) for contact in contacts],
         "hand_motion_world": _matrix(grasp.hand_motion_world, flat=flat),
     }
+    if not np.array_equal(palm.matrix(), _assumed_palm(points).matrix()):
+        entry["world_T_palm"] = palm.matrix().tolist()
+    if grasp.closing_lines:
+        entry["closing_lines"] = [_line_entry(line, scale) for line in grasp.closing_lines]
     if world_T_object is not None:
         entry["world_T_object"] = _matrix(world_T_object, flat=flat)
     return entry
 
 
-def _contact_entry(contact: Contact, *, flat: bool) -> dict[str, Any] | None:
-    scale = np.array([1.0, 1.0, 0.0]) if flat else np.ones(3)
-    point, normal = contact.point_world_m * scale, contact.normal_world * scale
-    length = float(np.linalg.norm(normal))
-    if length < 0.5:  # steeper than 60 deg: it says nothing about the horizontal outline
-        return None
-    return {"finger": contact.finger, "point_world_m": point.tolist(), "normal_world": (normal / length).tolist()}
+def _horizontal(contact: Contact) -> float:
+    """Length of the normal's horizontal part; of little it says nothing about the horizontal outline."""
+    return float(np.linalg.norm(contact.normal_world[:2]))
+
+
+def _contact_entry(contact: Contact, log: ContactLog, scale: Array) -> dict[str, Any]:
+    """A contact; what the log says of all of them is left out."""
+    steep = 1.0 if scale[2] else _horizontal(contact)
+    covariance = contact.point_covariance_m2 * np.outer(scale, scale)
+    normal_sigma_rad = contact.normal_sigma_rad / steep
+    entry: dict[str, Any] = {
+        "finger": contact.finger,
+        "point_world_m": (scale * contact.point_world_m).tolist(),
+        "normal_world": (scale * contact.normal_world / steep).tolist(),
+    }
+    if not np.array_equal(contact.point_covariance_m2, log.point_sigma_m**2 * np.eye(3)):
+        entry["point_covariance_m2"] = covariance.tolist()
+    if normal_sigma_rad != log.normal_sigma_rad:
+        entry["normal_sigma_rad"] = normal_sigma_rad
+    if contact.force_N:
+        entry["force_N"] = contact.force_N
+    return entry
+
+
+def _line_entry(line: ClosingLine, scale: Array) -> dict[str, Any]:
+    return {
+        "finger": line.finger,
+        "start_world_m": (scale * line.start_world_m).tolist(),
+        "end_world_m": (scale * line.end_world_m).tolist(),
+        "touched": line.touched,
+    }
 
 
 def _matrix(pose: Pose3, *, flat: bool) -> list[list[float]]:
