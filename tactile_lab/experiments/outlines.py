@@ -67,7 +67,7 @@ def first_crossing(
 def edge_normals(outline_m: Array) -> Array:
     """Outward unit normals of a counter-clockwise polygon's sides, shape (n, 2)."""
     edges = np.roll(outline_m, -1, axis=0) - outline_m
-    return np.column_stack([edges[:, 1], -edges[:, 0]]) / np.linalg.norm(edges, axis=1, keepdims=True)
+    return np.asarray(np.column_stack([edges[:, 1], -edges[:, 0]]) / np.linalg.norm(edges, axis=1, keepdims=True))
 
 
 def random_boundary_points(outline_m: Array, count: int, rng: np.random.Generator) -> tuple[Array, Array]:

@@ -21,9 +21,11 @@ from tactile_lab.experiments.sensing import (
     SLIP_SIGMA_rad,
     line_to_contact,
     measured_contact,
+    planar_pose,
 )
 from tactile_lab.geometry.contacts import FINGERS, Array, ClosingLine, Contact, Grasp
 from tactile_lab.geometry.poses import spatial
+from tactile_lab.tracking.motion import row_pose
 
 _FAN_rad = np.deg2rad([-75.0, -25.0, 25.0, 75.0, 180.0])
 _AIM_m = np.array([[-0.006, -0.006], [0.0, -0.004], [0.0, 0.004], [-0.006, 0.006], [0.0, 0.0]])
@@ -71,8 +73,8 @@ def simulate(
     """
     outline_m = outline(shape)
     rng = np.random.default_rng([seed, 20261, round(1000 * motion_scale)])
-    world_T_body = Pose2(*rng.normal(0.0, 0.05, 2), rng.uniform(-np.pi, np.pi))
-    palm = world_T_body.compose(Pose2(*rng.normal(0.0, 0.006, 2), -world_T_body.theta() + rng.normal(0, 0.09)))
+    world_T_body = planar_pose(rng.normal(0.0, 0.05, 2), rng.uniform(-np.pi, np.pi))
+    palm = world_T_body.compose(planar_pose(rng.normal(0.0, 0.006, 2), -world_T_body.theta() + rng.normal(0, 0.09)))
     grasps: list[Grasp] = []
     truth: list[Pose3] = []
     hand_motion, body_T_frame = Pose2(), Pose2()
@@ -84,7 +86,7 @@ def simulate(
         grasps.append(Grasp(index, index * 10**9, contacts, pose, spatial(hand_motion), lines))
         truth.append(spatial(world_T_body))
         if index == 0 and contacts:
-            body_T_frame = world_T_body.between(Pose2(*grasps[0].points_world_m[:, :2].mean(axis=0), 0))
+            body_T_frame = world_T_body.between(planar_pose(grasps[0].points_world_m.mean(axis=0)))
     return PlanarGrasps(shape, tuple(grasps), tuple(truth), outline_m)
 
 
@@ -119,10 +121,10 @@ def _reorient(
     middle = (points.min(axis=0) + points.max(axis=0)) / 2 if len(points) else palm_m
     shift = rng.normal(0.0, 0.005, 2)
     turn = Pose2(0, 0, float(np.deg2rad(rng.uniform(5.0, 25.0))))
-    hand_motion = Pose2(*(middle + shift), 0).compose(turn).compose(Pose2(*-middle, 0))
-    slip = Pose2(*(scale * np.array([SLIP_SIGMA_m, SLIP_SIGMA_m, SLIP_SIGMA_rad]) * rng.normal(size=3)))
+    hand_motion = planar_pose(middle + shift).compose(turn).compose(planar_pose(-middle))
+    slip = row_pose(scale * np.array([SLIP_SIGMA_m, SLIP_SIGMA_m, SLIP_SIGMA_rad]) * rng.normal(size=3))
     moved = hand_motion.compose(world_T_body).compose(body_T_frame).compose(slip).compose(body_T_frame.inverse())
-    palm = Pose2(*(middle + shift + rng.normal(0.0, 0.008, 2)), rng.normal(0.0, np.deg2rad(5.0)))
+    palm = planar_pose(middle + shift + rng.normal(0.0, 0.008, 2), rng.normal(0.0, np.deg2rad(5.0)))
     return hand_motion, moved, palm
 
 

@@ -25,7 +25,7 @@ def first_hits(corners_m: Array, starts_m: Array, ways: Array, longest_m: float)
     return np.asarray(distances), faces
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _cast(corners: Any, starts: Any, ways: Any, longest: float) -> Any:
     distances = np.full(len(starts), np.inf)
     faces = np.full(len(starts), -1)
@@ -39,8 +39,8 @@ def _cast(corners: Any, starts: Any, ways: Any, longest: float) -> Any:
     return distances, faces
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _crossing(corners: Any, start: Any, way: Any) -> float:
+@njit(cache=True)
+def _crossing(corners: Any, start: Any, way: Any) -> Any:
     """Distance to one triangle (Moeller and Trumbore 1997), -1 where the ray passes it by."""
     ax, ay, az = corners[1, 0] - corners[0, 0], corners[1, 1] - corners[0, 1], corners[1, 2] - corners[0, 2]
     bx, by, bz = corners[2, 0] - corners[0, 0], corners[2, 1] - corners[0, 1], corners[2, 2] - corners[0, 2]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from gtsam import Pose3
+from gtsam import Pose2, Pose3
 
 from tactile_lab.geometry.contacts import Array, ClosingLine, Contact, Grasp
 from tactile_lab.geometry.poses import rotate, transform_points
@@ -73,3 +73,8 @@ def measured_contact(
 def line_to_contact(start_world_m: Array, contact: Contact) -> ClosingLine:
     """The way of a finger that touched: to where its contact was measured, as a rig knows it."""
     return ClosingLine(contact.finger, start_world_m, contact.point_world_m, touched=True)
+
+
+def planar_pose(place_m: Array, heading_rad: float = 0.0) -> Pose2:
+    """A pose in the plane from a place, of which x and y count, and a heading."""
+    return Pose2(float(place_m[0]), float(place_m[1]), heading_rad)

@@ -98,8 +98,8 @@ def ycb_path(name: str) -> Path:
 
 def _ellipsoid() -> trimesh.Trimesh:
     """Semi-axes 60, 40 and 30 mm, lying."""
-    mesh = trimesh.creation.icosphere(subdivisions=5)
-    mesh.apply_scale([0.060, 0.040, 0.030])
+    mesh: trimesh.Trimesh = trimesh.creation.icosphere(subdivisions=5)
+    mesh.apply_scale([0.060, 0.040, 0.030])  # type: ignore[no-untyped-call]
     return mesh
 
 
@@ -107,7 +107,8 @@ def _bottle() -> trimesh.Trimesh:
     """A body of 70 mm with rounded shoulders and a neck of 28 mm, 130 mm high."""
     radii_mm = [0, 32, 35, 35, 34, 30, 23, 17, 14, 14, 12, 0]
     heights_mm = [-65, -65, -61, 12, 22, 32, 41, 47, 53, 63, 65, 65]
-    return trimesh.creation.revolve(np.column_stack([radii_mm, heights_mm]) / 1000, sections=96)
+    mesh: trimesh.Trimesh = trimesh.creation.revolve(np.column_stack([radii_mm, heights_mm]) / 1000, sections=96)
+    return mesh
 
 
 def _mug() -> trimesh.Trimesh:
@@ -116,7 +117,8 @@ def _mug() -> trimesh.Trimesh:
     x, y, z = np.meshgrid(*axes, indexing="ij")
     body = _capped_cylinder(np.hypot(x, y), z, radius_m=0.038, half_height_m=0.048)
     handle = np.hypot(np.hypot(x - 0.044, z) - 0.028, y) - 0.008
-    vertices, faces, _, _ = marching_cubes(_blend(body, handle, 0.006), 0.0, spacing=(_MUG_GRID_m,) * 3)
+    distances_m = _blend(body, handle, 0.006)
+    vertices, faces, _, _ = marching_cubes(distances_m, 0.0, spacing=(_MUG_GRID_m,) * 3)  # type: ignore[no-untyped-call]
     mesh = trimesh.Trimesh(vertices + [axis[0] for axis in axes], faces)
     if mesh.volume < 0:
         mesh.invert()

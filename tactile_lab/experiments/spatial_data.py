@@ -22,10 +22,11 @@ from tactile_lab.experiments.sensing import (
     SLIP_SIGMA_rad,
     line_to_contact,
     measured_contact,
+    planar_pose,
 )
 from tactile_lab.experiments.solids import Solid, solid
 from tactile_lab.geometry.contacts import FINGERS, Array, ClosingLine, Contact, Grasp
-from tactile_lab.geometry.poses import rotate, spatial, transform_points
+from tactile_lab.geometry.poses import planar, rotate, spatial, transform_points
 from tactile_lab.shape.sampling import sample_mesh_with_normals
 
 Motion: TypeAlias = Literal["table", "free"]
@@ -211,9 +212,9 @@ class _OnTable(_Session):
     def __init__(self, body: Solid, scale: float, rng: np.random.Generator) -> None:
         super().__init__(body, scale, rng)
         place = rng.normal(0.0, 0.05, 2)
-        self.world_T_body = spatial(Pose2(*place, rng.uniform(-np.pi, np.pi)), -body.foot_m)
+        self.world_T_body = spatial(planar_pose(place, rng.uniform(-np.pi, np.pi)), -body.foot_m)
         palm = place + rng.normal(0.0, 0.006, 2)
-        self.world_T_palm = spatial(Pose2(*palm, rng.normal(0.0, 0.1)), _REACH_m)
+        self.world_T_palm = spatial(planar_pose(palm, rng.normal(0.0, 0.1)), _REACH_m)
 
     def rays(self, index: int, spread: float) -> _Rays:
         rng, height = self._rng, self.solid.height_m
@@ -227,7 +228,7 @@ class _OnTable(_Session):
             tilts[finger] = np.deg2rad(rng.uniform(60.0, 85.0))
             aims[finger] = [*rng.uniform(-0.035 * spread, 0.035 * spread, 2), height]
         ways = -_directions(angles, tilts)
-        world_T_foot = spatial(Pose2(*self.world_T_palm.translation()[:2], self.world_T_palm.rotation().yaw()))
+        world_T_foot = spatial(planar(self.world_T_palm))
         return _Rays(transform_points(world_T_foot, aims - _REACH_m * ways), rotate(world_T_foot, ways))
 
     def hand_step(self) -> tuple[Array, Rot3]:
@@ -240,7 +241,7 @@ class _OnTable(_Session):
 
     def approach(self, middle_world_m: Array) -> None:
         place = middle_world_m[:2] + self._rng.normal(0.0, 0.008, 2)
-        self.world_T_palm = spatial(Pose2(*place, self._rng.normal(0.0, 0.1)), _REACH_m)
+        self.world_T_palm = spatial(planar_pose(place, self._rng.normal(0.0, 0.1)), _REACH_m)
 
 
 class _InSpace(_Session):
