@@ -32,8 +32,9 @@ from tactile_lab.errors import ConfigurationError, ShapeError, TrackingError
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.graph.pose_graph import LoopReport
+from tactile_lab.shape.choice import best_shape
 from tactile_lab.shape.gpis import Gpis
-from tactile_lab.shape.surface import Contour, SurfaceMesh, extract_contour, extract_mesh
+from tactile_lab.shape.surface import Contour, SurfaceMesh
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.motion import planar_motion, row_pose_in_space
@@ -314,12 +315,11 @@ class TactileSlam:
     def _extract(self) -> tuple[Contour | None, SurfaceMesh | None]:
         if self.surface is None:
             return None, None
+        shape = best_shape(self.surface, self._tracker.map.free_points_m if self._tracker else None)
         try:
             if self._settings.dimension == 2:
-                return extract_contour(self.surface, resolution_m=self._settings.contour_resolution_m), None
-            return None, extract_mesh(
-                self.surface, resolution_m=self._settings.mesh_resolution_m, floor_m=-self._origin_height_m
-            )
+                return shape.contour(self._settings.contour_resolution_m), None
+            return None, shape.mesh(self._settings.mesh_resolution_m, -self._origin_height_m)
         except ShapeError:  # contacts that enclose nothing: the trajectory is still a result
             return None, None
 

@@ -51,9 +51,13 @@ def _pairs(points_m: Array, normals: Array) -> tuple[int, int]:
     return int(opposing.sum()), int((opposing & (apart < 0)).sum())
 
 
-def touched_one_side(grasps: Sequence[Grasp]) -> bool:
-    """Every grasp touched the object from one side only: the other sides are not known at all."""
-    return all(_one_sided(grasp.normals_world) for grasp in grasps)
+def touched_one_side(normals: Sequence[Array]) -> bool:
+    """Whether every grasp touched the object from one side only: the other sides are not known at all.
+
+    Args:
+        normals: of each grasp, shape (n, 3), any frame.
+    """
+    return any(len(one) for one in normals) and all(_one_sided(one) for one in normals)
 
 
 def _one_sided(normals: Array) -> bool:

@@ -62,6 +62,11 @@ class ContactMap:
     space: PoseRows = PLANAR
 
     @property
+    def dimension(self) -> int:
+        """Of the contacts."""
+        return self.placed[0].contacts_world.dimension
+
+    @property
     def rows(self) -> Array:
         """Poses of all grasps, shape (n, size)."""
         return np.array([grasp.row for grasp in self.placed])
@@ -77,6 +82,13 @@ class ContactMap:
         world = self.contacts_world
         points, normals = self.space.to_object(self.rows[self.grasp_indices], world.points_m, world.normals)
         return replace(world, points_m=points, normals=normals)
+
+    @property
+    def free_points_m(self) -> Array:
+        """Places that were free at grasps whose contacts are part of the shape, object frame, shape (q, d)."""
+        known = [grasp for grasp in self.placed if grasp.used and len(grasp.contacts_world.free_m)]
+        places = [self.space.to_object(g.row, g.contacts_world.free_m, g.contacts_world.free_m)[0] for g in known]
+        return np.vstack([np.empty((0, self.placed[0].contacts_world.dimension)), *places])
 
     @property
     def contacts_world(self) -> ContactSet:

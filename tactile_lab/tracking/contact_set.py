@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import TrackingError
 from tactile_lab.geometry.contacts import Array, Grasp
+from tactile_lab.tracking.free_space import fingertip_places, places_on_lines
 
 LARGEST_GRASP_m = 0.6
 """No hand spans more; contacts farther apart are in wrong units."""
@@ -28,12 +29,14 @@ class ContactSet:
         normals: outward unit normals, shape (n, d).
         point_sigma_m: standard deviation of each point along its normal, shape (n,).
         normal_sigma_rad: standard deviation of each normal's direction, shape (n,).
+        free_m: places known to be outside of the object when these contacts were made, shape (q, d), same frame.
     """
 
     points_m: Array
     normals: Array
     point_sigma_m: Array
     normal_sigma_rad: Array
+    free_m: Array = field(default_factory=lambda: np.empty((0, 0)))
 
     def __len__(self) -> int:
         return len(self.points_m)
@@ -65,7 +68,8 @@ class ContactSet:
             normal_sigma = normal_sigma[keep] / flat
         along_normal = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariances, normals))
         heights = np.array([0.0, 0.0, origin_height_m])
-        return cls((points - heights)[:, :dimension], normals[:, :dimension].copy(), along_normal, normal_sigma)
+        seen = cls((points - heights)[:, :dimension], normals[:, :dimension].copy(), along_normal, normal_sigma)
+        return replace(seen, free_m=_free_places(grasp, seen, heights))
 
     @classmethod
     def concatenated(cls, parts: Sequence[ContactSet]) -> Self:
@@ -90,6 +94,13 @@ class ContactSet:
         return ContactSet(
             self.points_m[mask], self.normals[mask], self.point_sigma_m[mask], self.normal_sigma_rad[mask]
         )
+
+
+def _free_places(grasp: Grasp, contacts: ContactSet, origin: Array) -> Array:
+    """By the closing lines; where they are not known, the fingertips themselves."""
+    if not grasp.closing_lines:
+        return fingertip_places(contacts.points_m, contacts.normals)
+    return np.asarray((places_on_lines(grasp.closing_lines) - origin)[:, : contacts.dimension])
 
 
 def planar_rotation(angle_rad: float) -> Array:

@@ -8,12 +8,12 @@ its measured share of a smoothing step is in docs/results.md.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def assemble(points: Array, value: Array, first: Array, second: Array, noise_variance: Array, jitter: float) -> Array:
     """Covariance of values and gradients at all points with noise on its diagonal; only the upper triangle is filled.
 
@@ -41,7 +41,7 @@ def assemble(points: Array, value: Array, first: Array, second: Array, noise_var
     return matrix
 
 
-@njit(cache=True)
+@compiled
 def pull(points: Array, first: Array, second: Array, third: Array, inverse: Array, weights: Array) -> Array:
     """Derivative by each point of ``sum((inverse - weights weights^T) * K) / 2``, K as in :func:`assemble`.
 
@@ -88,6 +88,6 @@ def pull(points: Array, first: Array, second: Array, third: Array, inverse: Arra
     return result
 
 
-@njit(cache=True)
+@compiled
 def _symmetric(lower: Array, row: int, column: int) -> float:
     return float(lower[row, column] if row >= column else lower[column, row])

@@ -16,25 +16,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field as Limit
-from scipy.special import log_ndtr
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import Field, FieldGrid
+from tactile_lab.shape.polygon_segmentation import log_evidence
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.facet_smoothing import smoothed_with_faces
+from tactile_lab.tracking.free_space import free_space_cost
 from tactile_lab.tracking.motion import MotionNoise, compose, deviation
 from tactile_lab.tracking.particle_filter import PoseEstimate
 from tactile_lab.tracking.pose_evidence import PoseEvidence
 from tactile_lab.tracking.proposals import ProposalSettings, fit_poses, propose
-
-FREE_DISTANCES_m = np.array([0.004, 0.008, 0.012, 0.016])
-"""A fingertip is there: so far out along each contact's normal there is no object."""
-
-_FREE_TOLERANCE_m = 0.001
-_FREE_WEIGHT = 0.5
-"""Points behind one contact tell much the same, so each counts half."""
-
 
 GRID_MARGIN_m = 0.040
 GRID_SPACING_m = 0.003
@@ -130,6 +124,22 @@ class JointTracker:
             smoothed = [self._smoothed(hypothesis, self._settings.final_iterations) for hypothesis in self._hypotheses]
             self._hypotheses = self._likeliest(_different(smoothed), self._settings.hypotheses)
             self._share_kernel(self.map.with_best_kernel())
+        self._hypotheses = sorted((self._with_faces(one) for one in self._hypotheses), key=lambda one: one.cost)
+
+    def _with_faces(self, hypothesis: Hypothesis) -> Hypothesis:
+        """The hypothesis with poses smoothed together with flat faces, if those explain its contacts better."""
+        rated = self._rated(hypothesis.map)
+        faceted = smoothed_with_faces(hypothesis.map, self._noise) if hypothesis.map.dimension == 2 else None
+        if faceted is None:
+            return rated
+        moved = hypothesis.map.with_rows(faceted.rows)
+        contacts = moved.contacts
+        explained = log_evidence(
+            faceted.chi_square, faceted.faces.count, contacts.point_sigma_m, contacts.normal_sigma_rad
+        )
+        constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
+        cost = faceted.motion_cost - explained - constant + self._other_costs(moved)
+        return Hypothesis(moved, cost) if cost < rated.cost else rated
 
     def _unplaced(self, hypothesis: Hypothesis, contacts: ContactSet) -> Hypothesis:
         last = hypothesis.map.placed[-1]
@@ -202,7 +212,9 @@ class JointTracker:
 
     def _other_costs(self, contact_map: ContactMap) -> float:
         """What the poses are judged by beside the contacts in place: free space and the contacts left out."""
-        return free_space_cost(contact_map) + self._settings.proposals.unexplained_cost * contact_map.left_out_count
+        sigma_m = float(contact_map.placed[0].contacts_world.point_sigma_m.mean())
+        free = free_space_cost(contact_map.fit(), contact_map.free_points_m, sigma_m)
+        return free + self._settings.proposals.unexplained_cost * contact_map.left_out_count
 
     def _likeliest(self, hypotheses: list[Hypothesis], count: int) -> list[Hypothesis]:
         ranked = sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)[:count]
@@ -222,16 +234,6 @@ def _trailing_unplaced(contact_map: ContactMap) -> int:
     """How many grasps in a row were left out last."""
     used = [grasp.used for grasp in reversed(contact_map.placed)]
     return used.index(True)
-
-
-def free_space_cost(contact_map: ContactMap) -> float:
-    """Negative log probability that the places where fingertips were are outside the object."""
-    contacts = contact_map.contacts
-    outward = contacts.points_m[:, None] + FREE_DISTANCES_m[:, None] * contacts.normals[:, None]
-    found = contact_map.fit().predict(outward.reshape(-1, contacts.dimension), variance=True)
-    assert found.variance_m2 is not None
-    sigma = np.sqrt(found.variance_m2 + contacts.point_sigma_m.mean() ** 2)
-    return float(-_FREE_WEIGHT * log_ndtr((found.mean_m + _FREE_TOLERANCE_m) / sigma).sum())
 
 
 def _different(hypotheses: list[Hypothesis]) -> list[Hypothesis]:

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.experiments import planar_data, spatial_data
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import FieldGrid
 from tactile_lab.shape.kernels import Kernel, Matern52, SquaredExponential, ThinPlate, covariance

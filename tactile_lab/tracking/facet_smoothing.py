@@ -1,0 +1,263 @@
+"""Poses and flat faces together: what the trajectory is if the object has faces.
+
+The faces take the place of the field in :mod:`pose_evidence`: every contact lies on its face and its normal is the
+face's, up to the sensors' noise, and successive poses follow the motion model. All of it is one least-squares
+problem in the poses and the faces, in the plane and in space alike. A few faces bind contacts all over the object
+together where the field only binds neighbours, so that poses become as certain as the contacts are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.errors import ShapeError
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.choice import polygon_of
+from tactile_lab.shape.polygon_segmentation import price_of_face
+from tactile_lab.shape.surface import extract_contour
+from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.motion_cost import MotionCost
+
+_ORDERING_RESOLUTION_m = 0.002
+"""Of the outline that only orders contacts along it."""
+
+_FIRST_DAMPING = 1e-3
+_LARGEST_DAMPING = 1e6
+_LARGEST_FOLD = float(np.cos(np.deg2rad(35.0)))
+"""Faces that meet at a larger angle are never one."""
+
+
+@dataclass(frozen=True)
+class FlatFaces:
+    """Faces ``u . x = offset`` in the object frame and the contacts on them.
+
+    Attributes:
+        labels: face of each contact, shape (n,).
+        normals: outward unit normals u, shape (s, d).
+        offsets_m: shape (s,).
+    """
+
+    labels: NDArray[np.int64]
+    normals: Array
+    offsets_m: Array
+
+    @property
+    def count(self) -> int:
+        return len(self.offsets_m)
+
+    def merged(self, kept: int, dropped: int) -> FlatFaces:
+        """The same with two faces made one, in between by the number of their contacts."""
+        weights = np.bincount(self.labels, minlength=self.count)[[kept, dropped]].astype(float)
+        weights /= weights.sum()
+        normals, offsets = self.normals.copy(), self.offsets_m.copy()
+        between = weights @ normals[[kept, dropped]]
+        normals[kept], offsets[kept] = between / np.linalg.norm(between), weights @ offsets[[kept, dropped]]
+        labels = np.where(self.labels == dropped, kept, self.labels)
+        labels = labels - (labels > dropped)
+        return FlatFaces(labels, np.delete(normals, dropped, axis=0), np.delete(offsets, dropped))
+
+
+@dataclass(frozen=True)
+class FacetedTrajectory:
+    """Poses and faces that fit each other.
+
+    Attributes:
+        rows: poses, shape (k, size).
+        faces: in the object frame.
+        chi_square: of contacts and normals against the faces.
+        motion_cost: negative log probability of the slips.
+    """
+
+    rows: Array
+    faces: FlatFaces
+    chi_square: float
+    motion_cost: float
+
+    @property
+    def cost(self) -> float:
+        """Negative log posterior, without the price of the faces."""
+        return 0.5 * self.chi_square + self.motion_cost
+
+    def description_length(self, price: float) -> float:
+        """Twice the cost, and the price of the faces."""
+        return 2 * self.cost + self.faces.count * price
+
+
+class FacetSmoother:
+    """Least squares over the poses of a map and the faces of its contacts."""
+
+    def __init__(self, contact_map: ContactMap, noise: MotionNoise) -> None:
+        self._space = contact_map.space
+        self._motion = MotionCost(contact_map.motions, noise, contact_map.space)
+        self._world = contact_map.contacts_world
+        self._grasp_of = contact_map.grasp_indices
+
+    def fitted(self, rows: Array, faces: FlatFaces, iterations: int) -> FacetedTrajectory:
+        """The best poses and faces near the given ones, contacts keeping their faces (Levenberg-Marquardt).
+
+        Args:
+            rows: poses to start from, shape (k, size); the first stays.
+            faces: to start from.
+            iterations: at most.
+        """
+        best, damping = self._rated(rows, faces), _FIRST_DAMPING
+        for _ in range(iterations):
+            information, gradient = self._normal_equations(best)
+            before = best.cost
+            while damping < _LARGEST_DAMPING:
+                damped = information + damping * np.diag(np.diag(information))
+                candidate = self._stepped(best, -np.linalg.solve(damped, gradient))
+                if candidate.cost < best.cost:
+                    best, damping = candidate, max(damping / 8, 1e-9)
+                    break
+                damping *= 5
+            if before - best.cost < 1e-3:
+                break
+        return best
+
+    def simplified(
+        self, rows: Array, faces: FlatFaces, price: float, neighbours: Callable[[FlatFaces], list[tuple[int, int]]]
+    ) -> FacetedTrajectory:
+        """Merge neighbouring faces as long as that costs less than the price of a face, the poses giving way.
+
+        What a merger would cost is foreseen from the joint covariance of all faces and poses, and then verified.
+
+        Args:
+            rows, faces: to start from.
+            price: chi-square a face has to save.
+            neighbours: pairs of faces that may be one.
+        """
+        best, refused = self.fitted(rows, faces, 15), set()
+        while best.faces.count > 3:
+            costs = self._merger_costs(best, [pair for pair in neighbours(best.faces) if pair not in refused])
+            if not costs or min(costs.values()) > 2 * price:
+                return best
+            kept, dropped = min(costs, key=costs.__getitem__)
+            merged = self.fitted(best.rows, best.faces.merged(kept, dropped), 10)
+            if 2 * (merged.cost - best.cost) < price:
+                best, refused = merged, set()
+            else:
+                refused.add((kept, dropped))
+        return best
+
+    def _rated(self, rows: Array, faces: FlatFaces) -> FacetedTrajectory:
+        values, tilts = self._residuals(rows, faces)
+        chi_square = float(np.sum(values**2) + np.sum(tilts**2))
+        return FacetedTrajectory(rows, faces, chi_square, self._motion.value(rows))
+
+    def _residuals(self, rows: Array, faces: FlatFaces) -> tuple[Array, Array]:
+        points, normals = self._space.to_object(rows[self._grasp_of], self._world.points_m, self._world.normals)
+        outward = faces.normals[faces.labels]
+        away = np.einsum("nd,nd->n", outward, points) - faces.offsets_m[faces.labels]
+        return away / self._world.point_sigma_m, (normals - outward) / self._world.normal_sigma_rad[:, None]
+
+    def _normal_equations(self, at: FacetedTrajectory) -> tuple[Array, Array]:
+        """Gauss-Newton information and gradient by all poses but the first, then by each face's tilt and offset."""
+        values, tilts = self._residuals(at.rows, at.faces)
+        jacobian = self._jacobian(at)
+        information = jacobian.T @ jacobian
+        gradient = jacobian.T @ np.concatenate([values, tilts.T.ravel()])
+        free = (len(at.rows) - 1) * self._space.size
+        information[:free, :free] += self._motion.information(at.rows)
+        gradient[:free] += self._motion.value_and_gradient(at.rows)[1][1:].ravel()
+        information[np.diag_indices_from(information)] += 1e-9 * np.trace(information) / len(information)
+        return information, gradient
+
+    def _jacobian(self, at: FacetedTrajectory) -> Array:
+        """Derivatives of the residuals: values, then the normals' components one after the other."""
+        rows, faces, world = at.rows, at.faces, self._world
+        points, normals = self._space.to_object(rows[self._grasp_of], world.points_m, world.normals)
+        count, dimension = points.shape
+        contact, still, each = np.arange(count), np.zeros_like(normals), rows[self._grasp_of]
+        outward, tangents = faces.normals[faces.labels], _tangents(faces.normals)[faces.labels]
+        by_poses = np.zeros(((dimension + 1) * count, len(rows), self._space.size))
+        by_faces = np.zeros(((dimension + 1) * count, faces.count, dimension))
+        value = self._space.by_row(each, points, normals, outward, still)
+        by_poses[contact, self._grasp_of] = value / world.point_sigma_m[:, None]
+        tilt = np.column_stack([np.einsum("ndt,nd->nt", tangents, points), -np.ones(count)])
+        by_faces[contact, faces.labels] = tilt / world.point_sigma_m[:, None]
+        for axis in range(dimension):
+            unit = np.broadcast_to(np.eye(dimension)[axis], normals.shape)
+            lines = (axis + 1) * count + contact
+            turned = self._space.by_row(each, points, normals, still, unit)
+            by_poses[lines, self._grasp_of] = turned / world.normal_sigma_rad[:, None]
+            by_faces[lines, faces.labels, :-1] = -tangents[:, axis] / world.normal_sigma_rad[:, None]
+        free = by_poses[:, 1:].reshape(len(by_poses), -1)
+        return np.hstack([free, by_faces.reshape(len(by_faces), -1)])
+
+    def _stepped(self, at: FacetedTrajectory, step: Array) -> FacetedTrajectory:
+        size, dimension = self._space.size, at.faces.normals.shape[1]
+        free = (len(at.rows) - 1) * size
+        rows = self._space.moved(at.rows, np.vstack([np.zeros(size), step[:free].reshape(-1, size)]))
+        changes = step[free:].reshape(-1, dimension)
+        normals = at.faces.normals + np.einsum("sdt,st->sd", _tangents(at.faces.normals), changes[:, :-1])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        return self._rated(rows, replace(at.faces, normals=normals, offsets_m=at.faces.offsets_m + changes[:, -1]))
+
+    def _merger_costs(self, at: FacetedTrajectory, pairs: list[tuple[int, int]]) -> dict[tuple[int, int], float]:
+        """Chi-square by which making two faces one is expected to raise the total, for pairs that are nearly flat."""
+        information, _ = self._normal_equations(at)
+        free, dimension = (len(at.rows) - 1) * self._space.size, at.faces.normals.shape[1]
+        covariance = np.linalg.inv(information)[free:, free:]
+        costs = {}
+        for one, other in pairs:
+            normals, offsets = at.faces.normals[[one, other]], at.faces.offsets_m[[one, other]]
+            if normals[0] @ normals[1] < _LARGEST_FOLD:
+                continue
+            lines = np.r_[one * dimension : (one + 1) * dimension, other * dimension : (other + 1) * dimension]
+            both = covariance[np.ix_(lines, lines)].reshape(2, dimension, 2, dimension)
+            spread = both[0, :, 0] + both[1, :, 1] - both[0, :, 1] - both[1, :, 0]
+            change = np.append(_tangents(normals[:1])[0].T @ (normals[1] - normals[0]), offsets[1] - offsets[0])
+            costs[(one, other)] = float(change @ np.linalg.solve(spread, change))
+        return costs
+
+
+def smoothed_with_faces(contact_map: ContactMap, noise: MotionNoise, rounds: int = 3) -> FacetedTrajectory | None:
+    """Divide a map's contacts into faces, and let poses, faces and the division settle.
+
+    Returns:
+        None if the contacts make no faces that enclose anything.
+    """
+    world = contact_map.contacts_world
+    price = price_of_face(world.point_sigma_m, world.normal_sigma_rad)
+    best: FacetedTrajectory | None = None
+    for _ in range(rounds):
+        found = _settled(contact_map, noise, price)
+        if found is None or (best and found.description_length(price) >= best.description_length(price) - 1e-3):
+            return best
+        best, contact_map = found, contact_map.with_rows(found.rows)
+    return best
+
+
+def _settled(contact_map: ContactMap, noise: MotionNoise, price: float) -> FacetedTrajectory | None:
+    """One round of division and smoothing."""
+    fitted = contact_map.fit()
+    try:
+        divided = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m)).faces
+    except ShapeError:  # nothing enclosed, or no faces in it
+        return None
+    order = divided.order
+
+    def in_turn(faces: FlatFaces) -> list[tuple[int, int]]:
+        along = faces.labels[order]
+        borders = np.flatnonzero(along != np.roll(along, 1))
+        return sorted({tuple(sorted((int(along[i - 1]), int(along[i])))) for i in borders})
+
+    faces = FlatFaces(divided.labels, divided.normals, divided.offsets_m)
+    smoother = FacetSmoother(contact_map, noise)
+    return smoother.simplified(contact_map.rows, faces, price, in_turn)
+
+
+def _tangents(normals: Array) -> Array:
+    """Orthonormal directions along each face, shape (s, d, d - 1)."""
+    if normals.shape[1] == 2:
+        return np.stack([-normals[:, 1], normals[:, 0]], axis=1)[:, :, None]
+    helper = np.where(np.abs(normals[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    first = np.cross(normals, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normals, first)], axis=2)

@@ -1,0 +1,60 @@
+"""Where fingers were there is no object: free space as evidence about poses and shape.
+
+Points before the end of every closing line are outside of the object, and all of the line where a finger met
+nothing. Without closing lines the fingertip itself, outward along the normal, is what is known to be free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import log_ndtr
+
+from tactile_lab.geometry.contacts import Array, ClosingLine
+from tactile_lab.shape.gpis import Gpis
+
+BEFORE_CONTACT_m = np.array([0.004, 0.010, 0.020, 0.035])
+"""Places on a closing line before its contact."""
+
+ALONG_NORMAL_m = np.array([0.004, 0.008, 0.012, 0.016])
+"""Places in the fingertip itself, where the closing lines are not known."""
+
+_SPACING_m = 0.010
+"""Of places on the line of a finger that met nothing."""
+
+_CLEARANCE_m = 0.004
+"""The end of such a line is where a fingertip's surface was: so far before it, it is free for sure."""
+
+_TOLERANCE_m = 0.001
+_WEIGHT = 0.5
+"""Places on one line tell much the same, so each counts half."""
+
+
+def places_on_lines(lines: Sequence[ClosingLine]) -> Array:
+    """Places on closing lines that are free for sure, world frame, shape (q, 3)."""
+    return np.vstack([np.empty((0, 3)), *(_on_line(line) for line in lines)])
+
+
+def fingertip_places(points_m: Array, normals: Array) -> Array:
+    """Places inside the fingertips that touch contacts of shape (n, d), shape (q, d)."""
+    along = points_m[:, None] + ALONG_NORMAL_m[:, None] * normals[:, None]
+    return np.asarray(along.reshape(-1, points_m.shape[1]))
+
+
+def free_space_cost(gpis: Gpis, free_object_m: Array, point_sigma_m: float) -> float:
+    """Negative log probability that places of shape (q, d), object frame, are outside of the shape."""
+    if len(free_object_m) == 0:
+        return 0.0
+    found = gpis.predict(free_object_m, variance=True)
+    sigma = np.sqrt(found.variance_m2 + point_sigma_m**2)
+    return float(-_WEIGHT * log_ndtr((found.mean_m + _TOLERANCE_m) / sigma).sum())
+
+
+def _on_line(line: ClosingLine) -> Array:
+    back = line.start_world_m - line.end_world_m
+    length = float(np.linalg.norm(back))
+    if length < _CLEARANCE_m:
+        return np.empty((0, 3))
+    distances = BEFORE_CONTACT_m if line.touched else np.arange(_CLEARANCE_m, length, _SPACING_m)
+    return np.asarray(line.end_world_m + distances[distances <= length][:, None] * back / length)
