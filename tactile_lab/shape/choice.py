@@ -16,6 +16,7 @@ from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.model import FittedShape
 from tactile_lab.shape.outlines import encloses
 from tactile_lab.shape.polygon import Polygon
+from tactile_lab.shape.polygon_regularity import with_right_angles
 from tactile_lab.shape.polygon_segmentation import PlanarContacts, segment
 from tactile_lab.shape.sampling import distances_to_polygon
 from tactile_lab.shape.surface import Contour, SurfaceMesh, extract_contour, extract_mesh
@@ -81,7 +82,7 @@ def polygon_of(gpis: Gpis, provisional: Contour) -> Polygon:
     faces = segment(
         gpis.contacts_m, gpis.normals, contacts.point_sigma_m, contacts.normal_sigma_rad, provisional.points_m
     )
-    return Polygon.of(contacts, faces)
+    return Polygon.of(contacts, with_right_angles(contacts, faces))
 
 
 def _free_points(gpis: Gpis, free_points_m: Array | None) -> Array:

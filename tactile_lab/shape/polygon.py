@@ -12,6 +12,7 @@ from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.outlines import is_simple
 from tactile_lab.shape.polygon_segmentation import Faces, PlanarContacts, log_evidence
+from tactile_lab.shape.polygon_uncertainty import FaceUncertainty
 from tactile_lab.shape.sampling import polygon_area
 from tactile_lab.shape.surface import Contour, SurfaceMesh
 
@@ -70,10 +71,9 @@ class Polygon:
         return log_evidence(self.faces.chi_square, self.faces.count, contacts.point_sigma_m, contacts.normal_sigma_rad)
 
     @cached_property
-    def face_covariances(self) -> Array:
-        """Covariance of (direction rad, offset m) of each face, shape (s, 2, 2), the scatter found included."""
-        spread = _scatter(self.contacts, self.faces) ** 2
-        return spread * np.array([face_covariance(self.contacts, self.faces, s) for s in range(self.faces.count)])
+    def uncertainty(self) -> FaceUncertainty:
+        """Of the faces, the scatter found included."""
+        return FaceUncertainty.of(self.contacts, self.faces).scaled(_scatter(self.contacts, self.faces))
 
     @property
     def corner_covariances_m2(self) -> Array:
@@ -81,13 +81,8 @@ class Polygon:
 
         The ends of a joining line are known across their face; along it they are contacts, no corners.
         """
-        before = np.roll(self.edge_faces, 1)
-        return np.array(
-            [
-                self._corner_covariance(corner, (int(a), int(b)))
-                for corner, a, b in zip(self.corners_m, before, self.edge_faces, strict=True)
-            ]
-        )
+        pairs = zip(self.corners_m, np.roll(self.edge_faces, 1), self.edge_faces, strict=True)
+        return np.array([self._corner_covariance(corner, int(before), after) for corner, before, after in pairs])
 
     def contour(self, resolution_m: float = 0.001) -> Contour:
         """The outline with every corner; sigma across it from the covariance of the faces.
@@ -100,7 +95,7 @@ class Polygon:
             share = np.arange(max(1, int(np.ceil(length / resolution_m)))) / max(1, np.ceil(length / resolution_m))
             places = start + share[:, None] * (end - start)
             points.append(places)
-            sigmas.append(self._sigma(places, face) if face >= 0 else length * share * (1 - share) + self._end_sigma)
+            sigmas.append(self._sigma_m(places, face, share * length, (1 - share) * length))
         return Contour(np.vstack(points), np.concatenate(sigmas), is_closed=True)
 
     def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
@@ -108,22 +103,23 @@ class Polygon:
         raise ShapeError("a polygon is an outline in the plane and has no surface")
 
     @property
-    def _end_sigma(self) -> float:
+    def _end_sigma_m(self) -> float:
         return float(self.contacts.point_sigma_m.mean())
 
-    def _sigma(self, places_m: Array, face: int) -> Array:
-        """Standard deviation of places on a face, across it."""
-        effects = np.column_stack([-places_m @ self.faces.tangents[face], np.ones(len(places_m))])
-        return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", effects, self.face_covariances[face], effects)))
+    def _sigma_m(self, places_m: Array, face: int, behind_m: Array, ahead_m: Array) -> Array:
+        """Standard deviations of places on one edge, so far from its two corners."""
+        if face >= 0:
+            return np.asarray(np.sqrt(self.uncertainty.variance_m2(face, places_m)))
+        return self._end_sigma_m + behind_m * ahead_m / (behind_m + ahead_m)
 
-    def _corner_covariance(self, corner_m: Array, faces: tuple[int, int]) -> Array:
-        known = [face for face in faces if face >= 0]
-        if len(known) == 2:
-            across = np.linalg.inv(self.faces.normals[known])
-        else:
-            across = np.linalg.inv(np.array([self.faces.normals[known[0]], self.faces.tangents[known[0]]]))
-        sigmas = np.array([self._sigma(corner_m[None], face)[0] for face in known] + [self._end_sigma])[:2]
-        return np.asarray((across * sigmas**2) @ across.T)
+    def _corner_covariance(self, corner_m: Array, before: int, after: int) -> Array:
+        if before >= 0 and after >= 0:
+            across = np.linalg.inv(self.faces.normals[[before, after]])
+            return np.asarray(across @ self.uncertainty.joint_variance_m2(before, after, corner_m) @ across.T)
+        face = max(before, after)
+        axes = np.array([self.faces.normals[face], self.faces.tangents[face]])
+        variances = [self.uncertainty.variance_m2(face, corner_m[None])[0], self._end_sigma_m**2]
+        return np.asarray((axes.T * variances) @ axes)
 
 
 @dataclass(frozen=True)
@@ -156,13 +152,8 @@ def _is_plausible(
     leaps = np.array([(corner - ends[0]) @ faces.tangents[pair[0]], (ends[1] - corner) @ faces.tangents[pair[1]]])
     if leaps.min() < -slack_m or leaps.max() > _LARGEST_LEAP_m:
         return False
-    sigmas = [_across_sigma(contacts, faces, face, corner) for face in pair]
-    return bool(max(sigmas) < _LARGEST_CORNER_SIGMA_m)
-
-
-def _across_sigma(contacts: PlanarContacts, faces: Faces, face: int, place_m: Array) -> float:
-    effect = np.array([-place_m @ faces.tangents[face], 1.0])
-    return float(np.sqrt(effect @ face_covariance(contacts, faces, face) @ effect))
+    uncertainty = FaceUncertainty.of(contacts, faces)
+    return bool(max(uncertainty.variance_m2(face, corner[None])[0] for face in pair) < _LARGEST_CORNER_SIGMA_m**2)
 
 
 def _intersection(faces: Faces, face: int, following: int) -> Array | None:
@@ -177,15 +168,6 @@ def _foot(contacts: PlanarContacts, faces: Faces, face: int, contact: int) -> Ar
     """A contact moved onto the line of a face."""
     point, normal = contacts.points_m[contact], faces.normals[face]
     return np.asarray(point - (point @ normal - faces.offsets_m[face]) * normal)
-
-
-def face_covariance(contacts: PlanarContacts, faces: Faces, face: int) -> Array:
-    """Covariance of (direction rad, offset m) of one face from the standard deviations of its contacts, (2, 2)."""
-    members = faces.members(face)
-    effects = np.column_stack([-contacts.points_m[members] @ faces.tangents[face], np.ones(len(members))])
-    information = (effects / contacts.point_sigma_m[members, None] ** 2).T @ effects
-    information[0, 0] += np.sum(contacts.normal_sigma_rad[members] ** -2.0)
-    return np.asarray(np.linalg.inv(information))
 
 
 def _scatter(contacts: PlanarContacts, faces: Faces) -> float:

@@ -39,6 +39,7 @@ class Faces:
         order: indices of the contacts in cyclic order along the outline, counter-clockwise, shape (n,); starts with
             the contacts of face 0.
         chi_square: of all points and normals.
+        direction_groups: faces of the same number share one direction up to quarter turns, shape (s,).
     """
 
     labels: NDArray[np.int64]
@@ -46,6 +47,7 @@ class Faces:
     offsets_m: Array
     order: NDArray[np.int64]
     chi_square: float
+    direction_groups: NDArray[np.int64]
 
     @property
     def count(self) -> int:
@@ -232,5 +234,7 @@ def _divide_opened(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[
     labels[order] = np.repeat(np.arange(len(begin)), np.diff(borders_up))
     directions = angles[begin, end]
     shift = centre[0] * np.cos(directions) + centre[1] * np.sin(directions)
-    found = Faces(labels, directions, offsets[begin, end] + shift, order, float(costs[begin, end].sum()))
+    found = Faces(
+        labels, directions, offsets[begin, end] + shift, order, float(costs[begin, end].sum()), np.arange(len(begin))
+    )
     return found, borders_up
