@@ -111,7 +111,7 @@ class FacetSmoother:
             before = best.cost
             while damping < _LARGEST_DAMPING:
                 damped = information + damping * np.diag(np.diag(information))
-                candidate = self._stepped(best, -np.linalg.solve(damped, gradient))
+                candidate = self._stepped(best, np.asarray(-np.linalg.solve(damped, gradient)))
                 if candidate.cost < best.cost:
                     best, damping = candidate, max(damping / 8, 1e-9)
                     break
@@ -132,7 +132,8 @@ class FacetSmoother:
             price: chi-square a face has to save.
             neighbours: pairs of faces that may be one.
         """
-        best, refused = self.fitted(rows, faces, 15), set()
+        best = self.fitted(rows, faces, 15)
+        refused: set[tuple[int, int]] = set()
         while best.faces.count > 3:
             costs = self._merger_costs(best, [pair for pair in neighbours(best.faces) if pair not in refused])
             if not costs or min(costs.values()) > 2 * price:
@@ -140,7 +141,7 @@ class FacetSmoother:
             kept, dropped = min(costs, key=costs.__getitem__)
             merged = self.fitted(best.rows, best.faces.merged(kept, dropped), 10)
             if 2 * (merged.cost - best.cost) < price:
-                best, refused = merged, set()
+                best, refused = merged, set[tuple[int, int]]()
             else:
                 refused.add((kept, dropped))
         return best
@@ -246,7 +247,8 @@ def _settled(contact_map: ContactMap, noise: MotionNoise, price: float) -> Facet
     def in_turn(faces: FlatFaces) -> list[tuple[int, int]]:
         along = faces.labels[order]
         borders = np.flatnonzero(along != np.roll(along, 1))
-        return sorted({tuple(sorted((int(along[i - 1]), int(along[i])))) for i in borders})
+        pairs = np.sort(np.column_stack([along[borders - 1], along[borders]]), axis=1)
+        return [(int(one), int(other)) for one, other in np.unique(pairs, axis=0)]
 
     faces = FlatFaces(divided.labels, divided.normals, divided.offsets_m)
     smoother = FacetSmoother(contact_map, noise)

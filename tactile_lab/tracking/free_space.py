@@ -42,13 +42,21 @@ def fingertip_places(points_m: Array, normals: Array) -> Array:
     return np.asarray(along.reshape(-1, points_m.shape[1]))
 
 
-def free_space_cost(gpis: Gpis, free_object_m: Array, point_sigma_m: float) -> float:
-    """Negative log probability that places of shape (q, d), object frame, are outside of the shape."""
-    if len(free_object_m) == 0:
-        return 0.0
-    found = gpis.predict(free_object_m, variance=True)
-    sigma = np.sqrt(found.variance_m2 + point_sigma_m**2)
-    return float(-_WEIGHT * log_ndtr((found.mean_m + _TOLERANCE_m) / sigma).sum())
+def free_space_costs(gpis: Gpis, free_object_m: Array) -> Array:
+    """Negative log probability that places are outside of the shape.
+
+    Args:
+        gpis: the shape.
+        free_object_m: places for each of n poses, object frame, shape (n, q, d).
+
+    Returns:
+        Shape (n,).
+    """
+    count, each, dimension = free_object_m.shape
+    found = gpis.predict(free_object_m.reshape(-1, dimension), variance=True)
+    sigma = np.sqrt(found.variance_m2 + _TOLERANCE_m**2)
+    surely = log_ndtr((found.mean_m + _TOLERANCE_m) / sigma)
+    return np.asarray(-_WEIGHT * surely.reshape(count, each).sum(axis=1))
 
 
 def _on_line(line: ClosingLine) -> Array:

@@ -14,6 +14,7 @@ from importlib import import_module
 from types import ModuleType
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import lapack
 from scipy.optimize import minimize
 
@@ -102,17 +103,26 @@ class PoseEvidence:
         total[np.diag_indices_from(total)] *= 1 + _LEAST_INFORMATION
         return np.asarray(total)
 
-    def value_and_leave_one_out_costs(self, rows: Array) -> tuple[float, Array]:
-        """The negative log posterior, and for each contact that of its density given all others, shape (n,).
+    def value_and_leave_one_out_costs(self, rows: Array, asked: NDArray[np.intp]) -> tuple[float, Array]:
+        """The negative log posterior, and for some contacts that of their density given all others.
 
         The marginal likelihood of all contacts is that of the others times this, so these costs tell what would be
         gained by leaving a contact out. They follow from the blocks of the inverse covariance alone.
+
+        Args:
+            rows: poses, shape (k, size).
+            asked: indices of the contacts, shape (a,); the costs are in the same order.
         """
         placed = self._placed(rows)
-        count, rows_each = len(placed.points), placed.points.shape[1] + 1
-        blocks = np.einsum("aibi->iab", _inverse(placed.factor).reshape(rows_each, count, rows_each, count))
-        own = placed.weights.reshape(rows_each, count).T
-        misfits = np.einsum("ia,ia->i", own, np.linalg.solve(blocks, own[..., None])[..., 0])
+        count, each = len(placed.points), placed.points.shape[1] + 1
+        lines = (asked[:, None] + count * np.arange(each)).ravel()
+        units = np.zeros((count * each, len(lines)))
+        units[lines, np.arange(len(lines))] = 1.0
+        half, _ = lapack.dtrtrs(placed.factor, units, lower=1, overwrite_b=1)
+        own_half = half.reshape(len(half), len(asked), each)
+        blocks = np.einsum("rai,raj->aij", own_half, own_half)
+        own = placed.weights[lines].reshape(len(asked), each)
+        misfits = np.einsum("ai,ai->a", own, np.linalg.solve(blocks, own[..., None])[..., 0])
         costs = 0.5 * (misfits - np.linalg.slogdet(blocks)[1])
         return placed.misfit + self._motion.value(rows), np.asarray(costs)
 
@@ -185,12 +195,6 @@ def evidence_kernels() -> ModuleType:
 def _squared_distances(points: Array) -> Array:
     deltas = points.T[:, :, None] - points.T[:, None, :]
     return np.asarray(np.einsum("dnm,dnm->nm", deltas, deltas))
-
-
-def _inverse(factor: Array) -> Array:
-    """Inverse of the matrix with this lower Cholesky factor."""
-    lower, _ = lapack.dpotri(factor, lower=1)
-    return np.asarray(np.tril(lower) + np.tril(lower, -1).T)
 
 
 @singledispatch

@@ -15,18 +15,20 @@ from pydantic import Field as Limit
 from scipy.stats import norm, qmc
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import wrap_angle_rad
 from tactile_lab.shape.field_grid import Field
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.measurement import placed
-from tactile_lab.tracking.motion import MotionNoise, deviation
+from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.pose_rows import PLANAR, PoseRows
 
 _ROBUST_SQUARED = 9.0
 """Residuals beyond three sigma lose their pull (Geman-McClure), which keeps basins wide."""
 
-_LONGEST_STEP = np.array([0.012, 0.012, 0.35])
-_DAMPING = np.array([10.0, 10.0, 1e-3])
+_LONGEST_STEP_m = 0.012
+_LONGEST_TURN_rad = 0.35
+
+_VARIANCE_EVERY = 3
+"""Steps after which the field's variance is asked for again."""
 
 
 class ProposalSettings(StrictModel):
@@ -42,7 +44,7 @@ class ProposalSettings(StrictModel):
         normal_length_m: a map uncertain by sigma predicts normals to ``sigma / normal_length_m`` radians.
     """
 
-    samples: int = Limit(default=256, ge=2)
+    samples: int = Limit(default=128, ge=2)
     steps: int = Limit(default=6, ge=1)
     kept: int = Limit(default=12, ge=1)
     distinct_m: float = Limit(default=0.0025, gt=0)
@@ -57,8 +59,8 @@ class Fit:
 
     Attributes:
         cost: negative log of likelihood times motion prior, shape (n,).
-        information: Gauss-Newton approximation of its second derivative, shape (n, 3, 3).
-        gradient: shape (n, 3).
+        information: Gauss-Newton approximation of its second derivative, shape (n, size, size).
+        gradient: shape (n, size).
     """
 
     cost: Array
@@ -67,8 +69,13 @@ class Fit:
 
 
 def propose(
-    predicted: Array, contacts: ContactSet, field: Field, noise: MotionNoise, settings: ProposalSettings
-) -> tuple[Array, Array]:
+    predicted: Array,
+    contacts: ContactSet,
+    field: Field,
+    noise: MotionNoise,
+    settings: ProposalSettings,
+    space: PoseRows = PLANAR,
+) -> tuple[Array, Fit]:
     """Different poses that explain the contacts, the best first.
 
     Args:
@@ -77,85 +84,114 @@ def propose(
         field: the modelled surface.
         noise: of the motion model.
         settings: see there.
+        space: what rows mean.
 
     Returns:
-        Rows of shape (m, 3), and for each the negative log of likelihood times motion prior, shape (m,).
+        Rows of shape (m, size), and how they fit.
     """
-    spread = quasi_normal(settings.samples) * noise.sigmas
+    spread = quasi_normal(settings.samples, space.size) * space.sigmas(noise)
     spread[settings.samples // 2 :] *= 2.0
     spread[0] = 0.0
-    rows = predicted + spread
-    for _ in range(settings.steps):
-        fit = fit_poses(rows, predicted, contacts, field, noise, settings)
-        step = -np.linalg.solve(fit.information + np.diag(_DAMPING), fit.gradient[..., None])[..., 0]
-        rows = rows + step * np.minimum(
-            1.0, 1.0 / np.max(np.abs(step) / _LONGEST_STEP, axis=1, keepdims=True, initial=1e-12)
-        )
-    rows[:, 2] = wrap_angle_rad(rows[:, 2])
-    cost = fit_poses(rows, predicted, contacts, field, noise, settings).cost
-    chosen = _distinct(rows, cost, settings)
-    return rows[chosen], cost[chosen]
+    match = GraspMatch(predicted, contacts, field, noise, settings, space)
+    longest, damping = _limits(space)
+    rows = space.moved(predicted, spread)
+    variance_m2 = match.variance(rows)
+    for step in range(settings.steps):
+        if step and step % _VARIANCE_EVERY == 0:
+            variance_m2 = match.variance(rows)
+        fit = match.fit(rows, variance_m2)
+        steps = -np.linalg.solve(fit.information + damping, fit.gradient[..., None])[..., 0]
+        largest = np.max(np.abs(steps) / longest, axis=1, keepdims=True, initial=1e-12)
+        rows = space.moved(rows, steps / np.maximum(1.0, largest))
+    fit = match.fit(rows, match.variance(rows))
+    chosen = _distinct(rows, fit.cost, settings, space)
+    return rows[chosen], Fit(fit.cost[chosen], fit.information[chosen], fit.gradient[chosen])
 
 
-def fit_poses(
-    rows: Array, predicted: Array, contacts: ContactSet, field: Field, noise: MotionNoise, settings: ProposalSettings
-) -> Fit:
-    """Distances and normals of all contacts at poses of shape (n, 3), each contact on its own."""
-    points, normals = placed(rows, contacts)
-    found = field.predict(points.reshape(-1, contacts.dimension), gradient=True, variance=True)
-    assert found.gradient is not None
-    assert found.variance_m2 is not None
-    values = found.mean_m.reshape(points.shape[:2])
-    slopes = found.gradient.reshape(points.shape)
-    variance = found.variance_m2.reshape(values.shape)
-    value_variance = contacts.point_sigma_m**2 + variance
-    normal_variance = contacts.normal_sigma_rad**2 + np.minimum(variance / settings.normal_length_m**2, 1.0)
-    tilts = slopes - normals
-    tilt = np.einsum("nmd,nmd->nm", tilts, tilts) / normal_variance
-    distance = values**2 / value_variance
-    away = deviation(rows, predicted) / noise.sigmas
-    each = 0.5 * (distance + np.log(value_variance) + tilt + contacts.dimension * np.log(normal_variance))
-    cost = -np.logaddexp(-each, -settings.unexplained_cost).sum(axis=1)
-    by_pose = _value_rows(rows, points, slopes)
-    turned = np.stack([normals[..., 1], -normals[..., 0]], axis=-1)
-    pull = values / (value_variance * (1 + distance / _ROBUST_SQUARED))
-    grip = 1 / (value_variance * (1 + distance / _ROBUST_SQUARED))
-    twist = 1 / (normal_variance * (1 + tilt / _ROBUST_SQUARED))
-    information = np.einsum("nmi,nm,nmj->nij", by_pose, grip, by_pose) + np.diag(noise.sigmas**-2)
-    information[:, 2, 2] += np.einsum("nmd,nmd,nm->n", turned, turned, twist)
-    gradient = np.einsum("nmi,nm->ni", by_pose, pull) + away / noise.sigmas
-    gradient[:, 2] -= np.einsum("nmd,nmd,nm->n", turned, tilts[..., :2], twist)
-    return Fit(cost + 0.5 * np.sum(away**2, axis=1), information, gradient)
+class GraspMatch:
+    """How one grasp's contacts fit a field at many poses, each contact on its own."""
+
+    def __init__(
+        self,
+        predicted: Array,
+        contacts: ContactSet,
+        field: Field,
+        noise: MotionNoise,
+        settings: ProposalSettings,
+        space: PoseRows = PLANAR,
+    ) -> None:
+        self._predicted, self._contacts, self._field = predicted, contacts, field
+        self._settings, self._space, self._sigmas = settings, space, space.sigmas(noise)
+
+    def variance(self, rows: Array) -> Array:
+        """The field's variance at every contact for poses of shape (n, size), shape (n, m)."""
+        points, _ = self._placed(rows)
+        found = self._field.predict(points.reshape(-1, self._contacts.dimension), variance=True)
+        return np.asarray(found.variance_m2.reshape(points.shape[:2]))
+
+    def fit(self, rows: Array, variance_m2: Array) -> Fit:
+        """Cost, gradient and information of poses of shape (n, size), given the field's variance there.
+
+        The variance changes little over a step, and costs more than everything else.
+        """
+        contacts = self._contacts
+        points, normals = self._placed(rows)
+        found = self._field.predict(points.reshape(-1, contacts.dimension), gradient=True)
+        values, slopes = found.mean_m.reshape(points.shape[:2]), found.gradient.reshape(points.shape)
+        value_variance = contacts.point_sigma_m**2 + variance_m2
+        vagueness = np.minimum(variance_m2 / self._settings.normal_length_m**2, 1.0)
+        normal_variance = contacts.normal_sigma_rad**2 + vagueness
+        tilts = normals - slopes
+        tilt = np.einsum("nmd,nmd->nm", tilts, tilts) / normal_variance
+        distance = values**2 / value_variance
+        away = self._space.deviation(rows, self._predicted) / self._sigmas
+        each = 0.5 * (distance + np.log(value_variance) + tilt + contacts.dimension * np.log(normal_variance))
+        cost = -np.logaddexp(-each, -self._settings.unexplained_cost).sum(axis=1) + 0.5 * np.sum(away**2, axis=1)
+        still, poses = np.zeros_like(points), rows[:, None]
+        grip = 1 / (value_variance * (1 + distance / _ROBUST_SQUARED))
+        twist = 1 / (normal_variance * (1 + tilt / _ROBUST_SQUARED))
+        by_value = self._space.by_row(poses, points, normals, slopes, still)
+        information = np.einsum("nmi,nm,nmj->nij", by_value, grip, by_value) + np.diag(self._sigmas**-2)
+        gradient = np.einsum("nmi,nm->ni", by_value, grip * values) + away / self._sigmas
+        for axis in range(contacts.dimension):
+            unit = np.broadcast_to(np.eye(contacts.dimension)[axis], points.shape)
+            by_normal = self._space.by_row(poses, points, normals, still, unit)[..., self._space.translations :]
+            turning = slice(self._space.translations, None)
+            information[:, turning, turning] += np.einsum("nmi,nm,nmj->nij", by_normal, twist, by_normal)
+            gradient[:, turning] += np.einsum("nmi,nm->ni", by_normal, twist * tilts[..., axis])
+        return Fit(cost, information, gradient)
+
+    def _placed(self, rows: Array) -> tuple[Array, Array]:
+        return self._space.to_object(rows[:, None], self._contacts.points_m, self._contacts.normals)
 
 
-def _value_rows(rows: Array, points: Array, slopes: Array) -> Array:
-    """Derivative of the field's value at each contact by the pose, shape (n, m, 3)."""
-    cosine, sine = np.cos(rows[:, 2, None]), np.sin(rows[:, 2, None])
-    along_x = -(cosine * slopes[..., 0] - sine * slopes[..., 1])
-    along_y = -(sine * slopes[..., 0] + cosine * slopes[..., 1])
-    turning = slopes[..., 0] * points[..., 1] - slopes[..., 1] * points[..., 0]
-    return np.stack([along_x, along_y, turning], axis=-1)
+def _limits(space: PoseRows) -> tuple[Array, Array]:
+    """Longest step and damping of each number of a row."""
+    turning = np.arange(space.size) >= space.translations
+    return np.where(turning, _LONGEST_TURN_rad, _LONGEST_STEP_m), np.diag(np.where(turning, 1e-3, 10.0))
 
 
-def _distinct(rows: Array, cost: Array, settings: ProposalSettings) -> list[int]:
+def _distinct(rows: Array, cost: Array, settings: ProposalSettings, space: PoseRows) -> list[int]:
+    """Indices of the best of all poses that are close to each other."""
+    order = np.argsort(cost, kind="stable")
     chosen: list[int] = []
-    for index in np.argsort(cost, kind="stable").tolist():
-        gaps = deviation(rows[chosen], rows[index])
-        near = (np.hypot(gaps[:, 0], gaps[:, 1]) < settings.distinct_m) & (np.abs(gaps[:, 2]) < settings.distinct_rad)
-        if not near.any():
-            chosen.append(index)
-        if len(chosen) == settings.kept:
-            break
+    while len(order) and len(chosen) < settings.kept:
+        chosen.append(int(order[0]))
+        gaps = space.deviation(rows[order], rows[order[0]])
+        far = np.linalg.norm(gaps[:, : space.translations], axis=1) >= settings.distinct_m
+        far |= np.linalg.norm(gaps[:, space.translations :], axis=1) >= settings.distinct_rad
+        far[0] = False
+        order = order[far]
     return chosen
 
 
 @cache
-def _sobol_normals(count: int) -> Array:
+def _sobol_normals(count: int, size: int) -> Array:
     exponent = int(np.ceil(np.log2(count)))
-    uniform = qmc.Sobol(3, scramble=True, rng=np.random.default_rng(0)).random_base2(exponent)[:count]
+    uniform = qmc.Sobol(size, scramble=True, rng=np.random.default_rng(0)).random_base2(exponent)[:count]
     return np.asarray(norm.ppf(np.clip(uniform, 1e-6, 1 - 1e-6)))
 
 
-def quasi_normal(count: int) -> Array:
-    """Evenly spread standard normal vectors of three components, always the same, shape (count, 3)."""
-    return _sobol_normals(count).copy()
+def quasi_normal(count: int, size: int) -> Array:
+    """Evenly spread standard normal vectors, always the same, shape (count, size)."""
+    return _sobol_normals(count, size).copy()

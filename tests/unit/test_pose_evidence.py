@@ -19,7 +19,7 @@ from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.evidence_kernels import assemble, pull
 from tactile_lab.tracking.motion import MotionNoise, compose, deviation, planar_motion, row_pose_in_space
 from tactile_lab.tracking.pose_evidence import PoseEvidence, third_derivative
-from tactile_lab.tracking.proposals import ProposalSettings, fit_poses, propose, quasi_normal
+from tactile_lab.tracking.proposals import GraspMatch, ProposalSettings, propose, quasi_normal
 
 NOISE = MotionNoise()
 
@@ -130,7 +130,9 @@ def test_smoothing_finds_the_poses_again() -> None:
 def test_leaving_one_contact_out_changes_the_evidence_by_its_cost() -> None:
     contact_map = true_map("hexagon", 3)
     contact_map = replace(contact_map, settings=contact_map.settings.model_copy(update={"prior_mean": "zero"}))
-    value, costs = PoseEvidence(contact_map, NOISE).value_and_leave_one_out_costs(contact_map.rows)
+    value, costs = PoseEvidence(contact_map, NOISE).value_and_leave_one_out_costs(
+        contact_map.rows, np.arange(len(contact_map.contacts))
+    )
     assert costs.shape == (len(contact_map.contacts),)
     assert value == pytest.approx(PoseEvidence(contact_map, NOISE).value(contact_map.rows))
     for position, cost in enumerate(costs):
@@ -145,7 +147,9 @@ def test_a_torn_contact_costs_most() -> None:
     normals[2] *= -1.0
     torn = replace(grasp, contacts_world=replace(grasp.contacts_world, normals=normals))
     spoiled = replace(contact_map, placed=(*contact_map.placed[:3], torn, *contact_map.placed[4:]))
-    _, costs = PoseEvidence(spoiled, NOISE).value_and_leave_one_out_costs(spoiled.rows)
+    _, costs = PoseEvidence(spoiled, NOISE).value_and_leave_one_out_costs(
+        spoiled.rows, np.arange(len(spoiled.contacts))
+    )
     worst = int(costs.argmax())
     assert spoiled.grasp_indices[worst] == 3
     cleaned = spoiled.without_contact(worst)
@@ -186,10 +190,10 @@ def test_proposals_contain_the_true_pose() -> None:
     last = contact_map.placed[7]
     predicted = compose(last.motion, contact_map.rows[6])
     for field in (known.fit(), FieldGrid.around(known.fit(), spacing_m=0.003)):
-        rows, cost = propose(predicted, last.contacts_world, field, NOISE, ProposalSettings())
+        rows, fit = propose(predicted, last.contacts_world, field, NOISE, ProposalSettings())
         gaps = deviation(rows, last.row)
         assert np.any((np.hypot(gaps[:, 0], gaps[:, 1]) < 0.004) & (np.abs(gaps[:, 2]) < 0.1))
-        assert np.all(np.diff(cost) >= 0)
+        assert np.all(np.diff(fit.cost) >= 0)
 
 
 def test_proposals_differ_from_each_other() -> None:
@@ -208,15 +212,16 @@ def test_proposals_differ_from_each_other() -> None:
 def test_the_information_is_a_second_derivative_near_a_good_fit() -> None:
     contact_map = true_map("rectangle", 8)
     last = contact_map.placed[-1]
-    fit = fit_poses(last.row[None], last.row, last.contacts_world, contact_map.fit(), NOISE, ProposalSettings())
+    match = GraspMatch(last.row, last.contacts_world, contact_map.fit(), NOISE, ProposalSettings())
+    fit = match.fit(last.row[None], match.variance(last.row[None]))
     sigma = np.sqrt(np.diag(np.linalg.inv(fit.information[0])))
     assert np.all(sigma[:2] < 0.004)
     assert sigma[2] < 0.1
 
 
 def test_quasi_random_samples_are_normal_and_always_the_same() -> None:
-    drawn = quasi_normal(256)
+    drawn = quasi_normal(256, 3)
     assert np.allclose(drawn.mean(axis=0), 0.0, atol=0.05)
     assert np.allclose(drawn.std(axis=0), 1.0, atol=0.05)
     drawn[:] = 0.0
-    assert not np.any(np.all(quasi_normal(256) == 0.0, axis=1))
+    assert not np.any(np.all(quasi_normal(256, 3) == 0.0, axis=1))

@@ -1,0 +1,145 @@
+"""Hypotheses about the whole trajectory, and what they are judged by.
+
+The cost of a hypothesis is the negative logarithm of its evidence: the likelihood of all contacts for these poses,
+the shape integrated out (:mod:`pose_evidence`), the motion model, free space, and a price for every contact that is
+left out because a contact explained by nothing costs less than this one does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.polygon_segmentation import log_evidence
+from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.facet_smoothing import smoothed_with_faces
+from tactile_lab.tracking.free_space import free_space_costs
+from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.pose_evidence import PoseEvidence
+
+_SAME_TRANSLATION_m = 0.0005
+_SAME_ROTATION_rad = 0.01
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A trajectory and the map it makes.
+
+    Attributes:
+        map: poses and contacts.
+        misfit: negative log posterior of the poses and the contacts that are part of the shape.
+        intrusion: negative log probability that free places are free.
+        left_out: what the contacts that are left out cost.
+    """
+
+    map: ContactMap
+    misfit: float
+    intrusion: float
+    left_out: float
+
+    @property
+    def cost(self) -> float:
+        """Negative log evidence."""
+        return self.misfit + self.intrusion + self.left_out
+
+
+class Judge:
+    """Rates, smooths and cleans hypotheses."""
+
+    def __init__(self, noise: MotionNoise, unexplained_cost: float) -> None:
+        """
+        Args:
+            noise: of the motion model.
+            unexplained_cost: negative log likelihood of a contact that nothing explains.
+        """
+        self._noise, self._unexplained_cost = noise, unexplained_cost
+
+    def rated(self, contact_map: ContactMap) -> Hypothesis:
+        """A map as it is."""
+        return self._hypothesis(contact_map, PoseEvidence(contact_map, self._noise).value(contact_map.rows))
+
+    def smoothed(self, contact_map: ContactMap, iterations: int) -> Hypothesis:
+        """The poses of largest evidence nearby; once more if contacts turn out not to fit them."""
+        rows, _ = PoseEvidence(contact_map, self._noise).maximised(contact_map.rows, iterations)
+        cleaned, value = self.cleaned(contact_map.with_rows(rows))
+        if cleaned.left_out_count > contact_map.left_out_count:
+            rows, value = PoseEvidence(cleaned, self._noise).maximised(cleaned.rows, iterations)
+            cleaned = cleaned.with_rows(rows)
+        return self._hypothesis(cleaned, value)
+
+    def cleaned(self, contact_map: ContactMap, grasp: int | None = None) -> tuple[ContactMap, float]:
+        """Leave out contacts, the worst first, while they cost more than being explained by nothing.
+
+        Args:
+            contact_map: with its present poses.
+            grasp: whose contacts may be left out; None for all.
+
+        Returns:
+            The map, and the negative log posterior of its poses.
+        """
+        while True:
+            asked = _asked(contact_map, grasp)
+            evidence = PoseEvidence(contact_map, self._noise)
+            value, costs = evidence.value_and_leave_one_out_costs(contact_map.rows, asked)
+            if len(asked) == 0 or costs.max() <= self._unexplained_cost or len(contact_map.grasp_indices) == 1:
+                return contact_map, value
+            contact_map = contact_map.without_contact(int(asked[costs.argmax()]))
+
+    def with_faces(self, contact_map: ContactMap) -> Hypothesis:
+        """The map, or the one with poses smoothed together with flat faces if those explain its contacts better."""
+        rated = self.rated(contact_map)
+        faceted = smoothed_with_faces(contact_map, self._noise) if contact_map.dimension == 2 else None
+        if faceted is None:
+            return rated
+        moved = contact_map.with_rows(faceted.rows)
+        contacts = moved.contacts
+        explained = log_evidence(
+            faceted.chi_square, faceted.faces.count, contacts.point_sigma_m, contacts.normal_sigma_rad
+        )
+        constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
+        sharp = self._hypothesis(moved, faceted.motion_cost - explained - constant)
+        return min(sharp, rated, key=lambda one: one.cost)
+
+    def price(self, contact_map: ContactMap) -> float:
+        """What the contacts cost that are left out."""
+        return self._unexplained_cost * contact_map.left_out_count
+
+    def _hypothesis(self, contact_map: ContactMap, misfit: float) -> Hypothesis:
+        intrusion = free_space_costs(contact_map.fit(), contact_map.free_points_m[None])[0]
+        return Hypothesis(contact_map, misfit, float(intrusion), self.price(contact_map))
+
+
+def likeliest(hypotheses: list[Hypothesis], count: int, gap: float) -> list[Hypothesis]:
+    """The best ones, but none that is less likely than the best by more than ``gap`` (natural logarithm)."""
+    ranked = sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)[:count]
+    return [one for one in ranked if one.cost < ranked[0].cost + gap]
+
+
+def different(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
+    """The likeliest of those that ended at the same trajectory."""
+    kept: list[Hypothesis] = []
+    for one in sorted(hypotheses, key=lambda hypothesis: hypothesis.cost):
+        if not any(_same(one.map, other.map) for other in kept):
+            kept.append(one)
+    return kept
+
+
+def weights(hypotheses: list[Hypothesis]) -> Array:
+    """Their probabilities, if one of them is true, shape (n,)."""
+    costs = np.array([hypothesis.cost for hypothesis in hypotheses])
+    relative = np.exp(costs.min() - costs)
+    return np.asarray(relative / relative.sum())
+
+
+def _same(one: ContactMap, other: ContactMap) -> bool:
+    gaps = np.abs(one.space.deviation(one.rows, other.rows))
+    limits = np.where(np.arange(one.space.size) < one.space.translations, _SAME_TRANSLATION_m, _SAME_ROTATION_rad)
+    return bool((gaps <= limits).all())
+
+
+def _asked(contact_map: ContactMap, grasp: int | None) -> NDArray[np.intp]:
+    indices = contact_map.grasp_indices
+    return np.arange(len(indices)) if grasp is None else np.flatnonzero(indices == grasp)
