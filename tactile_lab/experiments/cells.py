@@ -1,0 +1,96 @@
+"""One run of an experiment and what came of it, as plain data that a file can keep."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, TypeAlias
+
+from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
+
+Value: TypeAlias = str | int | float
+Setting: TypeAlias = tuple[tuple[str, Value], ...]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One run.
+
+    Attributes:
+        setting: names and values of what is varied, in the order of the table's columns.
+        seed: of the data and of the method.
+    """
+
+    setting: Setting
+    seed: int
+
+    def __getitem__(self, name: str) -> Any:
+        """A value of the setting. Raises KeyError."""
+        return dict(self.setting)[name]
+
+    @property
+    def key(self) -> str:
+        """The run's identity in a file of results."""
+        return json.dumps([self.setting, self.seed])
+
+    def words(self) -> str:
+        """The run in one line, for people."""
+        return ", ".join([*(str(value) for _, value in self.setting), f"seed {self.seed}"])
+
+
+@dataclass(frozen=True)
+class Row:
+    """What came of one run.
+
+    Attributes:
+        cell: the run.
+        figures: numbers by name, a word or a list here and there; None when the run ended in an error.
+        problem: that error, "" otherwise.
+    """
+
+    cell: Cell
+    figures: Mapping[str, Any] | None
+    problem: str = ""
+
+    @property
+    def failure(self) -> str:
+        """Why the run counts as failed, or ""."""
+        if self.figures is None:
+            return self.problem
+        if self.figures.get("status", "ok") != "ok":
+            return f"object {self.figures['status']}"
+        registration = self.figures.get("registration_mm")
+        if registration is not None and registration > FAILURE_LIMIT_MM:
+            return f"registration above {FAILURE_LIMIT_MM:g} mm"
+        return "no shape" if self.figures.get("hausdorff_mm", 0.0) is None else ""
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it as plain data; the inverse is :meth:`from_json`."""
+        return {
+            "setting": dict(self.cell.setting),
+            "seed": self.cell.seed,
+            "figures": self.figures,
+            "problem": self.problem,
+        }
+
+    @classmethod
+    def from_json(cls, found: Mapping[str, Any]) -> Row:
+        """Raises KeyError or TypeError for what :meth:`as_json` did not write."""
+        cell = Cell(tuple(dict(found["setting"]).items()), int(found["seed"]))
+        return cls(cell, found["figures"], str(found["problem"]))
+
+
+Work: TypeAlias = Callable[[Cell], Mapping[str, Any]]
+"""Runs a cell and gives its figures; a function of a module, so that other processes can find it."""
+
+
+def grid(**values: Sequence[Value]) -> list[Setting]:
+    """Every combination of the values, the last one fastest."""
+    return [tuple(zip(values, combination, strict=True)) for combination in product(*values.values())]
+
+
+def planned_cells(settings: Sequence[Setting], seeds: Sequence[int]) -> list[Cell]:
+    """Every setting with every seed, seeds slowest: an experiment that is broken off has something of everything."""
+    return [Cell(setting, seed) for seed in seeds for setting in settings]

@@ -1,0 +1,180 @@
+"""Runs the cells of an experiment in worker processes and keeps every result as soon as it is there.
+
+The file has one line of JSON for each finished run, behind a first line that says which experiment and which
+version of the program wrote it. An experiment that was broken off goes on where it stopped; results of another
+version are not mixed in unless that is asked for. A run that ends in an error becomes a failed run with its
+reason. Results depend on the cells alone, not on the number of processes; times do.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
+from typing import IO
+
+from tactile_lab.errors import SessionError, TactileLabError
+from tactile_lab.experiments.cells import Cell, Row, Work
+
+FORMAT = "tactile-experiment/1"
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+"""What keeps the libraries of a worker to one thread: small matrices are faster so, and sums come out the same."""
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+_PARTS = ("experiments", "evaluation", "shape", "geometry", "tracking", "graph")
+
+Finished = Callable[[Row, int, int], None]
+"""Told about each finished run, the number of those done, and of all."""
+
+
+@dataclass(frozen=True)
+class RunnerSettings:
+    """How an experiment is run.
+
+    Attributes:
+        jobs: number of processes; one runs everything in this process.
+        keep: take over the results of another version of the program.
+    """
+
+    jobs: int = 1
+    keep: bool = False
+
+
+def run_cells(
+    name: str,
+    cells: Sequence[Cell],
+    work: Work,
+    file: Path,
+    settings: RunnerSettings | None = None,
+    finished: Finished = lambda row, done, total: None,
+) -> list[Row]:
+    """Run what is not yet in the file, and give one row for each cell, in the order of the cells.
+
+    Args:
+        name: of the experiment.
+        cells: what to run.
+        work: runs one cell; picklable where there is more than one process.
+        file: results, made if there is none.
+        settings: see there.
+        finished: told about progress.
+
+    Raises:
+        SessionError: the file belongs to another experiment, can not be read or written, or a process died.
+    """
+    settings = settings or RunnerSettings()
+    known = _known_rows(name, file, settings.keep)
+    missing = [cell for cell in cells if cell.key not in known]
+    done = len(cells) - len(missing)
+    with _appending(name, file, list(known.values())) as out:
+        for row in _executed(missing, work, settings.jobs):
+            known[row.cell.key] = row
+            out.write(_line(row.as_json()))
+            out.flush()
+            done += 1
+            finished(row, done, len(cells))
+    return [known[cell.key] for cell in cells]
+
+
+def execute(cell: Cell, work: Work) -> Row:
+    """Run one cell; whatever goes wrong in it is the result of this run and not the end of the others."""
+    try:
+        return Row(cell, work(cell))
+    except TactileLabError as error:
+        return Row(cell, None, str(error))
+    except Exception as error:  # a defect shows as a failed run with its name in the table
+        return Row(cell, None, f"{type(error).__name__}: {error}")
+
+
+def _executed(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
+    if jobs == 1 or len(cells) < 2:
+        return map(partial(execute, work=work), cells)
+    return _in_processes(cells, work, jobs)
+
+
+def _in_processes(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
+    """Rows as they are finished; the processes end with this generator, however it ends."""
+    os.environ.update(ONE_THREAD)  # the workers inherit it before they load any library
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare_worker)
+    try:
+        waiting = {pool.submit(execute, cell, work) for cell in cells}
+        while waiting:
+            ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in ready:
+                yield future.result()
+    except BrokenProcessPool as error:
+        hint = "Perhaps the memory was too small: take fewer --jobs. The same command goes on where it stopped"
+        raise SessionError("a worker process died", where="experiment", hint=hint) from error
+    finally:
+        _end(pool)
+
+
+def _end(pool: ProcessPoolExecutor) -> None:
+    """End the workers at once: a run may take a minute, and nobody waits for it any more."""
+    pool.shutdown(wait=False, cancel_futures=True)
+    for process in multiprocessing.active_children():
+        process.terminate()
+    pool.shutdown(wait=True)
+
+
+def _prepare_worker() -> None:
+    """Ctrl+C reaches every process of a terminal: only the parent answers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _known_rows(name: str, file: Path, keep: bool) -> dict[str, Row]:
+    """Results in the file, by the key of their cell."""
+    if not file.is_file():
+        return {}
+    try:
+        head, *lines = file.read_text(encoding="utf-8").splitlines()
+        found = json.loads(head)
+        if found["format"] != FORMAT or found["experiment"] != name:
+            raise SessionError(f"holds results of {found['experiment']}", where=str(file), hint="Choose another --out")
+        rows = [Row.from_json(json.loads(line)) for line in _whole(lines)]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        hint = "Remove the file to begin anew, or choose another --out"
+        raise SessionError("is not a file of results", where=str(file), hint=hint) from error
+    same = keep or found["version"] == version()
+    return {row.cell.key: row for row in rows} if same else {}
+
+
+def _whole(lines: list[str]) -> list[str]:
+    """Without a last line that was being written when the program was killed."""
+    return lines[:-1] if lines and not lines[-1].endswith("}") else lines
+
+
+def _appending(name: str, file: Path, rows: list[Row]) -> IO[str]:
+    """The file opened behind its head and the rows that stay."""
+    head = {"format": FORMAT, "experiment": name, "version": version()}
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        fresh = file.with_suffix(".tmp")
+        fresh.write_text("".join(map(_line, [head, *(row.as_json() for row in rows)])), encoding="utf-8")
+        fresh.replace(file)
+        return file.open("a", encoding="utf-8")
+    except OSError as error:
+        hint = "Choose another folder with --out"
+        raise SessionError(f"can not be written ({error.strerror})", where=str(file), hint=hint) from error
+
+
+def _line(document: object) -> str:
+    return json.dumps(document, allow_nan=False) + "\n"
+
+
+@cache
+def version() -> str:
+    """Hash of the sources that results depend on."""
+    digest = hashlib.sha256()
+    files = [path for part in _PARTS for path in sorted((_PACKAGE / part).rglob("*.py"))]
+    for path in [*files, _PACKAGE / "slam.py"]:
+        digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]

@@ -1,0 +1,233 @@
+"""Runs in groups: spreads over seeds and shapes, failures with their reasons, and the table that shows them.
+
+A run without the figure (no shape came of it) counts as infinitely wrong: leaving it out would make a method
+better by failing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+from tactile_lab.experiments.cells import Row, Setting, Value
+
+REFERENCE_METHOD = "known-pose"
+UNKNOWN = "–"
+
+Kind: TypeAlias = Literal["spread", "mean", "median", "pooled", "percent", "sum"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A figure of the table.
+
+    Attributes:
+        title: heading, with the unit.
+        key: name of the figure in a row.
+        digits: behind the point.
+        kind: "spread" gives median / p90 / maximum, "median" the median, "mean" the mean, "pooled" median / p95 of all
+            numbers in the lists of all runs, "percent" the mean of shares or flags, "sum" the total.
+        versus: add the ratio of the medians to the reference method's.
+    """
+
+    title: str
+    key: str
+    digits: int = 1
+    kind: Kind = "spread"
+    versus: bool = False
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Median, ninetieth percentile and maximum; infinite where too many runs have no figure."""
+
+    median: float
+    p90: float
+    largest: float
+
+    @classmethod
+    def of(cls, values: Sequence[float]) -> Spread:
+        """Of at least one value, infinite ones included."""
+        return cls(quantile(values, 0.5), quantile(values, 0.9), max(values))
+
+    def text(self, digits: int = 1) -> str:
+        """The three numbers, separated by slashes."""
+        return " / ".join(number(value, digits) for value in (self.median, self.p90, self.largest))
+
+    def as_json(self) -> dict[str, float | None]:
+        """Plain data; infinite becomes None."""
+        values = {"median": self.median, "p90": self.p90, "max": self.largest}
+        return {name: value if math.isfinite(value) else None for name, value in values.items()}
+
+
+@dataclass(frozen=True)
+class Group:
+    """All runs of one setting.
+
+    Attributes:
+        setting: what they have in common.
+        rows: the runs.
+    """
+
+    setting: Setting
+    rows: tuple[Row, ...]
+
+    def __getitem__(self, name: str) -> Value:
+        """A value of the setting. Raises KeyError."""
+        return dict(self.setting)[name]
+
+    @property
+    def failures(self) -> list[tuple[int, str]]:
+        """Seed and reason of each failed run."""
+        return [(row.cell.seed, row.failure) for row in self.rows if row.failure]
+
+    @property
+    def failed_share(self) -> float:
+        """Failed runs over all."""
+        return len(self.failures) / len(self.rows)
+
+    def values(self, key: str) -> list[float]:
+        """One number a run, infinite where it has none."""
+        found = [(row.figures or {}).get(key) for row in self.rows]
+        return [math.inf if value is None else float(value) for value in found]
+
+    def spread(self, key: str) -> Spread:
+        """Over all runs."""
+        return Spread.of(self.values(key))
+
+    def pooled(self, key: str) -> list[float]:
+        """The numbers in all lists of that name."""
+        return [value for row in self.rows for value in (row.figures or {}).get(key, [])]
+
+
+def quantile(values: Sequence[float], share: float) -> float:
+    """Linear between the sorted values; infinite as soon as an infinite value takes part."""
+    ordered = sorted(values)
+    place = share * (len(ordered) - 1)
+    low, part = ordered[math.floor(place)], place - math.floor(place)
+    return low if part == 0.0 else low + part * (ordered[math.ceil(place)] - low) if math.isfinite(low) else math.inf
+
+
+def grouped(rows: Sequence[Row], *, over: Sequence[str] = ()) -> list[Group]:
+    """Runs of equal settings together, in order of appearance, settings named in ``over`` and seeds mixed."""
+    groups: dict[Setting, list[Row]] = {}
+    for row in rows:
+        setting = tuple(pair for pair in row.cell.setting if pair[0] not in over)
+        groups.setdefault(setting, []).append(row)
+    return [Group(setting, tuple(members)) for setting, members in groups.items()]
+
+
+def varied(groups: Sequence[Group]) -> list[str]:
+    """Names of the settings that are not the same in all groups; of all if there is one group only."""
+    names = [name for name, _ in groups[0].setting]
+    return [name for name in names if len({group[name] for group in groups}) > 1] or names
+
+
+def table(groups: Sequence[Group], columns: Sequence[Column], units: Mapping[str, str]) -> list[list[str]]:
+    """Head and body of the table as texts."""
+    names = varied(groups)
+    head = [f"{name}, {units[name]}" if name in units else name for name in names]
+    head += ["runs", *(title for column in columns for title in _titles(column)), "failed", "why"]
+    body = []
+    for group in groups:
+        cells = [text for column in columns for text in _texts(group, column, _reference(group, groups))]
+        failed = f"{len(group.failures)} ({100 * group.failed_share:.0f} %)" if group.failures else "0"
+        body.append([*(str(group[name]) for name in names), str(len(group.rows)), *cells, failed, reasons(group)])
+    return [head, *body]
+
+
+def short_table(groups: Sequence[Group], columns: Sequence[Column]) -> list[list[str]]:
+    """Head and body of a table that fits a terminal: the settings that differ, the first two figures, failures."""
+    names, shown = varied(groups), columns[:2]
+    body = [[str(group[name]) for name in names] for group in groups]
+    for line, group in zip(body, groups, strict=True):
+        line += [text for column in shown for text in _texts(group, column, _reference(group, groups))]
+        line.append(f"{len(group.failures)} of {len(group.rows)}")
+    return [[*names, *(title for column in shown for title in _titles(column)), "failed"], *body]
+
+
+def reasons(group: Group) -> str:
+    """Why runs failed, the most frequent reason first, and with which seeds."""
+    seeds: dict[str, list[str]] = {}
+    for seed, reason in group.failures:
+        seeds.setdefault(reason, []).append(str(seed))
+    counts = Counter({reason: len(found) for reason, found in seeds.items()})
+    return "; ".join(f"{reason} ({_shortened(seeds[reason])})" for reason, _ in counts.most_common())
+
+
+def _shortened(seeds: list[str], most: int = 3) -> str:
+    return ", ".join(seeds) if len(seeds) <= most else f"{', '.join(seeds[:most])} and {len(seeds) - most} more"
+
+
+def _titles(column: Column) -> list[str]:
+    return [column.title, f"× {REFERENCE_METHOD}"] if column.versus else [column.title]
+
+
+def _texts(group: Group, column: Column, reference: Group | None) -> list[str]:
+    text = _SHOWN[column.kind](group, column)
+    if not column.versus:
+        return [text]
+    base = math.inf if reference is None else reference.spread(column.key).median
+    median = group.spread(column.key).median
+    return [text, number(median / base, 2) if math.isfinite(base) else UNKNOWN]
+
+
+def _reference(group: Group, groups: Sequence[Group]) -> Group | None:
+    wanted = {**dict(group.setting), "method": REFERENCE_METHOD}
+    return next((other for other in groups if dict(other.setting) == wanted), None)
+
+
+def _pooled(group: Group, column: Column) -> str:
+    values = group.pooled(column.key)
+    return " / ".join(number(quantile(values, share), column.digits) for share in (0.5, 0.95)) if values else UNKNOWN
+
+
+def _percent(group: Group, column: Column) -> str:
+    values = [value for value in group.values(column.key) if math.isfinite(value)]
+    return f"{100 * sum(values) / len(values):.{column.digits}f} %" if values else UNKNOWN
+
+
+def _sum(group: Group, column: Column) -> str:
+    values = [value for value in group.values(column.key) if math.isfinite(value)]
+    return number(sum(values), column.digits) if values else UNKNOWN
+
+
+_SHOWN: Mapping[Kind, Callable[[Group, Column], str]] = {
+    "spread": lambda group, column: group.spread(column.key).text(column.digits),
+    "mean": lambda group, column: number(sum(values := group.values(column.key)) / len(values), column.digits),
+    "median": lambda group, column: number(group.spread(column.key).median, column.digits),
+    "pooled": _pooled,
+    "percent": _percent,
+    "sum": _sum,
+}
+
+
+def number(value: float, digits: int) -> str:
+    """A number with so many digits behind the point."""
+    return f"{value:.{digits}f}" if math.isfinite(value) else "∞"
+
+
+def markdown(rows: Sequence[Sequence[str]]) -> str:
+    """Head and body as a Markdown table; the last column is text, the others numbers or names."""
+    head, *body = rows
+    lines = [head, ["---", *["---:"] * (len(head) - 2), "---"], *body]
+    return "".join(
+        "| " + " | ".join(" ".join(cell.replace("|", "\\|").split()) for cell in row) + " |\n" for row in lines
+    )
+
+
+def group_json(group: Group, columns: Sequence[Column]) -> dict[str, Any]:
+    """A group as plain data: setting, numbers of runs, failures, and the spread of every figure of the table."""
+    spreads = {column.key: _figure_json(group, column) for column in columns}
+    failures = [{"seed": seed, "reason": reason} for seed, reason in group.failures]
+    return {"setting": dict(group.setting), "runs": len(group.rows), "failures": failures, "figures": spreads}
+
+
+def _figure_json(group: Group, column: Column) -> Any:
+    if column.kind != "pooled":
+        return group.spread(column.key).as_json()
+    values = group.pooled(column.key)
+    return {"median": quantile(values, 0.5), "p95": quantile(values, 0.95), "max": max(values)} if values else None
