@@ -1,0 +1,177 @@
+"""A solid with flat faces from contacts: planes, the cells they divide space into, and those that are material."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Self
+
+import numpy as np
+
+from tactile_lab.errors import ShapeError
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.polyhedron_cells import arrange
+from tactile_lab.shape.polyhedron_extent import Cap, open_sides
+from tactile_lab.shape.polyhedron_labels import label_cells
+from tactile_lab.shape.polyhedron_mesh import FacetMesh, boundary, refined
+from tactile_lab.shape.polyhedron_planes import (
+    PARAMETERS_PER_PLANE,
+    Planes,
+    WeightedContacts,
+    divide,
+    weighted_contacts,
+)
+from tactile_lab.shape.polyhedron_regularity import RegularPlanes, regularise
+from tactile_lab.shape.surface import Contour, SurfaceMesh
+
+LARGEST_PLANE_COUNT = 24
+"""More planes make thousands of cells; a shape that needs more is a curved one."""
+
+_DEFAULT_NORMAL_SIGMA_rad = 0.1
+_MARGIN_m = 0.030
+_SIMILAR_ANGLE_rad, _SIMILAR_OFFSET_m = np.deg2rad(30.0), 0.012
+_LEAST_SUPPORT = 2
+_VERTEX_SPACING = 2.0
+
+
+class Polyhedron:
+    """Planes through contacts and the body they enclose; implements FittedShape. Made by :meth:`fit`.
+
+    Attributes:
+        name: "polyhedron".
+        planes: all planes, turned to be as regular as the contacts allow.
+        log_evidence: Gaussian log likelihood of points and normals, minus what the planes' parameters cost (BIC).
+    """
+
+    name = "polyhedron"
+
+    def __init__(self, gpis: Gpis, contacts: WeightedContacts, regular: RegularPlanes, free_points_m: Array) -> None:
+        self._gpis, self._contacts, self._regular, self._free_points_m = gpis, contacts, regular, free_points_m
+        self.log_evidence = _log_evidence(contacts, regular)
+        self._body = lru_cache(maxsize=2)(self._build)
+
+    @classmethod
+    def fit(cls, gpis: Gpis, free_points_m: Array | None = None, *, upright: bool = True) -> Self:
+        """Fit planes to the contacts of a field, with its sigmas.
+
+        Args:
+            gpis: a field fitted in space; it also closes the solid where no contact was made.
+            free_points_m: places that a finger went through, shape (k, 3), or None.
+            upright: the third axis is vertical: horizontal and vertical faces are likely.
+
+        Raises:
+            ShapeError: the contacts are in the plane.
+        """
+        contacts = contacts_of(gpis)
+        regular = regularise(contacts, divide(contacts), upright=upright)
+        free = np.empty((0, 3)) if free_points_m is None else np.asarray(free_points_m, dtype=float).reshape(-1, 3)
+        return cls(gpis, contacts, regular, free)
+
+    @property
+    def planes(self) -> Planes:
+        return self._regular.planes
+
+    def contour(self, resolution_m: float = 0.001) -> Contour:
+        """Raises ShapeError: a solid has no outline."""
+        raise ShapeError("contacts in space have a surface, not an outline", hint="Ask for the mesh")
+
+    def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
+        """The surface with sharp edges, watertight, its vertices at most twice ``resolution_m`` apart.
+
+        Raises:
+            ShapeError: the planes enclose nothing, or are too many.
+        """
+        coarse, sigmas, caps = self._body(floor_m)
+        fine = refined(coarse, _VERTEX_SPACING * resolution_m)
+        normals, sigma_m = self._vertex_normals_and_sigma(fine, sigmas, caps)
+        return SurfaceMesh(fine.vertices_m, fine.triangles, sigma_m, normals, is_closed=True)
+
+    def _build(self, floor_m: float | None) -> tuple[FacetMesh, RegularPlanes, tuple[Cap, ...]]:
+        """The coarse body, the planes it is made of, and the caps that follow them."""
+        kept = _kept(self._regular)
+        if kept.planes.count > LARGEST_PLANE_COUNT:
+            raise ShapeError(f"{kept.planes.count} planes are too many for a solid with flat faces")
+        caps = open_sides(self._gpis, kept.planes, floor_m)
+        normals = np.vstack([kept.planes.normals, *(cap.normal[None] for cap in caps)])
+        offsets = np.append(kept.planes.offsets_m, [cap.offset_m for cap in caps])
+        lower, upper = self._box(caps, floor_m)
+        arrangement = arrange(normals, offsets, lower, upper)
+        material = label_cells(
+            arrangement, kept.planes, self._contacts.points_m, self._gpis, self._free_points_m, floor_m
+        )
+        return boundary(arrangement, material), kept, caps
+
+    def _box(self, caps: tuple[Cap, ...], floor_m: float | None) -> tuple[Array, Array]:
+        contacts = self._contacts.points_m
+        reach = np.vstack([contacts, *(cap.foot_m[None] for cap in caps)])
+        lower, upper = reach.min(axis=0) - _MARGIN_m, reach.max(axis=0) + _MARGIN_m
+        if floor_m is not None:
+            if contacts[:, 2].max() <= floor_m:
+                raise ShapeError("all contacts lie below the table", hint="Check the units and the contacts' heights")
+            lower[2] = floor_m
+        return lower, upper
+
+    def _vertex_normals_and_sigma(
+        self, mesh: FacetMesh, regular: RegularPlanes, caps: tuple[Cap, ...]
+    ) -> tuple[Array, Array]:
+        """Mean normals of the faces at each vertex, and the largest sigma of their planes there."""
+        corners = mesh.vertices_m[mesh.triangles]
+        areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals, sigma = np.zeros_like(mesh.vertices_m), np.full(len(mesh.vertices_m), _FOOT_SIGMA_m)
+        for k in range(3):
+            np.add.at(normals, mesh.triangles[:, k], areas)
+        for plane in np.unique(mesh.planes[mesh.planes >= 0]):
+            touched = np.unique(mesh.triangles[mesh.planes == plane])
+            here = self._plane_sigma(int(plane), mesh.vertices_m[touched], regular, caps)
+            sigma[touched] = np.maximum(sigma[touched], here)
+        return normals / np.linalg.norm(normals, axis=1, keepdims=True), sigma
+
+    def _plane_sigma(self, plane: int, points_m: Array, regular: RegularPlanes, caps: tuple[Cap, ...]) -> Array:
+        if plane >= regular.planes.count:
+            return np.full(len(points_m), caps[plane - regular.planes.count].sigma_m)
+        return regular.sigma_m(plane, points_m)
+
+
+_FOOT_SIGMA_m = 1e-4
+
+
+def contacts_of(gpis: Gpis) -> WeightedContacts:
+    """Contacts of a field with the noise it assumes, its noise scale included.
+
+    Raises:
+        ShapeError: the contacts are in the plane.
+    """
+    if gpis.contacts_m.shape[1] != 3:
+        raise ShapeError("a polyhedron needs contacts in space")
+    count = len(gpis.contacts_m)
+    point_sigma = gpis.noise_scale * gpis.observations.value_sigma_m[:count]
+    seen = gpis.observations.gradient_sigma
+    normal_sigma = gpis.noise_scale * (seen if len(seen) == count else np.full(count, _DEFAULT_NORMAL_SIGMA_rad))
+    return weighted_contacts(gpis.contacts_m, gpis.normals, point_sigma, normal_sigma)
+
+
+def _log_evidence(contacts: WeightedContacts, regular: RegularPlanes) -> float:
+    count = len(contacts)
+    parameters = PARAMETERS_PER_PLANE * regular.planes.count - regular.saved
+    scale = 0.5 * np.log(contacts.point_weights).sum() + 1.5 * np.log(contacts.normal_weights).sum()
+    likelihood = -0.5 * regular.planes.chi_square + scale - 2 * count * np.log(2 * np.pi)
+    return float(likelihood - 0.5 * parameters * np.log(max(count, 2)))
+
+
+def _kept(regular: RegularPlanes) -> RegularPlanes:
+    """Without planes of a single contact that lie close to others: most likely that contact is wrong."""
+    planes = regular.planes
+    similar = planes.normals @ planes.normals.T > np.cos(_SIMILAR_ANGLE_rad)
+    similar &= np.abs(planes.offsets_m[:, None] - planes.offsets_m) < _SIMILAR_OFFSET_m
+    np.fill_diagonal(similar, False)
+    kept = (planes.sizes >= _LEAST_SUPPORT) | ~similar.any(axis=1)
+    numbers = np.where(kept, np.cumsum(kept) - 1, -1)
+    fewer = Planes(numbers[planes.labels], planes.normals[kept], planes.offsets_m[kept], planes.chi_square)
+    return replace(
+        regular,
+        planes=fewer,
+        middles_m=regular.middles_m[kept],
+        turn_covariances=regular.turn_covariances[kept],
+        offset_variances_m2=regular.offset_variances_m2[kept],
+    )
