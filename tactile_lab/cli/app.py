@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli import bench, evaluate, report, rig, run, session, sweep
+from tactile_lab.cli import bench, evaluate, experiment, reconstruct, report, rig, run, session, sweep
 
 app = typer.Typer(
     help="Tactile SLAM in the laboratory: the shape and pose of an unknown object from a few fingertip contacts.",
@@ -16,10 +16,12 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("run")(run.run)
+app.command("reconstruct")(reconstruct.reconstruct)
 app.command("evaluate")(evaluate.evaluate)
 app.command("report")(report.report)
 app.command("sweep")(sweep.sweep)
 app.command("bench")(bench.bench)
+app.command("experiment")(experiment.experiment)
 app.add_typer(session.app, name="session")
 app.add_typer(rig.app, name="rig")
 

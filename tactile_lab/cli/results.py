@@ -35,6 +35,8 @@ def conclude(finished: FinishedSession, as_json: bool, extra: Mapping[str, Any] 
         show_evaluation(finished.evaluation.as_json())
     _tell_files(finished)
     _tell_losses(finished)
+    for reservation in finished.evaluation.warnings if finished.evaluation else ():
+        warn(reservation)
     if finished.problem:
         complain(f"no evaluation: {finished.problem}")
     if code := _exit_code(finished):
@@ -59,7 +61,7 @@ def _tell_outcome(outcome: SessionOutcome | None) -> None:
 
 
 def _tell_files(finished: FinishedSession) -> None:
-    say(f"{'session':<13}{finished.folder}")
+    say(f"{'contact log' if finished.folder.is_file() else 'session':<13}{finished.folder}")
     for name, what in FILES:
         path = finished.results / name
         if path.is_file():

@@ -85,6 +85,29 @@ def replay(
     conclude(finished, as_json, {"identical": identical})
 
 
+@app.command("export")
+def export(
+    session: SessionName,
+    contacts: Annotated[Path, typer.Option(help="The contact log to write, a JSON file (tactile-contacts/1).")],
+    root: Root = Path("runs"),
+    dimension: Annotated[int | None, typer.Option(min=2, max=3, help="2 or 3.", show_default="the session's")] = None,
+    as_json: Json = False,
+    no_input: NoInput = False,
+) -> None:
+    """Write a session's grasps as a contact log, with the truth where it is known; see 'reconstruct'."""
+    from sessions.listing import find_session
+    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.workflow.exporting import export_contacts
+
+    del no_input
+    log = export_contacts(find_session(root, session), contacts, dimension)
+    touched = sum(len(grasp.contacts) for grasp in log.grasps)
+    if as_json:
+        emit_json({"log": str(contacts), "dimension": log.dimension, "grasps": len(log.grasps), "contacts": touched})
+    else:
+        say(f"{len(log.grasps)} grasps with {touched} contacts: {contacts}")
+
+
 def _tell_identity(recorded: Session, out: Path) -> bool:
     """Whether a replay gave the session's own results; tells people."""
     from sessions.manifest import installed_versions

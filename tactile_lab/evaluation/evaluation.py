@@ -19,6 +19,7 @@ from tactile_lab.errors import SessionError
 from tactile_lab.evaluation.loops import wrong_loops
 from tactile_lab.evaluation.plain import json_text, plain
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM, registration_rms_mm
+from tactile_lab.evaluation.reservations import reservations
 from tactile_lab.evaluation.results import Results, read_results
 from tactile_lab.evaluation.shape import (
     ShapeComparison,
@@ -27,6 +28,7 @@ from tactile_lab.evaluation.shape import (
     contact_distances_m,
     contact_height_m,
     horizontal_outline,
+    outline_distances_m,
 )
 from tactile_lab.evaluation.tables import read_contour
 from tactile_lab.evaluation.trajectory import PoseErrors, compared_grasps, estimate_T_truth, pose_errors
@@ -45,10 +47,12 @@ class Truth:
     Attributes:
         world_T_object: the object's pose at each grasp by the marker camera, None where it was not seen.
         mesh: the object's surface in the truth's object frame, or None.
+        outline_m: its horizontal outline in that frame, shape (n, 2), where that is what is known of it.
     """
 
     world_T_object: tuple[Pose3 | None, ...]
     mesh: trimesh.Trimesh | None = None
+    outline_m: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -102,8 +106,16 @@ class SensingFigures:
 
 
 @dataclass(frozen=True)
+class UncertaintyFigures:
+    """What the estimate says of itself: the standard deviation of its contour or surface, over all its points."""
+
+    sigma_mm_median: float
+    sigma_mm_p95: float
+
+
+@dataclass(frozen=True)
 class TruthFigures:
-    """How many grasps the marker camera saw, how many it did not, and whether the true mesh is known."""
+    """For how many grasps the true pose is known, for how many not, and whether the true shape is."""
 
     seen: int
     missing: int
@@ -119,8 +131,10 @@ class Evaluation:
         shape: errors with that alignment.
         shape_best_fit: errors after the best rigid alignment.
         registration_rms_mm: see :func:`tactile_lab.evaluation.registration.registration_rms_mm`.
+        uncertainty: see :class:`UncertaintyFigures`; None without a shape.
         sensing: see :class:`SensingFigures`; None without sightings or mesh.
         failed: the object was lost or the registration error is above 5 mm; None when neither is known.
+        warnings: why the result should not be believed as it stands, in words.
     """
 
     schema_version: int
@@ -133,6 +147,7 @@ class Evaluation:
     aligned: str
     shape: ShapeFigures | None
     shape_best_fit: ShapeFigures | None
+    uncertainty: UncertaintyFigures | None
     pose: PoseErrors | None
     registration_rms_mm: float | None
     sensing: SensingFigures | None
@@ -141,6 +156,7 @@ class Evaluation:
     time: TimeFigures
     truth: TruthFigures
     status: str
+    warnings: tuple[str, ...]
 
     def as_json(self) -> dict[str, Any]:
         """Plain data, numbers rounded to six decimals."""
@@ -174,6 +190,7 @@ def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
     points = [rows.points_world_m for rows in contacts]
     registration_mm = registration_rms_mm(points, poses, truth.world_T_object, results.dimension)
     seen = sum(pose is not None for pose in truth.world_T_object)
+    shape_known = truth.mesh is not None or truth.outline_m is not None
     return Evaluation(
         schema_version=SCHEMA_VERSION,
         method=str(results.slam["method"]),
@@ -185,35 +202,39 @@ def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
         aligned="first_grasp",
         shape=None if shape is None else ShapeFigures.of(shape.first_grasp),
         shape_best_fit=None if shape is None else ShapeFigures.of(shape.best_fit),
+        uncertainty=_uncertainty(results.sigma_quantiles_m),
         pose=pose_errors(poses, truth.world_T_object),
         registration_rms_mm=registration_mm,
         sensing=_sensing(results, truth),
         failed=_failed(str(results.slam["status"]), registration_mm),
         loops=_loops(results, truth),
         time=_time(results.step_seconds),
-        truth=TruthFigures(seen, len(poses) - seen, truth.mesh is not None),
+        truth=TruthFigures(seen, len(poses) - seen, shape_known),
         status=str(results.slam["status"]),
+        warnings=reservations(results),
     )
 
 
 def _shape(folder: Path, results: Results, truth: Truth) -> ShapeComparison | None:
     """The comparison of contour or mesh with the truth; None where one of them is missing."""
     name = "contour.csv" if results.dimension == 2 else "mesh.ply"
-    if truth.mesh is None or not (folder / name).is_file():
+    if not (folder / name).is_file():
         return None
     alignment = estimate_T_truth(results.trajectory.world_T_object, truth.world_T_object)
     truth_T_estimate = None if alignment is None else alignment.inverse()
     if results.dimension == 3:
-        return compare_mesh(read_mesh(folder / name), truth.mesh, truth_T_estimate)
+        return None if truth.mesh is None else compare_mesh(read_mesh(folder / name), truth.mesh, truth_T_estimate)
     outline = true_outline(results, truth)
     return None if outline is None else compare_contour(read_contour(folder / name)[:-1], outline, truth_T_estimate)
 
 
 def true_outline(results: Results, truth: Truth) -> Array | None:
-    """The true mesh's horizontal section at the mean height of the contacts, shape (n, 2), truth's object frame.
+    """The true outline, shape (n, 2), truth's object frame: as given, or the mesh's section at the contacts' height.
 
-    Without any sighting the contacts' height in the object is not known: half the mesh's height then.
+    That is their mean height; half the mesh's where no true pose tells it.
     """
+    if truth.outline_m is not None:
+        return truth.outline_m
     if truth.mesh is None:
         return None
     points, poses = _seen_contacts(results, truth)
@@ -229,13 +250,24 @@ def _seen_contacts(results: Results, truth: Truth) -> tuple[list[Array], list[Po
 
 
 def _sensing(results: Results, truth: Truth) -> SensingFigures | None:
-    if truth.mesh is None:
+    seen = _seen_contacts(results, truth)
+    if truth.mesh is not None:
+        distances_m = contact_distances_m(*seen, truth.mesh)
+    elif truth.outline_m is not None:
+        distances_m = outline_distances_m(*seen, truth.outline_m)
+    else:
         return None
-    distances_m = contact_distances_m(*_seen_contacts(results, truth), truth.mesh)
     if not len(distances_m):
         return None
     median, p95 = 1e3 * np.percentile(distances_m, [50, 95])
     return SensingFigures(float(median), float(p95))
+
+
+def _uncertainty(quantiles_m: Array | None) -> UncertaintyFigures | None:
+    if quantiles_m is None:
+        return None
+    median, p95 = 1e3 * np.percentile(quantiles_m, [50, 95])
+    return UncertaintyFigures(float(median), float(p95))
 
 
 def _failed(status: str, registration_mm: float | None) -> bool | None:

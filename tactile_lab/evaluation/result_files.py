@@ -32,6 +32,7 @@ from tactile_lab.shape.surface import Contour, SurfaceMesh
 from tactile_lab.slam import SlamResult, SlamStep
 
 SCHEMA_VERSION = 1
+_LEAST_HEIGHT_m = 0.001
 
 
 def write_results(
@@ -78,11 +79,12 @@ def _write_mesh(folder: Path, result: SlamResult, grasps: Sequence[Grasp]) -> li
 def upright_contour(result: SlamResult, grasps: Sequence[Grasp]) -> SurfaceMesh | None:
     """The contour extruded from the table to the highest contact, in the object frame; None without a contour.
 
-    A planar session feels no top; the highest contact is the height the object is known to reach.
+    A planar session feels no top; the highest contact is the height the object is known to reach. A contact log of the
+    plane has no heights, and gets no solid.
     """
     heights = np.concatenate([grasp.points_world_m[:, 2] for grasp in grasps] or [np.zeros(0)])
     placed = next((pose for pose in result.world_T_object if pose is not None), None)
-    if result.contour is None or placed is None or not heights.size:
+    if result.contour is None or placed is None or not heights.size or heights.max() < _LEAST_HEIGHT_m:
         return None
     ring, sigma_m = _ring_with_sigma(result.contour)
     origin_m = float(placed.z())
@@ -118,8 +120,15 @@ def _slam_record(result: SlamResult, settings: Mapping[str, Any]) -> dict[str, A
         "steps": [_without_duration(step) for step in result.steps],
         "covariances": result.covariances,
         "loops": result.loops,
+        "sigma_quantiles_m": _sigma_quantiles(result),
         "contour_sigma_m": None if result.contour is None else _ring_with_sigma(result.contour)[1],
     }
+
+
+def _sigma_quantiles(result: SlamResult) -> Array | None:
+    """Standard deviation of the contour or surface, from its smallest to its largest, in hundredths."""
+    shape = result.contour if result.contour is not None else result.mesh
+    return None if shape is None else np.quantile(shape.sigma_m, np.linspace(0.0, 1.0, 101))
 
 
 def _without_duration(step: SlamStep) -> dict[str, Any]:

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tactile_lab.errors import SessionError
 from tactile_lab.evaluation.plain import read_json_object
 from tactile_lab.evaluation.tables import RERUN, ContactRows, read_contacts
 from tactile_lab.evaluation.trajectory import Trajectory, read_trajectory
+from tactile_lab.geometry.contacts import Array
 
 
 @dataclass(frozen=True)
@@ -21,6 +24,12 @@ class Results:
     contacts: tuple[ContactRows, ...]
     slam: Mapping[str, Any]
     step_seconds: tuple[float, ...]
+
+    @property
+    def sigma_quantiles_m(self) -> Array | None:
+        """Standard deviation over the contour or surface, every hundredth of it; None without a shape."""
+        quantiles = self.slam.get("sigma_quantiles_m")
+        return None if quantiles is None else np.array(quantiles, dtype=float)
 
     @property
     def dimension(self) -> int:

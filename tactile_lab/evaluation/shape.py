@@ -18,7 +18,7 @@ from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import planar, transform_points
 from tactile_lab.shape.alignment import align_contours, align_meshes
 from tactile_lab.shape.metrics import ShapeErrors, contour_errors, mesh_errors
-from tactile_lab.shape.sampling import TriangleMesh, distances_to_mesh
+from tactile_lab.shape.sampling import TriangleMesh, distances_to_mesh, distances_to_polygon
 
 
 @dataclass(frozen=True)
@@ -91,9 +91,20 @@ def contact_distances_m(contacts_world_m: list[Array], truth: list[Pose3], mesh:
 
     It judges the sensing alone: joints, fingertips and calibration, without any estimated pose.
     """
-    placed = [transform_points(pose.inverse(), points) for points, pose in zip(contacts_world_m, truth, strict=True)]
-    points = np.concatenate([*placed, np.zeros((0, 3))])
+    points = _in_truth(contacts_world_m, truth)
     return distances_to_mesh(points, mesh) if len(points) else np.zeros(0)
+
+
+def outline_distances_m(contacts_world_m: list[Array], truth: list[Pose3], outline_m: Array) -> Array:
+    """As :func:`contact_distances_m`, from the true outline of shape (m, 2), in the plane."""
+    points = _in_truth(contacts_world_m, truth)
+    return distances_to_polygon(points[:, :2], outline_m) if len(points) else np.zeros(0)
+
+
+def _in_truth(contacts_world_m: list[Array], truth: list[Pose3]) -> Array:
+    """All contacts in the truth's object frame, shape (n, 3)."""
+    placed = [transform_points(pose.inverse(), points) for points, pose in zip(contacts_world_m, truth, strict=True)]
+    return np.concatenate([*placed, np.zeros((0, 3))])
 
 
 def contact_height_m(contacts_world_m: list[Array], truth: list[Pose3]) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from tactile_lab.errors import SessionError
 from tactile_lab.evaluation.prism import open_ring
-from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
+from tactile_lab.geometry.contacts import Array, Grasp
 
 NANOSECOND_s = 1e-9
 CONTACT_COLUMNS = (
@@ -77,7 +77,7 @@ def read_contacts(path: Path, grasp_count: int) -> tuple[ContactRows, ...]:
     for number, row in enumerate(_read_csv(path, CONTACT_COLUMNS), start=2):
         try:
             index, finger = int(row[0]), row[2]
-            if finger not in FINGERS or not 0 <= index < grasp_count:
+            if not finger or not 0 <= index < grasp_count:
                 raise ValueError(f"no such finger or grasp: {finger}, {index}")
             grasps[index].append([finger, *map(str, map(float, row[3:]))])
         except ValueError as error:

@@ -22,7 +22,7 @@ from sessions.traffic_reader import Loss
 from tactile_lab import report
 from tactile_lab.clock import VirtualClock
 from tactile_lab.errors import SessionError, TactileLabError
-from tactile_lab.evaluation.evaluation import Evaluation, evaluate
+from tactile_lab.evaluation.evaluation import Evaluation, Truth, evaluate
 from tactile_lab.evaluation.result_files import write_results
 from tactile_lab.evaluation.results import read_results
 from tactile_lab.evaluation.session_truth import TRUTH_TRAJECTORY, Look, session_truth
@@ -41,10 +41,10 @@ RESULT_FILES = (*REPLAYABLE, "timing.json", TRUTH_TRAJECTORY, EVALUATION, report
 
 @dataclass(frozen=True)
 class FinishedSession:
-    """A session with its results.
+    """A session, or a log of contacts, with its results.
 
     Attributes:
-        folder: the session's.
+        folder: the session's; the log's file.
         results: the folder of these results.
         outcome: how the autonomous part ended; None for a replay.
         evaluation: None when there was nothing to judge.
@@ -96,7 +96,7 @@ def estimate_rest(slam: TactileSlam, grasps: Sequence[Grasp], progress: Progress
 
 def judge(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp], out: Path) -> FinishedSession:
     """Finish the estimation and write model, evaluation and report; what stands in the way is told in the record."""
-    _remove_results(out)
+    remove_results(out)
     if not grasps:
         return FinishedSession(session.folder, out, problem="no grasp was recorded")
     try:
@@ -108,7 +108,7 @@ def judge(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp]
     return FinishedSession(session.folder, out, evaluation=evaluation)
 
 
-def _remove_results(out: Path) -> None:
+def remove_results(out: Path) -> None:
     """Files of an earlier replay: what this one does not write should not look like its own."""
     try:
         for name in RESULT_FILES:
@@ -119,15 +119,26 @@ def _remove_results(out: Path) -> None:
 
 
 def _write_evaluation(session: Session, rig: Rig, out: Path) -> tuple[Evaluation, Loss]:
-    stamps_s, traffic = read_results(out).trajectory.stamps_s, session.traffic()
-    truth = session_truth(session, len(stamps_s), _marker_detector(session, rig), traffic)
+    traffic, count = session.traffic(), len(read_results(out).trajectory.stamps_s)
+    truth = session_truth(session, count, marker_detector(session, rig), traffic)
+    return write_evaluation(out, truth, session.manifest.object_name), traffic.loss
+
+
+def write_evaluation(out: Path, truth: Truth, object_name: str) -> Evaluation:
+    """Judge the results in a folder, and put the evaluation and the truth beside them.
+
+    Raises:
+        SessionError, ShapeError: as :func:`tactile_lab.evaluation.evaluation.evaluate`.
+    """
+    stamps_s = read_results(out).trajectory.stamps_s
     write_whole(out / TRUTH_TRAJECTORY, trajectory_text(Trajectory(stamps_s, truth.world_T_object)).encode())
-    evaluation = evaluate(out, truth, session.manifest.object_name)
+    evaluation = evaluate(out, truth, object_name)
     write_whole(out / EVALUATION, evaluation.as_text().encode())
-    return evaluation, traffic.loss
+    return evaluation
 
 
-def _marker_detector(session: Session, rig: Rig) -> Look | None:
+def marker_detector(session: Session, rig: Rig) -> Look | None:
+    """Finds the object in the session's recorded pictures; None for a rig without a camera."""
     if "camera" not in rig.files:
         return None
     camera = Camera(ReplayLink(CAMERA_LINK, ()), VirtualClock())

@@ -5,17 +5,27 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from gtsam import Pose3
+
 from sessions.progress import NullProgress, Progress
 from sessions.replay import Replay
 from sessions.session import Session
 from sessions.traffic_reader import Loss
 from tactile_lab.errors import ConfigurationError
+from tactile_lab.evaluation.session_truth import session_truth
 from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import OTHER_VERSION, rig_of_session
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.strict_yaml import validate
-from tactile_lab.workflow.judging import RESULT_FILES, FinishedSession, estimate_rest, has_results, judge
+from tactile_lab.workflow.judging import (
+    RESULT_FILES,
+    FinishedSession,
+    estimate_rest,
+    has_results,
+    judge,
+    marker_detector,
+)
 
 
 def replay_session(
@@ -33,12 +43,17 @@ def replay_session(
         ConfigurationError: ``out`` holds other files.
         SessionError: the recording can not be used at all. One that was cut off is used up to the cut.
     """
-    _check_replaceable(session, out)
+    if has_results(session) and out.resolve() == session.results.resolve():
+        hint = "Choose another folder for the results"
+        raise ConfigurationError("holds the session's own results", where=str(out), hint=hint)
+    check_replaceable(out)
     rig = rig_of_session(session)
-    slam, replay = TactileSlam(settings, seed), Replay(session, build_interpreter(rig))
+    replay = Replay(session, build_interpreter(rig))
     progress = progress or NullProgress()
     progress.phase(0, "read")
     grasps = [outcome for outcome in replay.outcomes() if isinstance(outcome, Grasp)]
+    known_poses = true_poses(session, len(grasps)) if settings.method == "known-pose" else None
+    slam = TactileSlam(settings, seed, known_poses)
     estimate_rest(slam, grasps, progress)
     progress.phase(len(grasps), "model and evaluation")
     finished = judge(session, rig, slam, grasps, out)
@@ -54,20 +69,25 @@ def _unread(loss: Loss, grasps: int, recorded: int | None) -> str:
     return f"{loss.describe()}; {grasps}{known} grasps could be read"
 
 
-def _check_replaceable(session: Session, out: Path) -> None:
-    """Never write over what a replay has not made."""
-    if has_results(session) and out.resolve() == session.results.resolve():
-        hint = "Choose another folder with --into"
-        raise ConfigurationError("holds the session's own results", where=str(out), hint=hint)
+def true_poses(session: Session, grasp_count: int) -> tuple[Pose3 | None, ...]:
+    """The object's pose at each grasp by the marker camera; None where it was not seen.
+
+    Raises:
+        SessionError, ConfigurationError: the recording, or the calibration in it, can not be used.
+    """
+    return session_truth(session, grasp_count, marker_detector(session, rig_of_session(session))).world_T_object
+
+
+def check_replaceable(out: Path) -> None:
+    """Never write over what is no result of an estimation. Raises ConfigurationError."""
+    hint = "Choose a new folder for the results"
     try:
         strange = sorted(entry.name for entry in out.iterdir() if entry.name not in RESULT_FILES)
     except FileNotFoundError:
         return
     except OSError as error:
-        hint = "Choose another folder with --into"
         raise ConfigurationError(f"can not be used ({error.strerror})", where=str(out), hint=hint) from error
     if strange:
-        hint = "Choose a new folder with --into"
         raise ConfigurationError(f"holds files that are no results, such as {strange[0]}", where=str(out), hint=hint)
 
 

@@ -1,0 +1,78 @@
+"""A session as a contact log, for other programs and for :mod:`tactile_lab.workflow.reconstructing`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from sessions.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
+from sessions.manifest import write_whole
+from sessions.replay import Replay
+from sessions.session import Session
+from tactile_lab.errors import SessionError
+from tactile_lab.geometry.contacts import Contact, Grasp
+from tactile_lab.rigs.build import build_interpreter
+from tactile_lab.rigs.description import rig_of_session
+from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.workflow.replaying import recorded_slam, true_poses
+
+
+def export_contacts(session: Session, path: Path, dimension: int | None = None) -> ContactLog:
+    """Write the grasps of a recorded session, understood from its raw bytes, as a contact log.
+
+    The true mesh, where the session has one, is written beside it as a PLY file of the same name.
+
+    Args:
+        session: the recording.
+        path: of the log.
+        dimension: 2 keeps the horizontal part; None for the session's own.
+
+    Raises:
+        SessionError: the recording can not be read, holds no grasp, or the log can not be written.
+        ConfigurationError: no grasp of the session has a contact.
+    """
+    settings = recorded_slam(session)
+    replay = Replay(session, build_interpreter(rig_of_session(session)))
+    grasps = tuple(outcome for outcome in replay.outcomes() if isinstance(outcome, Grasp))
+    contacts = [contact for grasp in grasps for contact in grasp.contacts]
+    if not contacts:
+        raise SessionError("no grasp with a contact was recorded", where=str(session.folder))
+    log = ContactLog(
+        dimension=_dimension(dimension or settings.dimension),
+        point_sigma_m=_common_point_sigma_m(contacts),
+        normal_sigma_rad=float(np.median([contact.normal_sigma_rad for contact in contacts])),
+        motion_sigma=_motion_sigma(settings.motion),
+        grasps=grasps,
+        truth=_truth(session, path),
+        true_poses=true_poses(session, len(grasps)),
+    )
+    write_contact_log(path, log)
+    return log
+
+
+def _dimension(number: int) -> Literal[2, 3]:
+    return 2 if number == 2 else 3
+
+
+def _common_point_sigma_m(contacts: Sequence[Contact]) -> float:
+    """Median over the contacts of the mean deviation per axis."""
+    return float(np.median([np.sqrt(np.trace(contact.point_covariance_m2) / 3) for contact in contacts]))
+
+
+def _motion_sigma(noise: MotionNoise) -> MotionSigma:
+    return MotionSigma(translation_m=noise.translation_m, rotation_rad=noise.rotation_rad)
+
+
+def _truth(session: Session, path: Path) -> ObjectTruth:
+    """The object's name, and a copy of its mesh beside the log."""
+    name = session.manifest.object_name
+    if session.truth_mesh is None:
+        return ObjectTruth(name=name)
+    try:
+        write_whole(path.with_suffix(".ply"), session.truth_mesh.read_bytes())
+    except OSError as error:
+        raise SessionError(f"can not be written ({error.strerror})", where=str(path), hint="Check the path") from error
+    return ObjectTruth(name=name, mesh=path.with_suffix(".ply").name)

@@ -1,0 +1,131 @@
+"""One estimation of recorded contacts: a log of contacts, or a session, by any method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import trimesh
+
+from sessions.contact_log import ContactLog, read_contact_log
+from sessions.listing import find_session
+from sessions.progress import NullProgress, Progress
+from tactile_lab.errors import ConfigurationError, TactileLabError
+from tactile_lab.evaluation.evaluation import Truth
+from tactile_lab.evaluation.prism import open_ring
+from tactile_lab.evaluation.result_files import write_results
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.mesh_io import read_mesh
+from tactile_lab.slam import SlamSettings, TactileSlam
+from tactile_lab.strict_yaml import load, validate
+from tactile_lab.workflow.judging import FinishedSession, estimate_rest, remove_results, write_evaluation
+from tactile_lab.workflow.replaying import check_replaceable, recorded_seed, recorded_slam, replay_session
+
+_LEAST_MOTION = {"translation_m": 1e-5, "rotation_rad": 1e-4}
+"""Motions that a log calls exact are taken as almost so: smoothing needs some play."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a person asks of an estimation; None where the data or the defaults decide.
+
+    Attributes:
+        method: by name, see :class:`tactile_lab.tracking.trackers.TrackingSettings`.
+        dimension: 2 or 3.
+        seed: of all that is left to chance.
+        settings: a YAML file with any part of :class:`tactile_lab.slam.SlamSettings`.
+    """
+
+    method: str | None = None
+    dimension: int | None = None
+    seed: int | None = None
+    settings: Path | None = None
+
+    def applied(self, given: dict[str, Any]) -> SlamSettings:
+        """The settings: the data's, changed by the file's, changed by the options'.
+
+        Raises:
+            ConfigurationError: no such method, dimension or parameter.
+        """
+        from_file = {} if self.settings is None else load(self.settings)
+        if not isinstance(from_file, dict):
+            raise ConfigurationError("must be keys with values", where=str(self.settings), hint="Correct the file")
+        options = {"method": self.method, "dimension": self.dimension}
+        wanted = {**given, **from_file, **{key: value for key, value in options.items() if value is not None}}
+        return validate(wanted, SlamSettings, where="options" if self.settings is None else str(self.settings))
+
+
+def reconstruct(
+    source: str, root: Path, wishes: Wishes, out: Path | None = None, progress: Progress | None = None
+) -> FinishedSession:
+    """Estimate from a log of contacts, or from a session's raw bytes, and judge the result where the truth is known.
+
+    Args:
+        source: a log's file, a session's folder, or a session's name.
+        root: where sessions are looked for by name.
+        wishes: how to estimate.
+        out: folder of the results, those of an earlier estimation in it are replaced; None for one beside the data
+            that is named after the method.
+        progress: is told which grasp is being estimated.
+
+    Raises:
+        ConfigurationError: log, settings or folder do not fit, or the method needs a truth that is not there.
+        SessionError, ShapeError: the data, or the true mesh, can not be read.
+    """
+    path = Path(source)
+    if path.is_file() or path.suffix == ".json":
+        return reconstruct_log(path, wishes, out, progress)
+    session = find_session(root, source)
+    own = recorded_slam(session)
+    settings = wishes.applied({"method": own.method, "dimension": own.dimension, "motion": own.motion.model_dump()})
+    seed = recorded_seed(session) if wishes.seed is None else wishes.seed
+    return replay_session(session, settings, seed, out or session.folder / f"reconstruct-{settings.method}", progress)
+
+
+def reconstruct_log(
+    path: Path, wishes: Wishes, out: Path | None = None, progress: Progress | None = None
+) -> FinishedSession:
+    """As :func:`reconstruct`, for a log's file."""
+    log = read_contact_log(path)
+    settings, progress = wishes.applied(log_settings(log)), progress or NullProgress()
+    if settings.dimension > log.dimension:
+        raise ConfigurationError("a log of dimension 2 has no heights", where=str(path), hint="Ask for dimension 2")
+    out = out or path.with_name(f"{path.stem}-{settings.method}")
+    check_replaceable(out)
+    truth = log_truth(log, path.parent)
+    known_poses = log.true_poses if settings.method == "known-pose" else None
+    slam = TactileSlam(settings, wishes.seed or 0, known_poses)
+    estimate_rest(slam, log.grasps, progress)
+    progress.phase(len(log.grasps), "model and evaluation")
+    remove_results(out)
+    try:
+        write_results(out, slam.finish(), log.grasps, settings.model_dump(mode="json"))
+        evaluation = write_evaluation(out, truth, log.truth.name if log.truth else path.stem)
+    except TactileLabError as error:
+        return FinishedSession(path, out, problem=str(error))
+    return FinishedSession(path, out, evaluation=evaluation)
+
+
+def log_settings(log: ContactLog) -> dict[str, Any]:
+    """What a log says about the estimation: its dimension, and how far the object strays from the hand's motion."""
+    found: dict[str, Any] = {"dimension": log.dimension}
+    if log.motion_sigma is not None:
+        stated = log.motion_sigma.model_dump()
+        found["motion"] = {key: max(value, _LEAST_MOTION[key]) for key, value in stated.items()}
+    return found
+
+
+def log_truth(log: ContactLog, folder: Path) -> Truth:
+    """The truth in a log, for evaluation. A mesh is a file beside the log.
+
+    Raises:
+        ShapeError: the mesh can not be used, or the polygon has no area.
+    """
+    mesh: trimesh.Trimesh | None = None
+    outline_m: Array | None = None
+    if log.truth is not None and log.truth.mesh is not None:
+        mesh = read_mesh(folder / log.truth.mesh)
+    if log.truth is not None and log.truth.polygon_m is not None:
+        outline_m = open_ring(log.truth.polygon_m)
+    return Truth(log.true_poses, mesh, outline_m)
