@@ -30,16 +30,19 @@ THREE_SHAPES = ("rectangle", "ellipse", "hexagon")
 
 PLANAR_GRASPS, SPATIAL_GRASPS = 16, 24
 UNITS = {"noise": "%", "outliers": "%"}
+LOGARITHMIC = {"particles"}
 
-HAUSDORFF = Column("Hausdorff at best fit, mm", "hausdorff_mm")
+HAUSDORFF = Column("Hausdorff, mm", "hausdorff_mm")
 MEAN_DISTANCE = Column("mean distance, mm", "mean_mm", kind="median")
 REGISTRATION = Column("registration, mm", "registration_mm")
 STEP = Column("step, ms: median / p95", "step_ms", 0, kind="pooled")
 FINISH = Column("end, ms", "finish_ms", 0, kind="median")
 COVERED = Column("within 2 sigma", "within_2_sigma", 0, kind="percent")
-AGAINST_KNOWN = Column("Hausdorff at best fit, mm", "hausdorff_mm", 2, versus=True)
+AGAINST_KNOWN = Column("Hausdorff, mm", "hausdorff_mm", 2, versus=True)
 TRACKING_COLUMNS = (AGAINST_KNOWN, MEAN_DISTANCE, REGISTRATION, COVERED, STEP, FINISH)
 SHAPE_COLUMNS = (HAUSDORFF, Column("mean Hausdorff, mm", "hausdorff_mm", 1, kind="mean"), MEAN_DISTANCE, COVERED)
+
+_HAUSDORFF_LABEL = "Hausdorff at best fit, mm"
 
 Plot: TypeAlias = Callable[[str, Sequence[Row]], str]
 
@@ -158,7 +161,7 @@ def _curves(x: str, x_label: str, panel: str, line: str, *, columns: int = 2, ke
                 curve_of(str(value), grouped(lines, over=_others(lines, x)), x, key)
                 for value, lines in _by(part, line).items()
             ]
-            panels.append(CurvePanel(_titled(panel, name), x_label, "Hausdorff, mm", series, smallest_top=4.0))
+            panels.append(CurvePanel(_titled(panel, name), x_label, _HAUSDORFF_LABEL, series, x in LOGARITHMIC))
         return curves_svg(title, panels, columns)
 
     return plot
@@ -198,8 +201,6 @@ def _kind_of_solid(cell: Cell) -> str:
     kinds = {"flat faces": FACETED_SOLIDS, "curved": CURVED_SOLIDS, "scanned": SCANNED_SOLIDS}
     return next(kind for kind, names in kinds.items() if cell["shape"] in names)
 
-
-_HAUSDORFF_LABEL = "Hausdorff at best fit, mm"
 
 EXPERIMENTS: Mapping[str, Experiment] = {
     study.name: study

@@ -23,6 +23,20 @@ _LEGEND_LETTER = 6.7
 _LARGEST_mm = 300.0
 """Axes end here: what is farther off is simply wrong."""
 
+_COLOURS = {
+    "joint": 0,
+    "thesis-pf": 1,
+    "particle": 2,
+    "icp": 3,
+    "thesis-pf-graph": 4,
+    "odometry": 5,
+    "known-pose": 6,
+    "chosen by evidence": 0,
+    "ours": 0,
+    "particle, no graph": 3,
+}
+"""Names that have the same colour in every plot; the others take those that are left."""
+
 STYLE = """
 :root { --page:#ffffff; --ink:#1b2330; --soft:#5a6678; --grid:#e6e9ee;
   --s0:#1d5fa8; --s1:#c2570c; --s2:#1a8f6a; --s3:#8a4fbf; --s4:#b3261e; --s5:#7a6a00; --s6:#5a6678; }
@@ -58,20 +72,20 @@ class Series:
 
 @dataclass(frozen=True)
 class CurvePanel:
-    """One chart of curves.
+    """One chart of curves, with a logarithmic vertical axis.
 
     Attributes:
         title: above it.
         x_label, y_label: of the axes.
         series: the curves.
-        smallest_top: the vertical axis reaches at least so far up, from zero.
+        log_x: the horizontal axis is logarithmic too.
     """
 
     title: str
     x_label: str
     y_label: str
     series: Sequence[Series]
-    smallest_top: float = 1.0
+    log_x: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,47 +118,77 @@ def curve_of(name: str, groups: Sequence[Group], x: str, key: str) -> Series:
 
 
 def curves_svg(title: str, panels: Sequence[CurvePanel], columns: int = 2) -> str:
-    """Charts of curves side by side, with one legend."""
+    """Charts of curves side by side, with one legend and the same vertical axis."""
+    columns = min(columns, len(panels))
     names = list(dict.fromkeys(series.name for panel in panels for series in panel.series))
-    charts = [_curves(panel, names, _panel_width(columns)) for panel in panels]
+    reached = [values for panel in panels for series in panel.series for values in (series.median, series.p90)]
+    limits = _log_limits(np.concatenate(reached))
+    charts = [_curves(panel, names, limits, _panel_width(columns)) for panel in panels]
     return _sheet(title, charts, [panel.title for panel in panels], columns, names)
 
 
 def ranges_svg(title: str, panels: Sequence[RangePanel], columns: int = 2) -> str:
     """Charts of spreads side by side, all with the same axis."""
+    columns = min(columns, len(panels))
     names = list(dict.fromkeys(name for panel in panels for name, _ in panel.groups))
     known = [group.spread(panel.key) for panel in panels for _, group in panel.groups]
-    low = min(min(spread.median for spread in known), 1.0)
-    high = max(10.0, *(min(spread.largest, _LARGEST_mm) for spread in known))
-    limits = (math.log10(low) - 0.1, math.log10(high) + 0.05)
+    limits = _log_limits(np.array([value for spread in known for value in (spread.median, spread.largest)]))
     charts = [_ranges(panel, names, limits, _panel_width(columns)) for panel in panels]
     return _sheet(title, charts, [panel.title for panel in panels], columns, [])
+
+
+def _log_limits(values: Array) -> tuple[float, float]:
+    """Decimal logarithms of the ends of an axis that shows the values, at least from 1 to 10."""
+    finite = np.clip(values[np.isfinite(values)], 0.05, _LARGEST_mm)
+    low, high = min(1.0, *finite, 1.0), max(10.0, *finite, 10.0)
+    return math.log10(low) - 0.1, math.log10(high) + 0.06
 
 
 def _panel_width(columns: int) -> float:
     return (WIDTH - _GAP * (columns + 1)) / columns
 
 
-def _curves(panel: CurvePanel, names: list[str], width: float) -> Chart:
-    x = np.concatenate([series.x for series in panel.series])
-    shown = np.concatenate([series.p90 for series in panel.series])
-    medians = np.concatenate([series.median for series in panel.series])
-    reach = max(panel.smallest_top, *shown[np.isfinite(shown)], 0.0)
-    top = min(reach, max(panel.smallest_top, 2.5 * float(np.max(medians[np.isfinite(medians)], initial=0.0))))
-    span = max(float(np.ptp(x)), 1e-9)
-    chart = Chart(Frame(width, 250), (float(x.min()) - 0.03 * span, float(x.max()) + 0.03 * span), (0.0, 1.05 * top))
-    chart.axes(panel.x_label, panel.y_label)
+def _curves(panel: CurvePanel, names: list[str], limits: tuple[float, float], width: float) -> Chart:
+    x = _across(panel, np.concatenate([series.x for series in panel.series]))
+    margin = 0.03 * max(float(np.ptp(x)), 1e-9)
+    chart = Chart(Frame(width, 250), (float(x.min()) - margin, float(x.max()) + margin), limits)
+    _curve_axes(chart, panel, limits)
     for series in panel.series:
-        colour = _colour(names.index(series.name))
+        colour = _colour(series.name, names)
         fine = np.isfinite(series.median)
-        upper = np.minimum(np.where(np.isfinite(series.p90), series.p90, 1.05 * top), 1.05 * top)
-        line = np.column_stack([series.x, np.minimum(series.median, 1.05 * top)])[fine]
-        band = np.vstack([line, np.column_stack([series.x, upper])[fine][::-1]])
-        chart.add(f'<path class="band" fill="{colour}" d="{chart.trace(band, closed=True)}"/>')
+        places = _across(panel, series.x)[fine]
+        line, reach = (np.column_stack([places, _log(values[fine], limits)]) for values in (series.median, series.p90))
+        band = chart.trace(np.vstack([line, reach[::-1]]), closed=True)
+        chart.add(f'<path class="band" fill="{colour}" d="{band}"/>')
         chart.add(f'<path class="line" stroke="{colour}" d="{chart.trace(line)}"/>')
-        for place, value in line:
-            chart.dot((place, value), "dot", tip=f"{series.name}, {place:g}: {value:.2f}", style=f"fill:{colour}")
+        for place, at, value in zip(series.x[fine], line, series.median[fine], strict=True):
+            chart.dot(at, "dot", tip=f"{series.name}, {place:g}: {value:.2f}", style=f"fill:{colour}")
     return chart
+
+
+def _across(panel: CurvePanel, x: Array) -> Array:
+    return np.asarray(np.log10(x)) if panel.log_x else x
+
+
+def _log(values: Array, limits: tuple[float, float]) -> Array:
+    return np.clip(np.log10(np.maximum(values, 1e-9)), *limits)
+
+
+def _curve_axes(chart: Chart, panel: CurvePanel, limits: tuple[float, float]) -> None:
+    frame, base = chart.frame, chart.frame.height - chart.frame.bottom
+    for value in _decade_ticks(limits):
+        chart.segment(np.array([chart.x.low, math.log10(value)]), np.array([chart.x.high, math.log10(value)]), "grid")
+        chart.label(chart.x.low, math.log10(value), tick_label(value), "tick", "end", dy=4)
+    ends = (chart.x.low, chart.x.high)
+    places = [math.log10(v) for v in _decade_ticks(ends)] if panel.log_x else chart.x.ticks(8)
+    for place in places:
+        chart.segment(np.array([place, limits[0]]), np.array([place, limits[1]]), "grid")
+        text = tick_label(10**place if panel.log_x else place)
+        chart.label(place, limits[0], text, "tick", "middle", dy=16)
+    middle = (frame.top + base) / 2
+    chart.label(sum(ends) / 2, limits[0], panel.x_label, "axis", "middle", dy=34)
+    turned = f'<text class="axis" x="12" y="{middle:.1f}" text-anchor="middle">{escape(panel.y_label)}</text>'
+    chart.add(f'<g transform="rotate(-90 12 {middle:.1f})">{turned}</g>')
 
 
 def _ranges(panel: RangePanel, names: list[str], limits: tuple[float, float], width: float) -> Chart:
@@ -156,7 +200,7 @@ def _ranges(panel: RangePanel, names: list[str], limits: tuple[float, float], wi
         chart.label(math.log10(value), count - 0.5, tick_label(value), "tick", "middle", dy=16)
     chart.label((limits[0] + limits[1]) / 2, count - 0.5, panel.label, "axis", "middle", dy=34)
     for line, (name, group) in enumerate(panel.groups):
-        _range(chart, line, name, group, panel.key, _colour(names.index(name)))
+        _range(chart, line, name, group, panel.key, _colour(name, names))
     return chart
 
 
@@ -179,8 +223,12 @@ def _decade_ticks(limits: tuple[float, float]) -> list[float]:
     return [value for value in values if limits[0] <= math.log10(value) <= limits[1]]
 
 
-def _colour(index: int) -> str:
-    return f"var(--s{index % 7})"
+def _colour(name: str, names: list[str]) -> str:
+    taken = {_COLOURS[other] for other in names if other in _COLOURS}
+    left = [index for index in range(7) if index not in taken] or [6]
+    others = [other for other in names if other not in _COLOURS]
+    index = _COLOURS[name] if name in _COLOURS else left[others.index(name) % len(left)]
+    return f"var(--s{index})"
 
 
 def _sheet(title: str, charts: Sequence[Chart], titles: Sequence[str], columns: int, legend: list[str]) -> str:
@@ -206,7 +254,8 @@ def _placed(chart: Chart, title: str, left: float, top: float) -> str:
 
 def _legend_places(names: list[str]) -> list[tuple[float, int]]:
     """Left edge and line of each entry."""
-    places, left, line = [], _GAP, 0
+    places: list[tuple[float, int]] = []
+    left, line = _GAP, 0
     for name in names:
         width = 34.0 + _LEGEND_LETTER * len(name)
         if left + width > WIDTH - _GAP and left > _GAP:
@@ -226,7 +275,7 @@ def _legend(names: list[str]) -> list[str]:
         y = _TITLE_HEIGHT + 12 + line * _LEGEND_HEIGHT
         parts.append(
             f'<line x1="{left:.0f}" y1="{y - 4:.0f}" x2="{left + 16:.0f}" y2="{y - 4:.0f}" '
-            f'stroke="{_colour(index)}" stroke-width="3"/>'
+            f'stroke="{_colour(names[index], names)}" stroke-width="3"/>'
             f'<text class="name" x="{left + 22:.0f}" y="{y:.0f}">{escape(names[index])}</text>'
         )
     return parts

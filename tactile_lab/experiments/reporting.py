@@ -38,7 +38,8 @@ def section(study: Experiment, rows: Sequence[Row], jobs: int) -> str:
     seeds = seeds_of(rows)
     text = f"{study.sentence}\n\n```\ntactile-lab experiment {study.name}\n```\n\n"
     text += f"Seeds {_ranges(seeds)}; {len(rows)} runs, {jobs} at a time on {os.cpu_count()} cores. "
-    text += "Cells give median / p90 / maximum; a run without a shape counts as infinitely wrong.\n\n"
+    text += "Cells give median / p90 / maximum"
+    text += ", Hausdorff distances at the best fit; a run without a shape counts as infinitely wrong.\n\n"
     pooled = pooled_groups(study, rows)
     if pooled:
         text += f"All values of {' and '.join(study.pooled)} together:\n\n"

@@ -7,7 +7,6 @@ better by failing.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
@@ -151,15 +150,16 @@ def short_table(groups: Sequence[Group], columns: Sequence[Column]) -> list[list
 
 def reasons(group: Group) -> str:
     """Why runs failed, the most frequent reason first, and with which seeds."""
-    seeds: dict[str, list[str]] = {}
+    seeds: dict[str, list[int]] = {}
     for seed, reason in group.failures:
-        seeds.setdefault(reason, []).append(str(seed))
-    counts = Counter({reason: len(found) for reason, found in seeds.items()})
-    return "; ".join(f"{reason} ({_shortened(seeds[reason])})" for reason, _ in counts.most_common())
+        seeds.setdefault(reason, []).append(seed)
+    ordered = sorted(seeds.items(), key=lambda item: -len(item[1]))
+    return "; ".join(f"{reason}: {len(found)} ({_shortened(sorted(set(found)))})" for reason, found in ordered)
 
 
-def _shortened(seeds: list[str], most: int = 3) -> str:
-    return ", ".join(seeds) if len(seeds) <= most else f"{', '.join(seeds[:most])} and {len(seeds) - most} more"
+def _shortened(seeds: list[int], most: int = 3) -> str:
+    shown = ", ".join(map(str, seeds[:most]))
+    return shown if len(seeds) <= most else f"{shown} and {len(seeds) - most} more"
 
 
 def _titles(column: Column) -> list[str]:
