@@ -249,6 +249,10 @@ class Bench:
             self.event(Level.WARNING, finger, reason)
         return report
 
+    def begin_closing(self) -> None:
+        """The open hand stands around the object; from here on the fingers close."""
+        self._mark(MarkKind.CLOSE_BEGIN)
+
     def begin_capture(self) -> None:
         """Gather samples from here on."""
         self._mark(MarkKind.CAPTURE_BEGIN)

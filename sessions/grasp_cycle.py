@@ -135,6 +135,7 @@ class GraspCycle:
         s, table = self.settings, self._table()
         step_m = s.closing_m_s * self._motion.supervisor.speed_scale * self._motion.cycle_s
         moving, touched = set(FINGERS), dict.fromkeys(FINGERS, 0)
+        self._motion.bench.begin_closing()
         while moving:
             loads_N = self._motion.loads_N()
             for finger in moving:

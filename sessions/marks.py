@@ -20,6 +20,8 @@ class MarkKind(StrEnum):
 
     TARE = "tare"
     """The named fingers touch nothing: take this as zero."""
+    CLOSE_BEGIN = "close_begin"
+    """The open hand stands around the object: from here on the fingers close."""
     CAPTURE_BEGIN = "capture_begin"
     """The grasp has settled: gather samples from here on."""
     CAPTURE_END = "capture_end"

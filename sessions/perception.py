@@ -17,11 +17,12 @@ from pydantic import Field
 
 from drivers.fingertip import FingertipSensor, TipContact
 from drivers.shadow.kinematics import forearm_T_palm_matrix
+from sessions.closing_lines import TipSurface, closing_lines
 from sessions.contact_world import HandGeometry, MountUncertainty
 from sessions.instruments import BaseReading, FrameReading, HandReading, SlotFingertip, WrenchFingertip
 from sessions.marks import Mark, MarkKind
 from tactile_lab.errors import DeviceError, SessionError
-from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
+from tactile_lab.geometry.contacts import FINGERS, Array, ClosingLine, Contact, Grasp
 from tactile_lab.strict_yaml import StrictModel
 
 
@@ -70,6 +71,7 @@ class Perception:
         mount_T_forearm: the positioner's kinematics, from its joint vector (6,).
         world_T_mount: the forearm-to-world calibration.
         mount_covariance: its covariance, see :class:`MountUncertainty`; None when not known.
+        tip_surfaces: of the fingertips whose ways are to be told, by finger.
     """
 
     def __init__(
@@ -80,6 +82,7 @@ class Perception:
         mount_T_forearm: Callable[[Array], Pose3],
         world_T_mount: Pose3,
         mount_covariance: Array | None = None,
+        tip_surfaces: Mapping[str, TipSurface] | None = None,
         settings: PerceptionSettings | None = None,
     ) -> None:
         self._wrench = dict(wrench_fingertips or {})
@@ -99,6 +102,8 @@ class Perception:
         self._loads_N: dict[str, float] | None = None
         self._frame: FrameReading | None = None
         self._capture: _Capture | None = None
+        self._tip_surfaces = dict(tip_surfaces or {})
+        self._closing_start: HandGeometry | None = None
         self._hold_start: Pose3 | None = None
         self._hand_motion_world = Pose3()
         self._grasp_count = 0
@@ -205,6 +210,9 @@ class Perception:
         match mark.kind:
             case MarkKind.TARE:
                 return self._tare(mark)
+            case MarkKind.CLOSE_BEGIN:
+                self._closing_start = self._current()
+                return None
             case MarkKind.CAPTURE_BEGIN:
                 self._begin_capture(mark)
                 return None
@@ -249,13 +257,22 @@ class Perception:
             self._carry(self.world_T_palm)
         motion, self._hand_motion_world = self._hand_motion_world, Pose3()
         index, self._grasp_count = self._grasp_count, self._grasp_count + 1
+        contacts = geometry.contacts(tips, self.settings.joint_sigma_rad, self._mount)
         return Grasp(
             index=index,
             stamp_ns=(capture.stamp_ns + mark.stamp_ns) // 2,
-            contacts=geometry.contacts(tips, self.settings.joint_sigma_rad, self._mount),
+            contacts=contacts,
             world_T_palm=Pose3(geometry.world_T_palm),
             hand_motion_world=motion if index else Pose3(),
+            closing_lines=self._ways(geometry, contacts),
         )
+
+    def _ways(self, geometry: HandGeometry, contacts: Sequence[Contact]) -> tuple[ClosingLine, ...]:
+        """How the fingers came to this grasp; of a second capture after one closing nothing is known."""
+        begun, self._closing_start = self._closing_start, None
+        if begun is None:
+            return ()
+        return closing_lines(begun.world_T_distal, geometry.world_T_distal, self._tip_surfaces, contacts)
 
     def _touches(self, geometry: HandGeometry, *, heard: bool) -> dict[str, TipContact]:
         """The touches that count; the reasons why others do not go to :attr:`dropped`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from calibration.forearm import load_forearm
 from drivers.ati.nano17 import Nano17
-from drivers.biotac.biotac import BioTac, load_biotacs
+from drivers.biotac.biotac import BioTac, BioTacCalibration, EllipsoidSkinSettings, load_biotacs
 from drivers.camera.calibration import load_camera
 from drivers.camera.camera import Camera
 from drivers.camera.markers import MarkerSettings
@@ -15,8 +15,10 @@ from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_samples import HandDecoder
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motors import MotorMap
+from drivers.shadow.posture import TipEllipsoid
 from drivers.simulation.world import SimulatedWorld
 from sessions.bench import Bench, SensorStream
+from sessions.closing_lines import TipSurface
 from sessions.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, Interpreter, Observer, fingertip_link
 from sessions.perception import Perception
 from sessions.recorder import Recorder
@@ -90,6 +92,7 @@ def build_interpreter(rig: Rig) -> Interpreter:
         mount_T_forearm=mount_T_forearm,
         world_T_mount=forearm.world_T_mount.pose(),
         mount_covariance=forearm.covariance(),
+        tip_surfaces=_tip_surfaces(rig),
         settings=description.perception,
     )
     return Interpreter(
@@ -118,6 +121,22 @@ def _biotacs(rig: Rig) -> dict[str, BioTac]:
         return {}
     calibrations = load_biotacs(rig.files["fingertips"])
     return {finger: BioTac(finger, calibrations[finger]) for finger in FINGERS if finger in calibrations}
+
+
+def _tip_surfaces(rig: Rig) -> dict[str, TipSurface]:
+    """What each finger touches with; the usual tip where a BioTac's calibration names no ellipsoid."""
+    if rig.description.fingertips == "nano17":
+        tips = _force_tips(rig)
+        return {finger: TipSurface.upright(tip.semi_axes_m, tip.centre_distal_m) for finger, tip in tips.items()}
+    return {finger: _skin(tip) for finger, tip in load_biotacs(rig.files["fingertips"]).items()}
+
+
+def _skin(biotac: BioTacCalibration) -> TipSurface:
+    if not isinstance(biotac.skin, EllipsoidSkinSettings):
+        usual = TipEllipsoid()
+        return TipSurface.upright(usual.semi_axes_m, usual.centre_distal_m)
+    centre = TipSurface.upright(biotac.skin.semi_axes_m, biotac.skin.centre_m)
+    return TipSurface(centre.semi_axes_m, biotac.distal_T_sensor.pose() * centre.distal_T_tip)
 
 
 def _silent(name: str) -> Link:

@@ -17,6 +17,7 @@ from drivers.shadow.kinematics import JOINTS, forearm_T_palm
 from drivers.simulation.settings import ObjectStart, SimulationSettings
 from drivers.simulation.world import SimulatedWorld
 from sessions.bench import Bench, SensorStream
+from sessions.closing_lines import TipSurface
 from sessions.interpreter import Interpreter, Observer, fingertip_link
 from sessions.perception import Perception, TruthFrame
 from sessions.replay import Replay
@@ -38,7 +39,9 @@ def make_interpreter(world):
         }
     else:
         slots = {finger: BioTac(finger, tip) for finger, tip in known.biotacs.items()}
+    surface = TipSurface.upright((0.0085, 0.0085, 0.013), (0.0, 0.0, 0.019))
     perception = Perception(
+        tip_surfaces=dict.fromkeys(FINGERS, surface),
         wrench_fingertips=tips,
         slot_fingertips=slots,
         mount_T_forearm=mount_T_forearm,
@@ -97,6 +100,7 @@ def grasp_twice(bench, stop_N):
     bench.tare()
     bench.base.set_target(q)
     bench.run(600_000_000)
+    bench.begin_closing()
     close_on_object(bench, table, stop_N)
     grasps = []
     for _ in range(2):
@@ -125,8 +129,11 @@ def bits(grasp):
         )
         for contact in grasp.contacts
     ]
+    ways = [
+        (way.finger, way.start_world_m.tobytes(), way.end_world_m.tobytes(), way.touched) for way in grasp.closing_lines
+    ]
     poses = (grasp.world_T_palm.matrix().tobytes(), grasp.hand_motion_world.matrix().tobytes())
-    return grasp.index, grasp.stamp_ns, contacts, poses
+    return grasp.index, grasp.stamp_ns, contacts, ways, poses
 
 
 @pytest.mark.parametrize(("fingertips", "stop_N"), [("nano17", 0.3), ("biotac", 0.3)])
@@ -141,6 +148,9 @@ def test_a_simulated_session_is_understood_the_same_from_its_bytes(tmp_path, fin
     replayed = [outcome for outcome in outcomes if isinstance(outcome, Grasp)]
     assert [bits(grasp) for grasp in replayed] == [bits(grasp) for grasp in live]
     assert len(live[0].contacts) >= 3
+    assert {way.finger for way in live[0].closing_lines if way.touched} <= {one.finger for one in live[0].contacts}
+    assert len(live[0].closing_lines) == 5
+    assert live[1].closing_lines == ()  # a second capture after one closing
     assert live[1].hand_motion_world.x() == pytest.approx(0.01, abs=0.002)
     frames = [outcome for outcome in outcomes if isinstance(outcome, TruthFrame)]
     assert [frame.grasp_index for frame in frames] == [0, 1]

@@ -192,6 +192,9 @@ class DiscWorld:
         assert isinstance(report, TareReport)
         return report
 
+    def begin_closing(self) -> None:
+        self._mark(MarkKind.CLOSE_BEGIN)
+
     def begin_capture(self) -> None:
         self._mark(MarkKind.CAPTURE_BEGIN)
 

@@ -79,7 +79,8 @@ def test_marks_come_in_the_order_of_the_cycle() -> None:
     world = DiscWorld(disc())
     run(world, grasps=2)
     carried = [MarkKind.HOLD_BEGIN, MarkKind.HOLD_END]
-    measured = [MarkKind.TARE, MarkKind.CAPTURE_BEGIN, MarkKind.CAPTURE_END, MarkKind.TRUTH_FRAME]
+    closed = [MarkKind.TARE, MarkKind.CLOSE_BEGIN]
+    measured = [*closed, MarkKind.CAPTURE_BEGIN, MarkKind.CAPTURE_END, MarkKind.TRUTH_FRAME]
     assert world.marks == [*measured, *carried, *measured]  # nothing is carried after the last grasp
 
 
