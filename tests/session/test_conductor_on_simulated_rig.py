@@ -173,7 +173,7 @@ def test_hand_motion_predicts_the_object_up_to_slip(session: Session) -> None:
 
 def test_marks_tell_the_cycle(session: Session) -> None:
     kinds = [mark.kind for mark in session.sink.marks if mark.kind is not MarkKind.TARE]
-    measured = [MarkKind.CAPTURE_BEGIN, MarkKind.CAPTURE_END, MarkKind.TRUTH_FRAME]
+    measured = [MarkKind.CLOSE_BEGIN, MarkKind.CAPTURE_BEGIN, MarkKind.CAPTURE_END, MarkKind.TRUTH_FRAME]
     carried = [MarkKind.HOLD_BEGIN, MarkKind.HOLD_END]
     assert kinds == [*measured, *carried, *measured, *carried, *measured]
     assert sum(mark.kind is MarkKind.TARE for mark in session.sink.marks) >= 3
