@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from tactile_lab.errors import ConfigurationError
-from tactile_lab.experiments import work
+from tactile_lab.experiments import graph_runs, shape_runs, tracking_runs
 from tactile_lab.experiments.cells import Cell, Row, Setting, Value, Work, grid, planned_cells
 from tactile_lab.experiments.graph_stress import stock_solvers
 from tactile_lab.experiments.plots import CurvePanel, RangePanel, curve_of, curves_svg, ranges_svg
@@ -139,7 +139,7 @@ def _particle_numbers(grasps: int) -> list[Setting]:
 
 
 def _graph_or_not(grasps: int) -> list[Setting]:
-    methods = ("thesis-pf", "thesis-pf-graph", work.WITHOUT_GRAPH, "particle", "joint")
+    methods = ("thesis-pf", "thesis-pf-graph", tracking_runs.WITHOUT_GRAPH, "particle", "joint")
     return grid(noise=[50, 100], shape=THREE_SHAPES, method=methods, outliers=[0], grasps=[grasps])
 
 
@@ -209,7 +209,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             "methods-2d",
             "All methods on all planar shapes, at 100 % and 50 % motion noise and with 10 % outliers.",
             _methods_in_plane,
-            work.track_in_plane,
+            tracking_runs.track_in_plane,
             TRACKING_COLUMNS,
             _ranges("method", _HAUSDORFF_LABEL, "hausdorff_mm", _condition),
             pooled=("shape",),
@@ -219,7 +219,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             "methods-3d",
             "All methods on solids moved on a table at 100 % motion noise.",
             _methods_on_table,
-            work.track_on_table,
+            tracking_runs.track_on_table,
             TRACKING_COLUMNS,
             _ranges("method", _HAUSDORFF_LABEL, "hausdorff_mm", _kind_of_solid),
             pooled=("shape",),
@@ -230,10 +230,10 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             "Shape models on random contacts of planar shapes whose pose is known.",
             lambda grasps: grid(
                 shape=("rectangle", "square", "ellipse", "hexagon", "L"),
-                model=list(work.SHAPE_MODELS),
+                model=list(shape_runs.SHAPE_MODELS),
                 contacts=[20, 40, 80],
             ),
-            work.contour_of_random_contacts,
+            shape_runs.contour_of_random_contacts,
             SHAPE_COLUMNS,
             _curves("contacts", "contacts", "shape", "model"),
         ),
@@ -242,10 +242,10 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             "Thesis, figure 2.7: two shapes and two kernels, error against the number of contacts.",
             lambda grasps: grid(
                 shape=("rectangle", "ellipse"),
-                model=list(work.SHAPE_MODELS),
+                model=list(shape_runs.SHAPE_MODELS),
                 contacts=[5, 10, 15, 20, 30, 40, 60, 80],
             ),
-            work.contour_of_random_contacts,
+            shape_runs.contour_of_random_contacts,
             SHAPE_COLUMNS,
             _curves("contacts", "contacts", "shape", "model"),
         ),
@@ -257,7 +257,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
                 model=["SE, inside and outside points", "Matérn, normals", "chosen by evidence"],
                 contacts=[10, 20, 30, 40, 60, 80, 120],
             ),
-            work.mesh_of_random_contacts,
+            shape_runs.mesh_of_random_contacts,
             SHAPE_COLUMNS,
             _curves("contacts", "contacts", "shape", "model", columns=1),
         ),
@@ -265,7 +265,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             "figure-3.12",
             "Thesis, figure 3.12: error against the motion noise, three planar shapes.",
             _noise_levels,
-            work.track_in_plane,
+            tracking_runs.track_in_plane,
             TRACKING_COLUMNS,
             _curves("noise", "motion noise, %", "shape", "method"),
             pooled=("shape",),
@@ -275,7 +275,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             "figure-3.14",
             "Thesis, figure 3.14: error and success of the particle filters against the number of particles.",
             _particle_numbers,
-            work.track_in_plane,
+            tracking_runs.track_in_plane,
             (HAUSDORFF, REGISTRATION, Column("grasps not placed", "untracked", 0, kind="spread"), STEP),
             _curves("particles", "particles", "noise", "method"),
             pooled=("shape",),
@@ -287,7 +287,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             lambda grasps: grid(
                 shape=("rectangle", "hexagon", "L"), constraints=[0, 1, 2, 4, 8, 16, 32], grasps=[grasps]
             ),
-            work.correct_by_loops,
+            tracking_runs.correct_by_loops,
             (HAUSDORFF, MEAN_DISTANCE, Column("constraints there were", "loops", 0, kind="spread")),
             _curves("constraints", "constraints", "grasps", "shape", columns=1),
             pooled=("shape",),
@@ -297,7 +297,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             "figure-3.16",
             "Thesis, figure 3.16: particle filters with and without the pose graph, three planar shapes.",
             _graph_or_not,
-            work.track_in_plane,
+            tracking_runs.track_in_plane,
             TRACKING_COLUMNS,
             _ranges("method", _HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: f"{cell['shape']}, {_condition(cell)}"),
             pooled=("shape",),
@@ -306,8 +306,8 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         Experiment(
             "graph-stress",
             "Pose graphs of 50 grasps with 20 % wrong loops: gtsam's solvers, ours, and one told which are right.",
-            lambda grasps: grid(solver=[*stock_solvers(), work.OUR_SOLVER]),
-            work.solve_stressed_graph,
+            lambda grasps: grid(solver=[*stock_solvers(), graph_runs.OUR_SOLVER]),
+            graph_runs.solve_stressed_graph,
             (
                 Column("position, mm", "error_mm"),
                 Column("rotation, °", "error_deg"),

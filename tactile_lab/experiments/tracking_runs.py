@@ -1,4 +1,4 @@
-"""What one run of each experiment does: from a cell to its figures."""
+"""One run of a method on simulated grasps, from a cell to its figures."""
 
 from __future__ import annotations
 
@@ -10,20 +10,11 @@ import numpy as np
 from tactile_lab.errors import ShapeError
 from tactile_lab.experiments import planar_data, spatial_data
 from tactile_lab.experiments.cells import Cell
-from tactile_lab.experiments.graph_stress import (
-    StressGraph,
-    stock_solvers,
-    stress_graph,
-    trajectory_errors,
-)
-from tactile_lab.experiments.merit import contour_figures, mesh_figures, slam_figures
+from tactile_lab.experiments.merit import contour_figures, slam_figures
 from tactile_lab.experiments.sensing import SimulatedGrasps, SLIP_SIGMA_m, SLIP_SIGMA_rad
 from tactile_lab.graph.faces import FaceSettings, assign_to_segments, contour_segments
 from tactile_lab.graph.pose_graph import PoseGraphSettings, find_loops, optimise_poses
-from tactile_lab.graph.robust import solve_robustly
-from tactile_lab.shape.choice import GpisShape, best_shape
-from tactile_lab.shape.gpis import Gpis
-from tactile_lab.shape.model import FittedShape
+from tactile_lab.shape.choice import GpisShape
 from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
@@ -33,19 +24,6 @@ from tactile_lab.tracking.motion import compose, planar_motion
 WITHOUT_GRAPH = "particle, no graph"
 """The calibrated filter whose poses the pose graph does not correct."""
 
-SHAPE_MODELS: dict[str, GpisSettings] = {
-    "SE, inside and outside points": GpisSettings(
-        observations="offsurface", kernel="squared_exponential", prior_mean="zero"
-    ),
-    "TP, inside and outside points": GpisSettings(observations="offsurface", kernel="thin_plate", prior_mean="zero"),
-    "SE, normals": GpisSettings(kernel="squared_exponential"),
-    "TP, normals": GpisSettings(kernel="thin_plate"),
-    "Matérn, normals": GpisSettings(),
-    "chosen by evidence": GpisSettings(),
-}
-"""Shape models by the names of tables and plots; the first two are the thesis's."""
-
-MOST_CONTACTS = 160
 _LEAST_NOISE = 0.05
 _DRIFT_SIGMAS = np.array([0.0015, 0.0015, np.deg2rad(1.7)])
 _KERNEL_STEPS = 30
@@ -96,37 +74,6 @@ def _slam_settings(cell: Cell, dimension: int) -> SlamSettings:
     return SlamSettings.model_validate(given)
 
 
-def contour_of_random_contacts(cell: Cell) -> dict[str, Any]:
-    """A shape model on random contacts with known poses. Cell: shape, model, contacts."""
-    data = planar_data.random_contacts(cell["shape"], MOST_CONTACTS, cell.seed)
-    shape, seconds = _fitted(_first_contacts(data, cell["contacts"], 2), cell["model"])
-    return {**contour_figures(shape.contour(), data.outline_m), "model": shape.name, "fit_ms": 1e3 * seconds}
-
-
-def mesh_of_random_contacts(cell: Cell) -> dict[str, Any]:
-    """As :func:`contour_of_random_contacts` for a solid on the table, whose height is known."""
-    data = spatial_data.random_contacts(cell["shape"], MOST_CONTACTS, cell.seed)
-    shape, seconds = _fitted(_first_contacts(data, cell["contacts"], 3), cell["model"])
-    figures = mesh_figures(shape.mesh(floor_m=0.0), data.mesh)
-    return {**figures, "model": shape.name, "fit_ms": 1e3 * seconds}
-
-
-def _first_contacts(data: SimulatedGrasps, count: int, dimension: int) -> ContactSet:
-    """The first contacts in the world, which for random contacts is the object's frame but for its height."""
-    sets = [ContactSet.of_grasp(grasp, dimension, 0.0) for grasp in data.grasps]
-    return ContactSet.concatenated(sets).selected(np.arange(count))
-
-
-def _fitted(contacts: ContactSet, model: str) -> tuple[FittedShape, float]:
-    """A shape model with its kernel optimised, and the seconds that took."""
-    started = time.perf_counter()
-    gpis = Gpis.fit(
-        contacts.points_m, contacts.normals, contacts.point_sigma_m, contacts.normal_sigma_rad, SHAPE_MODELS[model]
-    ).optimise(max_iterations=_KERNEL_STEPS)
-    shape = best_shape(gpis) if model == "chosen by evidence" else GpisShape(gpis)
-    return shape, time.perf_counter() - started
-
-
 def correct_by_loops(cell: Cell) -> dict[str, Any]:
     """Drifting poses corrected by a pose graph with some of its loops. Cell: shape, constraints, grasps.
 
@@ -159,29 +106,3 @@ def _drifting_map(data: planar_data.PlanarGrasps, rng: np.random.Generator) -> C
         placed.append(PlacedGrasp(contacts, row, covariance, planar_motion(grasp.hand_motion_world)))
         drift = compose(drift, _DRIFT_SIGMAS * rng.normal(size=3))
     return ContactMap(tuple(placed), GpisSettings())
-
-
-def solve_stressed_graph(cell: Cell) -> dict[str, Any]:
-    """A solver on a pose graph with wrong loops. Cell: solver, one of gtsam's or "ours"."""
-    graph = stress_graph(cell.seed)
-    started = time.perf_counter()
-    if cell["solver"] != OUR_SOLVER:
-        rows = stock_solvers()[cell["solver"]](graph)
-        verdicts = {}
-    else:
-        solution = solve_robustly(graph.odometry, graph.loops)
-        rows, verdicts = solution.rows, _verdicts(graph, solution.accepted)
-    seconds = time.perf_counter() - started
-    metres, radians = trajectory_errors(rows, graph.rows)
-    return {"error_mm": 1e3 * metres, "error_deg": float(np.rad2deg(radians)), "ms": 1e3 * seconds, **verdicts}
-
-
-OUR_SOLVER = "ours"
-
-
-def _verdicts(graph: StressGraph, accepted: Any) -> dict[str, Any]:
-    return {
-        "wrong_loops": int(graph.wrong.sum()),
-        "wrong_accepted": int((accepted & graph.wrong).sum()),
-        "right_refused": int((~accepted & ~graph.wrong).sum()),
-    }
