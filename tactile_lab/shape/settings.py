@@ -10,7 +10,8 @@ from pydantic import Field
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.kernels import Kernel, Matern52, SquaredExponential, ThinPlate
 from tactile_lab.shape.observations import Observations, derivative_observations, offsurface_observations
-from tactile_lab.shape.priors import OutwardMean, PriorMean, ZeroMean
+from tactile_lab.shape.priors import EllipsoidMean, OutwardMean, PriorMean, ZeroMean
+from tactile_lab.shape.superquadric import fit_superquadric
 from tactile_lab.strict_yaml import StrictModel
 
 
@@ -22,7 +23,9 @@ class GpisSettings(StrictModel):
         kernel: covariance function, (2.15), Matérn 5/2 or (2.17).
         amplitude_m: prior standard deviation of the field; start value if optimised.
         length_m: length of the kernel; start value if optimised. The thin plate takes its radius from the data.
-        prior_mean: "zero" (2.13) or "outward" (2.18), outside the more the farther from the data.
+        prior_mean: (2.18); "zero" is (2.13), "outward" positive everywhere and the more the farther from the data,
+            "sphere", "ellipsoid" (2.19) and "superquadric" are primitives placed by the contacts (the last by a fit
+            that takes about a second in space).
         prior_softness_m: value of the outward prior amid the data.
         offsurface_distance_m: distance of the inside and outside points from their contact.
     """
@@ -31,7 +34,7 @@ class GpisSettings(StrictModel):
     kernel: Literal["squared_exponential", "matern52", "thin_plate"] = "matern52"
     amplitude_m: float = Field(default=0.020, gt=0)
     length_m: float = Field(default=0.080, gt=0)
-    prior_mean: Literal["zero", "outward"] = "outward"
+    prior_mean: Literal["zero", "outward", "sphere", "ellipsoid", "superquadric"] = "outward"
     prior_softness_m: float = Field(default=0.020, gt=0)
     offsurface_distance_m: float = Field(default=0.005, gt=0)
 
@@ -57,5 +60,15 @@ def _domain_diameter(points_m: Array) -> float:
     return float(2 * np.linalg.norm(np.ptp(points_m, axis=0)) + 0.040)
 
 
-def prior_mean(points_m: Array, settings: GpisSettings) -> PriorMean:
-    return OutwardMean.around(points_m, settings.prior_softness_m) if settings.prior_mean == "outward" else ZeroMean()
+def prior_mean(contacts_m: Array, normals: Array, settings: GpisSettings) -> PriorMean:
+    """The prior that the settings ask for, placed by the contacts."""
+    if settings.prior_mean == "zero":
+        return ZeroMean()
+    if settings.prior_mean == "outward":
+        return OutwardMean.around(contacts_m, settings.prior_softness_m)
+    if settings.prior_mean == "sphere":
+        return EllipsoidMean.sphere_around(contacts_m, normals)
+    if settings.prior_mean == "ellipsoid":
+        return EllipsoidMean.ellipsoid_around(contacts_m, normals)
+    point_sigma_m, normal_sigma = np.full(len(contacts_m), 0.001), np.full(len(contacts_m), 0.1)
+    return fit_superquadric(contacts_m, normals, point_sigma_m, normal_sigma).superquadric
