@@ -105,7 +105,7 @@ class Gpis:
         point_sigma_m, normal_sigma_rad = _one_each(point_sigma_m, points_m), _one_each(normal_sigma_rad, points_m)
         check_contacts(points_m, normals, point_sigma_m, normal_sigma_rad)
         observations = observe(points_m, normals, point_sigma_m, normal_sigma_rad, settings)
-        kernel, prior = initial_kernel(observations, settings), prior_mean(points_m, settings)
+        kernel, prior = initial_kernel(observations, settings), prior_mean(points_m, normals, settings)
         return cls(points_m, normals, settings, observations, kernel, prior)
 
     def optimise(self, *, noise: bool = False, max_iterations: int = 30) -> Self:

@@ -66,7 +66,7 @@ class PoseEvidence:
         )
         self._noise_variance = seen.noise_variance
         self._kernel: Kernel = initial_kernel(seen, contact_map.settings)
-        self._prior: PriorMean = prior_mean(contacts.points_m, contact_map.settings)
+        self._prior: PriorMean = prior_mean(contacts.points_m, contacts.normals, contact_map.settings)
 
     def value(self, rows: Array) -> float:
         """The negative log posterior at poses of shape (k, size)."""
