@@ -71,7 +71,7 @@ def best_shape(gpis: Gpis, free_points_m: Array | None = None) -> FittedShape:
         return field
     free = _free_points(gpis, free_points_m)
     advantage = polygon.log_evidence - field.log_evidence
-    advantage += _free_evidence(polygon.contour(), free, gpis) - _free_evidence(provisional, free, gpis)
+    advantage += free_evidence(polygon.contour(), free, gpis) - free_evidence(provisional, free, gpis)
     return polygon if advantage > 0 and _holds_contacts(polygon) else field
 
 
@@ -82,7 +82,7 @@ def polygon_of(gpis: Gpis, provisional: Contour) -> Polygon:
     faces = segment(
         gpis.contacts_m, gpis.normals, contacts.point_sigma_m, contacts.normal_sigma_rad, provisional.points_m
     )
-    return Polygon.of(contacts, with_right_angles(contacts, faces))
+    return Polygon.of(contacts, with_right_angles(contacts, faces), provisional)
 
 
 def _free_points(gpis: Gpis, free_points_m: Array | None) -> Array:
@@ -90,7 +90,7 @@ def _free_points(gpis: Gpis, free_points_m: Array | None) -> Array:
     return at_contacts if free_points_m is None else np.vstack([at_contacts, free_points_m])
 
 
-def _free_evidence(contour: Contour, free_points_m: Array, gpis: Gpis) -> float:
+def free_evidence(contour: Contour, free_points_m: Array, gpis: Gpis) -> float:
     """Logarithm of the probability that places known to be free are outside of an outline.
 
     Places are known as well as contacts are, the outline by its own sigma. Neighbouring places tell nearly the same,
@@ -105,5 +105,5 @@ def _free_evidence(contour: Contour, free_points_m: Array, gpis: Gpis) -> float:
 
 def _holds_contacts(polygon: Polygon) -> bool:
     """All contacts but a few lie on the outline itself, not only on the lines of its faces."""
-    away = distances_to_polygon(polygon.contacts.points_m, polygon.corners_m)
+    away = distances_to_polygon(polygon.contacts.points_m, polygon.outline_m)
     return bool(np.mean(away > _ON_OUTLINE_SIGMAS * polygon.contacts.point_sigma_m) <= 0.05)
