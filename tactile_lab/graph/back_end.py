@@ -6,6 +6,7 @@ from pydantic import Field
 
 from tactile_lab.errors import ShapeError
 from tactile_lab.graph.faces import FaceSettings, Labels, assign_to_segments, contour_segments, surface_faces
+from tactile_lab.graph.loop_tests import LoopTestSettings, tested_together
 from tactile_lab.graph.pose_graph import (
     Loop,
     LoopReport,
@@ -17,6 +18,7 @@ from tactile_lab.graph.pose_graph import (
 from tactile_lab.shape.surface import extract_contour
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.motion import MotionNoise
 
 
 class BackEndSettings(StrictModel):
@@ -27,24 +29,36 @@ class BackEndSettings(StrictModel):
         faces: segmentation of the object.
         graph: loops and optimisation.
         contour_resolution_m: of the contour that is divided into faces (2-D).
+        tests: what loops have to pass beyond the tests on their own pairs; not asked of the thesis's variant.
     """
 
     enabled: bool = True
     faces: FaceSettings = FaceSettings()
     graph: PoseGraphSettings = PoseGraphSettings()
     contour_resolution_m: float = Field(default=0.003, gt=0)
+    tests: LoopTestSettings = LoopTestSettings()
 
 
 class BackEnd:
     """Loops found so far and their verdicts."""
 
-    def __init__(self, settings: BackEndSettings, *, each_grasp: bool = True) -> None:
+    def __init__(
+        self,
+        settings: BackEndSettings,
+        *,
+        each_grasp: bool = True,
+        as_printed: bool = False,
+        noise: MotionNoise | None = None,
+    ) -> None:
         """
         Args:
             settings: see there.
             each_grasp: correct after every grasp; without, only at the end (trackers that smooth by themselves).
+            as_printed: the thesis's variant: loops are tested one by one against the filter's poses only.
+            noise: of the object's motion in the hand; the thesis's 100 % if not given.
         """
-        self._settings, self._each_grasp = settings, each_grasp
+        self._settings, self._each_grasp, self._as_printed = settings, each_grasp, as_printed
+        self._noise = noise or MotionNoise()
         self._loops: list[Loop] = []
 
     @property
@@ -68,6 +82,8 @@ class BackEnd:
             return contact_map
         grasps = list(range(2, len(contact_map.placed)))
         self._loops = find_loops(contact_map, self._faces(contact_map), self._settings.graph, grasps)
+        if not self._as_printed:
+            self._loops = tested_together(contact_map, self._loops, self._noise, self._settings.tests)
         return self._corrected(contact_map)
 
     def _corrected(self, contact_map: ContactMap) -> ContactMap:
