@@ -35,10 +35,13 @@ OUTLINES_m: Mapping[str, Array] = {
     "L": _mm((-40, -32), (60, -32), (60, 8), (0, 8), (0, 48), (-40, 48)),
     "hexagon": _mm((-50, -20), (-10, -38), (45, -25), (50, 10), (10, 38), (-38, 28)),
     "trapezoid": _mm((-50, -28), (50, -28), (28, 30), (-22, 30)),
-    "pentagon": _arc(0.0, (0.045, 0.045), 90, 450, 5),
+    "pentagon": _mm((-45, -34), (45, -34), (45, 12), (0, 46), (-45, 12)),
     "stadium": _stadium(0.048, 0.028),
 }
-"""Outlines in the object's own coordinates, metres, counter-clockwise, first point not repeated."""
+"""Outlines in the object's own coordinates, metres, counter-clockwise, first point not repeated.
+
+No regular polygons but the square: a turn by an angle of its symmetry leaves no trace that could be tracked.
+"""
 
 
 def first_crossing(

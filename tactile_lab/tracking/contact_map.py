@@ -113,6 +113,11 @@ class ContactMap:
         emptier = replace(grasp, left_out=grasp.left_out | {int(grasp.kept[within])})
         return replace(self, placed=(*self.placed[:index], emptier, *self.placed[index + 1 :]))
 
+    def with_contact(self, grasp: int, contact: int) -> ContactMap:
+        """The map with one contact that was left out made part of the shape again."""
+        fuller = replace(self.placed[grasp], left_out=self.placed[grasp].left_out - {contact})
+        return replace(self, placed=(*self.placed[:grasp], fuller, *self.placed[grasp + 1 :]))
+
     def seen_by(self, index: int) -> ContactSet:
         """Contacts of one grasp, object frame."""
         world = self.placed[index].contacts_world

@@ -12,13 +12,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.polygon_segmentation import log_evidence
+from tactile_lab.shape.choice import free_evidence, polygon_of
+from tactile_lab.shape.surface import extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.facet_smoothing import smoothed_with_faces
 from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.pose_evidence import PoseEvidence
+
+_ORDERING_RESOLUTION_m = 0.002
+"""Of outlines that only order contacts and are compared with free places."""
 
 _SAME_TRANSLATION_m = 0.0005
 _SAME_ROTATION_rad = 0.01
@@ -89,19 +95,46 @@ class Judge:
             contact_map = contact_map.without_contact(int(asked[costs.argmax()]))
 
     def with_faces(self, contact_map: ContactMap) -> Hypothesis:
-        """The map, or the one with poses smoothed together with flat faces if those explain its contacts better."""
+        """The map, or the one with poses smoothed together with flat faces if those explain its contacts better.
+
+        Contacts that did not fit the field get another chance: a face that only they touch may be worth its price.
+        """
         rated = self.rated(contact_map)
-        faceted = smoothed_with_faces(contact_map, self._noise) if contact_map.dimension == 2 else None
-        if faceted is None:
+        if contact_map.dimension == 3:
             return rated
-        moved = contact_map.with_rows(faceted.rows)
-        contacts = moved.contacts
-        explained = log_evidence(
-            faceted.chi_square, faceted.faces.count, contacts.point_sigma_m, contacts.normal_sigma_rad
-        )
+        sharp = self._faceted(contact_map)
+        if sharp is None or sharp.cost > rated.cost:
+            return rated
+        restored = self._restored(sharp)
+        if restored.map.left_out_count < sharp.map.left_out_count:
+            sharp = min(sharp, self._faceted(restored.map) or sharp, key=lambda one: one.cost)
+        return sharp
+
+    def _faceted(self, contact_map: ContactMap) -> Hypothesis | None:
+        """Poses and faces smoothed together; None if there are no faces that enclose anything."""
+        faceted = smoothed_with_faces(contact_map, self._noise)
+        return self._with_polygon(contact_map.with_rows(faceted.rows)) if faceted else None
+
+    def _with_polygon(self, contact_map: ContactMap) -> Hypothesis | None:
+        """The map as it is, its contacts explained by flat faces."""
+        fitted, contacts = contact_map.fit(), contact_map.contacts
+        try:
+            polygon = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
+        except ShapeError:  # nothing enclosed, or no faces in it
+            return None
         constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
-        sharp = self._hypothesis(moved, faceted.motion_cost - explained - constant)
-        return min(sharp, rated, key=lambda one: one.cost)
+        motion = MotionCost(contact_map.motions, self._noise, contact_map.space).value(contact_map.rows)
+        intrusion = -free_evidence(polygon.contour(_ORDERING_RESOLUTION_m), contact_map.free_points_m, fitted)
+        misfit = motion - polygon.log_evidence - float(constant)
+        return Hypothesis(contact_map, misfit, intrusion, self.price(contact_map))
+
+    def _restored(self, sharp: Hypothesis) -> Hypothesis:
+        """With those contacts back that flat faces explain better than nothing does, one after the other."""
+        for index, grasp in enumerate(sharp.map.placed):
+            for contact in sorted(grasp.left_out) if grasp.used else ():
+                fuller = self._with_polygon(sharp.map.with_contact(index, contact))
+                sharp = min(sharp, fuller or sharp, key=lambda one: one.cost)
+        return sharp
 
     def price(self, contact_map: ContactMap) -> float:
         """What the contacts cost that are left out."""

@@ -13,11 +13,10 @@ from gtsam import Pose3
 from pydantic import Field as Limit
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import planar
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.motion import MotionNoise, pose_row, row_pose_in_space
+from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.odometry_tracker import OdometryTracker
 from tactile_lab.tracking.particle_filter import PoseEstimate
 
@@ -61,7 +60,7 @@ class IcpTracker(OdometryTracker):
 
         target, tree = _cloud(self._map.contacts)
         source, _ = _cloud(contacts)
-        start = row_pose_in_space(self._now.row, 0.0)
+        start = self._map.space.pose(self._now.row, 0.0)
         found = small_gicp.align(
             target,
             source,
@@ -78,15 +77,15 @@ class IcpTracker(OdometryTracker):
         enough = found.num_inliers >= self._settings.least_matched * source.size()
         if not enough or not np.isfinite(object_T_world).all():
             return None
-        return pose_row(planar(Pose3(object_T_world).inverse()))
+        return self._map.space.motion(Pose3(object_T_world).inverse())
 
     def _covariance_at(self, row: Array, contacts: ContactSet) -> Array:
         """What distances along the normals to equally uncertain partners tell, and odometry for the rest."""
-        arms = contacts.points_m[:, :2] - row[:2]
-        normals = contacts.normals[:, :2]
-        lever = arms[:, 0] * normals[:, 1] - arms[:, 1] * normals[:, 0]
-        rows = np.column_stack([normals, lever]) / (np.sqrt(2.0) * contacts.point_sigma_m[:, None])
-        return np.asarray(np.linalg.inv(rows.T @ rows + np.linalg.inv(self._now.covariance)))
+        space = self._map.space
+        points, normals = space.to_object(row, contacts.points_m, contacts.normals)
+        along = space.by_row(row, points, normals, normals, np.zeros_like(normals))
+        told = along / (np.sqrt(2.0) * contacts.point_sigma_m[:, None])
+        return np.asarray(np.linalg.inv(told.T @ told + np.linalg.inv(self._now.covariance)))
 
 
 def _cloud(contacts: ContactSet) -> tuple[Any, Any]:

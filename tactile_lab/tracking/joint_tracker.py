@@ -16,19 +16,16 @@ import numpy as np
 from pydantic import Field as Limit
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.field_grid import Field, FieldGrid
-from tactile_lab.shape.gpis import Gpis
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.fields import tabulated
 from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge, different, likeliest, weights
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.particle_filter import PoseEstimate
 from tactile_lab.tracking.proposals import ProposalSettings, propose
-
-GRID_MARGIN_m = 0.040
-GRID_SPACING_m = 0.003
+from tactile_lab.tracking.regrouping import regrouped
 
 
 class JointSettings(StrictModel):
@@ -41,6 +38,7 @@ class JointSettings(StrictModel):
         evidence_gap: hypotheses that much less likely than the best (natural logarithm) are given up.
         iterations: of the optimiser at each grasp.
         final_iterations: of the optimiser at the end.
+        backwards: read the session backwards as well at the end.
     """
 
     proposals: ProposalSettings = ProposalSettings()
@@ -49,6 +47,7 @@ class JointSettings(StrictModel):
     evidence_gap: float = Limit(default=25.0, gt=0)
     iterations: int = Limit(default=15, ge=1)
     final_iterations: int = Limit(default=80, ge=1)
+    backwards: bool = True
 
 
 class JointTracker:
@@ -72,6 +71,11 @@ class JointTracker:
     @property
     def map(self) -> ContactMap:
         return self._hypotheses[0].map
+
+    @property
+    def hypotheses(self) -> tuple[Hypothesis, ...]:
+        """The trajectories that are still followed, the likeliest first."""
+        return tuple(self._hypotheses)
 
     def predict(self, motion: Array) -> None:
         self._motion = motion
@@ -111,7 +115,14 @@ class JointTracker:
         self._hypotheses[0] = replace(self._hypotheses[0], map=corrected)
 
     def finish(self) -> None:
-        """Smooth the remaining hypotheses to the end, kernel parameters and faces included."""
+        """Smooth the remaining hypotheses to the end, those of the session read backwards among them.
+
+        Where the first grasps left a wrong impression the last ones may not, and the evidence tells which was right.
+        """
+        if self._settings.backwards and len(self.map.placed) > 2:
+            self._hypotheses = different(self._hypotheses + self._backwards())
+        others = [other for one in self._hypotheses for other in self._regrouped(one)]
+        self._hypotheses = self._likeliest(different(self._hypotheses + others), self._settings.hypotheses)
         for _ in range(2):
             iterations = self._settings.final_iterations
             smoothed = [self._judge.smoothed(one.map, iterations) for one in self._hypotheses]
@@ -119,6 +130,23 @@ class JointTracker:
             self._share_kernel(self.map.with_best_kernel())
         faceted = [self._judge.with_faces(one.map) for one in self._hypotheses]
         self._hypotheses = sorted(faceted, key=lambda one: one.cost)
+
+    def _backwards(self) -> list[Hypothesis]:
+        """The hypotheses that the same grasps give in the opposite order."""
+        placed, space = self.map.placed, self._space
+        last = replace(placed[-1], left_out=frozenset(), covariance=placed[0].covariance)
+        tracker = JointTracker(replace(self.map, placed=(last,)), self._noise, self._settings, self._kernel_every)
+        for grasp, later in zip(placed[-2::-1], placed[:0:-1], strict=True):
+            tracker.predict(space.inverse(later.motion))
+            tracker.weigh(grasp.contacts_world)
+            tracker.update_shape(grasp.contacts_world, certain=True)
+            tracker.resample()
+        return [self._judge.rated(_forward(one.map, self.map)) for one in tracker.hypotheses]
+
+    def _regrouped(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """The hypothesis joined otherwise at its unlikeliest steps."""
+        others = regrouped(hypothesis.map, self._noise, self._settings.proposals)
+        return [self._judge.smoothed(other, self._settings.iterations) for other in others]
 
     def _unplaced(self, hypothesis: Hypothesis, contacts: ContactSet) -> Hypothesis:
         """All contacts of the grasp left out: the motion model alone says where the object is."""
@@ -151,7 +179,7 @@ class JointTracker:
         noise = self._noise.accumulated(1 + _trailing_unplaced(hypothesis.map))
         predicted = self._space.compose(self._motion, hypothesis.map.placed[-1].row)
         fitted = hypothesis.map.fit()
-        rows, fit = propose(predicted, contacts, _tabulated(fitted), noise, self._settings.proposals, self._space)
+        rows, fit = propose(predicted, contacts, tabulated(fitted), noise, self._settings.proposals, self._space)
         free = contacts.free_m
         places, _ = self._space.to_object(rows[:, None], free, free)
         intrusions = hypothesis.intrusion + free_space_costs(fitted, places)
@@ -173,11 +201,15 @@ class JointTracker:
         self._hypotheses = [replace(one, map=replace(one.map, settings=best.settings)) for one in self._hypotheses]
 
 
-def _tabulated(fitted: Gpis) -> Field:
-    """In the plane a coarse grid is cheaper than the field itself; in space it is not, for so few samples."""
-    if fitted.contacts_m.shape[1] == 3:
-        return fitted
-    return FieldGrid.around(fitted, margin_m=GRID_MARGIN_m, spacing_m=GRID_SPACING_m)
+def _forward(backward: ContactMap, present: ContactMap) -> ContactMap:
+    """A map of the same grasps in the opposite order, turned round and brought into the present object frame."""
+    space, grasps = present.space, backward.placed[::-1]
+    body_T_frame = space.compose(space.inverse(grasps[0].row), present.placed[0].row)
+    placed = tuple(
+        replace(ours, row=space.compose(theirs.row, body_T_frame), left_out=theirs.left_out)
+        for ours, theirs in zip(present.placed, grasps, strict=True)
+    )
+    return replace(present, placed=placed)
 
 
 def _trailing_unplaced(contact_map: ContactMap) -> int:

@@ -12,14 +12,15 @@ import numpy as np
 from gtsam import Pose3
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import planar
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
-from tactile_lab.tracking.contact_set import ContactSet, planar_rotation
-from tactile_lab.tracking.motion import MotionNoise, compose, inverse, pose_row
+from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.particle_filter import PoseEstimate
 
-KNOWN_COVARIANCE = np.diag([1e-10, 1e-10, 1e-10])
+KNOWN_VARIANCE = 1e-10
 """A pose that is given is certain up to rounding."""
+
+_STEP = 1e-6
 
 
 class OdometryTracker:
@@ -29,7 +30,7 @@ class OdometryTracker:
 
     def __init__(self, first: ContactMap, noise: MotionNoise) -> None:
         self._map, self._noise = first, noise
-        self._motion, self._trusted = np.zeros(3), True
+        self._motion, self._trusted = np.zeros(first.space.size), True
         self._now = PoseEstimate(first.placed[-1].row, first.placed[-1].covariance)
 
     @property
@@ -37,12 +38,12 @@ class OdometryTracker:
         return self._map
 
     def predict(self, motion: Array) -> None:
-        """Carry the pose along; its covariance turns with it, and the noise is added."""
-        self._motion = motion
-        turn = np.eye(3)
-        turn[:2, :2] = planar_rotation(motion[2])
-        covariance = turn @ self._now.covariance @ turn.T + np.diag(self._noise.sigmas**2)
-        self._now = PoseEstimate(compose(motion, self._now.row), covariance)
+        """Carry the pose along; its covariance goes with it, and the noise is added."""
+        space, row = self._map.space, self._now.row
+        moved = space.compose(motion, row)
+        by_row = space.deviation(space.compose(motion, row + _STEP * np.eye(space.size)), moved).T / _STEP
+        covariance = by_row @ self._now.covariance @ by_row.T + np.diag(space.sigmas(self._noise) ** 2)
+        self._motion, self._now = motion, PoseEstimate(moved, covariance)
 
     def weigh(self, contacts: ContactSet) -> bool:
         self._trusted = len(contacts) > 0
@@ -79,17 +80,17 @@ class KnownPoseTracker(OdometryTracker):
                 own object frame, which the first grasp ties to the map's.
         """
         super().__init__(first, noise)
-        known = [None if pose is None else pose_row(planar(pose)) for pose in poses]
-        assert known[0] is not None
-        truth_T_map = compose(inverse(known[0]), first.placed[-1].row)
-        self._ahead = [None if row is None else compose(row, truth_T_map) for row in known[1:]]
+        space, start = first.space, poses[0]
+        assert start is not None
+        truth_T_map = start.inverse() * space.pose(first.placed[-1].row, 0.0)
+        self._ahead = [None if pose is None else space.motion(pose * truth_T_map) for pose in poses[1:]]
         self._given: Array | None = None
 
     def predict(self, motion: Array) -> None:
         super().predict(motion)
         self._given = self._ahead.pop(0) if self._ahead else None
         if self._given is not None:
-            self._now = PoseEstimate(self._given, KNOWN_COVARIANCE)
+            self._now = PoseEstimate(self._given, KNOWN_VARIANCE * np.eye(len(self._given)))
 
     def weigh(self, contacts: ContactSet) -> bool:
         """Grasps whose pose is not known stay out of the shape."""

@@ -13,7 +13,7 @@ from gtsam import Pose3
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import wrap_angle_rad
-from tactile_lab.tracking.motion import MotionNoise, compose, deviation, planar_motion, row_pose_in_space
+from tactile_lab.tracking.motion import MotionNoise, compose, deviation, inverse, planar_motion, row_pose_in_space
 
 
 class PoseRows(Protocol):
@@ -32,6 +32,9 @@ class PoseRows(Protocol):
 
     def compose(self, motion: Array, rows: Array) -> Array:
         """``motion * pose``, both in the world (eq. 3.8)."""
+
+    def inverse(self, rows: Array) -> Array:
+        """The inverse of each pose."""
 
     def deviation(self, rows: Array, reference: Array) -> Array:
         """The noise v of eq. 3.7 that leads from the reference to the rows."""
@@ -78,6 +81,9 @@ class PlanarRows:
 
     def compose(self, motion: Array, rows: Array) -> Array:
         return compose(motion, rows)
+
+    def inverse(self, rows: Array) -> Array:
+        return inverse(rows)
 
     def deviation(self, rows: Array, reference: Array) -> Array:
         return deviation(rows, reference)

@@ -1,0 +1,85 @@
+"""Other ways to join the two halves of a trajectory.
+
+A hypothesis that once took a wrong turn carries all later grasps with it: each half of the trajectory is right in
+itself, and only the step between them is wrong. Such a step mostly needs an unlikely slip, so that is where to look:
+the contacts of the smaller half, as one rigid set, are matched anew against the surface that the other half makes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.fields import tabulated
+from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.motion_cost import MotionCost
+from tactile_lab.tracking.proposals import ProposalSettings, propose
+
+_UNLIKELY_SIGMA = 2.0
+_MOST_STEPS = 4
+_KEPT = 3
+"""Other ways that are returned for each step."""
+
+_LEAST_CONTACTS = 3
+
+
+def regrouped(contact_map: ContactMap, noise: MotionNoise, settings: ProposalSettings) -> list[ContactMap]:
+    """The trajectory joined in other ways at its most unlikely steps.
+
+    Args:
+        contact_map: poses and contacts of a hypothesis.
+        noise: of the motion model.
+        settings: of the search.
+    """
+    slips = MotionCost(contact_map.motions, noise, contact_map.space).slips_in_sigma(contact_map.rows).max(axis=1)
+    steps = [int(step) + 1 for step in np.argsort(-slips)[:_MOST_STEPS] if slips[step] > _UNLIKELY_SIGMA]
+    return [other for step in steps for other in _joined_anew(contact_map, step, noise, settings)]
+
+
+def _joined_anew(
+    contact_map: ContactMap, step: int, noise: MotionNoise, settings: ProposalSettings
+) -> list[ContactMap]:
+    """The best other ways to join what is before a step with what comes from it on."""
+    space, rows, of_grasp = contact_map.space, contact_map.rows, contact_map.grasp_indices
+    later = of_grasp >= step
+    moves_later = int(later.sum()) <= int((~later).sum())
+    moved, anchor, other = (later, step, step - 1) if moves_later else (~later, step - 1, step)
+    if min(int(moved.sum()), int((~moved).sum())) < _LEAST_CONTACTS:
+        return []
+    motion = contact_map.motions[step] if moves_later else space.inverse(contact_map.motions[step])
+    submap = _at(contact_map.contacts.selected(moved), space.inverse(rows[anchor]), contact_map)
+    field = tabulated(_half(contact_map, keep_later=not moves_later, step=step).fit())
+    found, _ = propose(space.compose(motion, rows[other]), submap, field, noise, settings, space)
+    different = _far_from(found, rows[anchor], contact_map, settings)[:_KEPT]
+    members = np.arange(len(rows)) >= step if moves_later else np.arange(len(rows)) < step
+    return [_turned(contact_map, members, space.compose(space.inverse(rows[anchor]), row)) for row in different]
+
+
+def _half(contact_map: ContactMap, *, keep_later: bool, step: int) -> ContactMap:
+    placed = contact_map.placed[step:] if keep_later else contact_map.placed[:step]
+    return replace(contact_map, placed=placed)
+
+
+def _at(contacts: ContactSet, row: Array, contact_map: ContactMap) -> ContactSet:
+    points, normals = contact_map.space.to_object(row, contacts.points_m, contacts.normals)
+    return replace(contacts, points_m=points, normals=normals)
+
+
+def _far_from(found: Array, row: Array, contact_map: ContactMap, settings: ProposalSettings) -> Array:
+    gaps, split = contact_map.space.deviation(found, row), contact_map.space.translations
+    far = np.linalg.norm(gaps[:, :split], axis=1) > 2 * settings.distinct_m
+    far |= np.linalg.norm(gaps[:, split:], axis=1) > 2 * settings.distinct_rad
+    return np.asarray(found[far])
+
+
+def _turned(contact_map: ContactMap, members: NDArray[np.bool_], old_T_new: Array) -> ContactMap:
+    """Some grasps' object frames turned, and then all so that the first pose is what it was."""
+    space, rows = contact_map.space, contact_map.rows
+    rows[members] = space.compose(rows[members], old_T_new)
+    gauge = space.compose(space.inverse(rows[0]), contact_map.rows[0])
+    return contact_map.with_rows(space.compose(rows, gauge))
