@@ -215,15 +215,9 @@ def divide(contacts: PlanarContacts, order: NDArray[np.int64]) -> Faces:
 
 
 def _divide_opened(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[Faces, NDArray[np.int64]]:
-    from tactile_lab.shape.polygon_runs import cheapest_division, run_costs  # here: compiled loops are slow to import
+    from tactile_lab.shape.polygon_runs import cheapest_division  # here: compiled loops are slow to import
 
-    centre = contacts.points_m.mean(axis=0)
-    costs, angles, offsets = run_costs(
-        np.ascontiguousarray(contacts.points_m[order] - centre),
-        np.ascontiguousarray(contacts.normals[order]),
-        contacts.point_sigma_m[order] ** -2.0,
-        contacts.normal_sigma_rad[order] ** -2.0,
-    )
+    costs, angles, offsets = _runs(contacts, order)
     _, firsts = cheapest_division(costs, price_of_face(contacts.point_sigma_m, contacts.normal_sigma_rad))
     borders = [len(order)]
     while borders[-1] > 0:
@@ -232,9 +226,34 @@ def _divide_opened(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[
     begin, end = borders_up[:-1], borders_up[1:] - 1
     labels = np.empty(len(order), dtype=np.int64)
     labels[order] = np.repeat(np.arange(len(begin)), np.diff(borders_up))
-    directions = angles[begin, end]
-    shift = centre[0] * np.cos(directions) + centre[1] * np.sin(directions)
-    found = Faces(
-        labels, directions, offsets[begin, end] + shift, order, float(costs[begin, end].sum()), np.arange(len(begin))
+    chi_square, numbers = float(costs[begin, end].sum()), np.arange(len(begin))
+    return Faces(labels, angles[begin, end], offsets[begin, end], order, chi_square, numbers), borders_up
+
+
+def merged(contacts: PlanarContacts, faces: Faces, face: int) -> Faces:
+    """The same division with ``face`` and the next one, counter-clockwise, made one; at least two are needed."""
+    pair = np.isin(faces.labels[faces.order], (face, (face + 1) % faces.count))
+    order = np.roll(faces.order, -int(np.argmax(pair & ~np.roll(pair, 1))))
+    labels = np.maximum((faces.labels - face) % faces.count - 1, 0)
+    return fitted(contacts, labels, order)
+
+
+def fitted(contacts: PlanarContacts, labels: NDArray[np.int64], order: NDArray[np.int64]) -> Faces:
+    """The best lines for a given division: labels from 0 up along a cyclic order of the contacts."""
+    runs = [_runs(contacts, order[labels[order] == label]) for label in range(labels.max() + 1)]
+    costs, directions, offsets = np.array([[table[0, -1] for table in run] for run in runs]).T
+    return Faces(labels, directions, offsets, order, float(costs.sum()), np.arange(len(runs)))
+
+
+def _runs(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[Array, Array, Array]:
+    """Chi-square, direction and offset of every run of successive contacts; see :func:`run_costs`."""
+    from tactile_lab.shape.polygon_runs import run_costs  # here: compiled loops are slow to import
+
+    centre = contacts.points_m.mean(axis=0)
+    costs, angles, offsets = run_costs(
+        np.ascontiguousarray(contacts.points_m[order] - centre),
+        np.ascontiguousarray(contacts.normals[order]),
+        contacts.point_sigma_m[order] ** -2.0,
+        contacts.normal_sigma_rad[order] ** -2.0,
     )
-    return found, borders_up
+    return costs, angles, offsets + centre[0] * np.cos(angles) + centre[1] * np.sin(angles)
