@@ -43,6 +43,7 @@ from tactile_lab.tracking.particle_filter import PoseEstimate
 from tactile_lab.tracking.trackers import (
     FIRST_COVARIANCE,
     GRAPH_METHODS,
+    THESIS_METHODS,
     Tracker,
     TrackingSettings,
     make_tracker,
@@ -160,7 +161,12 @@ class TactileSlam:
         back_end = self._settings.back_end
         if self._settings.method not in GRAPH_METHODS:
             back_end = back_end.model_copy(update={"enabled": False})
-        self._back_end = BackEnd(back_end, each_grasp=self._settings.method != "joint")
+        self._back_end = BackEnd(
+            back_end,
+            each_grasp=self._settings.method != "joint",
+            as_printed=self._settings.method in THESIS_METHODS,
+            noise=self._settings.motion,
+        )
         self._tracker: Tracker | None = None
         self._origin_height_m = 0.0
         self._steps: list[SlamStep] = []
