@@ -26,8 +26,8 @@ from tactile_lab.tracking.pose_evidence import PoseEvidence
 _ORDERING_RESOLUTION_m = 0.002
 """Of outlines that only order contacts and are compared with free places."""
 
-_SAME_TRANSLATION_m = 0.0005
-_SAME_ROTATION_rad = 0.01
+_SAME_TRANSLATION_m = 0.001
+_SAME_ROTATION_rad = 0.03
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,7 @@ class JointTracker:
         if len(self.map.placed) % self._kernel_every == 0:
             self._share_kernel(self.map.with_best_kernel())
             rated = [self._judge.rated(one.map) for one in self._hypotheses]
-            self._hypotheses = sorted(rated, key=lambda one: one.cost)
+            self._hypotheses = sorted(rated, key=_cost)
 
     def adopt(self, corrected: ContactMap) -> None:
         self._hypotheses[0] = replace(self._hypotheses[0], map=corrected)
@@ -121,15 +121,15 @@ class JointTracker:
         """
         if self._settings.backwards and len(self.map.placed) > 2:
             self._hypotheses = different(self._hypotheses + self._backwards())
-        others = [other for one in self._hypotheses for other in self._regrouped(one)]
-        self._hypotheses = self._likeliest(different(self._hypotheses + others), self._settings.hypotheses)
+        self._hypotheses = different(self._hypotheses + self._regrouped(min(self._hypotheses, key=_cost)))
+        self._hypotheses = self._likeliest(self._hypotheses, self._settings.hypotheses)
         for _ in range(2):
             iterations = self._settings.final_iterations
             smoothed = [self._judge.smoothed(one.map, iterations) for one in self._hypotheses]
             self._hypotheses = self._likeliest(different(smoothed), self._settings.hypotheses)
             self._share_kernel(self.map.with_best_kernel())
         faceted = [self._judge.with_faces(one.map) for one in self._hypotheses]
-        self._hypotheses = sorted(faceted, key=lambda one: one.cost)
+        self._hypotheses = sorted(faceted, key=_cost)
 
     def _backwards(self) -> list[Hypothesis]:
         """The hypotheses that the same grasps give in the opposite order."""
@@ -145,8 +145,9 @@ class JointTracker:
 
     def _regrouped(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """The hypothesis joined otherwise at its unlikeliest steps."""
-        others = regrouped(hypothesis.map, self._noise, self._settings.proposals)
-        return [self._judge.smoothed(other, self._settings.iterations) for other in others]
+        others = [self._judge.rated(one) for one in regrouped(hypothesis.map, self._noise, self._settings.proposals)]
+        promising = sorted(others, key=_cost)[: self._settings.smoothed]
+        return [self._judge.smoothed(other.map, self._settings.iterations) for other in promising]
 
     def _unplaced(self, hypothesis: Hypothesis, contacts: ContactSet) -> Hypothesis:
         """All contacts of the grasp left out: the motion model alone says where the object is."""
@@ -199,6 +200,10 @@ class JointTracker:
 
     def _share_kernel(self, best: ContactMap) -> None:
         self._hypotheses = [replace(one, map=replace(one.map, settings=best.settings)) for one in self._hypotheses]
+
+
+def _cost(hypothesis: Hypothesis) -> float:
+    return hypothesis.cost
 
 
 def _forward(backward: ContactMap, present: ContactMap) -> ContactMap:
