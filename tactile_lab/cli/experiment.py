@@ -24,11 +24,14 @@ def experiment(
     jobs: Annotated[int, typer.Option(min=0, help="Runs side by side; 0 takes all cores.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder of the results (runs/experiments/NAME).")] = None,
     only: Annotated[
-        list[str] | None, typer.Option(help="Limit a setting, for example method=joint,known-pose; repeatable.")
+        list[str] | None,
+        typer.Option(help="Limit a setting: method=joint,icp, with ; where a value has a comma; repeatable."),
     ] = None,
     grasps: Annotated[int | None, typer.Option(min=1, help="Other number of grasps, for a quick look.")] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the results of another version of the program.")] = False,
-    into: Annotated[Path | None, typer.Option(help="Markdown file in which to replace the section.")] = None,
+    into: Annotated[
+        Path | None, typer.Option(help="Markdown document in which to replace the experiment's section.")
+    ] = None,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -40,7 +43,7 @@ def experiment(
     from tactile_lab.cli.console import emit_json, say, show_table
     from tactile_lab.cli.experiment_progress import ExperimentProgress
     from tactile_lab.experiments.catalogue import experiment
-    from tactile_lab.experiments.reporting import LINES_FILE, PLOT_FILE, document, insert_section, section, write_report
+    from tactile_lab.experiments.reporting import LINES_FILE, document, insert_section, write_report
     from tactile_lab.experiments.runner import RunnerSettings, run_cells
     from tactile_lab.experiments.summary import grouped, short_table
 
@@ -52,8 +55,7 @@ def experiment(
         rows = run_cells(name, cells, study.work, folder / LINES_FILE, settings, progress.finished)
     write_report(study, rows, folder, processes)
     if into is not None:
-        picture = os.path.relpath(folder / PLOT_FILE, into.parent)
-        insert_section(into, study, section(study, rows, processes), picture)
+        insert_section(into, study, rows, processes)
     if as_json:
         emit_json(document(study, rows, processes))
     else:
@@ -105,5 +107,6 @@ def _limits(only: list[str]) -> dict[str, list[str]]:
         name, equals, values = text.partition("=")
         if not (name and equals and values):
             raise typer.BadParameter(f"{text!r} is not of the form setting=value,value", param_hint="'--only'")
-        limits[name] = [value.strip() for value in values.split(";" if ";" in values else ",")]
+        parts = values.split(";" if ";" in values else ",")
+        limits[name] = [value.strip() for value in parts if value.strip()]
     return limits

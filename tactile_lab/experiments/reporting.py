@@ -16,6 +16,7 @@ from tactile_lab.experiments.runner import FORMAT, version
 from tactile_lab.experiments.summary import Group, group_json, grouped, markdown, table
 
 JSON_FILE, TABLE_FILE, PLOT_FILE, LINES_FILE = "results.json", "results.md", "plot.svg", "runs.jsonl"
+PICTURES = "pictures"
 
 
 def document(study: Experiment, rows: Sequence[Row], jobs: int) -> dict[str, Any]:
@@ -67,7 +68,7 @@ def write_report(study: Experiment, rows: Sequence[Row], folder: Path, jobs: int
     texts = {
         JSON_FILE: json.dumps(document(study, rows, jobs), indent=1, allow_nan=False) + "\n",
         TABLE_FILE: section(study, rows, jobs),
-        PLOT_FILE: study.plot(study.sentence.rstrip("."), rows),
+        PLOT_FILE: _plot(study, rows),
     }
     try:
         for name, text in texts.items():
@@ -77,25 +78,33 @@ def write_report(study: Experiment, rows: Sequence[Row], folder: Path, jobs: int
         raise SessionError(f"can not be written ({error.strerror})", where=str(folder), hint=hint) from error
 
 
-def insert_section(document_path: Path, study: Experiment, text: str, picture: str | None = None) -> None:
+def insert_section(page: Path, study: Experiment, rows: Sequence[Row], jobs: int) -> None:
     """Put an experiment's section between its two marks in a Markdown document, in place of what is there.
 
-    The marks are comments of the form ``<!-- experiment NAME -->`` and ``<!-- end NAME -->``.
+    The marks are comments of the form ``<!-- experiment NAME -->`` and ``<!-- end NAME -->``. The plot goes into the
+    folder ``pictures`` beside the document.
 
     Raises:
         SessionError: the document can not be read or written, or does not have the marks.
     """
     begin, end = f"<!-- experiment {study.name} -->", f"<!-- end {study.name} -->"
-    image = f"![{study.sentence}]({picture})\n\n" if picture else ""
+    picture = Path(PICTURES) / f"{study.name}.svg"
     try:
-        before, found, rest = document_path.read_text(encoding="utf-8").partition(begin)
+        before, found, rest = page.read_text(encoding="utf-8").partition(begin)
         _, closed, after = rest.partition(end)
         if not (found and closed):
             hint = f"Add the lines {begin} and {end} where the section belongs"
-            raise SessionError(f"has no place for {study.name}", where=str(document_path), hint=hint)
-        document_path.write_text(f"{before}{begin}\n\n{image}{text}\n{end}{after}", encoding="utf-8")
+            raise SessionError(f"has no place for {study.name}", where=str(page), hint=hint)
+        text = f"{section(study, rows, jobs)}\n![{study.sentence}]({picture.as_posix()})\n"
+        (page.parent / PICTURES).mkdir(exist_ok=True)
+        (page.parent / picture).write_text(_plot(study, rows), encoding="utf-8")
+        page.write_text(f"{before}{begin}\n\n{text}\n{end}{after}", encoding="utf-8")
     except OSError as error:
-        raise SessionError(f"can not be used ({error.strerror})", where=str(document_path)) from error
+        raise SessionError(f"can not be used ({error.strerror})", where=str(page)) from error
+
+
+def _plot(study: Experiment, rows: Sequence[Row]) -> str:
+    return study.plot(study.sentence.rstrip("."), rows)
 
 
 def _ranges(seeds: Sequence[int]) -> str:

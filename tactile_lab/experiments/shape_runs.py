@@ -41,11 +41,10 @@ def contour_of_random_contacts(cell: Cell) -> dict[str, Any]:
 
 
 def mesh_of_random_contacts(cell: Cell) -> dict[str, Any]:
-    """As :func:`contour_of_random_contacts` for a solid on the table, whose height is known."""
-    data = spatial_data.random_contacts(cell["shape"], MOST_CONTACTS, cell.seed)
+    """As :func:`contour_of_random_contacts` for a solid that is touched from all sides."""
+    data = spatial_data.random_contacts(cell["shape"], MOST_CONTACTS, cell.seed, foot=True)
     shape, seconds = _fitted(_first_contacts(data, cell["contacts"], 3), cell["model"])
-    figures = mesh_figures(shape.mesh(floor_m=0.0), data.mesh)
-    return {**figures, "model": shape.name, "fit_ms": 1e3 * seconds}
+    return {**mesh_figures(shape.mesh(), data.mesh), "model": shape.name, "fit_ms": 1e3 * seconds}
 
 
 def _first_contacts(data: SimulatedGrasps, count: int, dimension: int) -> ContactSet:

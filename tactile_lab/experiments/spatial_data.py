@@ -101,10 +101,16 @@ def simulate(
     return SpatialGrasps(shape, tuple(grasps), tuple(truth), session.solid.mesh)
 
 
-def random_contacts(shape: str, count: int, seed: int) -> SpatialGrasps:
-    """Contacts spread at random over a solid standing on a table that does not move, without those under its foot.
+def random_contacts(shape: str, count: int, seed: int, *, foot: bool = False) -> SpatialGrasps:
+    """Contacts spread at random over a solid standing on a table that does not move.
 
     They come as grasps of five contacts (the last may have fewer), without closing lines.
+
+    Args:
+        shape: name of a solid.
+        count: number of contacts.
+        seed: of all randomness.
+        foot: the foot and what is just above the table are touched as well, as if there were no table.
 
     Raises:
         ConfigurationError: no such solid, or its mesh is not on this machine.
@@ -112,7 +118,7 @@ def random_contacts(shape: str, count: int, seed: int) -> SpatialGrasps:
     body = solid(shape)
     rng = np.random.default_rng([seed, 40963])
     points, normals = sample_mesh_with_normals(body.mesh, 8 * count, seed=int(rng.integers(1 << 31)))
-    reachable = np.flatnonzero((normals[:, 2] > -0.7) & (points[:, 2] > body.foot_m + _EDGE_m))
+    reachable = np.flatnonzero(foot | (normals[:, 2] > -0.7) & (points[:, 2] > body.foot_m + _EDGE_m))
     chosen = rng.choice(reachable, count, replace=False)
     pose = Pose3(Rot3(), np.array([0.0, 0.0, -body.foot_m]))
     contacts = [measured_contact(FINGERS[i % 5], points[j], normals[j], pose, rng) for i, j in enumerate(chosen)]

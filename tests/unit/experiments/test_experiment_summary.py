@@ -13,7 +13,7 @@ from tactile_lab.errors import SessionError
 from tactile_lab.experiments.catalogue import EXPERIMENTS, experiment
 from tactile_lab.experiments.cells import Cell, Row
 from tactile_lab.experiments.plots import CurvePanel, Series, curves_svg
-from tactile_lab.experiments.reporting import document, insert_section, section, write_report
+from tactile_lab.experiments.reporting import document, insert_section, write_report
 from tactile_lab.experiments.summary import (
     Column,
     Spread,
@@ -110,15 +110,16 @@ def test_a_curve_leaves_out_points_without_a_median() -> None:
 def test_a_section_replaces_what_is_between_its_marks(tmp_path: Path) -> None:
     page, study = tmp_path / "results.md", EXPERIMENTS["methods-2d"]
     page.write_text("# Results\n\n<!-- experiment methods-2d -->\nold\n<!-- end methods-2d -->\n\nafter\n")
-    insert_section(page, study, section(study, ROWS, 1), "pictures/plot.svg")
-    insert_section(page, study, section(study, ROWS, 1), "pictures/plot.svg")
+    insert_section(page, study, ROWS, 1)
+    insert_section(page, study, ROWS, 1)
     text = page.read_text()
     assert "old" not in text
     assert text.count("| joint |") == 1
-    assert text.count("pictures/plot.svg") == 1
+    assert text.count("(pictures/methods-2d.svg)") == 1
+    assert (tmp_path / "pictures" / "methods-2d.svg").is_file()
     assert text.startswith("# Results")
     assert text.endswith("\n\nafter\n")
     with pytest.raises(SessionError, match=r"no place for figure-3\.12"):
-        insert_section(page, EXPERIMENTS["figure-3.12"], "text")
+        insert_section(page, EXPERIMENTS["figure-3.12"], ROWS, 1)
     with pytest.raises(SessionError, match="can not be used"):
-        insert_section(tmp_path / "none.md", study, "text")
+        insert_section(tmp_path / "none.md", study, ROWS, 1)

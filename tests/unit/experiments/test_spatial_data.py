@@ -97,6 +97,8 @@ def test_random_contacts_leave_out_the_foot() -> None:
     assert distances_to_mesh(points, data.mesh).max() < 0.005
     assert points[:, 2].min() > -0.030
     assert np.ptp(points[:, 0]) > 0.11
+    everywhere = on_body(random_contacts("box-12x6x6", 80, seed=0, foot=True))
+    assert np.sum(everywhere[:, 2] < -0.028) > 10
 
 
 def test_scanned_objects_are_read_from_the_data_folder(lab_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:

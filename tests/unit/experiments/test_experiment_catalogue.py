@@ -1,0 +1,67 @@
+"""Every experiment in a tiny configuration, and what can be asked of the catalogue."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.experiments.catalogue import EXPERIMENTS, METHODS, REPORTED_SEEDS, Experiment, experiment
+from tactile_lab.experiments.reporting import write_report
+from tactile_lab.experiments.runner import execute
+
+TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
+    "methods-2d": ({"shape": ["rectangle"], "noise": ["50"], "method": ["known-pose", "odometry", "joint"]}, 4),
+    "methods-3d": ({"shape": ["l-block"], "method": ["known-pose", "odometry"]}, 4),
+    "random-contacts": ({"shape": ["L"], "contacts": ["20"], "model": ["TP, normals", "chosen by evidence"]}, None),
+    "figure-2.7": ({"shape": ["ellipse"], "contacts": ["5", "10"], "model": ["SE, normals"]}, None),
+    "figure-2.12": ({"contacts": ["20"], "model": ["Matérn, normals"]}, None),
+    "figure-3.12": ({"shape": ["ellipse"], "noise": ["0", "100"], "method": ["known-pose"]}, 4),
+    "figure-3.14": ({"shape": ["ellipse"], "noise": ["25"], "particles": ["500", "1000"]}, 4),
+    "figure-3.15": ({"shape": ["rectangle"], "constraints": ["0", "4"]}, 6),
+    "figure-3.16": ({"shape": ["rectangle"], "noise": ["50"], "method": ["thesis-pf", "particle, no graph"]}, 3),
+    "graph-stress": ({"solver": ["Cauchy", "ours"]}, None),
+}
+
+
+@pytest.mark.parametrize("study", EXPERIMENTS.values(), ids=lambda study: study.name)
+def test_every_experiment_runs_and_is_reported(study: Experiment, tmp_path: Path) -> None:
+    only, grasps = TINY[study.name]
+    cells = study.cells([0], only, grasps)
+    assert 0 < len(cells) <= 6
+    rows = [execute(cell, study.work) for cell in cells]
+    assert [row.problem for row in rows] == [""] * len(rows)
+    for column in study.columns:
+        assert any(column.key in (row.figures or {}) for row in rows)
+    write_report(study, rows, tmp_path, jobs=1)
+    ElementTree.fromstring((tmp_path / "plot.svg").read_text())
+    assert (tmp_path / "results.md").read_text().count("| --- ") >= 1
+
+
+def test_the_same_cell_gives_the_same_figures() -> None:
+    study = experiment("methods-2d")
+    cell = study.cells([1], {"shape": ["ellipse"], "noise": ["100"], "outliers": ["10"], "method": ["particle"]}, 4)[0]
+    first, second = execute(cell, study.work).figures, execute(cell, study.work).figures
+    assert first is not None
+    assert second is not None
+    times = {"step_ms", "finish_ms"}
+    assert {k: v for k, v in first.items() if k not in times} == {k: v for k, v in second.items() if k not in times}
+
+
+def test_all_methods_see_the_same_number_of_runs_with_the_reported_seeds() -> None:
+    cells = experiment("methods-2d").cells()
+    assert len(cells) == 3 * 8 * len(METHODS) * 30
+    assert {cell.seed for cell in cells} == set(REPORTED_SEEDS) == set(range(1000, 1030))
+    assert {cell["grasps"] for cell in cells} == {16}
+
+
+def test_unknown_names_are_refused_with_those_there_are() -> None:
+    with pytest.raises(ConfigurationError, match=r"figure-9\.9") as caught:
+        experiment("figure-9.9")
+    assert "methods-2d" in str(caught.value.hint)
+    with pytest.raises(ConfigurationError, match="colour"):
+        experiment("methods-2d").cells(only={"colour": ["red"]})
+    with pytest.raises(ConfigurationError, match="octagon"):
+        experiment("methods-2d").cells(only={"shape": ["octagon"]})
