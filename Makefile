@@ -10,7 +10,7 @@ READY  := $(VENV)/ready
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: demo test check bench lock clean
+.PHONY: demo test check bench results lock clean
 
 demo: $(READY)  ## A whole autonomous session on the simulated rig, evaluated, with its report
 	$(BIN)/tactile-lab run --rig sim --object box-10x6x4 --grasps 16 --seed 1 --out runs
@@ -26,6 +26,11 @@ check: $(READY)  ## Linters, types and the layer contract
 
 bench: $(READY)  ## Speed and memory, printed beside the reference
 	$(BIN)/tactile-lab bench
+
+EXPERIMENTS := methods-2d methods-3d random-contacts figure-2.7 figure-2.12 figure-3.12 figure-3.14 figure-3.15 figure-3.16 graph-stress
+
+results: $(READY)  ## All experiments over the reported seeds (hours), their tables and plots into docs/results.md
+	for name in $(EXPERIMENTS); do $(BIN)/tactile-lab experiment $$name --into docs/results.md || exit 1; done
 
 lock:  ## Resolve the dependencies again, with hashes
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-config \

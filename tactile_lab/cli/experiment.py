@@ -25,13 +25,11 @@ def experiment(
     out: Annotated[Path | None, typer.Option(help="Folder of the results (runs/experiments/NAME).")] = None,
     only: Annotated[
         list[str] | None,
-        typer.Option(help="Limit a setting: method=joint,icp, with ; where a value has a comma; repeatable."),
+        typer.Option(help="Limit a setting: method=joint,icp (; where values have commas)."),
     ] = None,
     grasps: Annotated[int | None, typer.Option(min=1, help="Other number of grasps, for a quick look.")] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the results of another version of the program.")] = False,
-    into: Annotated[
-        Path | None, typer.Option(help="Markdown document in which to replace the experiment's section.")
-    ] = None,
+    into: Annotated[Path | None, typer.Option(help="Markdown document whose section to replace.")] = None,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -40,7 +38,7 @@ def experiment(
     if name == "list":
         _list(as_json)
         return
-    from tactile_lab.cli.console import emit_json, say, show_table
+    from tactile_lab.cli.console import emit_json, say, show_table, warn
     from tactile_lab.cli.experiment_progress import ExperimentProgress
     from tactile_lab.experiments.catalogue import experiment
     from tactile_lab.experiments.reporting import LINES_FILE, document, insert_section, write_report
@@ -50,6 +48,8 @@ def experiment(
     study, processes = experiment(name), jobs or os.cpu_count() or 1
     folder = out or Path("runs/experiments") / name
     cells = study.cells(_seeds(seeds), _limits(only or []), grasps)
+    if study.left_out():
+        warn(study.left_out())
     with ExperimentProgress(study.name, len(cells)) as progress:
         settings = RunnerSettings(processes, keep)
         rows = run_cells(name, cells, study.work, folder / LINES_FILE, settings, progress.finished)

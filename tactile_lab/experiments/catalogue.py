@@ -14,7 +14,7 @@ from tactile_lab.experiments import graph_runs, shape_runs, tracking_runs
 from tactile_lab.experiments.cells import Cell, Row, Setting, Value, Work, grid, planned_cells
 from tactile_lab.experiments.graph_stress import stock_solvers
 from tactile_lab.experiments.plots import CurvePanel, RangePanel, curve_of, curves_svg, ranges_svg
-from tactile_lab.experiments.solids import YCB_NAMES, YCB_PREFIX
+from tactile_lab.experiments.solids import YCB_NAMES, YCB_PREFIX, ycb_path
 from tactile_lab.experiments.summary import Column, grouped
 
 REPORTED_SEEDS = tuple(range(1000, 1030))
@@ -60,6 +60,7 @@ class Experiment:
         plot: draws the outcome as an SVG file, from a title and all rows.
         pooled: settings over which a second table takes all runs together.
         grasps: number of grasps of a run; None where there are none.
+        left_out: what can not be run on this machine and why, "" if nothing.
     """
 
     name: str
@@ -70,6 +71,7 @@ class Experiment:
     plot: Plot
     pooled: tuple[str, ...] = ()
     grasps: int | None = None
+    left_out: Callable[[], str] = str
 
     def cells(
         self,
@@ -120,8 +122,18 @@ def _methods_in_plane(grasps: int) -> list[Setting]:
     ]
 
 
+def _scans_left_out() -> str:
+    try:
+        for name in YCB_NAMES:
+            ycb_path(name)
+    except ConfigurationError as error:
+        return f"scanned solids are left out: {error}"
+    return ""
+
+
 def _methods_on_table(grasps: int) -> list[Setting]:
-    solids = (*FACETED_SOLIDS, *CURVED_SOLIDS, *SCANNED_SOLIDS)
+    scanned = () if _scans_left_out() else SCANNED_SOLIDS
+    solids = (*FACETED_SOLIDS, *CURVED_SOLIDS, *scanned)
     return grid(noise=[100], shape=solids, method=METHODS, grasps=[grasps])
 
 
@@ -224,6 +236,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             _ranges("method", _HAUSDORFF_LABEL, "hausdorff_mm", _kind_of_solid),
             pooled=("shape",),
             grasps=SPATIAL_GRASPS,
+            left_out=_scans_left_out,
         ),
         Experiment(
             "random-contacts",

@@ -41,6 +41,8 @@ def section(study: Experiment, rows: Sequence[Row], jobs: int) -> str:
     text += f"Seeds {_ranges(seeds)}; {len(rows)} runs, {jobs} at a time on {os.cpu_count()} cores. "
     text += "Cells give median / p90 / maximum"
     text += ", Hausdorff distances at the best fit; a run without a shape counts as infinitely wrong.\n\n"
+    if study.left_out():
+        text += f"Not run: {study.left_out()}.\n\n"
     pooled = pooled_groups(study, rows)
     if pooled:
         text += f"All values of {' and '.join(study.pooled)} together:\n\n"

@@ -57,6 +57,18 @@ def test_all_methods_see_the_same_number_of_runs_with_the_reported_seeds() -> No
     assert {cell["grasps"] for cell in cells} == {16}
 
 
+def test_scanned_solids_are_left_out_with_the_reason_where_they_are_absent(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, lab_data: Path
+) -> None:
+    study = experiment("methods-3d")
+    monkeypatch.setenv("TACTILE_LAB_DATA", str(tmp_path))
+    assert "ycb_cracker_box.ply" in study.left_out()
+    without = study.cells([0])
+    monkeypatch.setenv("TACTILE_LAB_DATA", str(lab_data))
+    assert study.left_out() == ""
+    assert len(study.cells([0])) == len(without) + 4 * len(METHODS)
+
+
 def test_unknown_names_are_refused_with_those_there_are() -> None:
     with pytest.raises(ConfigurationError, match=r"figure-9\.9") as caught:
         experiment("figure-9.9")
