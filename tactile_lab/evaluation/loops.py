@@ -25,7 +25,7 @@ def wrong_loops(loops: Sequence[Mapping[str, Any]], estimate: Poses, truth: Pose
     """How many accepted loops contradict the truth; None when one of them can not be checked.
 
     Args:
-        loops: as in ``slam.json``: grasps in the graph, verdict, relative pose (3 x 3).
+        loops: as in ``slam.json``: grasps in the graph, verdict, relative pose and displacement (3 x 3 each).
         estimate: estimated poses of all grasps; they fix the object frame that the loops speak of.
         truth: true poses of all grasps.
     """
@@ -41,8 +41,18 @@ def _is_wrong(loop: Mapping[str, Any], truth: Sequence[Pose3 | None]) -> bool | 
     earlier, later = truth[loop["earlier"]], truth[loop["later"]]
     if earlier is None or later is None:
         return None
-    off = _pose(loop["earlier_T_later"]).between(planar(earlier.between(later)))
-    return bool(np.hypot(off.x(), off.y()) > WRONG_DISTANCE_m or abs(off.theta()) > WRONG_ANGLE_rad)
+    if loop.get("displacement") is not None:
+        distance_m, angle_rad = _displacement_error(_pose(loop["displacement"]), planar(earlier), planar(later))
+    else:
+        off = _pose(loop["earlier_T_later"]).between(planar(earlier.between(later)))
+        distance_m, angle_rad = float(np.hypot(off.x(), off.y())), abs(off.theta())
+    return distance_m > WRONG_DISTANCE_m or angle_rad > WRONG_ANGLE_rad
+
+
+def _displacement_error(displacement: Pose2, earlier: Pose2, later: Pose2) -> tuple[float, float]:
+    """How far a displacement misses the object where it truly was; no object frame has to be known for that."""
+    off = displacement.compose(later).between(earlier)
+    return float(np.hypot(off.x(), off.y())), abs(off.theta())
 
 
 def _pose(matrix: Sequence[Sequence[float]]) -> Pose2:

@@ -15,13 +15,12 @@ import numpy as np
 from pydantic import Field
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import wrap_angle_rad
 from tactile_lab.graph.relocation import RelocationSettings, relocation_candidates
 from tactile_lab.shape.gpis import Gpis
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet, planar_rotation
-from tactile_lab.tracking.motion import MotionNoise, compose, deviation, inverse
+from tactile_lab.tracking.motion import MotionNoise, compose, deviation
 
 
 class PlacementSettings(StrictModel):
@@ -158,12 +157,3 @@ def _covariance(grasp: PlacedGrasp, contacts: ContactSet, shape: Gpis, settings:
     tilt_variance = contacts.normal_sigma_rad**2 + np.minimum(variance / settings.normal_length_m**2, 1.0)
     information[2, 2] += np.sum(np.sum(flat**2, axis=1) / tilt_variance)
     return np.asarray(np.linalg.inv(information))
-
-
-def hand_motions(contact_map: ContactMap) -> Array:
-    """The hand's motion from each grasp to the next, seen from the object at the grasp before, shape (n - 1, 3)."""
-    rows = contact_map.rows[:-1]
-    motions = np.array([grasp.motion for grasp in contact_map.placed[1:]]).reshape(-1, 3)
-    relative = compose(inverse(rows), compose(motions, rows))
-    relative[:, 2] = wrap_angle_rad(relative[:, 2])
-    return relative

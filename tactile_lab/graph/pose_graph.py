@@ -57,7 +57,10 @@ class LoopReport:
         limit: what it may be.
         accepted: whether it went into the graph.
         reason: why, in words.
-        earlier_T_later: the relative pose of the object's frames that the shared contacts speak for (3.26).
+        earlier_T_later: the relative pose of the object's frames that the shared contacts speak for (3.26). It holds
+            for the earlier pose as it was estimated: its heading enters, times the way between the grasps.
+        displacement: what the contacts told by themselves: the motion in the world that brings the object from where
+            it was at the later grasp to where it was at the earlier one.
     """
 
     earlier: int
@@ -68,6 +71,7 @@ class LoopReport:
     accepted: bool
     reason: str
     earlier_T_later: gtsam.Pose2
+    displacement: gtsam.Pose2 | None = None
 
 
 @dataclass(frozen=True)
@@ -121,10 +125,11 @@ def _tested_loop(
     moved = gtsam.Pose2.Logmap(correction)
     test_value = float(moved @ np.linalg.solve(spread, moved))
     relative = estimated.compose(correction.inverse())
+    displacement = row_pose(rows[earlier]).compose(correction).compose(row_pose(rows[later]).inverse())
     verdict, reason = _judge(shared, alignment, test_value, settings)
     limit = _test_limit(settings)
     return Loop(
-        LoopReport(earlier, later, shared.faces, test_value, limit, verdict, reason, relative),
+        LoopReport(earlier, later, shared.faces, test_value, limit, verdict, reason, relative, displacement),
         covariance,
     )
 
