@@ -12,22 +12,28 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from scipy.linalg import lapack
 from scipy.optimize import Bounds, minimize
 from scipy.spatial.distance import cdist
 
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.kernels import Kernel, covariance, cross_covariance, log_parameter_traces
+from tactile_lab.shape.kernels import (
+    Kernel,
+    covariance,
+    cross_covariance,
+    cross_covariance_with_gradients,
+    log_parameter_traces,
+)
 from tactile_lab.shape.observations import Observations, check_contacts
 from tactile_lab.shape.priors import PriorMean
+from tactile_lab.shape.row_factor import RowFactor
 from tactile_lab.shape.settings import GpisSettings, initial_kernel, observe, prior_mean
 
 _BLOCK_ENTRIES = 1 << 19
 """Entries of the largest temporary matrix in a prediction, 4 MiB: it stays in the cache."""
 
-_JITTERS = (1e-10, 1e-8, 1e-6, 1e-4)
-"""Added to the diagonal relative to its entries, the first that makes it positive definite."""
+_SINGLE_PRECISION_RATIO = 1000.0
+"""Largest ratio of the prior's variance to a value's noise at which single precision keeps sigma to half a percent."""
 
 _AMPLITUDE_BOUNDS_m = (1e-3, 0.3)
 _LENGTH_BOUNDS_m = (0.010, 0.300)
@@ -70,13 +76,14 @@ class Gpis:
         kernel: Kernel,
         prior: PriorMean,
         noise_scale: float = 1.0,
+        factor: RowFactor | None = None,
     ) -> None:
         self.contacts_m, self.normals, self.settings = contacts_m, normals, settings
         self.observations, self.kernel, self.prior, self.noise_scale = observations, kernel, prior, noise_scale
         self._gradient_count = len(observations.gradients)
         self._residual = self._observed_minus_prior()
-        self._factor = self._factorise()
-        self._weights = _solve(self._factor, self._residual)
+        self._factor = factor or self._factorise()
+        self._weights = self._factor.solve(self._residual)
 
     @classmethod
     def fit(
@@ -107,6 +114,30 @@ class Gpis:
         observations = observe(points_m, normals, point_sigma_m, normal_sigma_rad, settings)
         kernel, prior = initial_kernel(observations, settings), prior_mean(points_m, normals, settings)
         return cls(points_m, normals, settings, observations, kernel, prior)
+
+    def extended(
+        self,
+        points_m: Array,
+        normals: Array,
+        point_sigma_m: Array | float = 0.001,
+        normal_sigma_rad: Array | float = 0.1,
+    ) -> Self:
+        """The field with contacts appended; kernel, noise scale and prior stay as they are.
+
+        With normals the factor only grows, in order ``n^2`` for few contacts, where a fresh fit takes ``n^3``.
+        Arguments and errors as of :meth:`fit`.
+        """
+        points_m, normals = np.array(points_m, dtype=float), np.array(normals, dtype=float)
+        sigmas = _one_each(point_sigma_m, points_m), _one_each(normal_sigma_rad, points_m)
+        check_contacts(points_m, normals, *sigmas)
+        points_m, normals = np.vstack([self.contacts_m, points_m]), np.vstack([self.normals, normals])
+        point_sigma, normal_sigma = map(np.concatenate, zip(self._contact_sigmas(), sigmas, strict=True))
+        check_contacts(points_m, normals, point_sigma, normal_sigma)
+        observations = observe(points_m, normals, point_sigma, normal_sigma, self.settings)
+        factor = self._extended_factor(observations) if self.settings.observations == "normals" else None
+        return type(self)(
+            points_m, normals, self.settings, observations, self.kernel, self.prior, self.noise_scale, factor
+        )
 
     def optimise(self, *, noise: bool = False, max_iterations: int = 30) -> Self:
         """The field with the kernel's parameters (and the noise scale) at a maximum of the marginal likelihood.
@@ -146,13 +177,12 @@ class Gpis:
         This is (2.16) with its sign: the thesis prints the negative logarithm, without its constant, under
         the name L, and maximises L.
         """
-        log_determinant = 2 * np.log(np.diag(self._factor)).sum()
         misfit = self._residual @ self._weights
-        return float(-0.5 * (misfit + log_determinant + len(self._residual) * np.log(2 * np.pi)))
+        return float(-0.5 * (misfit + self._factor.log_determinant + len(self._residual) * np.log(2 * np.pi)))
 
     def log_marginal_likelihood_gradient(self) -> Array:
         """Its derivatives by the kernel's ``log_parameters`` and, last, by ``log(noise_scale)``."""
-        outer = np.outer(self._weights, self._weights) - _inverse(self._factor)
+        outer = np.outer(self._weights, self._weights) - self._factor.inverse()
         by_kernel = log_parameter_traces(self.kernel, self.observations.points_m, self._gradient_count, outer)
         by_noise = 2 * self.noise_scale**2 * (np.diag(outer) @ self.observations.noise_variance)
         return 0.5 * np.append(by_kernel, by_noise)
@@ -165,10 +195,16 @@ class Gpis:
         """Gradient of the posterior mean at points of shape (q, d); shape (q, d)."""
         return self.predict(points_m, gradient=True).gradient
 
-    def variance(self, points_m: Array) -> Array:
-        """Posterior variance (2.14) at points of shape (q, d); shape (q,), square metres."""
+    def variance(self, points_m: Array, *, rough: bool = False) -> Array:
+        """Posterior variance (2.14) at points of shape (q, d); shape (q,), square metres.
+
+        ``rough`` allows single precision, wherever that changes sigma by less than half a percent.
+        """
         points_m = np.asarray(points_m, dtype=float)
-        return np.concatenate([self._variance(points_m[block]) for block in self._blocks(len(points_m))])
+        noise = self.noise_scale**2 * self.observations.value_sigma_m.min() ** 2
+        fits = self.kernel.amplitude < _SINGLE_PRECISION_RATIO * noise
+        single = self._factor.in_single_precision() if rough and fits else None
+        return np.concatenate([self._variance(points_m[block], single) for block in self._blocks(len(points_m))])
 
     def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
         """The field at points of shape (q, d), in blocks, so that memory stays bounded for any q.
@@ -181,26 +217,39 @@ class Gpis:
             mean[block], slope[block] = self._mean_and_gradient(points_m[block], gradient)
         return Prediction(mean, slope if gradient else slope[:0], self.variance(points_m) if variance else mean[:0])
 
+    def _contact_sigmas(self) -> tuple[Array, Array]:
+        """Of points and normals; off-surface points do not know that of the normals, nor use it."""
+        seen, count = self.observations, len(self.contacts_m)
+        return seen.value_sigma_m[:count], seen.gradient_sigma if self._gradient_count else np.zeros(count)
+
     def _observed_minus_prior(self) -> Array:
         seen, count = self.observations, self._gradient_count
         values = seen.values_m - self.prior.value(seen.points_m)
         gradients = seen.gradients - self.prior.gradient(seen.points_m[:count])
         return np.concatenate([values, gradients.T.ravel()])
 
-    def _factorise(self) -> Array:
-        """Lower Cholesky factor of ``K + noise``, with the least jitter that it needs."""
+    def _factorise(self) -> RowFactor:
+        """Of ``K + noise``, with the least jitter that it needs."""
         matrix = covariance(self.kernel, self.observations.points_m, self._gradient_count)
-        diagonal = np.diag(matrix) + self.noise_scale**2 * self.observations.noise_variance
-        for jitter in _JITTERS:
-            np.fill_diagonal(matrix, diagonal * (1 + jitter))
-            factor, problem = lapack.dpotrf(matrix.T, lower=1, clean=1)
-            if problem == 0:
-                return np.asarray(factor)
-        raise ShapeError(
-            "the covariance of the contacts is not positive definite",
-            where=f"{len(self.contacts_m)} contacts, {self.kernel}",
-            hint="Use a shorter kernel length, or larger standard deviations of the contacts",
-        )
+        factor = RowFactor.of(matrix, self.noise_scale**2 * self.observations.noise_variance)
+        if factor is None:
+            raise ShapeError(
+                "the covariance of the contacts is not positive definite",
+                where=f"{len(self.contacts_m)} contacts, {self.kernel}",
+                hint="Use a shorter kernel length, or larger standard deviations of the contacts",
+            )
+        return factor
+
+    def _extended_factor(self, observations: Observations) -> RowFactor | None:
+        """The factor for these observations with normals, the first of which are the present ones."""
+        old, total, dimension = len(self.contacts_m), len(observations.points_m), self.contacts_m.shape[1]
+        new = observations.points_m[old:]
+        corner = covariance(self.kernel, new, len(new))
+        places = np.arange(total * (dimension + 1)).reshape(dimension + 1, total)
+        noise = self.noise_scale**2 * observations.noise_variance[places[:, old:].ravel()]
+        np.fill_diagonal(corner, np.diag(corner) + noise)
+        cross = cross_covariance_with_gradients(self.kernel, new, self.contacts_m, old)
+        return self._factor.extended(cross, corner, places[:, :old].ravel(), places[:, old:].ravel())
 
     def _mean_and_gradient(self, queries: Array, gradient: bool) -> tuple[Array, Array]:
         """Mean and its gradient (left zero unless asked for) without forming the covariance with all rows."""
@@ -220,11 +269,10 @@ class Gpis:
         change = queries * pull.sum(axis=1)[:, None] - pull @ points - 2 * slope @ on_gradients
         return mean, self.prior.gradient(queries) + change
 
-    def _variance(self, queries: Array) -> Array:
+    def _variance(self, queries: Array, single: Array | None) -> Array:
         rows = cross_covariance(self.kernel, queries, self.observations.points_m, self._gradient_count)
-        explained, _ = lapack.dtrtrs(self._factor, rows.T, lower=1, overwrite_b=1)
         floor = np.finfo(float).eps * self.kernel.amplitude
-        return np.asarray(np.maximum(self.kernel.amplitude - np.einsum("nq,nq->q", explained, explained), floor))
+        return np.asarray(np.maximum(self.kernel.amplitude - self._factor.explained(rows, single), floor))
 
     def _blocks(self, count: int) -> Iterator[slice]:
         size = max(1, _BLOCK_ENTRIES // len(self._residual))
@@ -240,14 +288,3 @@ class Gpis:
 def _one_each(sigma: Array | float, points_m: Array) -> Array:
     """A standard deviation for every contact, where one is given for all."""
     return np.full(len(points_m), float(sigma)) if np.ndim(sigma) == 0 else np.array(sigma, dtype=float)
-
-
-def _solve(factor: Array, right: Array) -> Array:
-    solution, _ = lapack.dpotrs(factor, right, lower=1)
-    return np.asarray(solution)
-
-
-def _inverse(factor: Array) -> Array:
-    """Inverse of the matrix whose lower Cholesky factor is given."""
-    lower, _ = lapack.dpotri(factor, lower=1)
-    return np.asarray(np.tril(lower) + np.tril(lower, -1).T)

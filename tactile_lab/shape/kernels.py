@@ -188,6 +188,25 @@ def cross_covariance(kernel: Kernel, queries: Array, points: Array, gradient_cou
     return matrix
 
 
+def cross_covariance_with_gradients(kernel: Kernel, queries: Array, points: Array, gradient_count: int) -> Array:
+    """Prior covariance of values and gradients at q places, in the order of :func:`covariance`, with its rows.
+
+    Shape (q + q d, rows).
+    """
+    n, m, dimension, count = len(points), gradient_count, points.shape[1], len(queries)
+    deltas = differences(queries, points)
+    phi = kernel.profile(np.einsum("dnm,dnm->nm", deltas, deltas))
+    matrix = np.empty((count * (dimension + 1), n + m * dimension))
+    matrix[:count] = cross_covariance(kernel, queries, points, gradient_count)
+    for i in range(dimension):
+        rows = slice(count * (i + 1), count * (i + 2))
+        matrix[rows, :n] = 2 * phi.first * deltas[i]
+        for j in range(dimension):
+            block = -4 * phi.second[:, :m] * deltas[i, :, :m] * deltas[j, :, :m]
+            matrix[rows, n + j * m : n + (j + 1) * m] = block - 2 * phi.first[:, :m] if i == j else block
+    return matrix
+
+
 def log_parameter_traces(kernel: Kernel, points: Array, gradient_count: int, weights: Array) -> Array:
     """``sum(weights * dK/dlog(parameter))`` for each parameter, K being :func:`covariance`.
 

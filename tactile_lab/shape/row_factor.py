@@ -1,0 +1,101 @@
+"""The triangular factor of the covariance of all observation rows, which grows when rows are appended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from tactile_lab.geometry.contacts import Array
+
+JITTERS = (1e-10, 1e-8, 1e-6, 1e-4)
+"""Added to the diagonal relative to its entries, the first that makes it positive definite."""
+
+
+@dataclass(frozen=True)
+class RowFactor:
+    """Cholesky factor of a covariance whose rows may stand in another order.
+
+    Attributes:
+        lower: of ``covariance[rows][:, rows]``, shape (n, n), column after column in memory.
+        rows: shape (n,); a factor that has grown has its rows in their order of arrival.
+        jitter: relative addition to the diagonal.
+    """
+
+    lower: Array
+    rows: NDArray[np.intp]
+    jitter: float
+
+    @classmethod
+    def of(cls, matrix: Array, noise_variance: Array) -> Self | None:
+        """Of a prior covariance with noise on its diagonal (overwritten); None if even the largest jitter fails."""
+        diagonal = np.diag(matrix) + noise_variance
+        for jitter in JITTERS:
+            np.fill_diagonal(matrix, diagonal * (1 + jitter))
+            lower, problem = lapack.dpotrf(matrix.T, lower=1, clean=1)
+            if problem == 0:
+                return cls(np.asarray(lower), np.arange(len(lower)), jitter)
+        return None
+
+    @property
+    def log_determinant(self) -> float:
+        return float(2 * np.log(np.diag(self.lower)).sum())
+
+    def solve(self, right: Array) -> Array:
+        """The inverse covariance times a vector of shape (n,)."""
+        solution, _ = lapack.dpotrs(self.lower, right[self.rows], lower=1)
+        restored = np.empty_like(right)
+        restored[self.rows] = solution
+        return restored
+
+    def explained(self, covariances: Array, single: Array | None = None) -> Array:
+        """``k K^-1 k'`` for each row k of covariances with all rows, shape (q, n); shape (q,).
+
+        Args:
+            covariances: may be overwritten.
+            single: :meth:`in_single_precision`, to be used in place of the factor.
+        """
+        columns = self._ordered(covariances).T
+        if single is None:
+            found, _ = lapack.dtrtrs(self.lower, columns, lower=1, overwrite_b=1)
+        else:
+            found, _ = lapack.strtrs(single, columns.astype(np.float32), lower=1, overwrite_b=1)
+        return np.asarray(np.einsum("nq,nq->q", found, found, dtype=float))
+
+    def in_single_precision(self) -> Array:
+        """The factor as single-precision numbers, half as dear to solve with."""
+        return np.asarray(self.lower, dtype=np.float32, order="F")
+
+    def inverse(self) -> Array:
+        """Inverse of the covariance, rows in its own order."""
+        lower, _ = lapack.dpotri(self.lower, lower=1)
+        restored: Array = np.empty_like(lower)
+        restored[np.ix_(self.rows, self.rows)] = np.tril(lower) + np.tril(lower, -1).T
+        return restored
+
+    def extended(self, cross: Array, corner: Array, old_rows: NDArray[np.intp], rows: NDArray[np.intp]) -> Self | None:
+        """The factor with m rows more, at a cost of order ``n^2 m``; None if they make it indefinite.
+
+        Args:
+            cross: prior covariance of the new rows with the old ones, shape (m, n), the old ones in their own order.
+            corner: covariance of the new rows with their noise, shape (m, m).
+            old_rows: where each old row stands among all, shape (n,).
+            rows: where each new row stands among all, shape (m,).
+        """
+        count = len(self.lower)
+        beside, _ = lapack.dtrtrs(self.lower, self._ordered(cross).T, lower=1)
+        diagonal = np.diag(corner) * (1 + self.jitter)
+        rest = corner - beside.T @ beside
+        np.fill_diagonal(rest, diagonal - np.sum(beside**2, axis=0))
+        last, problem = lapack.dpotrf(rest, lower=1, clean=1)
+        if problem:
+            return None
+        lower = np.zeros((count + len(last), count + len(last)), order="F")
+        lower[:count, :count], lower[count:, :count], lower[count:, count:] = self.lower, beside.T, last
+        return type(self)(lower, np.concatenate([old_rows[self.rows], rows]), self.jitter)
+
+    def _ordered(self, columns: Array) -> Array:
+        return columns if np.array_equal(self.rows, np.arange(len(self.rows))) else columns[:, self.rows]
