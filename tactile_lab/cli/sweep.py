@@ -43,7 +43,7 @@ def sweep(
     names = None if objects == "all" else tuple(name.strip() for name in objects.split(","))
     chosen = _numbers(dimensions, "--dimensions", smallest=2, largest=3)
     drawn = _numbers(seeds, "--seeds")
-    runs = planned_runs(check_sweep(rig, names, out), chosen, drawn)
+    runs = planned_runs(check_sweep(rig, names, out, method), chosen, drawn)
     job = partial(run_for_sweep, rig=rig, method=str(method), grasps=grasps, root=out)
     with ProcessPoolExecutor(jobs, initializer=_leave_ctrl_c_to_the_parent) as pool:
         rows = sweep(runs, job, lambda row: say(row.line()), pool.map)

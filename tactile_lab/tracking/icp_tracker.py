@@ -24,12 +24,16 @@ _DISC_POINTS = 6
 _DISC_RADIUS_m = 0.0015
 _ROTATION_STEP_rad, _TRANSLATION_STEP_m = 1e-5, 1e-6
 
+_PLANE_VARIANCE = 1e-3
+"""small-gicp gives every point this variance along its normal, in no unit; two partners have it twice."""
+
 
 class IcpSettings(StrictModel):
     """Parameters of the registration baseline.
 
     Attributes:
-        reach: contacts farther from the map than so many standard deviations of the motion are not matched.
+        reach: contacts farther from the map than so many standard deviations of the motion are not matched, and a pose
+            that far from odometry is not believed.
         iterations: at most so many a grasp.
         least_matched: share of a grasp's contacts that must find a partner; below it odometry stands.
     """
@@ -48,14 +52,18 @@ class IcpTracker(OdometryTracker):
 
     def weigh(self, contacts: ContactSet) -> bool:
         """Register the contacts; False when too few find a partner, and the predicted pose stands."""
-        row = self._registered(contacts) if len(contacts) else None
-        self._trusted = row is not None
-        if row is not None:
-            self._now = PoseEstimate(row, self._covariance_at(row, contacts))
+        found = self._registered(contacts) if len(contacts) else None
+        self._trusted = found is not None and self._believable(found[0])
+        if found is not None and self._trusted:
+            self._now = PoseEstimate(found[0], self._covariance_at(*found, contacts))
         return self._trusted
 
-    def _registered(self, contacts: ContactSet) -> Array | None:
-        """The pose that lays the contacts onto the map, or None."""
+    def _believable(self, row: Array) -> bool:
+        away = self._map.space.deviation(row, self._now.row)
+        return bool(away @ np.linalg.solve(self._now.covariance, away) < len(row) * self._settings.reach**2)
+
+    def _registered(self, contacts: ContactSet) -> tuple[Array, float] | None:
+        """The pose that lays the contacts onto the map, and their mean squared distance from it, or None."""
         import small_gicp  # here: only this baseline needs it
 
         target, tree = _cloud(self._map.contacts)
@@ -77,14 +85,18 @@ class IcpTracker(OdometryTracker):
         enough = found.num_inliers >= self._settings.least_matched * source.size()
         if not enough or not np.isfinite(object_T_world).all():
             return None
-        return self._map.space.motion(Pose3(object_T_world).inverse())
+        squared_m2 = 2 * found.error * 2 * _PLANE_VARIANCE / found.num_inliers
+        return self._map.space.motion(Pose3(object_T_world).inverse()), squared_m2
 
-    def _covariance_at(self, row: Array, contacts: ContactSet) -> Array:
-        """What distances along the normals to equally uncertain partners tell, and odometry for the rest."""
+    def _covariance_at(self, row: Array, squared_m2: float, contacts: ContactSet) -> Array:
+        """What distances along the normals to equally uncertain partners tell, and odometry for the rest.
+
+        Contacts that lie farther from their partners than their noise explains tell as little as that.
+        """
         space = self._map.space
         points, normals = space.to_object(row, contacts.points_m, contacts.normals)
         along = space.by_row(row, points, normals, normals, np.zeros_like(normals))
-        told = along / (np.sqrt(2.0) * contacts.point_sigma_m[:, None])
+        told = along / np.sqrt(np.maximum(2 * contacts.point_sigma_m**2, squared_m2))[:, None]
         return np.asarray(np.linalg.inv(told.T @ told + np.linalg.inv(self._now.covariance)))
 
 

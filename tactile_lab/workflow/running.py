@@ -11,7 +11,7 @@ from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutc
 from sessions.manifest import Status
 from sessions.progress import Progress
 from sessions.session import RunningSession, create_session
-from tactile_lab.errors import InterruptionError
+from tactile_lab.errors import ConfigurationError, InterruptionError
 from tactile_lab.rigs.build import build_bench, check_calibration, simulated_world
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.slam import SlamSettings, TactileSlam
@@ -50,6 +50,13 @@ def slam_settings(method: str, dimension: int, motion: MotionNoise) -> SlamSetti
     return validate(wanted, SlamSettings, where="options")
 
 
+def refuse_known_pose(method: str) -> None:
+    """A running session does not know the truth. Raises ConfigurationError."""
+    if method == "known-pose":
+        hint = "Record with another method, then: tactile-lab reconstruct SESSION --method known-pose"
+        raise ConfigurationError("a running session does not know the true poses", where="known-pose", hint=hint)
+
+
 def run_session(request: SessionRequest, progress: Progress) -> FinishedSession:
     """Run an autonomous session on a rig, and judge it.
 
@@ -59,6 +66,7 @@ def run_session(request: SessionRequest, progress: Progress) -> FinishedSession:
         SessionError: the session could not be recorded.
         InterruptionError: a person ended it at once; the session folder is kept and readable.
     """
+    refuse_known_pose(request.method)
     rig = load_rig(request.rig)
     check_calibration(rig)
     world = simulated_world(rig, request.seed, request.object_name)

@@ -12,17 +12,18 @@ from tactile_lab.errors import SessionError
 from tactile_lab.evaluation.sweep import SweepRun
 from tactile_lab.rigs.build import check_calibration, simulated_world
 from tactile_lab.rigs.description import load_rig
-from tactile_lab.workflow.running import SessionRequest, run_session
+from tactile_lab.workflow.running import SessionRequest, refuse_known_pose, run_session
 
 
-def check_sweep(rig: str, objects: Sequence[str] | None, root: Path) -> tuple[str, ...]:
+def check_sweep(rig: str, objects: Sequence[str] | None, root: Path, method: str) -> tuple[str, ...]:
     """The objects of a sweep, the whole catalogue when None; what would fail in every run fails here.
 
     Raises:
-        ConfigurationError: no such rig, object or calibration.
+        ConfigurationError: no such rig, object or calibration, or a method that needs the truth.
         ShapeError: an object's mesh can not be used.
         SessionError: the folder of the sessions can not be made.
     """
+    refuse_known_pose(method)
     loaded = load_rig(rig)
     check_calibration(loaded)
     for name in objects or ():

@@ -16,6 +16,7 @@ from tactile_lab.slam import SlamSettings
 
 COMMANDS = (
     "run",
+    "reconstruct",
     "evaluate",
     "report",
     "sweep",
@@ -24,6 +25,7 @@ COMMANDS = (
     "session list",
     "session show",
     "session replay",
+    "session export",
     "rig",
     "rig list",
     "rig check",
