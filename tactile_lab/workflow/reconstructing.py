@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import trimesh
 
 from sessions.contact_log import ContactLog, read_contact_log
@@ -127,5 +128,5 @@ def log_truth(log: ContactLog, folder: Path) -> Truth:
     if log.truth is not None and log.truth.mesh is not None:
         mesh = read_mesh(folder / log.truth.mesh)
     if log.truth is not None and log.truth.polygon_m is not None:
-        outline_m = open_ring(log.truth.polygon_m)
+        outline_m = open_ring(np.array(log.truth.polygon_m))
     return Truth(log.true_poses, mesh, outline_m)
