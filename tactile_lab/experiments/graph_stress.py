@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import wrap_angle_rad
+from tactile_lab.graph.least_squares import solve
 from tactile_lab.graph.relative_poses import RelativePose, chained
-from tactile_lab.graph.robust import RobustSettings, solve, solve_robustly
+from tactile_lab.graph.robust import RobustSettings, solve_robustly
 from tactile_lab.tracking.motion import compose, inverse, pose_row, row_pose
 
 DEVELOPMENT_SEEDS = range(100)

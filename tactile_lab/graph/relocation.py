@@ -112,7 +112,7 @@ def relocation_candidates(
     kept = _distinct(poses, scores, settings, settings.kept)
     poses, scores = poses[kept], scores[kept]
     _, information = _step(poses, new, sides, settings)
-    return Relocations(*_in_world(poses, np.linalg.inv(information)), scores)
+    return Relocations(*_in_world(poses, np.asarray(np.linalg.inv(information), dtype=np.float64)), scores)
 
 
 def _sideways(contacts: ContactSet) -> ContactSet:

@@ -25,13 +25,11 @@ from scipy.stats import chi2
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.graph.heading_hypotheses import heading_hypotheses
+from tactile_lab.graph.least_squares import covariance_of, gtsam_problem, solve, squared_distances
 from tactile_lab.graph.relative_poses import RelativePose, chained, jacobians, residuals
 from tactile_lab.strict_yaml import StrictModel
-from tactile_lab.tracking.motion import pose_row, row_pose
 
 Mask = NDArray[np.bool_]
-
-_ANCHOR_SIGMAS = np.full(3, 1e-6)
 
 _TIGHTENING = (100.0, 30.0, 10.0, 3.0)
 """Whitened errors at which a loop's weight has fallen to a quarter, from start to end."""
@@ -246,7 +244,7 @@ class _Problem:
     def _marginals(self, rows: Array, taken: Sequence[RelativePose]) -> Array:
         count = len(rows)
         if self.large:
-            marginals = gtsam.Marginals(*_problem(self.odometry, taken, rows, None))
+            marginals = gtsam.Marginals(*gtsam_problem(self.odometry, taken, rows, None))
             return np.array([marginals.marginalCovariance(index) for index in range(count)])
         joint = covariance_of(rows, [*self.odometry, *taken])
         return np.asarray(joint.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)])
@@ -262,70 +260,3 @@ class _Problem:
         else:
             reason = f"belongs to a combination of loops that explains less ({words})"
         return LoopVerdict(accepted, value, self.limit, reason)
-
-
-def solve(
-    odometry: Sequence[RelativePose],
-    loops: Sequence[RelativePose],
-    start: Array,
-    *,
-    robust_scale: float | None = None,
-) -> Array:
-    """Minimise (3.20) over all poses by Levenberg-Marquardt; the first one stays.
-
-    Args:
-        odometry: edges with a quadratic cost.
-        loops: edges with a quadratic cost, or a redescending one (Geman-McClure).
-        start: poses to start from, shape (n, 3).
-        robust_scale: whitened error at which a loop's weight has fallen to a quarter; None for the quadratic cost.
-    """
-    graph, values = _problem(odometry, loops, start, robust_scale)
-    found = gtsam.LevenbergMarquardtOptimizer(graph, values).optimize()
-    return np.array([pose_row(found.atPose2(index)) for index in range(len(start))])
-
-
-def _problem(
-    odometry: Sequence[RelativePose], loops: Sequence[RelativePose], rows: Array, robust_scale: float | None
-) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
-    graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-    anchor = gtsam.noiseModel.Diagonal.Sigmas(_ANCHOR_SIGMAS)
-    graph.add(gtsam.PriorFactorPose2(0, row_pose(rows[0]), anchor))
-    for index, row in enumerate(rows):
-        values.insert(index, row_pose(row))
-    for edge in odometry:
-        graph.add(_factor(edge, gtsam.noiseModel.Gaussian.Covariance(edge.covariance)))
-    for edge in loops:
-        noise: gtsam.noiseModel.Base = gtsam.noiseModel.Gaussian.Covariance(edge.covariance)
-        if robust_scale is not None:
-            noise = gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.GemanMcClure.Create(robust_scale), noise)
-        graph.add(_factor(edge, noise))
-    return graph, values
-
-
-def _factor(edge: RelativePose, noise: gtsam.noiseModel.Base) -> gtsam.BetweenFactorPose2:
-    return gtsam.BetweenFactorPose2(edge.start, edge.end, row_pose(edge.row), noise)
-
-
-def squared_distances(rows: Array, edges: Sequence[RelativePose]) -> Array:
-    """Squared Mahalanobis distance of each edge from the poses, shape (m,)."""
-    gaps = residuals(rows, edges)
-    covariances = np.array([edge.covariance for edge in edges]).reshape(-1, 3, 3)
-    return np.asarray(np.einsum("mi,mi->m", gaps, np.linalg.solve(covariances, gaps[..., None])[..., 0]))
-
-
-def covariance_of(rows: Array, edges: Sequence[RelativePose]) -> Array:
-    """Joint covariance of all poses, each in its own axes, the first one fixed, shape (3 n, 3 n)."""
-    size = 3 * len(rows)
-    information = np.zeros((size, size))
-    by_start, by_end = jacobians(rows, edges)
-    weights = np.linalg.inv(np.array([edge.covariance for edge in edges]))
-    starts = np.array([edge.start for edge in edges])
-    ends = np.array([edge.end for edge in edges])
-    for one, left in ((starts, by_start), (ends, by_end)):
-        for other, right in ((starts, by_start), (ends, by_end)):
-            blocks = left.transpose(0, 2, 1) @ weights @ right
-            at = (3 * one[:, None] + np.arange(3))[:, :, None], (3 * other[:, None] + np.arange(3))[:, None, :]
-            np.add.at(information, at, blocks)
-    joint = np.zeros((size, size))
-    joint[3:, 3:] = np.linalg.inv(information[3:, 3:])
-    return joint

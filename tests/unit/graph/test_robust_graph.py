@@ -16,8 +16,9 @@ from tactile_lab.experiments.graph_stress import (
     trajectory_errors,
 )
 from tactile_lab.geometry.contacts import Array
+from tactile_lab.graph.least_squares import covariance_of
 from tactile_lab.graph.relative_poses import RelativePose, chained, jacobians, residuals
-from tactile_lab.graph.robust import RobustSettings, covariance_of, solve_robustly
+from tactile_lab.graph.robust import RobustSettings, solve_robustly
 from tactile_lab.tracking.motion import compose, inverse
 
 
