@@ -114,7 +114,7 @@ def remove_results(out: Path) -> None:
         for name in RESULT_FILES:
             (out / name).unlink(missing_ok=True)
     except OSError as error:
-        hint = "Choose another folder with --into"
+        hint = "Choose another folder for the results (--into or --out)"
         raise SessionError(f"can not be replaced ({error.strerror})", where=str(out / name), hint=hint) from error
 
 

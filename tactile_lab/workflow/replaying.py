@@ -44,7 +44,7 @@ def replay_session(
         SessionError: the recording can not be used at all. One that was cut off is used up to the cut.
     """
     if has_results(session) and out.resolve() == session.results.resolve():
-        hint = "Choose another folder for the results"
+        hint = "Choose another folder for the results (--into or --out)"
         raise ConfigurationError("holds the session's own results", where=str(out), hint=hint)
     check_replaceable(out)
     rig = rig_of_session(session)
@@ -80,7 +80,7 @@ def true_poses(session: Session, grasp_count: int) -> tuple[Pose3 | None, ...]:
 
 def check_replaceable(out: Path) -> None:
     """Never write over what is no result of an estimation. Raises ConfigurationError."""
-    hint = "Choose a new folder for the results"
+    hint = "Choose a new folder for the results (--into or --out)"
     try:
         strange = sorted(entry.name for entry in out.iterdir() if entry.name not in RESULT_FILES)
     except FileNotFoundError:
