@@ -6,6 +6,8 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
 
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
@@ -30,13 +32,20 @@ def contour_of(value: Function, lower_m: Array, upper_m: Array, resolution_m: fl
     Raises:
         ShapeError: the shape is in space, there is no inside, or the grid would be too large.
     """
+    _check_dimension(lower_m, 2)
+    first, nodes = _tabulated(value, lower_m, upper_m, resolution_m)
+    return contour_of_nodes(first, nodes, resolution_m, sigma)
+
+
+def contour_of_nodes(first_m: Array, nodes: Array, resolution_m: float, sigma: Function) -> Contour:
+    """As :func:`contour_of`, from values on a grid whose first node is at ``first_m``."""
     from skimage.measure import find_contours  # here, so that importing this module stays quick
 
-    _check_dimension(lower_m, 2)
-    first, nodes, closed = _tabulated(value, lower_m, upper_m, resolution_m)
-    loops = find_contours(nodes, 0.0, fully_connected="high")  # type: ignore[no-untyped-call]
+    _check_dimension(first_m, 2)
+    body, closed = _one_body(nodes, resolution_m)
+    loops = find_contours(body, 0.0, fully_connected="high")  # type: ignore[no-untyped-call]
     loop = max(loops, key=lambda each: abs(polygon_area(each)))[:-1]
-    points = first + resolution_m * loop
+    points = first_m + resolution_m * loop
     points = points if polygon_area(points) > 0 else points[::-1].copy()
     return Contour(points, sigma(points), closed)
 
@@ -53,21 +62,27 @@ def mesh_of(
 
     What is below ``floor_m`` is cut off with a flat foot.
     """
+    _check_dimension(lower_m, 3)
+    first, nodes = _tabulated(value, lower_m, upper_m, resolution_m)
+    return mesh_of_nodes(first, nodes, resolution_m, sigma, floor_m)
+
+
+def mesh_of_nodes(
+    first_m: Array, nodes: Array, resolution_m: float, sigma: Function, floor_m: float | None = None
+) -> SurfaceMesh:
+    """As :func:`mesh_of`, from values on a grid whose first node is at ``first_m``."""
     from skimage.measure import marching_cubes  # here, so that importing this module stays quick
 
-    _check_dimension(lower_m, 3)
-
-    def standing(points: Array) -> Array:
-        return value(points) if floor_m is None else np.maximum(value(points), floor_m - points[:, 2])
-
-    first, nodes, closed = _tabulated(standing, lower_m, upper_m, resolution_m)
-    places, faces, _, _ = marching_cubes(nodes, 0.0, gradient_direction="descent", allow_degenerate=False)  # type: ignore[no-untyped-call]
-    vertices = first + resolution_m * places.astype(float)
-    faces = faces.astype(np.int64)
-    return SurfaceMesh(vertices, faces, sigma(vertices), vertex_normals(vertices, faces), closed)
+    _check_dimension(first_m, 3)
+    if floor_m is not None:
+        nodes = np.maximum(nodes, floor_m - first_m[2] - resolution_m * np.arange(nodes.shape[2]))
+    body, closed = _one_body(nodes, resolution_m)
+    places, faces, _, _ = marching_cubes(body, 0.0, gradient_direction="descent", allow_degenerate=False)  # type: ignore[no-untyped-call]
+    vertices, triangles = first_m + resolution_m * places.astype(float), faces.astype(np.int64)
+    return SurfaceMesh(vertices, triangles, sigma(vertices), vertex_normals(vertices, triangles), closed)
 
 
-def vertex_normals(vertices: Array, faces: Array) -> Array:
+def vertex_normals(vertices: Array, faces: NDArray[np.int64]) -> Array:
     """Outward unit normals, of the faces around each vertex by their area."""
     corners = vertices[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -84,8 +99,8 @@ def _check_dimension(lower_m: Array, wanted: int) -> None:
         )
 
 
-def _tabulated(value: Function, lower_m: Array, upper_m: Array, resolution_m: float) -> tuple[Array, Array, bool]:
-    """First node, values on the nodes with a positive border, and whether nothing was cut off there."""
+def _tabulated(value: Function, lower_m: Array, upper_m: Array, resolution_m: float) -> tuple[Array, Array]:
+    """First node, and values on the nodes of the box and a little around it."""
     first = lower_m - _MARGIN_NODES * resolution_m
     counts = np.ceil((upper_m - lower_m) / resolution_m).astype(int) + 2 * _MARGIN_NODES + 1
     if np.prod(counts, dtype=float) > LARGEST_NODE_COUNT:
@@ -94,11 +109,17 @@ def _tabulated(value: Function, lower_m: Array, upper_m: Array, resolution_m: fl
         )
     nodes = first + resolution_m * np.moveaxis(np.indices(tuple(counts)), 0, -1).reshape(-1, len(counts))
     blocks = [value(nodes[start : start + _AT_ONCE]) for start in range(0, len(nodes), _AT_ONCE)]
-    values = np.concatenate(blocks).reshape(counts)
-    if not (values < 0).any():
+    return first, np.concatenate(blocks).reshape(counts)
+
+
+def _one_body(nodes: Array, resolution_m: float) -> tuple[Array, bool]:
+    """The largest region of negative nodes without cavities and with a positive border; whether none was cut there."""
+    labels, _ = ndimage.label(nodes < 0)
+    sizes = np.bincount(labels.ravel())
+    if len(sizes) < 2:
         raise ShapeError("the shape has no inside near the contacts", hint="Choose a finer resolution or more contacts")
-    border = np.ones(values.shape, dtype=bool)
-    border[(slice(1, -1),) * values.ndim] = False
-    closed = not bool((values[border] < 0).any())
-    values[border] = np.maximum(values[border], 1e-6 * resolution_m)
-    return first, values, closed
+    body = ndimage.binary_fill_holes(labels == sizes[1:].argmax() + 1)
+    border = np.ones(nodes.shape, dtype=bool)
+    border[(slice(1, -1),) * nodes.ndim] = False
+    size = np.maximum(np.abs(nodes), 1e-6 * resolution_m)
+    return np.where(body & ~border, -size, size), not bool((body & border).any())

@@ -181,7 +181,8 @@ class _Fit:
             residuals, begin, bounds=(lower, upper), loss="soft_l1", f_scale=_LOSS_SCALE, max_nfev=evaluations
         )
         held[self._free] = found.x
-        information = found.jac.T @ found.jac
+        jacobian = np.asarray(found.jac, dtype=float)
+        information = jacobian.T @ jacobian
         return float(found.cost), held, np.linalg.inv(information + 1e-9 * np.diag(np.diag(information) + 1.0))
 
     def log_likelihood(self, parameters: Array) -> float:
