@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -186,6 +187,23 @@ class Gpis:
         by_kernel = log_parameter_traces(self.kernel, self.observations.points_m, self._gradient_count, outer)
         by_noise = 2 * self.noise_scale**2 * (np.diag(outer) @ self.observations.noise_variance)
         return 0.5 * np.append(by_kernel, by_noise)
+
+    @cached_property
+    def sigma_inflation(self) -> float:
+        """How many times larger than stated the standard deviation of the surface is, at least 1.
+
+        A stationary kernel does not foresee edges. It shows in the normals: the squares of their standardised
+        leave-one-out residuals, ``weight^2 / inverse[i, i]``, exceed their mean for a true model, ``(d - 1) / d``
+        (a unit normal has no error along itself), by a ratio r of 2 to 3.5 on sharp shapes and of 0.9 to 1.2 on smooth
+        ones. What comes from the sensors' noise should not grow, what comes from interpolation should grow by r;
+        the variance is given the geometric mean, ``sqrt(r)``. Off-surface points do not tell.
+        """
+        if self._gradient_count == 0:
+            return 1.0
+        dimension = self.contacts_m.shape[1]
+        squares = (self._weights**2 / self._factor.inverse_diagonal())[len(self.contacts_m) :]
+        ratio = float(squares.mean()) * dimension / (dimension - 1)
+        return float(max(1.0, ratio) ** 0.25)
 
     def mean(self, points_m: Array) -> Array:
         """Posterior mean (2.13, 2.18) at points of shape (q, d); shape (q,), metres."""

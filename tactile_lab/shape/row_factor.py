@@ -76,6 +76,13 @@ class RowFactor:
         restored[np.ix_(self.rows, self.rows)] = np.tril(lower) + np.tril(lower, -1).T
         return restored
 
+    def inverse_diagonal(self) -> Array:
+        """The diagonal of :meth:`inverse`, for a third of the work."""
+        inverted, _ = lapack.dtrtri(self.lower, lower=1)
+        diagonal = np.empty(len(self.rows))
+        diagonal[self.rows] = np.einsum("ij,ij->j", inverted, inverted)
+        return diagonal
+
     def extended(self, cross: Array, corner: Array, old_rows: NDArray[np.intp], rows: NDArray[np.intp]) -> Self | None:
         """The factor with m rows more, at a cost of order ``n^2 m``; None if they make it indefinite.
 

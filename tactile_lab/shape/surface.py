@@ -181,7 +181,8 @@ def _refined(gpis: Gpis, points_m: Array, reach_m: float) -> tuple[Array, Array,
         points_m = points_m - np.where(is_near[:, None], steps, 0.0)
     found = gpis.predict(points_m, gradient=True, variance=True)
     slope = _slope(found.gradient)
-    return points_m, found.gradient / slope[:, None], np.sqrt(found.variance_m2) / slope
+    sigma = gpis.sigma_inflation * np.sqrt(found.variance_m2) / slope
+    return points_m, found.gradient / slope[:, None], sigma
 
 
 def _slope(gradient: Array) -> Array:
