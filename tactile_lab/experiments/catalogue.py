@@ -201,6 +201,8 @@ def _others(rows: Sequence[Row], kept: str) -> list[str]:
 
 
 def _titled(name: str, value: Value) -> str:
+    if name == "grasps":
+        return f"{value} grasps"
     return f"{name} {value} {UNITS[name]}" if name in UNITS else str(value)
 
 
@@ -301,7 +303,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
                 shape=("rectangle", "hexagon", "L"), constraints=[0, 1, 2, 4, 8, 16, 32], grasps=[grasps]
             ),
             tracking_runs.correct_by_loops,
-            (HAUSDORFF, MEAN_DISTANCE, Column("constraints there were", "loops", 0, kind="spread")),
+            (HAUSDORFF, REGISTRATION, MEAN_DISTANCE, Column("constraints there were", "loops", 0, kind="spread")),
             _curves("constraints", "constraints", "grasps", "shape", columns=1),
             pooled=("shape",),
             grasps=PLANAR_GRASPS,
