@@ -15,7 +15,7 @@ import numpy as np
 import trimesh
 from gtsam import Pose3
 
-from tactile_lab.errors import SessionError
+from tactile_lab.errors import SessionError, ShapeError
 from tactile_lab.evaluation.loops import wrong_loops
 from tactile_lab.evaluation.plain import json_text, plain
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM, registration_rms_mm
@@ -179,14 +179,14 @@ def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
 
     Raises:
         SessionError: results are missing or unreadable, or do not belong to the truth.
-        ShapeError: a mesh or contour that can not be compared.
+        ShapeError: a true mesh or contour that can not be compared.
     """
     results = read_results(folder)
     poses, contacts = results.trajectory.world_T_object, results.contacts
     if len(poses) != len(truth.world_T_object):
         counts = f"{len(poses)} grasps in the results, {len(truth.world_T_object)} in the session"
         raise SessionError(counts, where=str(folder), hint="Replay the session to renew its results")
-    shape = _shape(folder, results, truth)
+    shape, incomparable = _shape(folder, results, truth)
     points = [rows.points_world_m for rows in contacts]
     registration_mm = registration_rms_mm(points, poses, truth.world_T_object, results.dimension)
     seen = sum(pose is not None for pose in truth.world_T_object)
@@ -211,21 +211,33 @@ def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
         time=_time(results.step_seconds),
         truth=TruthFigures(seen, len(poses) - seen, shape_known),
         status=str(results.slam["status"]),
-        warnings=reservations(results),
+        warnings=(*reservations(results), *incomparable),
     )
 
 
-def _shape(folder: Path, results: Results, truth: Truth) -> ShapeComparison | None:
-    """The comparison of contour or mesh with the truth; None where one of them is missing."""
+def _shape(folder: Path, results: Results, truth: Truth) -> tuple[ShapeComparison | None, tuple[str, ...]]:
+    """The comparison of contour or mesh with the truth, None where one of them is missing; and why there is none."""
     name = "contour.csv" if results.dimension == 2 else "mesh.ply"
     if not (folder / name).is_file():
-        return None
+        return None, ()
     alignment = estimate_T_truth(results.trajectory.world_T_object, truth.world_T_object)
     truth_T_estimate = None if alignment is None else alignment.inverse()
     if results.dimension == 3:
-        return None if truth.mesh is None else compare_mesh(read_mesh(folder / name), truth.mesh, truth_T_estimate)
+        return (None, ()) if truth.mesh is None else _surface(folder / name, truth.mesh, truth_T_estimate)
     outline = true_outline(results, truth)
-    return None if outline is None else compare_contour(read_contour(folder / name)[:-1], outline, truth_T_estimate)
+    compared = None if outline is None else compare_contour(read_contour(folder / name)[:-1], outline, truth_T_estimate)
+    return compared, ()
+
+
+def _surface(
+    path: Path, truth: trimesh.Trimesh, truth_T_estimate: Pose3 | None
+) -> tuple[ShapeComparison | None, tuple[str, ...]]:
+    """A surface that is wildly wrong is a result too: no figures, and a word why."""
+    try:
+        mesh = read_mesh(path)
+    except ShapeError as error:
+        return None, (f"the estimated surface can not be compared: it {error.what}",)
+    return compare_mesh(mesh, truth, truth_T_estimate), ()
 
 
 def true_outline(results: Results, truth: Truth) -> Array | None:

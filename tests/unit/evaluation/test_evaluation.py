@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +23,8 @@ from tactile_lab.evaluation.results import read_results
 from tactile_lab.evaluation.session_truth import marked_pictures
 from tactile_lab.evaluation.shape import horizontal_outline
 from tactile_lab.evaluation.table import evaluation_rows
+from tactile_lab.experiments.planar_data import PlanarGrasps, simulate
+from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.slam import SlamSettings, TactileSlam
 
 GRASPS = 6
@@ -191,3 +196,47 @@ def test_aligned_error_is_independent_of_where_the_truths_frame_lies(results: Pa
     assert first.pose is not None
     assert second.pose is not None
     assert first.pose.rmse_deg == pytest.approx(second.pose.rmse_deg, abs=1e-4)
+
+
+def planar_results(folder: Path, change: Callable[[Grasp], Grasp] = lambda grasp: grasp) -> PlanarGrasps:
+    data = simulate("rectangle", 3, count=5)
+    slam = TactileSlam(SlamSettings(method="odometry"))
+    for grasp in data.grasps:
+        slam.take(change(grasp))
+    write_results(folder, slam.finish(), [change(grasp) for grasp in data.grasps])
+    return data
+
+
+def test_an_outline_is_truth_enough_in_the_plane(tmp_path: Path) -> None:
+    data = planar_results(tmp_path)
+    found = evaluate(tmp_path, Truth(data.world_T_body, outline_m=data.outline_m), "rectangle")
+    assert found.shape is not None
+    assert found.truth.mesh
+    assert found.sensing is not None
+    assert 0.3 < found.sensing.median_mm < 1.5
+    assert not (tmp_path / "mesh.ply").exists()  # contacts of the plane have no heights
+
+
+def test_a_shape_states_its_own_uncertainty(tmp_path: Path) -> None:
+    data = planar_results(tmp_path)
+    found = evaluate(tmp_path, Truth((None,) * len(data.grasps)), "rectangle")
+    assert found.uncertainty is not None
+    assert 0 < found.uncertainty.sigma_mm_median <= found.uncertainty.sigma_mm_p95
+
+
+def test_a_lost_object_without_a_shape_is_said_in_words(tmp_path: Path) -> None:
+    data = planar_results(tmp_path, lambda grasp: replace(grasp, contacts=grasp.contacts[:2]))
+    found = evaluate(tmp_path, Truth(data.world_T_body, outline_m=data.outline_m), "rectangle")
+    assert (found.status, found.failed, found.shape, found.uncertainty) == ("lost", True, None, None)
+    assert found.warnings[0] == "the object is lost: 5 of 5 grasps could not be placed"
+    assert "the contacts enclose no shape" in found.warnings
+
+
+def test_a_surface_that_can_not_be_compared_is_said_in_words(tmp_path: Path, recorded: Recorded, results: Path) -> None:
+    shutil.copytree(results, tmp_path / "results")
+    if not (results / "mesh.ply").exists() or read_results(results).dimension == 2:
+        return
+    trimesh.creation.box((3.0, 3.0, 3.0)).export(tmp_path / "results" / "mesh.ply")
+    found = evaluate(tmp_path / "results", full_truth(recorded), "box")
+    assert found.shape is None
+    assert any("can not be compared" in warning for warning in found.warnings)

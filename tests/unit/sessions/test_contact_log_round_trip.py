@@ -228,3 +228,11 @@ def test_outward_normals_of_no_shape_are_taken_for_inward_ones(tmp_path: Path, s
     grasps = simulate(shape, 1, count=10, outlier_share=outliers).grasps
     write_contact_log(tmp_path / "log.json", planar_log(grasps=grasps, true_poses=()))
     assert len(read_contact_log(tmp_path / "log.json").grasps) == 10
+
+
+def test_the_example_in_the_guide_is_a_log(tmp_path: Path):
+    guide = (Path(__file__).resolve().parents[3] / "docs" / "contact-log.md").read_text()
+    (tmp_path / "log.json").write_text(guide.split("```json\n")[1].split("```")[0])
+    log = read_contact_log(tmp_path / "log.json")
+    assert log.truth.name == "box"
+    assert log.grasps[0].closing_lines[0].touched
