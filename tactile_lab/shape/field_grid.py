@@ -72,18 +72,21 @@ class FieldGrid:
             ShapeError: the grid would have more than :data:`LARGEST_NODE_COUNT` nodes.
         """
         lower_m = np.asarray(lower_m, dtype=float)
-        shape = tuple(np.maximum(np.ceil((np.asarray(upper_m) - lower_m) / spacing_m - 1e-9).astype(int) + 1, 2))
-        if np.prod(shape, dtype=float) > LARGEST_NODE_COUNT:
-            raise ShapeError(
-                f"a grid of {' x '.join(map(str, shape))} nodes is too large", hint="Choose a coarser resolution"
-            )
-        nodes = lower_m + spacing_m * np.moveaxis(np.indices(shape), 0, -1).reshape(-1, len(shape))
+        shape, nodes = _nodes(lower_m, np.asarray(upper_m), spacing_m)
         found = field.predict(nodes, gradient=gradient, variance=variance and variance_step == 1)
         spread = found.variance_m2 if variance else None
         if variance and variance_step > 1:
-            coarse = cls.tabulate(field, lower_m, nodes[-1], variance_step * spacing_m, variance=True)
+            coarse = cls._of_variances(field, lower_m, nodes[-1], variance_step * spacing_m)
             spread = coarse.predict(nodes, variance=True).variance_m2
         return cls(lower_m, spacing_m, found.mean_m.reshape(shape), found.gradient if gradient else None, spread)
+
+    @classmethod
+    def _of_variances(cls, field: Field, lower_m: Array, upper_m: Array, spacing_m: float) -> Self:
+        """A grid of variances alone, in single precision where that is good enough."""
+        shape, nodes = _nodes(lower_m, upper_m, spacing_m)
+        if isinstance(field, Gpis):
+            return cls(lower_m, spacing_m, np.zeros(shape), None, field.variance(nodes, rough=True))
+        return cls(lower_m, spacing_m, np.zeros(shape), None, field.predict(nodes, variance=True).variance_m2)
 
     @classmethod
     def around(
@@ -150,6 +153,16 @@ class FieldGrid:
         """For each corner of a cell its side along each axis, and its distance in memory from the first corner."""
         corners = list(product((0, 1), repeat=self.values_m.ndim))
         return [(sides, int(np.ravel_multi_index(sides, self.values_m.shape))) for sides in corners]
+
+
+def _nodes(lower_m: Array, upper_m: Array, spacing_m: float) -> tuple[tuple[int, ...], Array]:
+    """Number of nodes along each axis from ``lower_m`` to at least ``upper_m``, and all of them, shape (n, d)."""
+    shape = tuple(np.maximum(np.ceil((upper_m - lower_m) / spacing_m - 1e-9).astype(int) + 1, 2).tolist())
+    if np.prod(shape, dtype=float) > LARGEST_NODE_COUNT:
+        raise ShapeError(
+            f"a grid of {' x '.join(map(str, shape))} nodes is too large", hint="Choose a coarser resolution"
+        )
+    return shape, lower_m + spacing_m * np.moveaxis(np.indices(shape), 0, -1).reshape(-1, len(shape))
 
 
 def _product(shares: list[tuple[Array, Array]], sides: tuple[int, ...]) -> Array:
