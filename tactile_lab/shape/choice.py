@@ -19,6 +19,7 @@ from tactile_lab.shape.polygon import Polygon
 from tactile_lab.shape.polygon_regularity import with_right_angles
 from tactile_lab.shape.polygon_segmentation import PlanarContacts, segment
 from tactile_lab.shape.sampling import distances_to_polygon
+from tactile_lab.shape.spatial_choice import best_spatial_shape
 from tactile_lab.shape.surface import Contour, SurfaceMesh, extract_contour, extract_mesh
 
 FINGERTIP_RADIUS_m = 0.006
@@ -53,16 +54,21 @@ class GpisShape:
         return extract_mesh(self.gpis, resolution_m=resolution_m, floor_m=floor_m)
 
 
-def best_shape(gpis: Gpis, free_points_m: Array | None = None) -> FittedShape:
+def best_shape(gpis: Gpis, free_points_m: Array | None = None, floor_m: float | None = None) -> FittedShape:
     """The field itself, or the facet model of its contacts if that is the more probable one.
+
+    For contacts in space see :func:`tactile_lab.shape.spatial_choice.best_spatial_shape`.
 
     Args:
         gpis: a field with its kernel at a maximum of the marginal likelihood, else the comparison favours faces.
         free_points_m: places known to be outside, shape (q, d), for example on the ways of fingertips; those at each
             contact's own fingertip are always looked at.
+        floor_m: height of the table that the object stands on; for contacts in space.
     """
     field = GpisShape(gpis)
-    if field.log_evidence is None or gpis.contacts_m.shape[1] != 2:
+    if gpis.contacts_m.shape[1] == 3:
+        return best_spatial_shape(field, gpis, best_shape, free_points_m, floor_m)
+    if field.log_evidence is None:
         return field
     try:
         provisional = field.contour()

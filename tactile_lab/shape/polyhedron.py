@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Self
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
@@ -14,9 +15,8 @@ from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.polyhedron_cells import arrange
 from tactile_lab.shape.polyhedron_extent import Cap, open_sides
 from tactile_lab.shape.polyhedron_labels import label_cells
-from tactile_lab.shape.polyhedron_mesh import FacetMesh, boundary, refined
+from tactile_lab.shape.polyhedron_mesh import FacetMesh, area_weighted_normals, boundary, refined
 from tactile_lab.shape.polyhedron_planes import (
-    PARAMETERS_PER_PLANE,
     Planes,
     WeightedContacts,
     divide,
@@ -28,11 +28,17 @@ from tactile_lab.shape.surface import Contour, SurfaceMesh
 LARGEST_PLANE_COUNT = 24
 """More planes make thousands of cells; a shape that needs more is a curved one."""
 
+OFFSET_RANGE_m = 0.1
+"""Objects that a hand explores are about so large; the prior range of a plane's offset."""
+
 _DEFAULT_NORMAL_SIGMA_rad = 0.1
 _MARGIN_m = 0.030
 _SIMILAR_ANGLE_rad, _SIMILAR_OFFSET_m = np.deg2rad(30.0), 0.012
 _LEAST_SUPPORT = 2
 _VERTEX_SPACING = 2.0
+_FOOT_SIGMA_m = 1e-4
+_SUPPORT_m, _UNSUPPORTED_SLOPE = 0.020, 0.05
+"""A face is trusted so far around its contacts; farther, its sigma grows by this share of the distance."""
 
 
 class Polyhedron:
@@ -41,7 +47,7 @@ class Polyhedron:
     Attributes:
         name: "polyhedron".
         planes: all planes, turned to be as regular as the contacts allow.
-        log_evidence: Gaussian log likelihood of points and normals, minus what the planes' parameters cost (BIC).
+        log_evidence: Gaussian log likelihood of points and normals, minus what the planes cost (:func:`_log_evidence`).
     """
 
     name = "polyhedron"
@@ -61,10 +67,13 @@ class Polyhedron:
             upright: the third axis is vertical: horizontal and vertical faces are likely.
 
         Raises:
-            ShapeError: the contacts are in the plane.
+            ShapeError: the contacts are in the plane, or on too many planes.
         """
         contacts = contacts_of(gpis)
-        regular = regularise(contacts, divide(contacts), upright=upright)
+        planes = divide(contacts)
+        if planes.count > LARGEST_PLANE_COUNT:
+            raise ShapeError(f"{planes.count} planes are too many for a solid with flat faces")
+        regular = regularise(contacts, planes, upright=upright)
         free = np.empty((0, 3)) if free_points_m is None else np.asarray(free_points_m, dtype=float).reshape(-1, 3)
         return cls(gpis, contacts, regular, free)
 
@@ -80,18 +89,16 @@ class Polyhedron:
         """The surface with sharp edges, watertight, its vertices at most twice ``resolution_m`` apart.
 
         Raises:
-            ShapeError: the planes enclose nothing, or are too many.
+            ShapeError: the planes enclose nothing.
         """
-        coarse, sigmas, caps = self._body(floor_m)
+        coarse, kept, caps = self._body(floor_m)
         fine = refined(coarse, _VERTEX_SPACING * resolution_m)
-        normals, sigma_m = self._vertex_normals_and_sigma(fine, sigmas, caps)
-        return SurfaceMesh(fine.vertices_m, fine.triangles, sigma_m, normals, is_closed=True)
+        sigma_m = self._sigma(fine, kept, caps)
+        return SurfaceMesh(fine.vertices_m, fine.triangles, sigma_m, area_weighted_normals(fine), is_closed=True)
 
     def _build(self, floor_m: float | None) -> tuple[FacetMesh, RegularPlanes, tuple[Cap, ...]]:
         """The coarse body, the planes it is made of, and the caps that follow them."""
         kept = _kept(self._regular)
-        if kept.planes.count > LARGEST_PLANE_COUNT:
-            raise ShapeError(f"{kept.planes.count} planes are too many for a solid with flat faces")
         caps = open_sides(self._gpis, kept.planes, floor_m)
         normals = np.vstack([kept.planes.normals, *(cap.normal[None] for cap in caps)])
         offsets = np.append(kept.planes.offsets_m, [cap.offset_m for cap in caps])
@@ -112,28 +119,28 @@ class Polyhedron:
             lower[2] = floor_m
         return lower, upper
 
-    def _vertex_normals_and_sigma(
-        self, mesh: FacetMesh, regular: RegularPlanes, caps: tuple[Cap, ...]
-    ) -> tuple[Array, Array]:
-        """Mean normals of the faces at each vertex, and the largest sigma of their planes there."""
-        corners = mesh.vertices_m[mesh.triangles]
-        areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals, sigma = np.zeros_like(mesh.vertices_m), np.full(len(mesh.vertices_m), _FOOT_SIGMA_m)
-        for k in range(3):
-            np.add.at(normals, mesh.triangles[:, k], areas)
+    def _sigma(self, mesh: FacetMesh, regular: RegularPlanes, caps: tuple[Cap, ...]) -> Array:
+        """At each vertex the largest sigma of the planes that meet there."""
+        sigma = np.full(len(mesh.vertices_m), _FOOT_SIGMA_m)
         for plane in np.unique(mesh.planes[mesh.planes >= 0]):
             touched = np.unique(mesh.triangles[mesh.planes == plane])
             here = self._plane_sigma(int(plane), mesh.vertices_m[touched], regular, caps)
             sigma[touched] = np.maximum(sigma[touched], here)
-        return normals / np.linalg.norm(normals, axis=1, keepdims=True), sigma
+        return sigma
 
     def _plane_sigma(self, plane: int, points_m: Array, regular: RegularPlanes, caps: tuple[Cap, ...]) -> Array:
+        """Of a plane at points on it: its own, more where contacts scatter, and more far from its contacts."""
         if plane >= regular.planes.count:
             return np.full(len(points_m), caps[plane - regular.planes.count].sigma_m)
-        return regular.sigma_m(plane, points_m)
+        contacts = self._contacts.points_m[regular.planes.labels == plane]
+        away, _ = cKDTree(contacts).query(points_m)
+        guessed = _UNSUPPORTED_SLOPE * np.maximum(away - _SUPPORT_m, 0.0)
+        return np.hypot(self._scatter * regular.sigma_m(plane, points_m), guessed)
 
-
-_FOOT_SIGMA_m = 1e-4
+    @property
+    def _scatter(self) -> float:
+        """How much more the contacts scatter about their planes than their sigmas say, at least 1."""
+        return max(1.0, float(np.sqrt(self.planes.chi_square / (3 * len(self._contacts)))))
 
 
 def contacts_of(gpis: Gpis) -> WeightedContacts:
@@ -152,11 +159,19 @@ def contacts_of(gpis: Gpis) -> WeightedContacts:
 
 
 def _log_evidence(contacts: WeightedContacts, regular: RegularPlanes) -> float:
+    """Log likelihood at the best planes, and for each plane how far the contacts narrow what was known before.
+
+    That is Laplace's approximation of the integral over the planes, with even priors of normals over the sphere and
+    of offsets over :data:`OFFSET_RANGE_m`. A regularity saves the price of one angle and costs the choice between yes
+    and no.
+    """
     count = len(contacts)
-    parameters = PARAMETERS_PER_PLANE * regular.planes.count - regular.saved
     scale = 0.5 * np.log(contacts.point_weights).sum() + 1.5 * np.log(contacts.normal_weights).sum()
     likelihood = -0.5 * regular.planes.chi_square + scale - 2 * count * np.log(2 * np.pi)
-    return float(likelihood - 0.5 * parameters * np.log(max(count, 2)))
+    angles = np.log(2.0) - regular.log_angle_areas
+    offsets = np.log(OFFSET_RANGE_m) - 0.5 * np.log(2 * np.pi * regular.offset_variances_m2)
+    saved = regular.saved * max(0.5 * float(angles.mean()) - np.log(2.0), 0.0)
+    return float(likelihood - np.sum(angles + offsets) + saved)
 
 
 def _kept(regular: RegularPlanes) -> RegularPlanes:
@@ -174,4 +189,5 @@ def _kept(regular: RegularPlanes) -> RegularPlanes:
         middles_m=regular.middles_m[kept],
         turn_covariances=regular.turn_covariances[kept],
         offset_variances_m2=regular.offset_variances_m2[kept],
+        log_angle_areas=regular.log_angle_areas[kept],
     )

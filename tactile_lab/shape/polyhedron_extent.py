@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import FieldGrid
 from tactile_lab.shape.gpis import Gpis
@@ -41,13 +42,27 @@ def open_sides(gpis: Gpis, planes: Planes, floor_m: float | None) -> tuple[Cap, 
     sides = [side for side, least in _sides(planes, floor_m) if (planes.normals @ side).max() < least]
     if not sides:
         return ()
+    inside_m = _inside(gpis)
+    return tuple(_cap(gpis, side, inside_m) for side in sides) if len(inside_m) else ()
+
+
+def field_end(gpis: Gpis, side: Array) -> Cap:
+    """Where the field's inside ends in a direction, a unit vector of shape (3,).
+
+    Raises:
+        ShapeError: it has no inside near the contacts.
+    """
+    inside_m = _inside(gpis)
+    if len(inside_m) == 0:
+        raise ShapeError("the field has no inside near the contacts", hint="More contacts are needed")
+    return _cap(gpis, side, inside_m)
+
+
+def _inside(gpis: Gpis) -> Array:
+    """Points of a coarse grid that are inside, shape (k, 3)."""
     contacts = gpis.contacts_m
     grid = FieldGrid.tabulate(gpis, contacts.min(axis=0) - _MARGIN_m, contacts.max(axis=0) + _MARGIN_m, _SPACING_m)
-    nodes = np.argwhere(grid.values_m < 0)
-    if len(nodes) == 0:
-        return ()
-    inside_m = grid.lower_m + _SPACING_m * nodes
-    return tuple(_cap(gpis, side, inside_m[int((inside_m @ side).argmax())]) for side in sides)
+    return np.asarray(grid.lower_m + _SPACING_m * np.argwhere(grid.values_m < 0))
 
 
 def _sides(planes: Planes, floor_m: float | None) -> list[tuple[Array, float]]:
@@ -61,7 +76,8 @@ def _sides(planes: Planes, floor_m: float | None) -> list[tuple[Array, float]]:
     return ends + [(side, _LEAST_COSINE_ASIDE) for side in (along, -along, across, -across)]
 
 
-def _cap(gpis: Gpis, side: Array, start_m: Array) -> Cap:
+def _cap(gpis: Gpis, side: Array, inside_m: Array) -> Cap:
+    start_m = inside_m[int((inside_m @ side).argmax())]
     near, far = 0.0, 2 * _SPACING_m
     for _ in range(_BISECTIONS):
         middle = (near + far) / 2

@@ -141,3 +141,13 @@ def _pattern(count: int, corners: Indices, middles: Indices, vertices: Array) ->
     third = np.where(slanted, c, bc)
     fourth = np.where(slanted, ab, a)
     return [np.column_stack(rows) for rows in ((ab, b, bc), (a, ab, third), (fourth, bc, c))]
+
+
+def area_weighted_normals(mesh: FacetMesh) -> Array:
+    """Outward unit normals at the vertices: the mean of the triangles around each, shape (n, 3)."""
+    corners = mesh.vertices_m[mesh.triangles]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.zeros_like(mesh.vertices_m)
+    for k in range(3):
+        np.add.at(normals, mesh.triangles[:, k], areas)
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30))

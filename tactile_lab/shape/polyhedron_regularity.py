@@ -30,6 +30,7 @@ class RegularPlanes:
         middles_m: weighted middle of each plane's contacts, shape (S, 3).
         turn_covariances: of each normal, shape (S, 3, 3), square radians.
         offset_variances_m2: of each plane's distance at its middle, shape (S,).
+        log_angle_areas: logarithm of the product of each normal's two principal sigmas by its own contacts, shape (S,).
         saved: parameters that the regularities make unnecessary.
     """
 
@@ -37,6 +38,7 @@ class RegularPlanes:
     middles_m: Array
     turn_covariances: Array
     offset_variances_m2: Array
+    log_angle_areas: Array
     saved: int
 
     def sigma_m(self, plane: int, points_m: Array) -> Array:
@@ -63,14 +65,23 @@ def regularise(contacts: WeightedContacts, planes: Planes, *, upright: bool) -> 
         upright: the third axis is vertical, and horizontal and vertical planes are likely.
     """
     middles, covariance, offset_variances = _uncertainty(contacts, planes)
+    log_areas = np.array([_log_angle_area(block) for block in _own_blocks(covariance)])
     normals, saved = _regular_normals(planes.normals, covariance, float(np.log(len(contacts))), upright)
     offsets = np.sum(normals * middles, axis=1)
     chi_square = contacts.chi_squares(normals, offsets)[np.arange(len(contacts)), planes.labels].sum()
-    count = planes.count
-    turns = covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count), :]
-    return RegularPlanes(
-        Planes(planes.labels, normals, offsets, float(chi_square)), middles, turns, offset_variances, saved
-    )
+    regular = Planes(planes.labels, normals, offsets, float(chi_square))
+    return RegularPlanes(regular, middles, _own_blocks(covariance), offset_variances, log_areas, saved)
+
+
+def _own_blocks(covariance: Array) -> Array:
+    """The covariance of each normal, shape (S, 3, 3)."""
+    count = len(covariance) // 3
+    return covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count), :]
+
+
+def _log_angle_area(covariance: Array) -> float:
+    """Logarithm of the product of the two sigmas of a normal."""
+    return float(0.5 * np.log(np.linalg.eigvalsh(covariance)[1:]).sum())
 
 
 def _uncertainty(contacts: WeightedContacts, planes: Planes) -> tuple[Array, Array, Array]:

@@ -21,8 +21,11 @@ Mask: TypeAlias = NDArray[np.bool_]
 
 FIRST_MARGIN_m = 0.015
 _NEWTON_STEPS = 2
-_FOOT = 1e-3
-"""A vertex this close to the floor, in grid spacings, is part of the foot."""
+_FLAT = 1e-3
+"""A vertex this close to the floor or ceiling, in grid spacings, is part of the flat end."""
+_RIM_STEPS, _LARGEST_RIM_STEP, _FLATTEST_WALL = 4, 1.7, 0.3
+LEVEL_SIGMA_m = 0.0002
+"""Standard deviation of the heights of flat ends: the table's, or one that many contacts agree on."""
 _FLATTEST_SLOPE = 1e-3
 """Below this slope the field says nothing about where its surface is; sigma is computed as if it were this."""
 
@@ -82,26 +85,34 @@ def extract_contour(gpis: Gpis, *, resolution_m: float = 0.001, largest_margin_m
 
 
 def extract_mesh(
-    gpis: Gpis, *, resolution_m: float = 0.003, largest_margin_m: float = 0.060, floor_m: float | None = None
+    gpis: Gpis,
+    *,
+    resolution_m: float = 0.003,
+    largest_margin_m: float = 0.060,
+    floor_m: float | None = None,
+    ceiling_m: float | None = None,
 ) -> SurfaceMesh:
     """The object's surface in a spatial field, by marching cubes; arguments and errors as :func:`extract_contour`.
 
     ``floor_m`` is the height of the table the object stands on, if it does: nothing of it is below, and where the
-    field would go on it ends in a flat foot.
+    field would go on it ends in a flat foot. ``ceiling_m`` likewise is the height of a flat top, if it has one.
+    Both ends have sharp rims, and their sigma is :data:`LEVEL_SIGMA_m`.
     """
     from skimage.measure import marching_cubes  # here, so that importing this module stays quick
 
-    solid = _solid(gpis, resolution_m, largest_margin_m)
-    if floor_m is not None:
-        solid = solid.standing_on(floor_m, resolution_m)
+    solid = _solid(gpis, resolution_m, largest_margin_m).between(floor_m, ceiling_m, resolution_m)
     places, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
         solid.values_m, 0.0, gradient_direction="descent", allow_degenerate=False
     )
     rough = solid.lower_m + resolution_m * places.astype(float)
     vertices, normals, sigma = _refined(gpis, rough, resolution_m)
-    if floor_m is not None:
-        foot = rough[:, 2] < floor_m + _FOOT * resolution_m
-        vertices, normals = _flat_foot(vertices, rough, normals, foot, floor_m)
+    for level_m, side in ((floor_m, -1.0), (ceiling_m, 1.0)):
+        if level_m is not None:
+            flat = side * rough[:, 2] > side * level_m - _FLAT * resolution_m
+            vertices = _levelled(vertices, rough, flat, level_m, side)
+            rim = flat & np.isin(np.arange(len(flat)), faces[~flat[faces].all(axis=1)])
+            vertices[rim] = _moved_sideways(gpis, vertices[rim], _LARGEST_RIM_STEP * resolution_m)
+            normals[flat], sigma[flat] = [0.0, 0.0, side], LEVEL_SIGMA_m
     return SurfaceMesh(vertices, faces.astype(np.int64), sigma, normals, solid.is_closed)
 
 
@@ -113,20 +124,36 @@ class _Solid:
     values_m: Array
     is_closed: bool
 
-    def standing_on(self, floor_m: float, spacing_m: float) -> _Solid:
-        """The same body without what is below a height. Raises ShapeError when nothing is left."""
+    def between(self, floor_m: float | None, ceiling_m: float | None, spacing_m: float) -> _Solid:
+        """The same body without what is below or above a height. Raises ShapeError when nothing is left."""
         heights = self.lower_m[2] + spacing_m * np.arange(self.values_m.shape[2])
-        values = np.maximum(self.values_m, floor_m - heights)
+        below = -np.inf if floor_m is None else floor_m - heights
+        above = -np.inf if ceiling_m is None else heights - ceiling_m
+        values = np.maximum(self.values_m, np.maximum(below, above))
         if not (values < 0).any():
             raise ShapeError("the whole shape lies below the table", hint="Check the units and the contacts' heights")
         return replace(self, values_m=values)
 
 
-def _flat_foot(vertices: Array, rough: Array, normals: Array, foot: Mask, floor_m: float) -> tuple[Array, Array]:
-    """Vertices of the foot stay where the grid put them, at the floor; no other vertex is below it."""
-    flat = np.where(foot[:, None], rough, vertices)
-    flat[:, 2] = np.maximum(flat[:, 2], floor_m)
-    return flat, np.where(foot[:, None], [0.0, 0.0, -1.0], normals)
+def _levelled(vertices: Array, rough: Array, flat: Mask, level_m: float, side: float) -> Array:
+    """Vertices of a flat end stay where the grid put them, at its level; no other vertex is beyond it."""
+    levelled = np.where(flat[:, None], rough, vertices)
+    levelled[:, 2] = side * np.minimum(side * levelled[:, 2], side * level_m)
+    return levelled
+
+
+def _moved_sideways(gpis: Gpis, points_m: Array, reach_m: float) -> Array:
+    """Points moved at their heights onto the zero level, so that a flat end meets the walls in a sharp rim.
+
+    A point that would have to go farther than ``reach_m``, because the field has no wall there, stays.
+    """
+    moved = points_m.copy()
+    for _ in range(_RIM_STEPS):
+        found = gpis.predict(moved, gradient=True)
+        level = found.gradient[:, :2]
+        moved[:, :2] -= (found.mean_m / np.maximum(np.sum(level**2, axis=1), _FLATTEST_WALL**2))[:, None] * level
+    near = np.linalg.norm(moved - points_m, axis=1) < reach_m
+    return np.where(near[:, None], moved, points_m)
 
 
 def _solid(gpis: Gpis, resolution_m: float, largest_margin_m: float) -> _Solid:

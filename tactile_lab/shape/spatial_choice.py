@@ -1,0 +1,97 @@
+"""Which model describes a solid best, by what the contacts say: smooth field, flat faces, or upright walls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tactile_lab.errors import ShapeError
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.model import FittedShape
+from tactile_lab.shape.polyhedron import Polyhedron
+from tactile_lab.shape.prism import Prism
+from tactile_lab.shape.sampling import distances_to_mesh, mesh_arrays
+from tactile_lab.shape.standing_field import StandingField
+from tactile_lab.shape.surface import SurfaceMesh
+
+_COARSE_m = 0.006
+_FREE_SIGMA_m = 0.003
+_ON_SURFACE_m = 0.006
+_LARGEST_SHARE_OFF = 0.05
+
+OutlineChoice = Callable[[Gpis, "Array | None"], FittedShape]
+
+
+def best_spatial_shape(
+    field: FittedShape,
+    gpis: Gpis,
+    best_outline: OutlineChoice,
+    free_points_m: Array | None = None,
+    floor_m: float | None = None,
+) -> FittedShape:
+    """The field itself, or a solid with flat faces or upright walls if that is the more probable one.
+
+    A sharp solid is only taken if it holds what is known: its contacts lie on its surface, and it does not fill
+    places that fingers went through.
+
+    Args:
+        field: the field as a shape, taken unless another model is more probable.
+        gpis: the field, with its kernel at a maximum of the marginal likelihood.
+        best_outline: chooses the model of an outline.
+        free_points_m: places that a finger went through, shape (k, 3), or None.
+        floor_m: height of the table if the object stands on one; upright walls are considered only then, and the
+            field ends there as :class:`StandingField` does.
+    """
+    if field.log_evidence is None:
+        return field
+    if floor_m is not None:
+        field = _made(lambda: StandingField.fit(gpis, floor_m)) or field
+    sharp = [shape for shape in _candidates(gpis, best_outline, free_points_m, floor_m) if shape is not None]
+    for shape in sorted(sharp, key=lambda shape: -(shape.log_evidence or -np.inf)):
+        if (shape.log_evidence or -np.inf) <= (field.log_evidence or -np.inf):
+            break
+        if _holds(shape, gpis, free_points_m, floor_m):
+            return shape
+    return field
+
+
+def _candidates(
+    gpis: Gpis, best_outline: OutlineChoice, free_points_m: Array | None, floor_m: float | None
+) -> list[FittedShape | None]:
+    upright = floor_m is not None
+    makers: list[Callable[[], FittedShape]] = [lambda: Polyhedron.fit(gpis, free_points_m, upright=upright)]
+    if upright:
+        makers.append(lambda: Prism.fit(gpis, best_outline, free_points_m))
+    return [_made(maker) for maker in makers]
+
+
+def _made(maker: Callable[[], FittedShape]) -> FittedShape | None:
+    try:
+        return maker()
+    except ShapeError:  # the contacts do not allow this model: the others remain
+        return None
+
+
+def _holds(shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_m: float | None) -> bool:
+    """It has a surface, the contacts lie on it, and hardly a free place lies well within."""
+    try:
+        mesh = shape.mesh(_COARSE_m, floor_m)
+    except ShapeError:  # its faces enclose nothing
+        return False
+    off = distances_to_mesh(gpis.contacts_m, mesh) > _ON_SURFACE_m
+    if off.mean() > _LARGEST_SHARE_OFF:
+        return False
+    return free_points_m is None or len(free_points_m) == 0 or _filled_share(mesh, free_points_m) < _LARGEST_SHARE_OFF
+
+
+def _filled_share(mesh: SurfaceMesh, free_points_m: Array) -> float:
+    """Share of free places that lie inside a mesh by more than the contacts' noise."""
+    import igl  # here, so that importing this module stays quick
+
+    inside = np.asarray(igl.fast_winding_number(*mesh_arrays(mesh), np.ascontiguousarray(free_points_m))) > 0.5
+    if not inside.any():
+        return 0.0
+    deep = distances_to_mesh(free_points_m[inside], mesh) > _FREE_SIGMA_m
+    return float(deep.sum() / len(free_points_m))

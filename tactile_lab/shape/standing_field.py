@@ -1,0 +1,141 @@
+"""A smooth field that stands on a table, and may end in a flat top.
+
+A field alone rounds what it has not touched: walls curl inward below the lowest contacts, and the rim of a flat top is
+blunt. Here walls go on to the table where the lowest contacts are on upright walls: the field is fitted to mirror
+images of them below the table as well, a little inward, and cut there. A level top is treated likewise, as far as its
+contacts are better explained by one height than by the field.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactile_lab.errors import ShapeError
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.polyhedron import contacts_of
+from tactile_lab.shape.polyhedron_planes import WeightedContacts
+from tactile_lab.shape.surface import Contour, Indices, SurfaceMesh, extract_mesh
+
+_UPRIGHT_SINE = np.sin(np.deg2rad(20.0))
+_LEVEL_COSINE = np.cos(np.deg2rad(20.0))
+_MIRRORED_SHARE = 0.35
+"""Share of the object's height from which walls are mirrored at an end."""
+_LEAST_UPRIGHT_SHARE = 0.8
+"""Walls are only mirrored where so many of the contacts on sides near the end are upright: not below a sphere."""
+_INSET_SLOPE, _LARGEST_INSET_m = 0.2, 0.006
+"""Mirror images lie inward by this share of their distance from the end: edges at the foot are often rounded, and
+walls that were not touched near it should end between a sharp and a rounded one."""
+_LEAST_TOP_CONTACTS = 3
+_SAME_HEIGHT_SIGMAS = 4.0
+
+
+@dataclass(frozen=True)
+class StandingField:
+    """A field with flat ends; implements FittedShape. Made by :meth:`fit`.
+
+    Attributes:
+        field: fitted to the contacts and their mirror images.
+        floor_m: height of the table.
+        ceiling_m: height of the flat top, None if it has none.
+        log_evidence: of all contacts, mirror images apart.
+        name: "standing gpis".
+    """
+
+    field: Gpis
+    floor_m: float
+    ceiling_m: float | None
+    log_evidence: float
+    name: str = "standing gpis"
+
+    @classmethod
+    def fit(cls, gpis: Gpis, floor_m: float) -> StandingField:
+        """Let a field stand on the table, its kernel unchanged.
+
+        Args:
+            gpis: a field fitted in space.
+            floor_m: height of the table in its frame.
+
+        Raises:
+            ShapeError: the contacts are in the plane, or all below the table.
+        """
+        contacts = contacts_of(gpis)
+        if contacts.points_m[:, 2].max() <= floor_m:
+            raise ShapeError("all contacts lie below the table", hint="Check the units and the contacts' heights")
+        evidence, ceiling_m, rest = gpis.log_marginal_likelihood(), None, np.arange(len(contacts))
+        top = _top(contacts)
+        if _LEAST_TOP_CONTACTS <= len(top) < len(contacts):
+            without = np.setdiff1d(rest, top)
+            level_m = float(np.average(contacts.points_m[top, 2], weights=contacts.point_weights[top]))
+            ended = _fitted(gpis, contacts, without, []).log_marginal_likelihood() + _level(contacts, top, level_m)
+            if ended > evidence:
+                evidence, ceiling_m, rest = ended, level_m, without
+        ends = [floor_m] if ceiling_m is None else [floor_m, ceiling_m]
+        return cls(_fitted(gpis, contacts, rest, ends), floor_m, ceiling_m, float(evidence))
+
+    def contour(self, resolution_m: float = 0.001) -> Contour:
+        """Raises ShapeError: a solid has no outline."""
+        raise ShapeError("contacts in space have a surface, not an outline", hint="Ask for the mesh")
+
+    def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
+        """The surface, ending on the table it was fitted for whether or not its height is given again.
+
+        Raises:
+            ShapeError: the field has no inside near the contacts.
+        """
+        floor_m = self.floor_m if floor_m is None else floor_m
+        return extract_mesh(self.field, resolution_m=resolution_m, floor_m=floor_m, ceiling_m=self.ceiling_m)
+
+
+def _top(contacts: WeightedContacts) -> Indices:
+    """Indices of the contacts on the highest level that several share, with nothing touched above it."""
+    heights, sigma = contacts.points_m[:, 2], contacts.point_weights**-0.5
+    level = np.flatnonzero(contacts.normals[:, 2] > _LEVEL_COSINE)
+    if len(level) == 0:
+        return level.astype(np.int64)
+    reach = _SAME_HEIGHT_SIGMAS * float(np.median(sigma))
+    crowds = [level[np.abs(heights[level] - heights[k]) < reach] for k in level]
+    crowd = max(crowds, key=lambda members: (len(members), float(heights[members].mean())))
+    is_highest = heights.max() < heights[crowd].mean() + 2 * reach
+    return np.asarray(crowd if is_highest else level[:0], dtype=np.int64)
+
+
+def _level(contacts: WeightedContacts, top: Indices, level_m: float) -> float:
+    """Log likelihood of a level top, with the price of its height (BIC)."""
+    weights, turns = contacts.point_weights[top], contacts.normal_weights[top]
+    away = contacts.normals[top] - [0.0, 0.0, 1.0]
+    misfit = np.sum(weights * (contacts.points_m[top, 2] - level_m) ** 2) + np.sum(turns[:, None] * away**2)
+    scale = 0.5 * np.log(weights).sum() + 1.5 * np.log(turns).sum() - 2 * len(top) * np.log(2 * np.pi)
+    return float(scale - 0.5 * misfit - 0.5 * np.log(len(contacts)))
+
+
+def _walls_near(contacts: WeightedContacts, rest: Indices, end_m: float, reach_m: float) -> Indices:
+    """Contacts on the walls that stand on an end; none if what is near it is not mostly upright."""
+    up = np.abs(contacts.normals[rest, 2])
+    near = (np.abs(contacts.points_m[rest, 2] - end_m) < reach_m) & (up < _LEVEL_COSINE)
+    walls = near & (up < _UPRIGHT_SINE)
+    return rest[walls] if walls.sum() >= _LEAST_UPRIGHT_SHARE * near.sum() else rest[:0]
+
+
+def _fitted(gpis: Gpis, contacts: WeightedContacts, rest: Indices, ends_m: list[float]) -> Gpis:
+    """The field of some contacts and of their mirror images at the ends, with the kernel of another field."""
+    height_m = float(np.ptp(np.append(contacts.points_m[:, 2], ends_m)))
+    sources, mirrored = [rest], [contacts.points_m[rest]]
+    turned = [contacts.normals[rest]]
+    for end_m in ends_m:
+        walls = _walls_near(contacts, rest, end_m, _MIRRORED_SHARE * height_m)
+        sources.append(walls)
+        inset_m = np.minimum(_INSET_SLOPE * np.abs(contacts.points_m[walls, 2] - end_m), _LARGEST_INSET_m)
+        inward = contacts.points_m[walls] - inset_m[:, None] * contacts.normals[walls]
+        mirrored.append(inward * [1, 1, -1] + [0, 0, 2 * end_m])
+        turned.append(contacts.normals[walls] * [1, 1, -1])
+    source = np.concatenate(sources)
+    field = Gpis.fit(
+        np.vstack(mirrored),
+        np.vstack(turned),
+        contacts.point_weights[source] ** -0.5,
+        contacts.normal_weights[source] ** -0.5,
+        gpis.settings,
+    )
+    return field.with_log_parameters(gpis.kernel.log_parameters)
