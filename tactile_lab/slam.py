@@ -32,8 +32,8 @@ from tactile_lab.errors import ConfigurationError, ShapeError, TrackingError
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.graph.pose_graph import LoopReport
-from tactile_lab.shape.choice import best_shape
 from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.models import ShapeName, fit_shape
 from tactile_lab.shape.surface import Contour, SurfaceMesh
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
@@ -60,6 +60,7 @@ class SlamSettings(TrackingSettings):
         back_end: the pose graph.
         least_first_contacts: the object frame is born at the first grasp with so many contacts.
         placement_limit_m: see the module's text.
+        shape_model: of the final outline or surface; "auto" is chosen by evidence.
         lost_after: successive untracked grasps after which the object counts as lost.
         contour_resolution_m, mesh_resolution_m: of the final shape.
     """
@@ -68,6 +69,7 @@ class SlamSettings(TrackingSettings):
     least_first_contacts: int = Field(default=3, ge=1)
     placement_limit_m: float = Field(default=0.010, gt=0)
     lost_after: int = Field(default=4, ge=1)
+    shape_model: ShapeName = "auto"
     contour_resolution_m: float = Field(default=0.001, gt=0)
     mesh_resolution_m: float = Field(default=0.003, gt=0)
 
@@ -321,11 +323,13 @@ class TactileSlam:
     def _extract(self) -> tuple[Contour | None, SurfaceMesh | None]:
         if self.surface is None:
             return None, None
-        shape = best_shape(self.surface, self._tracker.map.free_points_m if self._tracker else None)
+        free = self._tracker.map.free_points_m if self._tracker else None
+        floor_m = -self._origin_height_m if self._settings.dimension == 3 else None
         try:
+            shape = fit_shape(self._settings.shape_model, self.surface, free, floor_m)
             if self._settings.dimension == 2:
                 return shape.contour(self._settings.contour_resolution_m), None
-            return None, shape.mesh(self._settings.mesh_resolution_m, -self._origin_height_m)
+            return None, shape.mesh(self._settings.mesh_resolution_m, floor_m)
         except ShapeError:  # contacts that enclose nothing: the trajectory is still a result
             return None, None
 

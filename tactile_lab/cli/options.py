@@ -26,6 +26,22 @@ METHOD_HELP = (
     "-graph with its pose graph; baselines: known-pose (the true poses), odometry, icp."
 )
 
+
+class Shape(StrEnum):
+    """Models of the final shape, by the names :func:`tactile_lab.shape.models.shape_models` knows."""
+
+    AUTO = "auto"
+    GPIS = "gpis"
+    FACETS = "facets"
+    SUPERQUADRIC = "superquadric"
+    NAGATA = "nagata"
+    OCCUPANCY = "occupancy"
+    POINT_CLOUD = "point-cloud"
+    EDGE_FEATURES = "edge-features"
+
+
+SHAPE_HELP = "Model of the final shape; auto: field or facets, by evidence; the others to compare with."
+
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
 Root = Annotated[Path, typer.Option(help="Folder of sessions.")]
 SessionName = Annotated[

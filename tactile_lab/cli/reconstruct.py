@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tactile_lab.cli.loading import interruptions_held
-from tactile_lab.cli.options import METHOD_HELP, Json, Method, NoInput, Root
+from tactile_lab.cli.options import METHOD_HELP, SHAPE_HELP, Json, Method, NoInput, Root, Shape
 
 
 def reconstruct(
@@ -19,6 +19,7 @@ def reconstruct(
         ),
     ],
     method: Annotated[Method | None, typer.Option(help=METHOD_HELP, show_default="joint, or the session's own")] = None,
+    shape: Annotated[Shape | None, typer.Option(help=SHAPE_HELP, show_default="auto")] = None,
     dimension: Annotated[
         int | None, typer.Option(min=2, max=3, help="2: contour; 3: surface.", show_default="the data's")
     ] = None,
@@ -45,7 +46,9 @@ def reconstruct(
         from tactile_lab.workflow.reconstructing import Wishes, reconstruct
 
     del no_input
-    wishes = Wishes(None if method is None else method.value, dimension, seed, settings)
+    wishes = Wishes(
+        None if method is None else method.value, dimension, seed, settings, None if shape is None else shape.value
+    )
     with LiveProgress(f"reconstruction of {source}") as progress:
         finished = reconstruct(source, root, wishes, out, progress)
     conclude(finished, as_json)

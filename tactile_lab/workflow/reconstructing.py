@@ -36,12 +36,14 @@ class Wishes:
         dimension: 2 or 3.
         seed: of all that is left to chance.
         settings: a YAML file with any part of :class:`tactile_lab.slam.SlamSettings`.
+        shape: model of the final shape by name, see :data:`tactile_lab.shape.models.ShapeName`.
     """
 
     method: str | None = None
     dimension: int | None = None
     seed: int | None = None
     settings: Path | None = None
+    shape: str | None = None
 
     def applied(self, given: dict[str, Any]) -> SlamSettings:
         """The settings: the data's, changed by the file's, changed by the options'.
@@ -52,7 +54,7 @@ class Wishes:
         from_file = {} if self.settings is None else load(self.settings)
         if not isinstance(from_file, dict):
             raise ConfigurationError("must be keys with values", where=str(self.settings), hint="Correct the file")
-        options = {"method": self.method, "dimension": self.dimension}
+        options = {"method": self.method, "dimension": self.dimension, "shape_model": self.shape}
         wanted = {**given, **from_file, **{key: value for key, value in options.items() if value is not None}}
         return validate(wanted, SlamSettings, where="options" if self.settings is None else str(self.settings))
 
@@ -67,7 +69,7 @@ def reconstruct(
         root: where sessions are looked for by name.
         wishes: how to estimate.
         out: folder of the results, those of an earlier estimation in it are replaced; None for one beside the data
-            that is named after the method.
+            that is named after the method, and the shape model if one was chosen.
         progress: is told which grasp is being estimated.
 
     Raises:
@@ -81,7 +83,7 @@ def reconstruct(
     own = recorded_slam(session)
     settings = wishes.applied({"method": own.method, "dimension": own.dimension, "motion": own.motion.model_dump()})
     seed = recorded_seed(session) if wishes.seed is None else wishes.seed
-    return replay_session(session, settings, seed, out or session.folder / f"reconstruct-{settings.method}", progress)
+    return replay_session(session, settings, seed, out or session.folder / f"reconstruct-{_label(settings)}", progress)
 
 
 def reconstruct_log(
@@ -92,7 +94,7 @@ def reconstruct_log(
     settings, progress = wishes.applied(log_settings(log)), progress or NullProgress()
     if settings.dimension > log.dimension:
         raise ConfigurationError("a log of dimension 2 has no heights", where=str(path), hint="Ask for dimension 2")
-    out = out or path.with_name(f"{path.stem}-{settings.method}")
+    out = out or path.with_name(f"{path.stem}-{_label(settings)}")
     check_replaceable(out)
     truth = log_truth(log, path.parent)
     known_poses = log.true_poses if settings.method == "known-pose" else None
@@ -106,6 +108,11 @@ def reconstruct_log(
     except TactileLabError as error:
         return FinishedSession(path, out, problem=str(error))
     return FinishedSession(path, out, evaluation=evaluation)
+
+
+def _label(settings: SlamSettings) -> str:
+    """What tells the results of one estimation from those of another."""
+    return settings.method if settings.shape_model == "auto" else f"{settings.method}-{settings.shape_model}"
 
 
 def log_settings(log: ContactLog) -> dict[str, Any]:

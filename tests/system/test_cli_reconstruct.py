@@ -13,7 +13,7 @@ import trimesh
 from gtsam import Pose3
 
 from sessions.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
-from tactile_lab.cli.options import Method
+from tactile_lab.cli.options import Method, Shape
 from tactile_lab.evaluation.trajectory import read_trajectory
 from tactile_lab.experiments import planar_data, spatial_data
 from tactile_lab.geometry.contacts import FINGERS, Contact, Grasp
@@ -87,6 +87,20 @@ def test_every_method_runs_on_the_same_log(inside, planar_log, tmp_path, method)
     if method == "known-pose":
         assert document["registration_rms_mm"] == 0.0
         assert document["pose"]["rmse_mm"] < 1e-3
+
+
+@pytest.mark.parametrize("shape", [shape.value for shape in Shape])
+def test_every_shape_model_is_made_from_the_same_log(inside, planar_log, tmp_path, shape):
+    answer = inside("reconstruct", planar_log, "--method", "known-pose", "--shape", shape, "--out", tmp_path, "--json")
+    assert answer.code == 0, answer.err
+    assert json.loads(answer.out)["shape_best_fit"]["mean_distance_mm"] < 8.0
+    assert json.loads((tmp_path / "slam.json").read_text())["settings"]["shape_model"] == shape
+
+
+def test_results_of_shape_models_lie_beside_each_other(inside, planar_log):
+    for shape in ("gpis", "nagata"):
+        assert inside("reconstruct", planar_log, "--method", "known-pose", "--shape", shape).code == 0
+        assert (planar_log.parent / f"rectangle-known-pose-{shape}" / "contour.csv").exists()
 
 
 def test_a_spatial_log_gets_a_mesh_with_its_uncertainty(inside, spatial_log, tmp_path):

@@ -10,8 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from tactile_lab.cli.app import app
-from tactile_lab.cli.options import Method
+from tactile_lab.cli.options import Method, Shape
 from tactile_lab.errors import TactileLabError
+from tactile_lab.shape.models import shape_models
 from tactile_lab.slam import SlamSettings
 
 COMMANDS = (
@@ -91,6 +92,10 @@ def test_a_usage_error_names_the_option_and_exits_with_2(words, told, tmp_path, 
 def test_the_methods_on_offer_are_those_of_the_estimation():
     schema = SlamSettings.model_json_schema()["properties"]["method"]
     assert {method.value for method in Method} == set(schema["enum"])
+
+
+def test_the_shape_models_on_offer_are_those_there_are():
+    assert [shape.value for shape in Shape] == list(shape_models())
 
 
 def test_the_rigs_are_listed_for_people_and_for_programs(inside):
