@@ -1,20 +1,24 @@
 """Figures of merit of one run: how good the shape, the tracking and the stated uncertainty are, and how long it took.
 
 Shape: Hausdorff and mean distance (appendix C) after the best rigid alignment. Tracking: registration error.
-Uncertainty: share of the surface whose true error is within two stated standard deviations.
+For round solids the contacts of each grasp may be turned about the solid's own axis first: no contact can tell how
+far it has turned. Uncertainty: share of the surface whose true error is within two stated standard deviations.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import trimesh
-from gtsam import Pose3
+from gtsam import Pose3, Rot3
 
 from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.evaluation.trajectory import Poses
 from tactile_lab.experiments.planar_data import PlanarGrasps
 from tactile_lab.experiments.sensing import SimulatedGrasps
+from tactile_lab.experiments.solids import ROUND_SOLIDS
 from tactile_lab.experiments.spatial_data import SpatialGrasps
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import spatial, transform_points
@@ -53,14 +57,38 @@ def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
     elif isinstance(data, SpatialGrasps):
         shape = mesh_figures(result.mesh, data.mesh, upright=_upright(data.world_T_body))
     contacts = [grasp.points_world_m for grasp in data.grasps]
+    poses = result.world_T_object
+    if data.shape in ROUND_SOLIDS and _upright(data.world_T_body):
+        poses = without_own_turns(poses, data.world_T_body)
     return {
         **shape,
-        "registration_mm": registration_rms_mm(contacts, result.world_T_object, data.world_T_body, result.dimension),
+        "registration_mm": registration_rms_mm(contacts, poses, data.world_T_body, result.dimension),
         "status": result.status,
         "contacts": sum(map(len, contacts)),
         "untracked": sum(step.verdict == "untracked" for step in result.steps),
         "step_ms": [round(1e3 * seconds, 3) for seconds in result.step_seconds[1:]],
     }
+
+
+def without_own_turns(estimate: Poses, world_T_body: Sequence[Pose3]) -> tuple[Pose3 | None, ...]:
+    """Estimated poses of a round solid on the table, turned about its axis to the heading it truly has.
+
+    The axis in the estimated object frame is where the estimates place the true axis, in the mean over all grasps.
+    """
+    pairs = [(pose, truth) for pose, truth in zip(estimate, world_T_body, strict=True) if pose is not None]
+    if not pairs:
+        return tuple(estimate)
+    axis_m = np.mean([pose.transformTo(truth.translation()) for pose, truth in pairs], axis=0)
+    heading = pairs[0][1].rotation().inverse() * pairs[0][0].rotation()
+    return tuple(
+        None if pose is None else _about(axis_m, pose, truth.rotation() * heading)
+        for pose, truth in zip(estimate, world_T_body, strict=True)
+    )
+
+
+def _about(axis_object_m: Array, pose: Pose3, rotation: Rot3) -> Pose3:
+    """The pose with another rotation, the axis staying where it is in the world."""
+    return Pose3(rotation, pose.transformFrom(axis_object_m) - rotation.rotate(axis_object_m))
 
 
 def _upright(world_T_body: tuple[Pose3, ...]) -> bool:

@@ -27,6 +27,9 @@ DATA_VARIABLE = "TACTILE_LAB_DATA"
 YCB_PREFIX = "ycb:"
 YCB_NAMES = ("cracker_box", "mug", "mustard_bottle", "tomato_soup_can")
 
+ROUND_SOLIDS = frozenset({"cylinder", "sphere", "bottle", YCB_PREFIX + "tomato_soup_can"})
+"""Those that look the same after any turn about their vertical axis."""
+
 _MUG_GRID_m = 0.0015
 
 
