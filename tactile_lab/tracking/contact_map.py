@@ -55,11 +55,15 @@ class ContactMap:
         placed: the grasps in order, the first one fixes the object frame.
         settings: of the shape model, with the current kernel parameters.
         space: what the rows of poses mean.
+        archive: settled grasps of a long session; the first of the placed ones then sums them up (:mod:`fixed_lag`).
+        settled_cost: what the archive's grasps cost beyond their summary.
     """
 
     placed: tuple[PlacedGrasp, ...]
     settings: GpisSettings
     space: PoseRows = PLANAR
+    archive: tuple[PlacedGrasp, ...] = ()
+    settled_cost: float = 0.0
 
     @property
     def dimension(self) -> int:

@@ -7,7 +7,7 @@ left out because a contact explained by nothing costs less than this one does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from tactile_lab.shape.choice import free_evidence, polygon_of
 from tactile_lab.shape.surface import extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.facet_smoothing import smoothed_with_faces
+from tactile_lab.tracking.fixed_lag import condensed
 from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
@@ -49,7 +50,7 @@ class Hypothesis:
     @property
     def cost(self) -> float:
         """Negative log evidence."""
-        return self.misfit + self.intrusion + self.left_out
+        return self.misfit + self.intrusion + self.left_out + self.map.settled_cost
 
 
 class Judge:
@@ -75,6 +76,12 @@ class Judge:
             rows, value = PoseEvidence(cleaned, self._noise).maximised(cleaned.rows, iterations)
             cleaned = cleaned.with_rows(rows)
         return self._hypothesis(cleaned, value)
+
+    def condensed(self, hypothesis: Hypothesis, window: int, remembered: int) -> Hypothesis:
+        """The hypothesis with only the last grasps open, at the same cost."""
+        short = self.rated(condensed(hypothesis.map, window, remembered))
+        settled = hypothesis.cost - short.cost + hypothesis.map.settled_cost
+        return replace(short, map=replace(short.map, settled_cost=settled))
 
     def cleaned(self, contact_map: ContactMap, grasp: int | None = None) -> tuple[ContactMap, float]:
         """Leave out contacts, the worst first, while they cost more than being explained by nothing.

@@ -19,7 +19,7 @@ from tactile_lab.geometry.contacts import Array
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.fields import tabulated
+from tactile_lab.tracking.fixed_lag import unfolded
 from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge, different, likeliest, weights
 from tactile_lab.tracking.motion import MotionNoise
@@ -36,18 +36,24 @@ class JointSettings(StrictModel):
         hypotheses: so many are kept from grasp to grasp.
         smoothed: so many of the branches, by evidence before smoothing, are smoothed.
         evidence_gap: hypotheses that much less likely than the best (natural logarithm) are given up.
+        branch_gap: the same for branches before they are smoothed.
         iterations: of the optimiser at each grasp.
         final_iterations: of the optimiser at the end.
-        backwards: read the session backwards as well at the end.
+        backwards: read the session backwards as well at the end, unless it is too long for that.
+        window: beyond twice so many grasps, all but so many are settled.
+        remembered: so many contacts of settled grasps still count.
     """
 
     proposals: ProposalSettings = ProposalSettings()
     hypotheses: int = Limit(default=4, ge=1)
     smoothed: int = Limit(default=6, ge=1)
     evidence_gap: float = Limit(default=25.0, gt=0)
+    branch_gap: float = Limit(default=15.0, gt=0)
     iterations: int = Limit(default=15, ge=1)
     final_iterations: int = Limit(default=80, ge=1)
     backwards: bool = True
+    window: int = Limit(default=12, ge=2)
+    remembered: int = Limit(default=50, ge=10)
 
 
 class JointTracker:
@@ -66,11 +72,15 @@ class JointTracker:
         self._hypotheses = [self._judge.rated(first)]
         self._branches: list[Hypothesis] = []
         self._motion = np.zeros(self._space.size)
+        self._whole: tuple[ContactMap, ContactMap] | None = None
         self.effective_count = 1.0
 
     @property
     def map(self) -> ContactMap:
-        return self._hypotheses[0].map
+        best = self._hypotheses[0].map
+        if self._whole is None or self._whole[0] is not best:
+            self._whole = (best, unfolded(best))
+        return self._whole[1]
 
     @property
     def hypotheses(self) -> tuple[Hypothesis, ...]:
@@ -83,7 +93,7 @@ class JointTracker:
     def weigh(self, contacts: ContactSet) -> bool:
         """Branch every hypothesis into the poses proposed for this grasp, smooth the likeliest and rank them."""
         unplaced = [self._unplaced(hypothesis, contacts) for hypothesis in self._hypotheses]
-        branches = self._likeliest(unplaced + self._branched(contacts), self._settings.smoothed)
+        branches = likeliest(unplaced + self._branched(contacts), self._settings.smoothed, self._settings.branch_gap)
         smoothed = [self._judge.smoothed(branch.map, self._settings.iterations) for branch in branches]
         self._branches = self._likeliest(different(smoothed), self._settings.hypotheses)
         self.effective_count = float(1 / np.sum(weights(self._branches) ** 2))
@@ -106,20 +116,26 @@ class JointTracker:
     def resample(self) -> None:
         """Go on with the ranked branches; now and then with new kernel parameters, the same for all."""
         self._hypotheses = self._branches
-        if len(self.map.placed) % self._kernel_every == 0:
-            self._share_kernel(self.map.with_best_kernel())
-            rated = [self._judge.rated(one.map) for one in self._hypotheses]
-            self._hypotheses = sorted(rated, key=_cost)
+        count = len(self._hypotheses[0].map.placed)
+        if count % self._kernel_every == 0:
+            self._share_best_kernel()
+            self._hypotheses = sorted((self._judge.rated(one.map) for one in self._hypotheses), key=_cost)
+        lag = self._settings
+        if count > 2 * lag.window:
+            self._hypotheses = [self._judge.condensed(one, lag.window, lag.remembered) for one in self._hypotheses]
 
     def adopt(self, corrected: ContactMap) -> None:
-        self._hypotheses[0] = replace(self._hypotheses[0], map=corrected)
+        if corrected is not self.map:
+            self._hypotheses[0] = replace(self._hypotheses[0], map=corrected)
 
     def finish(self) -> None:
         """Smooth the remaining hypotheses to the end, those of the session read backwards among them.
 
         Where the first grasps left a wrong impression the last ones may not, and the evidence tells which was right.
         """
-        if self._settings.backwards and len(self.map.placed) > 2:
+        is_short = not self._hypotheses[0].map.archive
+        readable = len(self.map.placed) > 2 and len(self.map.placed[-1].contacts_world) > 0
+        if self._settings.backwards and is_short and readable:
             self._hypotheses = different(self._hypotheses + self._backwards())
         self._hypotheses = different(self._hypotheses + self._regrouped(min(self._hypotheses, key=_cost)))
         self._hypotheses = self._likeliest(self._hypotheses, self._settings.hypotheses)
@@ -127,9 +143,9 @@ class JointTracker:
             iterations = self._settings.final_iterations
             smoothed = [self._judge.smoothed(one.map, iterations) for one in self._hypotheses]
             self._hypotheses = self._likeliest(different(smoothed), self._settings.hypotheses)
-            self._share_kernel(self.map.with_best_kernel())
-        faceted = [self._judge.with_faces(one.map) for one in self._hypotheses]
-        self._hypotheses = sorted(faceted, key=_cost)
+            self._share_best_kernel()
+        faceted = sorted((self._judge.with_faces(one.map) for one in self._hypotheses), key=_cost)
+        self._hypotheses = [replace(one, map=unfolded(one.map)) for one in faceted]
 
     def _backwards(self) -> list[Hypothesis]:
         """The hypotheses that the same grasps give in the opposite order."""
@@ -180,7 +196,7 @@ class JointTracker:
         noise = self._noise.accumulated(1 + _trailing_unplaced(hypothesis.map))
         predicted = self._space.compose(self._motion, hypothesis.map.placed[-1].row)
         fitted = hypothesis.map.fit()
-        rows, fit = propose(predicted, contacts, tabulated(fitted), noise, self._settings.proposals, self._space)
+        rows, fit = propose(predicted, contacts, fitted, noise, self._settings.proposals, self._space)
         free = contacts.free_m
         places, _ = self._space.to_object(rows[:, None], free, free)
         intrusions = hypothesis.intrusion + free_space_costs(fitted, places)
@@ -198,7 +214,8 @@ class JointTracker:
     def _likeliest(self, hypotheses: list[Hypothesis], count: int) -> list[Hypothesis]:
         return likeliest(hypotheses, count, self._settings.evidence_gap)
 
-    def _share_kernel(self, best: ContactMap) -> None:
+    def _share_best_kernel(self) -> None:
+        best = self._hypotheses[0].map.with_best_kernel()
         self._hypotheses = [replace(one, map=replace(one.map, settings=best.settings)) for one in self._hypotheses]
 
 

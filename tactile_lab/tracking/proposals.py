@@ -44,7 +44,7 @@ class ProposalSettings(StrictModel):
         normal_length_m: a map uncertain by sigma predicts normals to ``sigma / normal_length_m`` radians.
     """
 
-    samples: int = Limit(default=128, ge=2)
+    samples: int = Limit(default=96, ge=2)
     steps: int = Limit(default=6, ge=1)
     kept: int = Limit(default=12, ge=1)
     distinct_m: float = Limit(default=0.0025, gt=0)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.fields import tabulated
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.proposals import ProposalSettings, propose
@@ -53,7 +52,7 @@ def _joined_anew(
         return []
     motion = contact_map.motions[step] if moves_later else space.inverse(contact_map.motions[step])
     submap = _at(contact_map.contacts.selected(moved), space.inverse(rows[anchor]), contact_map)
-    field = tabulated(_half(contact_map, keep_later=not moves_later, step=step).fit())
+    field = _half(contact_map, keep_later=not moves_later, step=step).fit()
     found, _ = propose(space.compose(motion, rows[other]), submap, field, noise, settings, space)
     different = _far_from(found, rows[anchor], contact_map, settings)[:_KEPT]
     members = np.arange(len(rows)) >= step if moves_later else np.arange(len(rows)) < step
