@@ -22,6 +22,7 @@ COMMANDS = (
     "report",
     "sweep",
     "bench",
+    "experiment",
     "session",
     "session list",
     "session show",
