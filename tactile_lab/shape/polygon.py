@@ -31,7 +31,7 @@ class Polygon:
         faces: which contact lies on which face.
         outline_m: vertices of the simple closed outline, counter-clockwise, shape (k, 2): its corners, and the points
             of bridges where two neighbouring faces do not meet in a plausible corner.
-        vertex_sigma_m: standard deviation across the outline at the points of bridges, shape (k,).
+        vertex_sigma_m: standard deviation across the outline at the points of bridges, NaN at corners, shape (k,).
         edge_faces: face of the edge from each vertex to the next, or :data:`BRIDGE`, shape (k,).
     """
 
@@ -52,18 +52,17 @@ class Polygon:
             contacts: what the faces were found in.
             faces: at least three.
             provisional: an outline that corners must not stray from, and that bridges gaps where faces do not meet;
-                straight lines do if it is None or would cross a face.
+                straight lines do if it is None or goes a long way round.
 
         Raises:
             ShapeError: fewer than three faces, or faces that do not enclose one simple region: no polygon then.
         """
         if faces.count < LEAST_FACES:
             raise ShapeError(f"{faces.count} faces enclose nothing", hint="Contacts on three sides are needed")
-        for straight in (False, True):
-            maker = JointMaker(contacts, faces, provisional, straight=straight)
-            polygon = cls(contacts, faces, [maker.between(i, (i + 1) % faces.count) for i in range(faces.count)])
-            if polygon_area(polygon.outline_m) > 0 and is_simple(polygon.outline_m):
-                return polygon
+        maker = JointMaker(contacts, faces, provisional)
+        polygon = cls(contacts, faces, [maker.between(i, (i + 1) % faces.count) for i in range(faces.count)])
+        if polygon_area(polygon.outline_m) > 0 and is_simple(polygon.outline_m):
+            return polygon
         raise ShapeError("the faces do not enclose one region", hint="More contacts near the corners would help")
 
     @cached_property

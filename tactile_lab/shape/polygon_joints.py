@@ -38,7 +38,7 @@ class Joint:
 
     Attributes:
         points_m: one corner, or a bridge from one end to the other, shape (k, 2).
-        sigma_m: standard deviation across the outline at each point of a bridge, shape (k,).
+        sigma_m: standard deviation across the outline at each point of a bridge, shape (k,); NaN at a corner.
     """
 
     points_m: Array
@@ -55,11 +55,10 @@ class JointMaker:
     Args:
         contacts, faces: as of the polygon.
         provisional: an outline that corners must not stray from, and that bridges the gaps where faces do not meet.
-        straight: straight lines bridge them, as without a provisional outline.
     """
 
-    def __init__(self, contacts: PlanarContacts, faces: Faces, provisional: Contour | None, *, straight: bool) -> None:
-        self._contacts, self._faces, self._provisional, self._straight = contacts, faces, provisional, straight
+    def __init__(self, contacts: PlanarContacts, faces: Faces, provisional: Contour | None) -> None:
+        self._contacts, self._faces, self._provisional = contacts, faces, provisional
         self._uncertainty = FaceUncertainty.of(contacts, faces)
         ring = contacts.points_m[faces.order]
         length = np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1).sum()
@@ -72,7 +71,7 @@ class JointMaker:
         slack = _SLACK_SIGMAS * float(self._contacts.point_sigma_m[[last, first]].max())
         corner = self._intersection(face, following)
         if corner is not None and self._is_plausible(face, following, corner, ends, slack):
-            return Joint(corner[None], np.empty(1))
+            return Joint(corner[None], np.full(1, np.nan))
         return self._bridge(ends)
 
     def _foot(self, face: int, contact: int) -> Array:
@@ -118,7 +117,7 @@ class JointMaker:
 
     def _piece_of_provisional(self, ends: Array, longest_m: float) -> Contour | None:
         """What lies between the points nearest to the ends, counter-clockwise, without those points."""
-        if self._provisional is None or self._straight:
+        if self._provisional is None:
             return None
         points = self._provisional.points_m
         first, last = (int(np.argmin(np.sum((points - end) ** 2, axis=1))) for end in ends)
