@@ -20,7 +20,7 @@ from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.odometry_tracker import OdometryTracker
 from tactile_lab.tracking.particle_filter import PoseEstimate
 
-_DISC_POINTS = 6
+_DISC_POINTS = 12  # with fewer the library complains on the terminal of a lone contact
 _DISC_RADIUS_m = 0.0015
 _ROTATION_STEP_rad, _TRANSLATION_STEP_m = 1e-5, 1e-6
 
@@ -32,13 +32,14 @@ class IcpSettings(StrictModel):
     """Parameters of the registration baseline.
 
     Attributes:
-        reach: contacts farther from the map than so many standard deviations of the motion are not matched, and a pose
-            that far from odometry is not believed.
+        reach_m: contacts farther from the map than this are not matched.
+        believed: a pose farther from odometry than so many standard deviations is not.
         iterations: at most so many a grasp.
         least_matched: share of a grasp's contacts that must find a partner; below it odometry stands.
     """
 
-    reach: float = Limit(default=3.0, gt=0)
+    reach_m: float = Limit(default=0.030, gt=0)
+    believed: float = Limit(default=3.0, gt=0)
     iterations: int = Limit(default=60, ge=1)
     least_matched: float = Limit(default=0.5, ge=0, le=1)
 
@@ -60,7 +61,7 @@ class IcpTracker(OdometryTracker):
 
     def _believable(self, row: Array) -> bool:
         away = self._map.space.deviation(row, self._now.row)
-        return bool(away @ np.linalg.solve(self._now.covariance, away) < len(row) * self._settings.reach**2)
+        return bool(away @ np.linalg.solve(self._now.covariance, away) < len(row) * self._settings.believed**2)
 
     def _registered(self, contacts: ContactSet) -> tuple[Array, float] | None:
         """The pose that lays the contacts onto the map, and their mean squared distance from it, or None."""
@@ -75,7 +76,7 @@ class IcpTracker(OdometryTracker):
             tree,
             init_T_target_source=start.inverse().matrix(),
             registration_type="GICP",
-            max_correspondence_distance=self._settings.reach * self._noise.translation_m,
+            max_correspondence_distance=self._settings.reach_m,
             num_threads=1,
             max_iterations=self._settings.iterations,
             rotation_epsilon=_ROTATION_STEP_rad,
@@ -111,7 +112,7 @@ def _cloud(contacts: ContactSet) -> tuple[Any, Any]:
 
 
 def _discs(contacts: ContactSet) -> Array:
-    """Each contact with six points around it in its tangent plane, shape (7 n, 3)."""
+    """Each contact with points around it in its tangent plane, shape (13 n, 3)."""
     missing = ((0, 0), (0, 3 - contacts.dimension))
     points, normals = np.pad(contacts.points_m, missing), np.pad(contacts.normals, missing)
     least = np.eye(3)[np.abs(normals).argmin(axis=1)]

@@ -50,7 +50,7 @@ class MotionCost:
         index = np.arange(count)
         by_rows[index, :, index] = later
         by_rows[index[1:], :, index[:-1]] = earlier[1:]
-        scaled = (by_rows / self._sigmas[:, None, None]).reshape(count * size, -1)
+        scaled = (by_rows / self._sigmas[:, None, None]).reshape(count * size, count * size)
         return np.asarray(scaled.T @ scaled)
 
     def slips_in_sigma(self, rows: Array) -> Array:

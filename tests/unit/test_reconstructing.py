@@ -151,3 +151,17 @@ def inward(data: PlanarGrasps) -> tuple[Grasp, ...]:
 def test_inward_normals_that_reach_the_estimation_give_no_certain_shape(method: str) -> None:
     result = taken(inward(DATA), method=method, particles=2000)
     assert result.status == "lost" or largest_sigma_m(result) > 0.005
+
+
+@pytest.mark.parametrize("method", ["joint", "particle", "thesis-pf-graph", "icp", "odometry"])
+def test_a_single_grasp_and_an_empty_one_at_the_end_are_survived(method: str) -> None:
+    assert taken(DATA.grasps[:1], method=method, particles=500).status == "ok"
+    empty = replace(DATA.grasps[3], contacts=())
+    result = taken((*DATA.grasps[:3], empty), method=method, particles=500)
+    assert result.steps[3].verdict == "untracked"
+
+
+def test_registration_of_a_lone_contact_says_nothing_on_the_terminal(capfd: pytest.CaptureFixture[str]) -> None:
+    lone = replace(DATA.grasps[1], contacts=DATA.grasps[1].contacts[:1])
+    taken((DATA.grasps[0], lone), method="icp")
+    assert capfd.readouterr() == ("", "")
