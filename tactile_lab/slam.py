@@ -37,11 +37,12 @@ from tactile_lab.shape.models import ShapeName, fit_shape
 from tactile_lab.shape.surface import Contour, SurfaceMesh
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.motion import planar_motion, row_pose_in_space
-from tactile_lab.tracking.observability import planar_observability
+from tactile_lab.tracking.observability import observability, planar_observability
 from tactile_lab.tracking.particle_filter import PoseEstimate
+from tactile_lab.tracking.pose_rows import PoseRows
+from tactile_lab.tracking.spatial_rows import SPATIAL
 from tactile_lab.tracking.trackers import (
-    FIRST_COVARIANCE,
+    FIRST_VARIANCE,
     GRAPH_METHODS,
     THESIS_METHODS,
     Tracker,
@@ -161,7 +162,7 @@ class TactileSlam:
         self._seed = seed
         self._rng = np.random.default_rng(seed)
         back_end = self._settings.back_end
-        if self._settings.method not in GRAPH_METHODS:
+        if self._settings.method not in GRAPH_METHODS or self._settings.freedom == "space":
             back_end = back_end.model_copy(update={"enabled": False})
         self._back_end = BackEnd(
             back_end,
@@ -169,6 +170,7 @@ class TactileSlam:
             as_printed=self._settings.method in THESIS_METHODS,
             noise=self._settings.motion,
         )
+        self._space = self._settings.space
         self._tracker: Tracker | None = None
         self._origin_height_m = 0.0
         self._steps: list[SlamStep] = []
@@ -194,7 +196,7 @@ class TactileSlam:
         contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
         if self._tracker is None:
             return self._begin(grasp, contacts, started)
-        self._tracker.predict(planar_motion(grasp.hand_motion_world))
+        self._tracker.predict(self._space.motion(grasp.hand_motion_world))
         explained = self._tracker.weigh(contacts)
         estimate = self._tracker.estimate()
         verdict, reason = self._judge(contacts, estimate, explained)
@@ -275,28 +277,30 @@ class TactileSlam:
         following = None if self._known_poses is None else self._known_poses[len(self._steps) :]
         if following is not None and (not following or following[0] is None):
             return self._record(grasp, contacts, "untracked", "its true pose is not known", started)
-        self._origin_height_m = float(grasp.points_world_m[:, 2].mean())
+        on_table = self._settings.freedom == "table"
+        self._origin_height_m = float(grasp.points_world_m[:, 2].mean()) if on_table else 0.0
         contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
-        row = np.array([*contacts.points_m[:, :2].mean(axis=0), palm_heading(grasp.world_T_palm)])
-        first = PlacedGrasp(contacts, row, FIRST_COVARIANCE, np.zeros(3))
+        row = first_row(grasp, contacts, on_table=on_table)
+        first = PlacedGrasp(contacts, row, FIRST_VARIANCE * np.eye(self._space.size), np.zeros(self._space.size))
         self._tracker = make_tracker(self._settings, first, self._rng, following)
         return self._record(grasp, contacts, "first", "object frame born", started)
 
     def _judge(self, contacts: ContactSet, estimate: PoseEstimate, explained: bool) -> tuple[Verdict, str]:
         if not explained:
             return "untracked", "no pose explains the contacts" if len(contacts) else "no contacts"
-        spread_m = placement_sigma_m(contacts, estimate)
+        spread_m = placement_sigma_m(contacts, estimate, self._space)
         if spread_m > self._settings.placement_limit_m:
             return "uncertain", f"contacts uncertain to {1e3 * spread_m:.0f} mm"
         return "tracked", f"contacts placed to {1e3 * spread_m:.1f} mm"
 
     def _record(self, grasp: Grasp, contacts: ContactSet, verdict: Verdict, reason: str, started: float) -> SlamStep:
         placed = self._tracker.map.placed[-1] if self._tracker else None
-        seen = planar_observability(contacts.points_m, contacts.normals).smallest if len(contacts) else 0.0
+        seen_by = planar_observability if self._settings.freedom == "table" else observability
+        seen = seen_by(contacts.points_m, contacts.normals).smallest if len(contacts) else 0.0
         step = SlamStep(
             index=grasp.index,
             stamp_ns=grasp.stamp_ns,
-            world_T_object=row_pose_in_space(placed.row, self._origin_height_m) if placed else None,
+            world_T_object=self._space.pose(placed.row, self._origin_height_m) if placed else None,
             covariance=placed.covariance if placed else None,
             effective_count=self._tracker.effective_count if self._tracker else 0.0,
             observability=seen,
@@ -315,7 +319,7 @@ class TactileSlam:
         return [None] * (len(self._steps) - len(placed)) + placed
 
     def _trajectory(self) -> tuple[Pose3 | None, ...]:
-        return tuple(row_pose_in_space(grasp.row, self._origin_height_m) if grasp else None for grasp in self._placed())
+        return tuple(self._space.pose(grasp.row, self._origin_height_m) if grasp else None for grasp in self._placed())
 
     def _covariances(self) -> tuple[Array | None, ...]:
         return tuple(grasp.covariance if grasp else None for grasp in self._placed())
@@ -324,7 +328,8 @@ class TactileSlam:
         if self.surface is None:
             return None, None
         free = self._tracker.map.free_points_m if self._tracker else None
-        floor_m = -self._origin_height_m if self._settings.dimension == 3 else None
+        stands = self._settings.dimension == 3 and self._settings.freedom == "table"
+        floor_m = -self._origin_height_m if stands else None
         try:
             shape = fit_shape(self._settings.shape_model, self.surface, free, floor_m)
             if self._settings.dimension == 2:
@@ -344,9 +349,15 @@ def _only_for_known_pose(method: str, poses: Sequence[Pose3 | None] | None) -> t
     return None if poses is None else tuple(poses)
 
 
-def placement_sigma_m(contacts: ContactSet, estimate: PoseEstimate) -> float:
+def first_row(grasp: Grasp, contacts: ContactSet, *, on_table: bool) -> Array:
+    """The pose of the object frame at its birth: at the contacts' centre, along the palm (section 3.4)."""
+    if on_table:
+        return np.array([*contacts.points_m[:, :2].mean(axis=0), palm_heading(grasp.world_T_palm)])
+    return SPATIAL.row(Pose3(grasp.world_T_palm.rotation(), contacts.points_m.mean(axis=0)))
+
+
+def placement_sigma_m(contacts: ContactSet, estimate: PoseEstimate, space: PoseRows) -> float:
     """How far the pose's uncertainty moves the contacts along their normals, root mean square."""
-    arms = contacts.points_m[:, :2] - estimate.row[:2]
-    normals = contacts.normals[:, :2]
-    rows = np.column_stack([normals, arms[:, 0] * normals[:, 1] - arms[:, 1] * normals[:, 0]])
+    points, normals = space.to_object(estimate.row, contacts.points_m, contacts.normals)
+    rows = space.by_row(estimate.row, points, normals, normals, np.zeros_like(normals))
     return float(np.sqrt(np.mean(np.einsum("ni,ij,nj->n", rows, estimate.covariance, rows))))

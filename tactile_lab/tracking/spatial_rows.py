@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from gtsam import Point3, Pose3, Rot3
+from gtsam import Pose3, Rot3
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.rotations import exponential, logarithm, right_jacobian
@@ -49,7 +49,7 @@ class SpatialRows:
 
     def pose(self, row: Array, height_m: float) -> Pose3:
         """The height is that of a planar pose's origin and has no meaning here."""
-        return Pose3(Rot3(exponential(row[3:])), Point3(*row[:3]))
+        return Pose3(Rot3(exponential(row[3:])), np.asarray(row[:3]))
 
     def to_object(self, rows: Array, points: Array, normals: Array) -> tuple[Array, Array]:
         turns = exponential(rows[..., 3:])

@@ -29,8 +29,10 @@ from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.odometry_tracker import KnownPoseTracker, OdometryTracker
 from tactile_lab.tracking.particle_filter import PoseEstimate
 from tactile_lab.tracking.particle_tracker import ParticleTracker
+from tactile_lab.tracking.pose_rows import PLANAR, PoseRows
+from tactile_lab.tracking.spatial_rows import SPATIAL
 
-FIRST_COVARIANCE = np.diag([1e-10, 1e-10, 1e-10])
+FIRST_VARIANCE = 1e-10
 """The first grasp defines the object frame: its pose is certain up to rounding."""
 
 GRID_MARGIN_m = 0.040
@@ -39,6 +41,7 @@ Method: TypeAlias = Literal["joint", "particle", "thesis-pf", "thesis-pf-graph",
 """The ways to follow the object, by the names that settings, command line and tables use; see TrackingSettings."""
 
 THESIS_METHODS: tuple[Method, ...] = ("thesis-pf", "thesis-pf-graph")
+PLANAR_METHODS: tuple[Method, ...] = ("thesis-pf", "thesis-pf-graph", "particle")
 GRAPH_METHODS: tuple[Method, ...] = ("joint", "particle", "thesis-pf-graph")
 """Methods whose poses the pose graph corrects."""
 
@@ -87,6 +90,7 @@ class TrackingSettings(StrictModel):
             "particle" is that filter with the calibrated likelihood. Baselines: "known-pose" is given the true poses,
             "odometry" believes the hand's motion, "icp" registers each grasp to those before.
         dimension: 2 for the horizontal contour, 3 for the surface.
+        freedom: "table", the object stands on the table and only turns and slides; "space", it is held free.
         motion: what the object does beside the hand's motion.
         particles: their number.
         shape: the shape model; None for the method's own.
@@ -100,6 +104,7 @@ class TrackingSettings(StrictModel):
 
     method: Method = "joint"
     dimension: Literal[2, 3] = 2
+    freedom: Literal["table", "space"] = "table"
     motion: MotionNoise = MotionNoise()
     particles: int = Limit(default=20_000, ge=100)
     shape: GpisSettings | None = None
@@ -110,6 +115,19 @@ class TrackingSettings(StrictModel):
     kernel_every: int = Limit(default=4, ge=1)
     contour_grid_m: float = Limit(default=0.002, gt=0)
     surface_grid_m: float = Limit(default=0.005, gt=0)
+
+    @property
+    def space(self) -> PoseRows:
+        """What poses are made of."""
+        return PLANAR if self.freedom == "table" else SPATIAL
+
+    @model_validator(mode="after")
+    def _surfaces_in_space(self) -> Self:
+        if self.freedom == "space" and self.dimension != 3:
+            raise ValueError('freedom "space" needs dimension 3')
+        if self.freedom == "space" and self.method in PLANAR_METHODS:
+            raise ValueError(f'method "{self.method}" knows objects on a table only; freedom "space" needs another')
+        return self
 
     @model_validator(mode="after")
     def _normals_for_joint(self) -> Self:
@@ -133,7 +151,7 @@ def make_tracker(
         known_poses: for "known-pose": true ``world_T_object`` of the first grasp and of all that follow.
     """
     shape = settings.shape or (THESIS_SHAPE if settings.method in THESIS_METHODS else GpisSettings())
-    start = ContactMap((first,), shape)
+    start = ContactMap((first,), shape, settings.space)
     match settings.method:
         case "joint":
             return JointTracker(start, settings.motion, settings.joint, settings.kernel_every)
