@@ -20,6 +20,8 @@ _COARSE_m = 0.006
 _FREE_SIGMA_m = 0.003
 _ON_SURFACE_m = 0.006
 _LARGEST_SHARE_OFF = 0.05
+_LEFT_OUT_nats = 12.0
+"""A contact that is off the surface by centimetres is as improbable as an outlier among twenty good contacts."""
 
 OutlineChoice = Callable[[Gpis, "Array | None"], FittedShape]
 
@@ -48,23 +50,22 @@ def best_spatial_shape(
         return field
     if floor_m is not None:
         field = _made(lambda: StandingField.fit(gpis, floor_m)) or field
-    sharp = [shape for shape in _candidates(gpis, best_outline, free_points_m, floor_m) if shape is not None]
-    for shape in sorted(sharp, key=lambda shape: -(shape.log_evidence or -np.inf)):
-        if (shape.log_evidence or -np.inf) <= (field.log_evidence or -np.inf):
-            break
-        if _holds(shape, gpis, free_points_m, floor_m):
-            return shape
-    return field
+    best, most = field, field.log_evidence or -np.inf
+    for shape in _candidates(gpis, best_outline, free_points_m, floor_m):
+        evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=most)
+        if evidence > most:
+            best, most = shape, evidence
+    return best
 
 
 def _candidates(
     gpis: Gpis, best_outline: OutlineChoice, free_points_m: Array | None, floor_m: float | None
-) -> list[FittedShape | None]:
+) -> list[FittedShape]:
     upright = floor_m is not None
     makers: list[Callable[[], FittedShape]] = [lambda: Polyhedron.fit(gpis, free_points_m, upright=upright)]
     if upright:
         makers.append(lambda: Prism.fit(gpis, best_outline, free_points_m))
-    return [_made(maker) for maker in makers]
+    return [shape for shape in map(_made, makers) if shape is not None]
 
 
 def _made(maker: Callable[[], FittedShape]) -> FittedShape | None:
@@ -74,20 +75,31 @@ def _made(maker: Callable[[], FittedShape]) -> FittedShape | None:
         return None
 
 
-def _holds(shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_m: float | None) -> bool:
-    """It has a surface, the contacts lie on it, and hardly a free place lies well within."""
+def _checked_evidence(
+    shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_m: float | None, *, at_least: float
+) -> float:
+    """The evidence of a sharp solid, less for contacts that its planes explain but its surface leaves out.
+
+    Minus infinity where it has no surface, leaves out many contacts, or fills places that are free; its surface is
+    only made if the evidence can reach ``at_least``.
+    """
+    if shape.log_evidence is None or shape.log_evidence <= at_least:
+        return -np.inf
     try:
         mesh = shape.mesh(_COARSE_m, floor_m)
     except ShapeError:  # its faces enclose nothing
-        return False
+        return -np.inf
     off = distances_to_mesh(gpis.contacts_m, mesh) > _ON_SURFACE_m
-    if off.mean() > _LARGEST_SHARE_OFF:
-        return False
-    return free_points_m is None or len(free_points_m) == 0 or _filled_share(mesh, free_points_m) < _LARGEST_SHARE_OFF
+    free = np.empty((0, 3)) if free_points_m is None else free_points_m
+    if off.mean() > _LARGEST_SHARE_OFF or _filled_share(mesh, free) > _LARGEST_SHARE_OFF:
+        return -np.inf
+    return shape.log_evidence - _LEFT_OUT_nats * float(off.sum())
 
 
 def _filled_share(mesh: SurfaceMesh, free_points_m: Array) -> float:
     """Share of free places that lie inside a mesh by more than the contacts' noise."""
+    if len(free_points_m) == 0:
+        return 0.0
     import igl  # here, so that importing this module stays quick
 
     inside = np.asarray(igl.fast_winding_number(*mesh_arrays(mesh), np.ascontiguousarray(free_points_m))) > 0.5

@@ -8,11 +8,12 @@ contacts are better explained by one height than by the field.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tactile_lab.errors import ShapeError
+from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.polyhedron import contacts_of
 from tactile_lab.shape.polyhedron_planes import WeightedContacts
@@ -40,6 +41,7 @@ class StandingField:
         floor_m: height of the table.
         ceiling_m: height of the flat top, None if it has none.
         log_evidence: of all contacts, mirror images apart.
+        mirrored: ends that walls were mirrored at, each with the distance of the nearest contact on a wall.
         name: "standing gpis".
     """
 
@@ -47,6 +49,7 @@ class StandingField:
     floor_m: float
     ceiling_m: float | None
     log_evidence: float
+    mirrored: tuple[tuple[float, float], ...]
     name: str = "standing gpis"
 
     @classmethod
@@ -72,7 +75,8 @@ class StandingField:
             if ended > evidence:
                 evidence, ceiling_m, rest = ended, level_m, without
         ends = [floor_m] if ceiling_m is None else [floor_m, ceiling_m]
-        return cls(_fitted(gpis, contacts, rest, ends), floor_m, ceiling_m, float(evidence))
+        field = _fitted(gpis, contacts, rest, ends)
+        return cls(field, floor_m, ceiling_m, float(evidence), _gaps(contacts, rest, ends))
 
     def contour(self, resolution_m: float = 0.001) -> Contour:
         """Raises ShapeError: a solid has no outline."""
@@ -85,7 +89,17 @@ class StandingField:
             ShapeError: the field has no inside near the contacts.
         """
         floor_m = self.floor_m if floor_m is None else floor_m
-        return extract_mesh(self.field, resolution_m=resolution_m, floor_m=floor_m, ceiling_m=self.ceiling_m)
+        mesh = extract_mesh(self.field, resolution_m=resolution_m, floor_m=floor_m, ceiling_m=self.ceiling_m)
+        return replace(mesh, sigma_m=np.hypot(mesh.sigma_m, self._doubt_m(mesh)))
+
+    def _doubt_m(self, mesh: SurfaceMesh) -> Array:
+        """Of walls between the contacts next to an end and the end itself: they may be sharp there or rounded."""
+        doubt = np.zeros(len(mesh.vertices))
+        for end_m, gap_m in self.mirrored:
+            away = np.abs(mesh.vertices[:, 2] - end_m) / max(gap_m, 1e-6)
+            largest = min(_INSET_SLOPE * gap_m, _LARGEST_INSET_m)
+            doubt = np.maximum(doubt, largest * np.clip(1 - away, 0.0, 1.0))
+        return np.where(np.abs(mesh.normals[:, 2]) < _LEVEL_COSINE, doubt, 0.0)
 
 
 def _top(contacts: WeightedContacts) -> Indices:
@@ -110,21 +124,28 @@ def _level(contacts: WeightedContacts, top: Indices, level_m: float) -> float:
     return float(scale - 0.5 * misfit - 0.5 * np.log(len(contacts)))
 
 
-def _walls_near(contacts: WeightedContacts, rest: Indices, end_m: float, reach_m: float) -> Indices:
+def _walls_near(contacts: WeightedContacts, rest: Indices, end_m: float, ends_m: list[float]) -> Indices:
     """Contacts on the walls that stand on an end; none if what is near it is not mostly upright."""
+    reach_m = _MIRRORED_SHARE * float(np.ptp(np.append(contacts.points_m[:, 2], ends_m)))
     up = np.abs(contacts.normals[rest, 2])
     near = (np.abs(contacts.points_m[rest, 2] - end_m) < reach_m) & (up < _LEVEL_COSINE)
     walls = near & (up < _UPRIGHT_SINE)
     return rest[walls] if walls.sum() >= _LEAST_UPRIGHT_SHARE * near.sum() else rest[:0]
 
 
+def _gaps(contacts: WeightedContacts, rest: Indices, ends_m: list[float]) -> tuple[tuple[float, float], ...]:
+    """The ends with walls on them, and how far the nearest contact on these is."""
+    walls = [(end_m, _walls_near(contacts, rest, end_m, ends_m)) for end_m in ends_m]
+    gaps = [(end_m, np.abs(contacts.points_m[members, 2] - end_m)) for end_m, members in walls]
+    return tuple((end_m, float(away.min())) for end_m, away in gaps if len(away))
+
+
 def _fitted(gpis: Gpis, contacts: WeightedContacts, rest: Indices, ends_m: list[float]) -> Gpis:
     """The field of some contacts and of their mirror images at the ends, with the kernel of another field."""
-    height_m = float(np.ptp(np.append(contacts.points_m[:, 2], ends_m)))
     sources, mirrored = [rest], [contacts.points_m[rest]]
     turned = [contacts.normals[rest]]
     for end_m in ends_m:
-        walls = _walls_near(contacts, rest, end_m, _MIRRORED_SHARE * height_m)
+        walls = _walls_near(contacts, rest, end_m, ends_m)
         sources.append(walls)
         inset_m = np.minimum(_INSET_SLOPE * np.abs(contacts.points_m[walls, 2] - end_m), _LARGEST_INSET_m)
         inward = contacts.points_m[walls] - inset_m[:, None] * contacts.normals[walls]
