@@ -36,6 +36,8 @@ THESIS_WEIGHTING_ms = 6000.0
 SHAPE_SIZES = ((2, 80), (2, 320), (3, 80), (3, 160))
 """Dimension and number of contacts."""
 QUERIES = 10_000
+LARGE_MAP, FIELD_NODES, VARIANCE_STEP = 500, 64, 3
+"""Contacts of the largest map, nodes along each axis of the field tabulated from it, nodes from variance to variance."""
 SEMI_AXES_m = (0.050, 0.030)
 _POINT_SIGMA_m, _NORMAL_SIGMA_rad = 0.001, 0.0873
 
@@ -192,6 +194,7 @@ def shape_table(clock: Clock | None = None, *, repeats: int = 5) -> TimingTable:
     """Fit and query of the shape model as it grows, planar and spatial, with its memory."""
     watch = _Stopwatch(clock or MonotonicClock(), repeats)
     timings = [line for size in SHAPE_SIZES for line in _shape_timings(watch, *size)]
+    timings += _large_timings(watch, _Stopwatch(clock or MonotonicClock(), 1))
     return TimingTable("Shape model", tuple(timings))
 
 
@@ -208,6 +211,30 @@ def _shape_timings(watch: _Stopwatch, dimension: int, count: int) -> tuple[Timin
             f"{QUERIES} points with gradient and variance",
         ),
     )
+
+
+def _large_timings(watch: _Stopwatch, once: _Stopwatch) -> list[Timing]:
+    """A map of very many contacts in space: one grasp more, and the whole field around it."""
+    contacts = ball_contacts(LARGE_MAP, 3)
+    is_last = np.arange(LARGE_MAP) >= LARGE_MAP - GRASP_CONTACTS
+    field, grasp = _fit(contacts.selected(~is_last)), contacts.selected(is_last)
+    corner, spacing_m = np.full(3, 0.06), 0.12 / (FIELD_NODES - 1)
+    size = f"3-D, {LARGE_MAP} contacts"
+
+    def extend() -> Gpis:
+        return field.extended(grasp.points_m, grasp.normals, grasp.point_sigma_m, grasp.normal_sigma_rad)
+
+    def tabulate() -> FieldGrid:
+        return FieldGrid.tabulate(field, -corner, corner, spacing_m, variance=True, variance_step=VARIANCE_STEP)
+
+    return [
+        watch(f"update, {size}", extend, f"{GRASP_CONTACTS} contacts appended to {_size(field)} observations"),
+        once(
+            f"field, {size}",
+            tabulate,
+            f"{FIELD_NODES}^3 nodes, the variance evaluated at every {VARIANCE_STEP}rd along each axis",
+        ),
+    ]
 
 
 def _fit(contacts: ContactSet) -> Gpis:
