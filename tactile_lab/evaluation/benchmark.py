@@ -37,7 +37,7 @@ SHAPE_SIZES = ((2, 80), (2, 320), (3, 80), (3, 160))
 """Dimension and number of contacts."""
 QUERIES = 10_000
 LARGE_MAP, FIELD_NODES, VARIANCE_STEP = 500, 64, 3
-"""Contacts of the largest map, nodes along each axis of the field tabulated from it, nodes from variance to variance."""
+"""Contacts of the largest map, nodes along each axis of its field, nodes from one variance to the next."""
 SEMI_AXES_m = (0.050, 0.030)
 _POINT_SIGMA_m, _NORMAL_SIGMA_rad = 0.001, 0.0873
 
@@ -232,7 +232,7 @@ def _large_timings(watch: _Stopwatch, once: _Stopwatch) -> list[Timing]:
         once(
             f"field, {size}",
             tabulate,
-            f"{FIELD_NODES}^3 nodes, the variance evaluated at every {VARIANCE_STEP}rd along each axis",
+            f"{FIELD_NODES}^3 nodes, variance on a grid {VARIANCE_STEP} times coarser",
         ),
     ]
 
