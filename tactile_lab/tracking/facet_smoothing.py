@@ -18,6 +18,7 @@ from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.choice import polygon_of
 from tactile_lab.shape.polygon_segmentation import price_of_face
+from tactile_lab.shape.polyhedron_planes import segment_planes
 from tactile_lab.shape.surface import extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.motion import MotionNoise
@@ -25,6 +26,9 @@ from tactile_lab.tracking.motion_cost import MotionCost
 
 _ORDERING_RESOLUTION_m = 0.002
 """Of the outline that only orders contacts along it."""
+
+_MOST_PLANES_SHARE = 0.25
+"""Solids whose planes have less than four contacts each on average are not faceted."""
 
 _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e6
@@ -194,7 +198,7 @@ class FacetSmoother:
     def _stepped(self, at: FacetedTrajectory, step: Array) -> FacetedTrajectory:
         size, dimension = self._space.size, at.faces.normals.shape[1]
         free = (len(at.rows) - 1) * size
-        rows = self._space.moved(at.rows, np.vstack([np.zeros(size), step[:free].reshape(-1, size)]))
+        rows = np.vstack([at.rows[:1], self._space.moved(at.rows[1:], step[:free].reshape(-1, size))])
         changes = step[free:].reshape(-1, dimension)
         normals = at.faces.normals + np.einsum("sdt,st->sd", _tangents(at.faces.normals), changes[:, :-1])
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -218,6 +222,9 @@ class FacetSmoother:
         return costs
 
 
+Neighbours = Callable[[FlatFaces], list[tuple[int, int]]]
+
+
 def smoothed_with_faces(contact_map: ContactMap, noise: MotionNoise, rounds: int = 3) -> FacetedTrajectory | None:
     """Divide a map's contacts into faces, and let poses, faces and the division settle.
 
@@ -228,15 +235,19 @@ def smoothed_with_faces(contact_map: ContactMap, noise: MotionNoise, rounds: int
     price = price_of_face(world.point_sigma_m, world.normal_sigma_rad)
     best: FacetedTrajectory | None = None
     for _ in range(rounds):
-        found = _settled(contact_map, noise, price)
-        if found is None or (best and found.description_length(price) >= best.description_length(price) - 1e-3):
+        divided = _outline_faces(contact_map) if contact_map.dimension == 2 else _solid_faces(contact_map)
+        if divided is None:
+            return best
+        faces, neighbours = divided
+        found = FacetSmoother(contact_map, noise).simplified(contact_map.rows, faces, price, neighbours)
+        if best and found.description_length(price) >= best.description_length(price) - 1e-3:
             return best
         best, contact_map = found, contact_map.with_rows(found.rows)
     return best
 
 
-def _settled(contact_map: ContactMap, noise: MotionNoise, price: float) -> FacetedTrajectory | None:
-    """One round of division and smoothing."""
+def _outline_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours] | None:
+    """The faces of an outline; only those that follow each other along it may be one."""
     fitted = contact_map.fit()
     try:
         divided = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m)).faces
@@ -250,9 +261,20 @@ def _settled(contact_map: ContactMap, noise: MotionNoise, price: float) -> Facet
         pairs = np.sort(np.column_stack([along[borders - 1], along[borders]]), axis=1)
         return [(int(one), int(other)) for one, other in np.unique(pairs, axis=0)]
 
-    faces = FlatFaces(divided.labels, divided.normals, divided.offsets_m)
-    smoother = FacetSmoother(contact_map, noise)
-    return smoother.simplified(contact_map.rows, faces, price, in_turn)
+    return FlatFaces(divided.labels, divided.normals, divided.offsets_m), in_turn
+
+
+def _solid_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours] | None:
+    """The planes of a solid; any two may be one."""
+    seen = contact_map.contacts
+    planes = segment_planes(seen.points_m, seen.normals, seen.point_sigma_m, seen.normal_sigma_rad)
+    if planes.count > _MOST_PLANES_SHARE * len(seen):  # round: planes would only follow the noise
+        return None
+
+    def all_pairs(faces: FlatFaces) -> list[tuple[int, int]]:
+        return [(one, other) for other in range(faces.count) for one in range(other)]
+
+    return FlatFaces(planes.labels, planes.normals, planes.offsets_m), all_pairs
 
 
 def _tangents(normals: Array) -> Array:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.choice import free_evidence, polygon_of
+from tactile_lab.shape.polyhedron import Polyhedron
 from tactile_lab.shape.surface import extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.facet_smoothing import smoothed_with_faces
@@ -23,6 +24,7 @@ from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.pose_evidence import PoseEvidence
+from tactile_lab.tracking.pose_rows import PLANAR
 
 _ORDERING_RESOLUTION_m = 0.002
 """Of outlines that only order contacts and are compared with free places."""
@@ -107,8 +109,6 @@ class Judge:
         Contacts that did not fit the field get another chance: a face that only they touch may be worth its price.
         """
         rated = self.rated(contact_map)
-        if contact_map.dimension == 3:
-            return rated
         sharp = self._faceted(contact_map)
         if sharp is None or sharp.cost > rated.cost:
             return rated
@@ -120,26 +120,31 @@ class Judge:
     def _faceted(self, contact_map: ContactMap) -> Hypothesis | None:
         """Poses and faces smoothed together; None if there are no faces that enclose anything."""
         faceted = smoothed_with_faces(contact_map, self._noise)
-        return self._with_polygon(contact_map.with_rows(faceted.rows)) if faceted else None
+        return self._with_sharp_shape(contact_map.with_rows(faceted.rows)) if faceted else None
 
-    def _with_polygon(self, contact_map: ContactMap) -> Hypothesis | None:
+    def _with_sharp_shape(self, contact_map: ContactMap) -> Hypothesis | None:
         """The map as it is, its contacts explained by flat faces."""
-        fitted, contacts = contact_map.fit(), contact_map.contacts
+        fitted, contacts, free = contact_map.fit(), contact_map.contacts, contact_map.free_points_m
         try:
-            polygon = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
+            if contact_map.dimension == 2:
+                polygon = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
+                intrusion = -free_evidence(polygon.contour(_ORDERING_RESOLUTION_m), free, fitted)
+                evidence = polygon.log_evidence
+            else:
+                on_table = contact_map.space is PLANAR
+                evidence = Polyhedron.fit(fitted, free, upright=on_table).log_evidence
+                intrusion = float(free_space_costs(fitted, free[None])[0])
         except ShapeError:  # nothing enclosed, or no faces in it
             return None
         constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
         motion = MotionCost(contact_map.motions, self._noise, contact_map.space).value(contact_map.rows)
-        intrusion = -free_evidence(polygon.contour(_ORDERING_RESOLUTION_m), contact_map.free_points_m, fitted)
-        misfit = motion - polygon.log_evidence - float(constant)
-        return Hypothesis(contact_map, misfit, intrusion, self.price(contact_map))
+        return Hypothesis(contact_map, motion - evidence - float(constant), intrusion, self.price(contact_map))
 
     def _restored(self, sharp: Hypothesis) -> Hypothesis:
         """With those contacts back that flat faces explain better than nothing does, one after the other."""
         for index, grasp in enumerate(sharp.map.placed):
             for contact in sorted(grasp.left_out) if grasp.used else ():
-                fuller = self._with_polygon(sharp.map.with_contact(index, contact))
+                fuller = self._with_sharp_shape(sharp.map.with_contact(index, contact))
                 sharp = min(sharp, fuller or sharp, key=lambda one: one.cost)
         return sharp
 

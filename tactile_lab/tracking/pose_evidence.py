@@ -144,7 +144,7 @@ class PoseEvidence:
 
         def moved(variables: Array) -> Array:
             steps = (spread @ variables).reshape(-1, self._space.size)
-            return self._space.moved(rows, np.vstack([np.zeros(self._space.size), steps]))
+            return np.vstack([rows[:1], self._space.moved(rows[1:], steps)])
 
         def objective(variables: Array) -> tuple[float, Array]:
             value, gradient = self.value_and_gradient(moved(variables))
