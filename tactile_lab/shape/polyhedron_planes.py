@@ -175,10 +175,17 @@ def _dissolved(contacts: WeightedContacts, planes: Planes, price: float) -> Plan
         worth = price + _label_entropy(sizes[plane], sizes[host])
         if elsewhere.min(axis=1).sum() - costs[members, plane].sum() < worth:
             return fit_planes(contacts, _with_labels(planes.labels, members, elsewhere.argmin(axis=1)))
-        joined = fit_planes(contacts, _with_labels(planes.labels, members, np.full(len(members), host)))
-        if joined.chi_square - planes.chi_square < worth:
-            return joined
+        if _joining_cost(contacts, planes, costs, plane, host) < worth:
+            return fit_planes(contacts, _with_labels(planes.labels, members, np.full(len(members), host)))
     return planes
+
+
+def _joining_cost(contacts: WeightedContacts, planes: Planes, costs: Array, plane: int, host: int) -> float:
+    """Chi-square added by one plane in place of two."""
+    both = np.flatnonzero((planes.labels == plane) | (planes.labels == host))
+    normal, offset_m = fit_plane(contacts, both)
+    together = contacts.chi_squares(normal[None], np.array([offset_m]))[both, 0].sum()
+    return float(together - costs[both, planes.labels[both]].sum())
 
 
 def _label_entropy(first: int, second: int) -> float:

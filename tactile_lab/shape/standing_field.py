@@ -29,6 +29,7 @@ _INSET_SLOPE, _LARGEST_INSET_m = 0.2, 0.006
 """Mirror images lie inward by this share of their distance from the end: edges at the foot are often rounded, and
 walls that were not touched near it should end between a sharp and a rounded one."""
 _LEAST_TOP_CONTACTS = 3
+_KERNEL_STEPS = 10
 _SAME_HEIGHT_SIGMAS = 4.0
 
 
@@ -54,7 +55,7 @@ class StandingField:
 
     @classmethod
     def fit(cls, gpis: Gpis, floor_m: float) -> StandingField:
-        """Let a field stand on the table, its kernel unchanged.
+        """Let a field stand on the table; its kernel changes only if a level top is taken out of it.
 
         Args:
             gpis: a field fitted in space.
@@ -71,9 +72,10 @@ class StandingField:
         if _LEAST_TOP_CONTACTS <= len(top) < len(contacts):
             without = np.setdiff1d(rest, top)
             level_m = float(np.average(contacts.points_m[top, 2], weights=contacts.point_weights[top]))
-            ended = _fitted(gpis, contacts, without, []).log_marginal_likelihood() + _level(contacts, top, level_m)
+            walls = _fitted(gpis, contacts, without, []).optimise(max_iterations=_KERNEL_STEPS)
+            ended = walls.log_marginal_likelihood() + _level(contacts, top, level_m)
             if ended > evidence:
-                evidence, ceiling_m, rest = ended, level_m, without
+                evidence, ceiling_m, rest, gpis = ended, level_m, without, walls
         ends = [floor_m] if ceiling_m is None else [floor_m, ceiling_m]
         field = _fitted(gpis, contacts, rest, ends)
         return cls(field, floor_m, ceiling_m, float(evidence), _gaps(contacts, rest, ends))

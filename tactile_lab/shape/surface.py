@@ -116,6 +116,27 @@ def extract_mesh(
     return SurfaceMesh(vertices, faces.astype(np.int64), sigma, normals, solid.is_closed)
 
 
+def supported(mesh: SurfaceMesh, largest_sigma_m: float) -> SurfaceMesh:
+    """The part of a surface that the data support: only faces whose corners are known at least so well.
+
+    Raises:
+        ShapeError: no face is.
+    """
+    faces = mesh.faces[(mesh.sigma_m[mesh.faces] <= largest_sigma_m).all(axis=1)]
+    if len(faces) == 0:
+        raise ShapeError(
+            f"no part of the surface is known to {1e3 * largest_sigma_m:.3g} mm", hint="Allow a larger sigma"
+        )
+    used, renumbered = np.unique(faces, return_inverse=True)
+    return SurfaceMesh(
+        vertices=mesh.vertices[used],
+        faces=renumbered.reshape(-1, 3).astype(np.int64),
+        sigma_m=mesh.sigma_m[used],
+        normals=mesh.normals[used],
+        is_closed=mesh.is_closed and len(faces) == len(mesh.faces),
+    )
+
+
 @dataclass(frozen=True)
 class _Solid:
     """Node values of one body without cavities, surrounded by positive nodes on all sides."""

@@ -15,7 +15,7 @@ from tactile_lab.shape.metrics import mesh_errors
 from tactile_lab.shape.prism import Prism, ear_triangles
 from tactile_lab.shape.sampling import polygon_area
 from tactile_lab.shape.standing_field import StandingField
-from tactile_lab.shape.surface import SurfaceMesh, extract_mesh
+from tactile_lab.shape.surface import SurfaceMesh, extract_mesh, supported
 
 
 def closed(mesh: SurfaceMesh) -> bool:
@@ -75,6 +75,19 @@ def test_a_prism_needs_walls() -> None:
     field = Gpis.fit(points[top], normals[top], POINT_SIGMA_m, NORMAL_SIGMA_rad)
     with pytest.raises(ShapeError, match="too few"):
         Prism.fit(field, best_shape)
+
+
+def test_a_surface_can_be_cut_down_to_what_the_data_support() -> None:
+    points, normals = contacts_on(box_mesh(), 100, seed=0)
+    seen = points[:, 0] > 0
+    whole = extract_mesh(Gpis.fit(points[seen], normals[seen], POINT_SIGMA_m, NORMAL_SIGMA_rad), floor_m=0.0)
+    part = supported(whole, 0.002)
+    assert 0 < len(part.faces) < len(whole.faces)
+    assert part.sigma_m.max() <= 0.002
+    assert not part.is_closed
+    assert supported(whole, 1.0).is_closed
+    with pytest.raises(ShapeError, match="no part"):
+        supported(whole, 1e-9)
 
 
 def test_ears_fill_a_polygon_that_is_not_convex() -> None:
