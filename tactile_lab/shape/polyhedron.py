@@ -34,7 +34,7 @@ OFFSET_RANGE_m = 0.1
 _DEFAULT_NORMAL_SIGMA_rad = 0.1
 _MARGIN_m = 0.030
 _SIMILAR_ANGLE_rad, _SIMILAR_OFFSET_m = np.deg2rad(30.0), 0.012
-_LEAST_SUPPORT = 2
+_LEAST_SUPPORT, _LARGEST_SINGLE_SHARE = 2, 0.04
 _VERTEX_SPACING = 2.0
 _FOOT_SIGMA_m = 1e-4
 _SUPPORT_m, _UNSUPPORTED_SLOPE = 0.020, 0.05
@@ -175,12 +175,16 @@ def _log_evidence(contacts: WeightedContacts, regular: RegularPlanes) -> float:
 
 
 def _kept(regular: RegularPlanes) -> RegularPlanes:
-    """Without planes of a single contact that lie close to others: most likely that contact is wrong."""
+    """Without planes of a single contact that lie close to others: most likely that contact is wrong.
+
+    Where single contacts are many, they are all most likely wrong.
+    """
     planes = regular.planes
     similar = planes.normals @ planes.normals.T > np.cos(_SIMILAR_ANGLE_rad)
     similar &= np.abs(planes.offsets_m[:, None] - planes.offsets_m) < _SIMILAR_OFFSET_m
     np.fill_diagonal(similar, False)
-    kept = (planes.sizes >= _LEAST_SUPPORT) | ~similar.any(axis=1)
+    single = planes.sizes < _LEAST_SUPPORT
+    kept = ~single | (~similar.any(axis=1) & (single.sum() <= _LARGEST_SINGLE_SHARE * len(planes.labels)))
     numbers = np.where(kept, np.cumsum(kept) - 1, -1)
     fewer = Planes(numbers[planes.labels], planes.normals[kept], planes.offsets_m[kept], planes.chi_square)
     return replace(

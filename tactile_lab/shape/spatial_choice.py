@@ -19,7 +19,7 @@ from tactile_lab.shape.surface import SurfaceMesh
 _COARSE_m = 0.006
 _FREE_SIGMA_m = 0.003
 _ON_SURFACE_m = 0.006
-_LARGEST_SHARE_OFF = 0.05
+_LARGEST_SHARE_OFF, _LARGEST_SHARE_FILLED = 0.15, 0.05
 _LEFT_OUT_nats = 12.0
 """A contact that is off the surface by centimetres is as improbable as an outlier among twenty good contacts."""
 
@@ -91,7 +91,7 @@ def _checked_evidence(
         return -np.inf
     off = distances_to_mesh(gpis.contacts_m, mesh) > _ON_SURFACE_m
     free = np.empty((0, 3)) if free_points_m is None else free_points_m
-    if off.mean() > _LARGEST_SHARE_OFF or _filled_share(mesh, free) > _LARGEST_SHARE_OFF:
+    if off.mean() > _LARGEST_SHARE_OFF or _filled_share(mesh, free) > _LARGEST_SHARE_FILLED:
         return -np.inf
     return shape.log_evidence - _LEFT_OUT_nats * float(off.sum())
 
