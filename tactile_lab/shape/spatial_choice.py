@@ -10,7 +10,8 @@ from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.model import FittedShape
-from tactile_lab.shape.polyhedron import Polyhedron
+from tactile_lab.shape.polyhedron import Polyhedron, contacts_of
+from tactile_lab.shape.polyhedron_planes import divide
 from tactile_lab.shape.prism import Prism
 from tactile_lab.shape.sampling import distances_to_mesh, mesh_arrays
 from tactile_lab.shape.standing_field import StandingField
@@ -20,6 +21,7 @@ _COARSE_m = 0.006
 _FREE_SIGMA_m = 0.003
 _ON_SURFACE_m = 0.006
 _LARGEST_SHARE_OFF, _LARGEST_SHARE_FILLED = 0.15, 0.05
+_KERNEL_STEPS = 10
 _LEFT_OUT_nats = 12.0
 """A contact that is off the surface by centimetres is as improbable as an outlier among twenty good contacts."""
 
@@ -39,7 +41,7 @@ def best_spatial_shape(
     places that fingers went through.
 
     Args:
-        field: the field as a shape, taken unless another model is more probable.
+        field: the field as a shape, taken unless another model is more probable; without a table it keeps all contacts.
         gpis: the field, with its kernel at a maximum of the marginal likelihood.
         best_outline: chooses the model of an outline.
         free_points_m: places that a finger went through, shape (k, 3), or None.
@@ -48,6 +50,7 @@ def best_spatial_shape(
     """
     if field.log_evidence is None:
         return field
+    gpis = _without_strays(gpis)
     if floor_m is not None:
         field = _made(lambda: StandingField.fit(gpis, floor_m)) or field
     best, most = field, field.log_evidence or -np.inf
@@ -56,6 +59,25 @@ def best_spatial_shape(
         if evidence > most:
             best, most = shape, evidence
     return best
+
+
+def _without_strays(gpis: Gpis) -> Gpis:
+    """The field without contacts that share a plane with no other, where it explains the rest so much better.
+
+    Every contact left out costs :data:`_LEFT_OUT_nats`, so that good contacts on curved parts stay.
+    """
+    contacts = contacts_of(gpis)
+    planes = divide(contacts)
+    kept = planes.sizes[planes.labels] > 1
+    if kept.all() or np.count_nonzero(~kept) > _LARGEST_SHARE_OFF * len(contacts):
+        return gpis
+    seen = gpis.observations
+    rest = gpis.contacts_m[kept], gpis.normals[kept]
+    trimmed = Gpis.fit(*rest, seen.value_sigma_m[kept], seen.gradient_sigma[kept], gpis.settings)
+    trimmed = trimmed.optimise(max_iterations=_KERNEL_STEPS)
+    peaks = 0.5 * np.log(contacts.point_weights) + 1.5 * np.log(contacts.normal_weights) - 2 * np.log(2 * np.pi)
+    without = trimmed.log_marginal_likelihood() + float(np.sum(peaks[~kept] - _LEFT_OUT_nats))
+    return trimmed if without > gpis.log_marginal_likelihood() + _LEFT_OUT_nats else gpis
 
 
 def _candidates(

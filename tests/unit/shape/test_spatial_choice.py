@@ -49,6 +49,20 @@ def test_the_field_is_chosen_for_an_ellipsoid_and_is_not_widened_at_the_table() 
     assert mesh_errors(shape.mesh(), ellipsoid_mesh()).hausdorff_m < alone.hausdorff_m + 0.0005
 
 
+def test_wild_contacts_do_not_spoil_a_box() -> None:
+    points, normals = contacts_on(box_mesh(), 110, seed=5)
+    rng = np.random.default_rng(5)
+    wild = rng.choice(len(points), 10, replace=False)
+    points[wild] += rng.normal(0, 0.01, (10, 3))
+    turned = rng.normal(size=(10, 3))
+    normals[wild] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    shape = best_shape(
+        Gpis.fit(points, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad).optimise(max_iterations=10), floor_m=0.0
+    )
+    assert shape.name in ("polyhedron", "prism")
+    assert mesh_errors(shape.mesh(floor_m=0.0), box_mesh()).hausdorff_m < 0.005
+
+
 def test_without_a_table_the_choice_is_between_field_and_flat_faces() -> None:
     assert best_shape(field_on(cylinder_mesh(), 60, seed=1)).name in ("gpis", "polyhedron")
 
