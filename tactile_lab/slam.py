@@ -32,6 +32,7 @@ from tactile_lab.errors import ConfigurationError, ShapeError, TrackingError
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.graph.pose_graph import LoopReport
+from tactile_lab.graph.relocation import relocation_candidates
 from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.models import ShapeName, fit_shape
 from tactile_lab.shape.surface import Contour, SurfaceMesh
@@ -282,7 +283,8 @@ class TactileSlam:
         contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
         row = first_row(grasp, contacts, on_table=on_table)
         first = PlacedGrasp(contacts, row, FIRST_VARIANCE * np.eye(self._space.size), np.zeros(self._space.size))
-        self._tracker = make_tracker(self._settings, first, self._rng, following)
+        relocate = relocated_rows if on_table else None
+        self._tracker = make_tracker(self._settings, first, self._rng, following, relocate)
         return self._record(grasp, contacts, "first", "object frame born", started)
 
     def _judge(self, contacts: ContactSet, estimate: PoseEstimate, explained: bool) -> tuple[Verdict, str]:
@@ -347,6 +349,11 @@ def _only_for_known_pose(method: str, poses: Sequence[Pose3 | None] | None) -> t
     if method != "known-pose" and poses is not None:
         raise ConfigurationError("must not be given the true poses", where=method)
     return None if poses is None else tuple(poses)
+
+
+def relocated_rows(contact_map: ContactMap, contacts: ContactSet) -> Array:
+    """Poses of contacts anywhere on a known object on the table, the best first, shape (m, 3)."""
+    return relocation_candidates(contact_map, contacts).rows
 
 
 def first_row(grasp: Grasp, contacts: ContactSet, *, on_table: bool) -> Array:

@@ -24,6 +24,7 @@ class PlacedGrasp:
         covariance: of the pose, shape (3, 3).
         motion: the hand's motion since the grasp before, as a row.
         left_out: indices of the contacts that are kept aside; the others are part of the shape.
+        moved_freely: the object did not follow the hand since the grasp before: it fell, or someone moved it.
     """
 
     contacts_world: ContactSet
@@ -31,6 +32,7 @@ class PlacedGrasp:
     covariance: Array
     motion: Array
     left_out: frozenset[int] = frozenset()
+    moved_freely: bool = False
 
     @property
     def kept(self) -> NDArray[np.intp]:
@@ -79,6 +81,11 @@ class ContactMap:
     def motions(self) -> Array:
         """The hand's motions before each grasp, shape (n, size)."""
         return np.array([grasp.motion for grasp in self.placed])
+
+    @property
+    def follows_hand(self) -> NDArray[np.bool_]:
+        """Whether the object followed the hand's motion before each grasp, shape (n,)."""
+        return np.array([not grasp.moved_freely for grasp in self.placed])
 
     @property
     def contacts(self) -> ContactSet:

@@ -97,7 +97,7 @@ class FacetSmoother:
 
     def __init__(self, contact_map: ContactMap, noise: MotionNoise) -> None:
         self._space = contact_map.space
-        self._motion = MotionCost(contact_map.motions, noise, contact_map.space)
+        self._motion = MotionCost.of(contact_map, noise)
         self._world = contact_map.contacts_world
         self._grasp_of = contact_map.grasp_indices
 

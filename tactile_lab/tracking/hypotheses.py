@@ -29,6 +29,9 @@ from tactile_lab.tracking.pose_rows import PLANAR
 _ORDERING_RESOLUTION_m = 0.002
 """Of outlines that only order contacts and are compared with free places."""
 
+_BREAK_COST = 20.0
+"""Negative log probability that the object moves otherwise than with the hand, wherever it then lies."""
+
 _SAME_TRANSLATION_m = 0.001
 _SAME_ROTATION_rad = 0.03
 
@@ -137,7 +140,7 @@ class Judge:
         except ShapeError:  # nothing enclosed, or no faces in it
             return None
         constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
-        motion = MotionCost(contact_map.motions, self._noise, contact_map.space).value(contact_map.rows)
+        motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
         return Hypothesis(contact_map, motion - evidence - float(constant), intrusion, self.price(contact_map))
 
     def _restored(self, sharp: Hypothesis) -> Hypothesis:
@@ -148,9 +151,18 @@ class Judge:
                 sharp = min(sharp, fuller or sharp, key=lambda one: one.cost)
         return sharp
 
+    def with_covariances(self, contact_map: ContactMap) -> ContactMap:
+        """The map with the covariance that all contacts and motions leave to each pose."""
+        size, count = contact_map.space.size, len(contact_map.placed)
+        joint = np.linalg.inv(PoseEvidence(contact_map, self._noise).information(contact_map.rows))
+        blocks = joint.reshape(count - 1, size, count - 1, size)[np.arange(count - 1), :, np.arange(count - 1)]
+        later = [replace(one, covariance=block) for one, block in zip(contact_map.placed[1:], blocks, strict=True)]
+        return replace(contact_map, placed=(contact_map.placed[0], *later))
+
     def price(self, contact_map: ContactMap) -> float:
-        """What the contacts cost that are left out."""
-        return self._unexplained_cost * contact_map.left_out_count
+        """What the contacts cost that are left out, and the steps in which the object did not follow the hand."""
+        breaks = int(np.sum(~contact_map.follows_hand))
+        return self._unexplained_cost * contact_map.left_out_count + _BREAK_COST * breaks
 
     def _hypothesis(self, contact_map: ContactMap, misfit: float) -> Hypothesis:
         intrusion = free_space_costs(contact_map.fit(), contact_map.free_points_m[None])[0]

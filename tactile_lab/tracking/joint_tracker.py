@@ -22,10 +22,19 @@ from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.fixed_lag import unfolded
 from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge, different, likeliest, weights
+from tactile_lab.tracking.late_placing import Relocate, placed_late, relocated
 from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.motion_cost import estimated_noise
 from tactile_lab.tracking.particle_filter import PoseEstimate
 from tactile_lab.tracking.proposals import ProposalSettings, propose
 from tactile_lab.tracking.regrouping import regrouped
+
+_LEAST_TO_RELOCATE = 3
+_LEAST_KNOWN = 30
+"""Contacts that a grasp must have, and the object, before the grasp is looked for anywhere on it."""
+
+_POOR_GAIN = 2.5
+"""Evidence (natural logarithm) that a contact brings on unknown ground, at most; on known ground it is 6 to 10."""
 
 
 class JointSettings(StrictModel):
@@ -41,6 +50,7 @@ class JointSettings(StrictModel):
         final_iterations: of the optimiser at the end.
         backwards: read the session backwards as well at the end, unless it is too long for that.
         window: beyond twice so many grasps, all but so many are settled.
+        estimate_motion: learn the motion's noise from the session; the configured one counts as much as six grasps.
         remembered: so many contacts of settled grasps still count.
     """
 
@@ -53,6 +63,7 @@ class JointSettings(StrictModel):
     final_iterations: int = Limit(default=80, ge=1)
     backwards: bool = True
     window: int = Limit(default=12, ge=2)
+    estimate_motion: bool = False
     remembered: int = Limit(default=50, ge=10)
 
 
@@ -65,7 +76,17 @@ class JointTracker:
         noise: MotionNoise,
         settings: JointSettings,
         kernel_every: int,
+        relocate: Relocate | None = None,
     ) -> None:
+        """
+        Args:
+            first: map of the first grasp.
+            noise: of the motion model.
+            settings: see there.
+            kernel_every: kernel parameters are estimated anew after so many grasps.
+            relocate: proposes poses anywhere on the object when it was lost; None for none.
+        """
+        self._relocate, self._configured = relocate, noise
         self._noise, self._settings, self._kernel_every = noise, settings, kernel_every
         self._space = first.space
         self._judge = Judge(noise, settings.proposals.unexplained_cost)
@@ -95,6 +116,7 @@ class JointTracker:
         unplaced = [self._unplaced(hypothesis, contacts) for hypothesis in self._hypotheses]
         branches = likeliest(unplaced + self._branched(contacts), self._settings.smoothed, self._settings.branch_gap)
         smoothed = [self._judge.smoothed(branch.map, self._settings.iterations) for branch in branches]
+        smoothed += self._relocated(min(smoothed, key=_cost))
         self._branches = self._likeliest(different(smoothed), self._settings.hypotheses)
         self.effective_count = float(1 / np.sum(weights(self._branches) ** 2))
         return self._branches[0].map.placed[-1].used
@@ -119,6 +141,8 @@ class JointTracker:
         count = len(self._hypotheses[0].map.placed)
         if count % self._kernel_every == 0:
             self._share_best_kernel()
+            if self._settings.estimate_motion:
+                self._trust(estimated_noise(self._hypotheses[0].map, self._configured))
             self._hypotheses = sorted((self._judge.rated(one.map) for one in self._hypotheses), key=_cost)
         lag = self._settings
         if count > 2 * lag.window:
@@ -144,8 +168,13 @@ class JointTracker:
             smoothed = [self._judge.smoothed(one.map, iterations) for one in self._hypotheses]
             self._hypotheses = self._likeliest(different(smoothed), self._settings.hypotheses)
             self._share_best_kernel()
+        self._hypotheses = [self._placed_late(one) for one in self._hypotheses]
         faceted = sorted((self._judge.with_faces(one.map) for one in self._hypotheses), key=_cost)
+        faceted[0] = replace(faceted[0], map=self._judge.with_covariances(faceted[0].map))
         self._hypotheses = [replace(one, map=unfolded(one.map)) for one in faceted]
+
+    def _placed_late(self, hypothesis: Hypothesis) -> Hypothesis:
+        return placed_late(hypothesis, self._noise, self._settings.proposals, self._relocate, self._judge)
 
     def _backwards(self) -> list[Hypothesis]:
         """The hypotheses that the same grasps give in the opposite order."""
@@ -164,6 +193,15 @@ class JointTracker:
         others = [self._judge.rated(one) for one in regrouped(hypothesis.map, self._noise, self._settings.proposals)]
         promising = sorted(others, key=_cost)[: self._settings.smoothed]
         return [self._judge.smoothed(other.map, self._settings.iterations) for other in promising]
+
+    def _relocated(self, best: Hypothesis) -> list[Hypothesis]:
+        """Poses anywhere on the object, where a grasp fits nothing that is known of it near the predicted pose."""
+        contacts, known = len(best.map.placed[-1].contacts_world), len(best.map.contacts)
+        gain = self._hypotheses[0].cost - best.cost
+        expected = contacts >= _LEAST_TO_RELOCATE and known >= _LEAST_KNOWN
+        if self._relocate is None or not expected or gain > _POOR_GAIN * contacts:
+            return []
+        return relocated(best, self._relocate, self._judge)
 
     def _unplaced(self, hypothesis: Hypothesis, contacts: ContactSet) -> Hypothesis:
         """All contacts of the grasp left out: the motion model alone says where the object is."""
@@ -213,6 +251,10 @@ class JointTracker:
 
     def _likeliest(self, hypotheses: list[Hypothesis], count: int) -> list[Hypothesis]:
         return likeliest(hypotheses, count, self._settings.evidence_gap)
+
+    def _trust(self, noise: MotionNoise) -> None:
+        """Go on with another noise of the motion model."""
+        self._noise, self._judge = noise, Judge(noise, self._settings.proposals.unexplained_cost)
 
     def _share_best_kernel(self) -> None:
         best = self._hypotheses[0].map.with_best_kernel()

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.geometry.contacts import Array
+from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.pose_rows import PoseRows
 
@@ -13,17 +17,35 @@ _STIFFNESS = 10.0
 """Slips are bounded by the hand's grip: beyond some sigma the motion prior gets stiffer than a Gaussian."""
 
 
+_HARDLY = 1e-3
+"""Certainty of a motion that the object did not follow: not zero, so that a pose nothing touches is still a pose."""
+
+
+_CONFIGURED_SLIPS = 6.0
+
+
 class MotionCost:
     """Negative log probability of the slips between successive poses, up to a constant."""
 
-    def __init__(self, motions: Array, noise: MotionNoise, space: PoseRows) -> None:
+    def __init__(
+        self, motions: Array, noise: MotionNoise, space: PoseRows, follows: NDArray[np.bool_] | None = None
+    ) -> None:
         """
         Args:
             motions: of the hand before each grasp, shape (k, size); the first is not used.
             noise: of a re-orientation.
             space: what the rows mean.
+            follows: whether the object followed the hand before each grasp, shape (k,); slips of other steps cost
+                nothing. None: always.
         """
-        self._motions, self._space, self._sigmas = motions, space, space.sigmas(noise)
+        self._motions, self._space = motions, space
+        certainty = np.ones(len(motions)) if follows is None else follows.astype(float)
+        self._weights = np.maximum(certainty, _HARDLY)[1:, None] / space.sigmas(noise)
+
+    @classmethod
+    def of(cls, contact_map: ContactMap, noise: MotionNoise) -> Self:
+        """Along the trajectory of a map."""
+        return cls(contact_map.motions, noise, contact_map.space, contact_map.follows_hand)
 
     def value(self, rows: Array) -> float:
         """The cost of poses of shape (k, size)."""
@@ -35,7 +57,7 @@ class MotionCost:
         slip = self._lengths(scaled)
         excess = np.maximum(slip - STIFF_BEYOND_SIGMA, 0.0)
         stretch = np.repeat(1 + _STIFFNESS * excess / np.maximum(slip, 1e-12), self._parts, axis=1)
-        pull = scaled * stretch / self._sigmas
+        pull = scaled * stretch * self._weights
         later, earlier = self._space.slip_derivatives(rows, self._motions)
         gradient = np.zeros_like(rows)
         gradient[1:] += np.einsum("kij,ki->kj", later, pull)
@@ -50,7 +72,7 @@ class MotionCost:
         index = np.arange(count)
         by_rows[index, :, index] = later
         by_rows[index[1:], :, index[:-1]] = earlier[1:]
-        scaled = (by_rows / self._sigmas[:, None, None]).reshape(count * size, count * size)
+        scaled = (by_rows * self._weights[:, :, None, None]).reshape(count * size, count * size)
         return np.asarray(scaled.T @ scaled)
 
     def slips_in_sigma(self, rows: Array) -> Array:
@@ -62,7 +84,8 @@ class MotionCost:
         return [self._space.translations, self._space.size - self._space.translations]
 
     def _scaled(self, rows: Array) -> Array:
-        return self._space.deviation(rows[1:], self._space.compose(self._motions[1:], rows[:-1])) / self._sigmas
+        slips = self._space.deviation(rows[1:], self._space.compose(self._motions[1:], rows[:-1]))
+        return np.asarray(slips * self._weights)
 
     def _lengths(self, scaled: Array) -> Array:
         split = self._space.translations
@@ -72,3 +95,16 @@ class MotionCost:
         slip = self._lengths(scaled)
         excess = np.maximum(slip - STIFF_BEYOND_SIGMA, 0.0)
         return np.asarray(0.5 * np.sum(slip**2) + 0.5 * _STIFFNESS * np.sum(excess**2))
+
+
+def estimated_noise(contact_map: ContactMap, configured: MotionNoise) -> MotionNoise:
+    """The noise that the slips of a trajectory speak for, the configured one counting as several of them."""
+    cost = MotionCost.of(contact_map, configured)
+    slips = cost.slips_in_sigma(contact_map.rows)[contact_map.follows_hand[1:]]
+    translations, size = contact_map.space.translations, contact_map.space.size
+    freedom = np.array([translations, size - translations])
+    variance = (_CONFIGURED_SLIPS + np.sum(slips**2, axis=0) / freedom) / (_CONFIGURED_SLIPS + len(slips))
+    ratio = np.sqrt(variance)
+    return MotionNoise(
+        translation_m=float(configured.translation_m * ratio[0]), rotation_rad=float(configured.rotation_rad * ratio[1])
+    )

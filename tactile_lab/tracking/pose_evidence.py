@@ -57,7 +57,7 @@ class PoseEvidence:
             noise: of the motion model.
         """
         self._space = contact_map.space
-        self._motion = MotionCost(contact_map.motions, noise, contact_map.space)
+        self._motion = MotionCost.of(contact_map, noise)
         self._world = contact_map.contacts_world
         self._grasp_of = contact_map.grasp_indices
         contacts = contact_map.contacts

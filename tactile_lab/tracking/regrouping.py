@@ -35,7 +35,7 @@ def regrouped(contact_map: ContactMap, noise: MotionNoise, settings: ProposalSet
         noise: of the motion model.
         settings: of the search.
     """
-    slips = MotionCost(contact_map.motions, noise, contact_map.space).slips_in_sigma(contact_map.rows).max(axis=1)
+    slips = MotionCost.of(contact_map, noise).slips_in_sigma(contact_map.rows).max(axis=1)
     steps = [int(step) + 1 for step in np.argsort(-slips)[:_MOST_STEPS] if slips[step] > _UNLIKELY_SIGMA]
     return [other for step in steps for other in _joined_anew(contact_map, step, noise, settings)]
 

@@ -18,6 +18,7 @@ from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.icp_tracker import IcpSettings, IcpTracker
 from tactile_lab.tracking.joint_tracker import JointSettings, JointTracker
+from tactile_lab.tracking.late_placing import Relocate
 from tactile_lab.tracking.measurement import (
     CalibratedMeasurement,
     CalibratedSettings,
@@ -141,6 +142,7 @@ def make_tracker(
     first: PlacedGrasp,
     rng: np.random.Generator,
     known_poses: Sequence[Pose3 | None] | None = None,
+    relocate: Relocate | None = None,
 ) -> Tracker:
     """The tracker that the settings ask for, started at the first grasp.
 
@@ -149,12 +151,13 @@ def make_tracker(
         first: the grasp in which the object frame is born.
         rng: source of all random numbers.
         known_poses: for "known-pose": true ``world_T_object`` of the first grasp and of all that follow.
+        relocate: for "joint": proposes poses anywhere on the object.
     """
     shape = settings.shape or (THESIS_SHAPE if settings.method in THESIS_METHODS else GpisSettings())
     start = ContactMap((first,), shape, settings.space)
     match settings.method:
         case "joint":
-            return JointTracker(start, settings.motion, settings.joint, settings.kernel_every)
+            return JointTracker(start, settings.motion, settings.joint, settings.kernel_every, relocate)
         case "odometry":
             return OdometryTracker(start, settings.motion)
         case "icp":

@@ -18,6 +18,7 @@ from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.evidence_kernels import assemble, pull
 from tactile_lab.tracking.motion import MotionNoise, compose, deviation, planar_motion, row_pose_in_space
+from tactile_lab.tracking.motion_cost import estimated_noise
 from tactile_lab.tracking.pose_evidence import PoseEvidence, third_derivative
 from tactile_lab.tracking.proposals import GraspMatch, ProposalSettings, propose, quasi_normal
 
@@ -225,3 +226,12 @@ def test_quasi_random_samples_are_normal_and_always_the_same() -> None:
     assert np.allclose(drawn.std(axis=0), 1.0, atol=0.05)
     drawn[:] = 0.0
     assert not np.any(np.all(quasi_normal(256, 3) == 0.0, axis=1))
+
+
+@pytest.mark.parametrize("scale", [0.3, 3.0])
+def test_the_noise_of_the_motion_is_learnt_from_the_slips(scale: float) -> None:
+    contact_map = true_map("rectangle", 16)
+    configured = MotionNoise(translation_m=0.010 * scale, rotation_rad=float(np.deg2rad(20.0)) * scale)
+    learnt = estimated_noise(contact_map, configured)
+    assert abs(np.log(learnt.translation_m / 0.010)) < 0.7 * abs(np.log(scale))
+    assert abs(np.log(learnt.rotation_rad / np.deg2rad(20.0))) < 0.7 * abs(np.log(scale))

@@ -1,0 +1,97 @@
+"""Grasps that could not be placed when they came: where they belong is looked for again, with more known.
+
+Two ways lead there: the motion model from the neighbouring grasps, and, if the object was lost, poses anywhere on the
+known object, which need no motion at all (relocation). Nothing is forced: a grasp stays aside unless the evidence
+for all contacts gets better with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.hypotheses import Hypothesis, Judge
+from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.proposals import ProposalSettings, propose
+
+Relocate: TypeAlias = Callable[[ContactMap, ContactSet], Array]
+"""Poses of a grasp's contacts anywhere on the object that a map describes, the best first, shape (m, size)."""
+
+_TRIED = 3
+_LEAST_CONTACTS = 3
+
+
+def relocated(hypothesis: Hypothesis, relocate: Relocate, judge: Judge) -> list[Hypothesis]:
+    """The hypothesis with its last grasp at other places on the object.
+
+    Args:
+        hypothesis: whose last grasp is aside, or on ground that nothing else supports.
+        relocate: proposes places.
+        judge: rates them.
+    """
+    last = len(hypothesis.map.placed) - 1
+    return _placed_at(hypothesis, last, relocate(*_without(hypothesis.map, last)), judge, moved_freely=True)
+
+
+def placed_late(
+    hypothesis: Hypothesis, noise: MotionNoise, settings: ProposalSettings, relocate: Relocate | None, judge: Judge
+) -> Hypothesis:
+    """The hypothesis with grasps that are aside placed, one after the other, where that is likelier.
+
+    Args:
+        hypothesis: to improve.
+        noise: of the motion model.
+        settings: of the search near the predicted pose.
+        relocate: proposes places anywhere; None for none.
+        judge: rates them.
+    """
+    for index, grasp in enumerate(hypothesis.map.placed):
+        if grasp.used or len(grasp.contacts_world) < _LEAST_CONTACTS:
+            continue
+        others, contacts = _without(hypothesis.map, index)
+        space = hypothesis.map.space
+        predicted = space.compose(grasp.motion, hypothesis.map.placed[index - 1].row)
+        near, _ = propose(predicted, contacts, others.fit(), noise.accumulated(2), settings, space)
+        candidates = _placed_at(hypothesis, index, near, judge, moved_freely=False)
+        if relocate is not None:
+            candidates += _placed_at(hypothesis, index, relocate(others, contacts), judge, moved_freely=True)
+        hypothesis = min([hypothesis, *candidates], key=lambda one: one.cost)
+    return hypothesis
+
+
+def _without(contact_map: ContactMap, index: int) -> tuple[ContactMap, ContactSet]:
+    """The map without a grasp, and the grasp's contacts in the world."""
+    placed = contact_map.placed[:index] + contact_map.placed[index + 1 :]
+    return replace(contact_map, placed=placed), contact_map.placed[index].contacts_world
+
+
+def _placed_at(
+    hypothesis: Hypothesis, index: int, rows: Array, judge: Judge, *, moved_freely: bool
+) -> list[Hypothesis]:
+    """The hypothesis with one grasp at the first few poses, smoothed, contacts that do not fit left out."""
+    found = []
+    for row in rows[:_TRIED]:
+        grasp = replace(hypothesis.map.placed[index], row=row, left_out=frozenset(), moved_freely=moved_freely)
+        cleaned, _ = judge.cleaned(_with(hypothesis.map, index, grasp), index)
+        if 2 * len(cleaned.placed[index].kept) > len(grasp.contacts_world):
+            found.append(judge.smoothed(cleaned, 15))
+    return found
+
+
+def _with(contact_map: ContactMap, index: int, grasp: PlacedGrasp) -> ContactMap:
+    placed = list(contact_map.placed)
+    placed[index] = grasp
+    following = np.flatnonzero(~np.array([one.used for one in placed]))
+    for after in [int(i) for i in following if i > index]:  # grasps aside go where the motion leads them from here
+        if any(one.used for one in placed[index + 1 : after]):
+            break
+        placed[after] = replace(
+            placed[after], row=contact_map.space.compose(placed[after].motion, placed[after - 1].row)
+        )
+    return replace(contact_map, placed=tuple(placed))
