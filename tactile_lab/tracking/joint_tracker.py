@@ -37,6 +37,10 @@ _POOR_GAIN = 2.5
 """Evidence (natural logarithm) that a contact brings on unknown ground, at most; on known ground it is 6 to 10."""
 
 
+_BACKWARD_HYPOTHESES = 2
+"""Kept when a session is read backwards: a second opinion need not be as thorough as the first."""
+
+
 class JointSettings(StrictModel):
     """Parameters of the hypotheses.
 
@@ -180,7 +184,9 @@ class JointTracker:
         """The hypotheses that the same grasps give in the opposite order."""
         placed, space = self.map.placed, self._space
         last = replace(placed[-1], left_out=frozenset(), covariance=placed[0].covariance)
-        tracker = JointTracker(replace(self.map, placed=(last,)), self._noise, self._settings, self._kernel_every)
+        fewer = {"hypotheses": _BACKWARD_HYPOTHESES, "smoothed": 2 * _BACKWARD_HYPOTHESES}
+        settings = self._settings.model_copy(update=fewer)
+        tracker = JointTracker(replace(self.map, placed=(last,)), self._noise, settings, self._kernel_every)
         for grasp, later in zip(placed[-2::-1], placed[:0:-1], strict=True):
             tracker.predict(space.inverse(later.motion))
             tracker.weigh(grasp.contacts_world)
