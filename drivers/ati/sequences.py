@@ -15,15 +15,21 @@ def _step(newer: int, older: int) -> int:
 class SequenceMonitor:
     """Follows the two counters of one sensor.
 
+    Args:
+        stuck_after: records with the same ft_sequence in a row after which the sensor counts as stuck.
+        step: how far ft_sequence moves from record to record (7000 / rate); 0 when that is not known.
+
     Attributes:
         seen: records taken.
         lost: records that the box sent and that never arrived.
+        skipped: records that the box should have sent by its own measuring rate and did not.
         disordered: records that came after a newer one, or twice.
         restarts: times the box began a new stream.
     """
 
-    def __init__(self) -> None:
-        self.seen = self.lost = self.disordered = self.restarts = 0
+    def __init__(self, stuck_after: int = STUCK_AFTER, step: int = 0) -> None:
+        self.seen = self.lost = self.skipped = self.disordered = self.restarts = 0
+        self._stuck_after, self._expected = stuck_after, step
         self._rdt: int | None = None
         self._ft = 0
         self._repeats = 0
@@ -41,14 +47,21 @@ class SequenceMonitor:
     @property
     def stuck(self) -> bool:
         """The box sends records, but the sensor behind it has stopped measuring."""
-        return self._repeats >= STUCK_AFTER
+        return self._repeats >= self._stuck_after
 
     def _follows(self, rdt_sequence: int, ft_sequence: int, previous: int) -> bool:
         step = _step(rdt_sequence, previous)
         if step > 0:
             self.lost += step - 1
+            self._note_skipped(step, _step(ft_sequence, self._ft))
             return True
         if _step(ft_sequence, self._ft) > 0:  # sent from the beginning again, measured later: a new stream
             self.restarts += 1
             return True
         return False
+
+    def _note_skipped(self, records: int, measured: int) -> None:
+        """Compare what was measured between two records with what should have been."""
+        if self._expected:
+            surplus = measured - records * self._expected
+            self.skipped += max(0, surplus + self._expected // 2) // self._expected

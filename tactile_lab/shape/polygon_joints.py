@@ -15,7 +15,7 @@ from tactile_lab.shape.surface import Contour
 _LEAST_TURN = 0.12
 """Sine of the least angle between two faces whose lines are intersected, 7 degrees; flatter ones are bridged."""
 
-_SLACK_SIGMAS = 5.0
+_SLACK_SIGMAS = 8.0
 """A corner may lie so many standard deviations of a contact behind the outermost contacts of its faces."""
 
 _LARGEST_CORNER_SIGMA_m = 0.015

@@ -37,7 +37,7 @@ _POOR_GAIN = 2.5
 """Evidence (natural logarithm) that a contact brings on unknown ground, at most; on known ground it is 6 to 10."""
 
 
-_BACKWARD_HYPOTHESES = 2
+_BACKWARD_HYPOTHESES = 4
 """Kept when a session is read backwards: a second opinion need not be as thorough as the first."""
 
 

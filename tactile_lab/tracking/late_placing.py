@@ -80,8 +80,15 @@ def _placed_at(
         grasp = replace(hypothesis.map.placed[index], row=row, left_out=frozenset(), moved_freely=moved_freely)
         cleaned, _ = judge.cleaned(_with(hypothesis.map, index, grasp), index)
         if 2 * len(cleaned.placed[index].kept) > len(grasp.contacts_world):
-            found.append(judge.smoothed(cleaned, 15))
+            found.append(_following(judge.smoothed(cleaned, 15), index, judge))
     return found
+
+
+def _following(hypothesis: Hypothesis, index: int, judge: Judge) -> Hypothesis:
+    """The hypothesis with one grasp as the motion model has it after all, if that is no less likely."""
+    placed = list(hypothesis.map.placed)
+    placed[index] = replace(placed[index], moved_freely=False)
+    return min(judge.rated(replace(hypothesis.map, placed=tuple(placed))), hypothesis, key=lambda one: one.cost)
 
 
 def _with(contact_map: ContactMap, index: int, grasp: PlacedGrasp) -> ContactMap:
