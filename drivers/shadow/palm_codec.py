@@ -114,6 +114,9 @@ class PalmCommand:
         motor_data: one word a motor, shape (20,), by motor number.
         tactile_data_type: what the fingertips shall answer.
         can: frame for the CAN bridge.
+        imu_command: 0240 only: 1 sets the scales below.
+        imu_scales: 0240 only: accelerometer and gyroscope.
+        aux_data_type: 0230 only: what its auxiliary sensors shall answer.
     """
 
     edc_command: int = EdcCommand.INVALID
@@ -123,6 +126,24 @@ class PalmCommand:
     motor_data: Sequence[int] | NDArray[np.integer[Any]] = (0,) * MOTORS
     tactile_data_type: int = 0
     can: CanFrame = field(default_factory=CanFrame)
+    imu_command: int = 0
+    imu_scales: tuple[int, int] = (0, 0)
+    aux_data_type: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class PalmAuxiliary:
+    """What only the 0230 palm sends.
+
+    Attributes:
+        links: tactile words of the middle (first four) and proximal links, shape (5, 8), by finger.
+        data_type: type of the auxiliary words.
+        words: auxiliary sensors, shape (16,).
+    """
+
+    links: NDArray[np.uint16]
+    data_type: int
+    words: NDArray[np.uint16]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,9 +161,10 @@ class PalmStatus:
         misc: the requested value of each packet, shape (10,), unsigned 16 bits.
         tactile_data_type: type of the fingertips' answer.
         tactile_valid: bit 0 FF, 1 MF, 2 RF, 3 LF, 4 TH.
-        tactile: raw fingertip slots, shape (5, 16), bytes.
+        tactile: raw fingertip slots, shape (5, 16), bytes; (5, 32) of a 0230.
         idle_time_us: spare time in the palm's cycle; healthy above 50.
         can: frame from the CAN bridge.
+        auxiliary: what only the 0230 sends.
     """
 
     edc_command: int
@@ -158,6 +180,7 @@ class PalmStatus:
     tactile: NDArray[np.uint8]
     idle_time_us: int
     can: CanFrame = field(default_factory=CanFrame)
+    auxiliary: PalmAuxiliary | None = None
 
     @property
     def written(self) -> bool:

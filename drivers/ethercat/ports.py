@@ -1,0 +1,163 @@
+"""Where EtherCAT frames leave and arrive: a network interface's raw socket, or slaves in the same process."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import select
+import socket
+from collections import deque
+from typing import Protocol
+
+from drivers.ethercat.frames import ETHERTYPE
+from tactile_lab.errors import DeviceError
+
+_LARGEST_FRAME = 1600
+_NEEDS_RIGHT = (
+    "Grant it once with: sudo setcap cap_net_raw+ep PATH, for the python that runs this program, or run it as root"
+)
+
+
+class Port(Protocol):
+    """Sends and receives whole Ethernet frames. ``name`` is the interface's."""
+
+    name: str
+
+    @property
+    def hardware_address(self) -> bytes:
+        """Six bytes; zeros where there is no hardware."""
+
+    def open(self) -> None:
+        """Make ready; repeatable, all or nothing. Raises DeviceError."""
+
+    def close(self) -> None:
+        """Release everything; idempotent."""
+
+    def send(self, frame: bytes) -> None:
+        """Send one frame. Raises DeviceError when the interface is gone."""
+
+    def receive(self, timeout_s: float) -> bytes | None:
+        """The next frame that has arrived, waiting at most so long; None for none. Raises DeviceError as ``send``."""
+
+
+class RawPort:
+    """A network interface on a raw packet socket; Linux, with the right to use raw sockets.
+
+    The socket never blocks: waiting is done by polling with a time limit, which keeps a lost frame from costing more
+    than that limit.
+    """
+
+    def __init__(self, interface: str) -> None:
+        self.name = interface
+        self._socket: socket.socket | None = None
+        self._poll = select.poll()
+        self._hardware_address = bytes(6)
+
+    @property
+    def hardware_address(self) -> bytes:
+        return self._hardware_address
+
+    def open(self) -> None:
+        if self._socket is not None:
+            return
+        self._check_name()
+        raw = self._raw_socket()
+        try:
+            raw.setblocking(False)
+            raw.bind((self.name, ETHERTYPE))
+            self._hardware_address = bytes(raw.getsockname()[4])
+        except OSError as error:
+            raw.close()
+            raise self._failed(error) from error
+        self._socket, self._poll = raw, select.poll()
+        self._poll.register(raw, select.POLLIN)
+
+    def close(self) -> None:
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def send(self, frame: bytes) -> None:
+        try:
+            self._opened().send(frame)
+        except BlockingIOError:
+            return  # the interface's queue is full: the frame is lost as on a bad cable, and counted where it is missed
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def receive(self, timeout_s: float) -> bytes | None:
+        raw = self._opened()
+        try:
+            with contextlib.suppress(BlockingIOError):
+                return raw.recv(_LARGEST_FRAME)
+            if not self._poll.poll(max(timeout_s, 0.0) * 1000.0):
+                return None
+            return raw.recv(_LARGEST_FRAME)
+        except BlockingIOError:
+            return None
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def _opened(self) -> socket.socket:
+        if self._socket is None:
+            raise DeviceError("the interface is not open", where=self.name, hint="Connect the device first")
+        return self._socket
+
+    def _check_name(self) -> None:
+        present = [name for _, name in socket.if_nameindex()]
+        if self.name not in present:
+            raise DeviceError("no such network interface", where=self.name, hint=f"Present are {', '.join(present)}")
+
+    def _raw_socket(self) -> socket.socket:
+        try:
+            return socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(ETHERTYPE))
+        except PermissionError as error:
+            raise DeviceError("no permission for raw sockets", where=self.name, hint=_NEEDS_RIGHT) from error
+        except (AttributeError, OSError) as error:
+            raise DeviceError(f"no raw sockets here ({error})", where=self.name, hint="Use Linux") from error
+
+    def _failed(self, error: OSError) -> DeviceError:
+        if error.errno in (errno.ENETDOWN, errno.ENXIO, errno.ENODEV):
+            hint = f"Plug the cable in and set it up: sudo ip link set {self.name} up"
+            return DeviceError("the network interface is down or gone", where=self.name, hint=hint)
+        return DeviceError(f"the network interface failed ({error})", where=self.name, hint="Check the adapter")
+
+
+class Ring(Protocol):
+    """Slaves that a frame runs through."""
+
+    def process(self, frame: bytes) -> bytes | None:
+        """The frame after it has passed all slaves; None when it got lost."""
+
+
+class MemoryPort:
+    """A port whose cable leads to slaves in the same process."""
+
+    def __init__(self, ring: Ring, name: str = "memory") -> None:
+        self.name, self._ring = name, ring
+        self._arrived: deque[bytes] = deque()
+        self._open = False
+
+    @property
+    def hardware_address(self) -> bytes:
+        return bytes(6)
+
+    def open(self) -> None:
+        self._open = True
+
+    def close(self) -> None:
+        self._open = False
+        self._arrived.clear()
+
+    def send(self, frame: bytes) -> None:
+        self._check_open()
+        if (answer := self._ring.process(frame)) is not None:
+            self._arrived.append(answer)
+
+    def receive(self, timeout_s: float) -> bytes | None:
+        self._check_open()
+        return self._arrived.popleft() if self._arrived else None
+
+    def _check_open(self) -> None:
+        if not self._open:
+            raise DeviceError("the interface is not open", where=self.name, hint="Connect the device first")
