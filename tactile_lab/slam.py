@@ -220,7 +220,7 @@ class TactileSlam:
         if self._tracker is not None:
             self._tracker.finish()
             self._tracker.adopt(self._back_end.close_all_loops(self._tracker.map))
-            self._tracker.adopt(self._tracker.map.with_best_kernel(max_iterations=30))
+            self._tracker.adopt(self._tracker.map.with_best_kernel(max_iterations=30, longest_m=0.300))
         contour, mesh = self._extract()
         return SlamResult(
             method=self._settings.method,

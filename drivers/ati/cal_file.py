@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from drivers.ati.xml_text import parse_xml
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
 
@@ -29,7 +30,25 @@ TORQUE_UNITS_Nm = {
     "lbf-ft": 4.4482216152605 * 0.3048,
     "kg-cm": 9.80665e-2,
 }
-_LARGEST_FILE = 1 << 20
+
+
+@dataclass(frozen=True)
+class TemperatureTerms:
+    """Correction of the gauges by the thermistor: (V + bias_slope (T - T0)) / (1 - gain_slope (T - T0)).
+
+    Attributes:
+        bias_slopes, gain_slopes: of each gauge, shape (6,).
+        thermistor_V: T0, the thermistor's reading at calibration.
+    """
+
+    bias_slopes: Array
+    gain_slopes: Array
+    thermistor_V: float
+
+    def corrected(self, volts: Array, thermistor_V: Array) -> Array:
+        """Gauge volts (..., 6) as they would be at the calibration's temperature; ``thermistor_V`` (...,)."""
+        off = (thermistor_V - self.thermistor_V)[..., None]
+        return np.asarray((volts + self.bias_slopes * off) / (1.0 - self.gain_slopes * off))
 
 
 @dataclass(frozen=True)
@@ -43,6 +62,8 @@ class AtiCalibration:
             reading is volts for a DAQ sensor and counts for a Net F/T box.
         user_rows: the file's own working matrix (version 1.1), or None.
         ranges: calibrated range of each axis, file's units, shape (6,).
+        output_range_V: span of the amplifier's output, so that +-10 V is 20; None for a Net F/T box.
+        temperature: how the gauges follow the temperature, or None where the file does not say.
     """
 
     serial: str
@@ -53,6 +74,8 @@ class AtiCalibration:
     matrix: Array
     user_rows: Array | None
     ranges: Array
+    output_range_V: float | None = None
+    temperature: TemperatureTerms | None = None
 
     @property
     def working_matrix(self) -> Array:
@@ -95,20 +118,12 @@ def load(path: Path) -> AtiCalibration:
 
 
 def _parse(path: Path) -> ET.Element:
-    """The XML root. Document types are refused: entities can read files or grow without end."""
     try:
-        content = path.read_bytes()
+        return parse_xml(path.read_bytes())
     except OSError as error:
         raise ConfigurationError(f"cannot be read ({error.strerror})", where=str(path)) from error
-    if len(content) > _LARGEST_FILE:
-        raise ConfigurationError("is too large for a calibration", where=str(path))
-    text = content.replace(b"\0", b"").upper()  # also finds the words in UTF-16
-    if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
-        raise ConfigurationError("carries a document type or entities", where=str(path), hint="Use ATI's own file")
-    try:
-        return ET.fromstring(content)
-    except (ET.ParseError, ValueError, LookupError) as error:
-        raise ConfigurationError(f"is not valid XML ({error})", where=str(path)) from error
+    except ValueError as error:
+        raise ConfigurationError(str(error), where=str(path), hint="Use ATI's own file") from error
 
 
 def _daq_sensor(root: ET.Element) -> AtiCalibration:
@@ -133,6 +148,20 @@ def _daq_sensor(root: ET.Element) -> AtiCalibration:
         matrix=transform @ internal,
         user_rows=np.array([_numbers(user[n].attrib["values"], 6) for n in AXES]) if user else None,
         ranges=np.array([_number(axes[n].attrib["max"]) for n in AXES]),
+        output_range_V=_number(calibration.attrib.get("OutputRange", "20")),
+        temperature=_temperature_terms(calibration),
+    )
+
+
+def _temperature_terms(calibration: ET.Element) -> TemperatureTerms | None:
+    """The terms where the file carries them, as most files of sensors with compensation in hardware do not."""
+    bias, gain, thermistor = (calibration.find(tag) for tag in ("BiasSlope", "GainSlope", "Thermistor"))
+    if bias is None or gain is None or thermistor is None:
+        return None
+    return TemperatureTerms(
+        bias_slopes=_numbers(bias.attrib["values"], 6),
+        gain_slopes=_numbers(gain.attrib["values"], 6),
+        thermistor_V=_number(thermistor.attrib["value"]),
     )
 
 

@@ -24,10 +24,12 @@ from drivers.ati.plausibility import PlausibilitySettings, WrenchJudge, objectio
 from drivers.ati.rdt_codec import Severity, describe_status
 from drivers.ati.sequences import SequenceMonitor
 from drivers.fingertip import GRAVITY, FingertipCalibration, TipContact
+from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import DeviceError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.strict_yaml import StrictModel
 
+AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 CAPTURE_LIMIT = 1000
 """Samples a capture keeps, the newest: a capture that nobody ends must not grow without bound."""
 
@@ -41,7 +43,8 @@ class WrenchSample:
         wrench: what acts on the fingertip, its weight and the sensor's bias included: force (N) then torque (N m),
             shape (6,), sensor frame.
         rdt_sequence, ft_sequence: the box's counters of sent and of measured records.
-        status: the box's status word, 0 when healthy.
+        status: the status word of a Net F/T box, 0 when healthy.
+        faults: what a wire found wrong with the reading, in words; the reading is void when there is anything.
     """
 
     stamp_ns: int
@@ -49,16 +52,26 @@ class WrenchSample:
     rdt_sequence: int
     ft_sequence: int
     status: int = 0
+    faults: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Tare:
-    """When and why the bias was taken. ``bias`` has shape (6,), N and N m, sensor frame, without the tip's weight."""
+    """When and why the bias was taken.
+
+    Attributes:
+        stamp_ns, reason, samples: of the newest sample, for people, and how many were averaged.
+        bias: shape (6,), N and N m, sensor frame, without the tip's weight.
+        moved: how far the bias is from the one before, shape (6,); None for the first.
+        since_s: seconds since the one before.
+    """
 
     stamp_ns: int
     reason: str
     samples: int
     bias: Array
+    moved: Array | None = None
+    since_s: float = 0.0
 
 
 class ForceTipSettings(StrictModel):
@@ -72,6 +85,9 @@ class ForceTipSettings(StrictModel):
         tare_samples: the newest samples that a tare averages.
         tare_spread_N, tare_spread_Nm: how far they may lie apart, largest minus smallest on any axis.
         lost_share: share of lost records that is reported as a problem.
+        limit_share: a reading beyond this share of the range, on any axis, counts as an infinite load, so that motion
+            stops: what a Nano17 survives beyond its range is not published.
+        drift_limit_N, drift_limit_Nm: a bias that has moved farther since the tare before is reported.
         plausibility: limits of what one contact can do.
     """
 
@@ -83,16 +99,25 @@ class ForceTipSettings(StrictModel):
     tare_spread_N: float = Field(default=0.05, gt=0.0)
     tare_spread_Nm: float = Field(default=5e-4, gt=0.0)
     lost_share: float = Field(default=0.01, ge=0.0)
+    limit_share: float = Field(default=0.8, gt=0.0, le=1.0)
+    drift_limit_N: float = Field(default=0.1, gt=0.0)
+    drift_limit_Nm: float = Field(default=1e-3, gt=0.0)
     plausibility: PlausibilitySettings = PlausibilitySettings()
 
 
 class ForceTip:
     """Bias, weight, load, contact and health of one force fingertip (a :class:`FingertipSensor`)."""
 
-    def __init__(self, finger: str, calibration: FingertipCalibration, settings: ForceTipSettings) -> None:
+    def __init__(
+        self,
+        finger: str,
+        calibration: FingertipCalibration,
+        settings: ForceTipSettings,
+        sequences: SequenceMonitor | None = None,
+    ) -> None:
         self.finger = finger
         self.calibration = calibration
-        self.sequences = SequenceMonitor()
+        self.sequences = sequences or SequenceMonitor()
         self.tare_record: Tare | None = None
         self.newest: WrenchSample | None = None
         self._newest_usable = False
@@ -139,21 +164,37 @@ class ForceTip:
                 f"samples differ by {spread[:3].max():.3f} N and {1e3 * spread[3:].max():.2f} N mm",
                 "Hold the hand still and free of contact",
             )
-        self._bias = window.mean(axis=0) - self._weight(world_R_distal)
-        self.tare_record = Tare(self.newest.stamp_ns, reason, len(window), self._bias)
+        before, self._bias = self.tare_record, window.mean(axis=0) - self._weight(world_R_distal)
+        moved = None if before is None else self._bias - before.bias
+        since_s = 0.0 if before is None else (self.newest.stamp_ns - before.stamp_ns) / NANOSECONDS
+        self.tare_record = Tare(self.newest.stamp_ns, reason, len(window), self._bias, moved, since_s)
 
     def load(self, wrench: Array, world_R_distal: Array) -> Array:
         """What the object does to the tip: the measured wrench without bias and weight, shape (6,), sensor frame."""
         return np.asarray(wrench - self._bias - self._weight(world_R_distal))
 
     def load_N(self, world_R_distal: Array) -> float:
-        """Contact force of the newest sample; 0 before the first, infinite when it is void, so that motion stops."""
+        """Contact force of the newest sample; 0 before the first.
+
+        Infinite, so that motion stops, when the sample is void or the sensor is near the end of its range.
+        """
         if self.newest is None:
             return 0.0
-        if not self._newest_usable:
+        if not self._newest_usable or self.overload:
             return math.inf
         force_N = self.load(self.newest.wrench, world_R_distal)[:3]
         return math.sqrt(force_N @ force_N)
+
+    @property
+    def overload(self) -> str:
+        """Which axis of the newest sample is beyond its limit, in words; empty when none is."""
+        if self.newest is None:
+            return ""
+        share = np.abs(self.newest.wrench) / self._range
+        if not (share > self._settings.limit_share).any():
+            return ""
+        axis = int(np.argmax(share))
+        return f"{AXES[axis]} at {100 * share[axis]:.0f} % of the calibration range"
 
     def begin_capture(self) -> None:
         """From here on samples are gathered for :meth:`contact`."""
@@ -182,13 +223,27 @@ class ForceTip:
     def health(self) -> tuple[str, ...]:
         """What is wrong with the sensor, in words; empty when all is well."""
         problems = list(describe_status(self.newest.status).messages) if self.newest else ["no sample received yet"]
+        if self.newest:
+            problems += self.newest.faults
         if self.newest and np.any(np.abs(self.newest.wrench) > self._range):
             problems.append("reading beyond the calibration range")
+        elif overload := self.overload:
+            problems.append(overload)
         if self._void:
             problems.append(f"{self._void} void samples left out")
         if self.tare_record is None:
             problems.append("not tared")
-        return (*problems, *self._sequence_problems(), *filter(None, [self._judge.fault]))
+        return (*problems, *self._sequence_problems(), *filter(None, [self._drift(), self._judge.fault]))
+
+    def _drift(self) -> str:
+        """How the bias has moved between the last two tares, when it is too far."""
+        tare, limits = self.tare_record, self._settings
+        if tare is None or tare.moved is None:
+            return ""
+        force_N, moment_Nm = np.abs(tare.moved[:3]).max(), np.abs(tare.moved[3:]).max()
+        if force_N <= limits.drift_limit_N and moment_Nm <= limits.drift_limit_Nm:
+            return ""
+        return f"the bias moved by {force_N:.2f} N and {1e3 * moment_Nm:.2f} N mm in {tare.since_s:.0f} s"
 
     def _sequence_problems(self) -> list[str]:
         monitor, problems = self.sequences, []
@@ -196,11 +251,20 @@ class ForceTip:
             problems.append("the sensor behind the box has stopped measuring (its counter does not move)")
         if monitor.lost > self._settings.lost_share * (monitor.seen + monitor.lost):
             problems.append(f"{monitor.lost} of {monitor.seen + monitor.lost} records lost")
+        if monitor.skipped > self._settings.lost_share * (monitor.seen + monitor.skipped):
+            problems.append(f"the box left out {monitor.skipped} records that its rate asks for")
+        if monitor.disordered:
+            problems.append(f"{monitor.disordered} records out of order or twice")
         return problems
 
     def _usable(self, sample: WrenchSample) -> bool:
         healthy = describe_status(sample.status).severity < Severity.FAULT if sample.status else True
-        return healthy and not self.sequences.stuck and bool((np.abs(sample.wrench) <= self._range).all())
+        return (
+            healthy
+            and not sample.faults
+            and not self.sequences.stuck
+            and bool((np.abs(sample.wrench) <= self._range).all())
+        )
 
     def _weight(self, world_R_distal: Array) -> Array:
         """The tip's own weight as the sensor feels it, shape (6,), sensor frame."""

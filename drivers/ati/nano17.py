@@ -1,32 +1,49 @@
-"""An ATI Nano17 fingertip behind a Net F/T box: the device that owns the RDT stream (protocols C.1, F)."""
+"""An ATI Nano17 fingertip: one device over every way its readings can come (protocols C, F).
+
+A Net F/T box over UDP is the usual one; :mod:`drivers.ati.wire` says what a wire is, and lists nothing: the wires are
+:mod:`~drivers.ati.rdt_wire`, :mod:`~drivers.ati.digital_wire`, :mod:`~drivers.ati.controller_wire`,
+:mod:`~drivers.ati.can_wire` and :mod:`~drivers.ati.gauge_volts`.
+"""
 
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Sequence
 
 import numpy as np
 from pydantic import Field
 
-from drivers.ati import rdt_codec
+from drivers.ati.conversation import Conversation
 from drivers.ati.force_tip import ForceTip, ForceTipSettings, WrenchSample
-from drivers.ati.rdt_codec import Command
-from drivers.fingertip import FingertipCalibration
+from drivers.ati.intrinsic_contact import wrench_transform
+from drivers.ati.rdt_wire import RdtWire
+from drivers.ati.sequences import SequenceMonitor
+from drivers.ati.wire import ForceWire
+from drivers.fingertip import FingertipCalibration, RigidTransform
 from drivers.links import Datagram, Link
-from tactile_lab.clock import Clock
+from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import CodecError, DeviceError
+from tactile_lab.geometry.contacts import Array
+
+_MINUTE_ns = 60 * NANOSECONDS
 
 
 class Nano17Settings(ForceTipSettings):
-    """Settings of the box beside those of the fingertip.
+    """Settings of the sensor beside those of the fingertip.
 
     Attributes:
-        counts_per_N, counts_per_Nm: the box's own figures (its configuration page: cfgcpf, cfgcpt).
-        silent_ms: time without any record after which the sensor counts as silent.
+        counts_per_N, counts_per_Nm: a Net F/T box's own figures (its configuration page: cfgcpf, cfgcpt).
+        silent_ms: time without any sample after which the sensor counts as silent.
+        sensor_T_tool: frame in which the readings are wanted, in the frame in which the device gives them; the
+            fingertip's ``distal_T_sensor`` then is that of the tool frame.
+        tare_minutes: age of a tare that is reported as a problem: readings wander with the temperature.
     """
 
     counts_per_N: float = Field(default=1_000_000.0, gt=0.0)
     counts_per_Nm: float = Field(default=1_000_000.0, gt=0.0)
     silent_ms: float = Field(default=100.0, gt=0.0)
+    sensor_T_tool: RigidTransform | None = None
+    tare_minutes: float = Field(default=30.0, gt=0.0)
 
 
 class Nano17(ForceTip):
@@ -34,45 +51,69 @@ class Nano17(ForceTip):
 
     :meth:`poll` and :meth:`receive` only decode. Whoever drives the session hands the samples to :meth:`update`, live
     and in replay alike.
+
+    Args:
+        finger: which.
+        link: to the device.
+        clock: the session's.
+        calibration: of the fingertip.
+        settings: limits and scale.
+        wire: how the readings come; a Net F/T box of the settings' scale unless given.
+
+    Attributes:
+        foreign_datagrams: messages that were none of this device.
+        silences: times the sensor was silent for longer than ``silent_ms``.
+        stamp_jumps: times a sample was stamped before the one that came before it.
     """
 
     def __init__(
-        self, finger: str, link: Link, clock: Clock, calibration: FingertipCalibration, settings: Nano17Settings
+        self,
+        finger: str,
+        link: Link,
+        clock: Clock,
+        calibration: FingertipCalibration,
+        settings: Nano17Settings,
+        wire: ForceWire | None = None,
     ) -> None:
-        super().__init__(finger, calibration, settings)
-        self.foreign_datagrams = 0
+        self.wire = wire or RdtWire(settings.counts_per_N, settings.counts_per_Nm)
+        super().__init__(finger, calibration, settings, SequenceMonitor(self.wire.stuck_after, self.wire.step))
+        self.foreign_datagrams = self.silences = self.stamp_jumps = 0
         self._link, self._clock, self._box = link, clock, settings
-        self._counts_per_unit = np.repeat([settings.counts_per_N, settings.counts_per_Nm], 3)
+        self._to_tool = _to_tool(settings.sensor_T_tool)
         self._connected = False
 
     def connect(self) -> None:
         """Open the link, end any stream an earlier client left running, and start ours. All or nothing; repeatable.
 
         Raises:
-            DeviceError: the link can not be opened or used.
+            DeviceError: the link can not be opened or used, or the device is not there or not the right one.
         """
         if self._connected:
             return
         self._link.open()
         try:
-            self._link.send(rdt_codec.encode_request(Command.STOP))
-            self._link.send(rdt_codec.encode_request(Command.START))
-        except DeviceError:
+            self.wire.start(Conversation(self._link, self._clock, self.wire.receive))
+            self._check_ranges()
+        except BaseException:
             self._link.close()
             raise
         self._connected = True
 
     def close(self) -> None:
-        """End the stream and close the link; idempotent. A box that is gone already is no error."""
+        """End the stream and close the link; idempotent. A device that is gone already is no error."""
         if not self._connected:
             return
         self._connected = False
         with contextlib.suppress(DeviceError):  # the link is given up anyway
-            self._link.send(rdt_codec.encode_request(Command.STOP))
+            self.wire.stop(self._link)
         self._link.close()
 
+    def ask(self) -> None:
+        """Ask for the next reading where the wire needs it. Raises DeviceError."""
+        self.wire.ask(self._link)
+
     def poll(self) -> list[WrenchSample]:
-        """Everything that waits on the link, decoded, oldest first; datagrams of strangers are counted.
+        """Everything that waits on the link, decoded, oldest first; messages of strangers are counted.
 
         Raises:
             DeviceError: the link failed.
@@ -83,24 +124,74 @@ class Nano17(ForceTip):
                 samples += self.receive(datagram)
             except CodecError:
                 self.foreign_datagrams += 1
+        self.ask()
         return samples
 
     def receive(self, datagram: Datagram) -> list[WrenchSample]:
-        """Decode one datagram; changes nothing.
+        """Decode one message; changes nothing but the wire's own state.
 
         Raises:
-            CodecError: it holds no RDT records.
+            CodecError: it is none of this device.
         """
-        return [
-            WrenchSample(datagram.stamp_ns, np.array(counts) / self._counts_per_unit, rdt_sequence, ft_sequence, status)
-            for rdt_sequence, ft_sequence, status, *counts in rdt_codec.records(datagram.payload)
-        ]
+        samples = self.wire.receive(datagram)
+        if self._to_tool is None:
+            return samples
+        return [_in_tool_frame(sample, self._to_tool) for sample in samples]
+
+    def update(self, samples: Sequence[WrenchSample]) -> None:
+        """As :meth:`ForceTip.update`; counts the silences between samples, and stamps that go back."""
+        if samples and self.newest:
+            gap_ns = samples[0].stamp_ns - self.newest.stamp_ns
+            self.silences += gap_ns > self._box.silent_ms * 1e6
+            self.stamp_jumps += gap_ns < 0
+        super().update(samples)
 
     def health(self) -> tuple[str, ...]:
-        """As :meth:`ForceTip.health`, and whether the box still sends."""
-        problems = list(super().health())
-        if self.newest and (silent := (self._clock.now_ns() - self.newest.stamp_ns) / 1e6) > self._box.silent_ms:
+        """As :meth:`ForceTip.health`, and whether the device still sends, and what its wire says."""
+        problems = [*super().health(), *self.wire.health()]
+        now_ns = self._clock.now_ns()
+        if self.newest and (silent := (now_ns - self.newest.stamp_ns) / 1e6) > self._box.silent_ms:
             problems.append(f"no record for {silent:.0f} ms")
+        if self.silences:
+            problems.append(f"silent {self.silences} times for more than {self._box.silent_ms:.0f} ms")
+        if self.stamp_jumps:
+            problems.append(f"stamps went back {self.stamp_jumps} times: the computer's clock was set")
         if self.foreign_datagrams:
-            problems.append(f"{self.foreign_datagrams} datagrams that are no RDT records")
+            problems.append(f"{self.foreign_datagrams} messages that are none of this sensor")
+        if self.tare_record and (age := (now_ns - self.tare_record.stamp_ns) / _MINUTE_ns) > self._box.tare_minutes:
+            problems.append(f"tared {age:.0f} minutes ago")
         return tuple(problems)
+
+    def _check_ranges(self) -> None:
+        """A sensor of another calibration than the settings' would be judged by wrong limits."""
+        told = self.wire.ranges_SI
+        if told is not None and np.any(self._range > told * (1 + 1e-6)):
+            raise DeviceError(
+                f"the sensor's calibrated range is {_in_words(told)}, the settings say {_in_words(self._range)}",
+                where=self._link.name,
+                hint="Correct nano17.force_range_N and nano17.torque_range_Nm in the rig file",
+            )
+
+
+def _to_tool(sensor_T_tool: RigidTransform | None) -> Array | None:
+    """Matrix (6, 6) that moves a wrench from the sensor frame to the tool frame."""
+    if sensor_T_tool is None:
+        return None
+    tool_T_sensor = sensor_T_tool.pose().inverse()
+    return wrench_transform(tool_T_sensor.rotation().matrix(), tool_T_sensor.translation())
+
+
+def _in_tool_frame(sample: WrenchSample, to_tool: Array) -> WrenchSample:
+    return WrenchSample(
+        sample.stamp_ns,
+        to_tool @ sample.wrench,
+        sample.rdt_sequence,
+        sample.ft_sequence,
+        sample.status,
+        sample.faults,
+    )
+
+
+def _in_words(ranges: Array) -> str:
+    force, torque = (" ".join(f"{value:g}" for value in part) for part in (ranges[:3], 1e3 * ranges[3:]))
+    return f"{force} N, {torque} N mm"

@@ -126,8 +126,8 @@ class RawPort:
 class Ring(Protocol):
     """Slaves that a frame runs through."""
 
-    def process(self, frame: bytes) -> bytes | None:
-        """The frame after it has passed all slaves; None when it got lost."""
+    def process(self, frame: bytes) -> list[bytes]:
+        """What comes back when a frame is sent: usually that frame, nothing when it got lost."""
 
 
 class MemoryPort:
@@ -151,8 +151,7 @@ class MemoryPort:
 
     def send(self, frame: bytes) -> None:
         self._check_open()
-        if (answer := self._ring.process(frame)) is not None:
-            self._arrived.append(answer)
+        self._arrived.extend(self._ring.process(frame))
 
     def receive(self, timeout_s: float) -> bytes | None:
         self._check_open()

@@ -16,7 +16,8 @@ from drivers.shadow.motor_data import ToMotor
 from drivers.shadow.motor_polling import MotorPolling
 from drivers.shadow.motor_watch import Fault, MotorWatch
 from drivers.shadow.motors import MotorMap
-from drivers.shadow.palm_codec import MOTORS, EdcCommand, PalmCommand, encode_command
+from drivers.shadow.palm_codec import MOTORS, EdcCommand, PalmCommand
+from drivers.shadow.palm_images import PALMS
 from drivers.shadow.position_control import PositionControl
 from drivers.shadow.tactile_requests import TactileRotation
 from tactile_lab.clock import NANOSECONDS, Clock
@@ -55,7 +56,7 @@ class ShadowHand:
     demands become zero and every further :meth:`exchange` raises, until :meth:`resume`.
 
     Args:
-        link: whole process images, 70 bytes out and 232 bytes in.
+        link: whole process images of the palm named in the settings.
         clock: the session's clock.
         calibration: of the hand's joints.
         settings: see :class:`HandSettings`.
@@ -75,7 +76,8 @@ class ShadowHand:
         motors = motors or MotorMap.load()
         self._control = PositionControl(motors, self._settings.gains)
         self._watch = MotorWatch(motors, self._settings.heat, link.name)
-        self._decoder = HandDecoder(calibration)
+        self._image = PALMS[self._settings.palm]
+        self._decoder = HandDecoder(calibration, self._image)
         self._connected = False
         self._reset()
 
@@ -124,8 +126,25 @@ class ShadowHand:
         finally:
             self._link.close()
 
+    def reconnect(self) -> int:
+        """Close the link without ceremony, open it again and wake the palm, after a fault or a loss of the link.
+
+        Nothing moves afterwards until :meth:`set_targets`.
+
+        Returns:
+            How long it took, nanoseconds.
+
+        Raises:
+            DeviceError: the hand does not come back; it is disconnected then.
+        """
+        started_ns = self._clock.now_ns()
+        self._connected = False
+        self._link.close()
+        self.connect()
+        return self._clock.now_ns() - started_ns
+
     def _wake_palm(self) -> None:
-        self._link.send(encode_command(PalmCommand()))
+        self._link.send(self._image.encode_command(PalmCommand()))
         self._take(self._link.receive())
         for _ in range(self._settings.connect_tries):
             self._pause()
@@ -199,7 +218,7 @@ class ShadowHand:
         """Decode one status without any other effect; None when the palm did not write it or it is a repetition.
 
         Raises:
-            CodecError: not a status of the 0220 palm.
+            CodecError: not a status of this palm.
         """
         return self._decoder.receive(datagram)
 
@@ -208,21 +227,26 @@ class ShadowHand:
         if self._sent_ns is None or now_ns - self._sent_ns > MOTOR_PATIENCE_ns:
             self._demands_since_ns = now_ns
         which_motors, kind = self._polling.next(now_ns)
-        self._link.send(
-            encode_command(
-                PalmCommand(
-                    edc_command=EdcCommand.SENSOR_DATA,
-                    from_motor_data_type=kind,
-                    which_motors=which_motors,
-                    to_motor_data_type=ToMotor.DEMAND_PWM,
-                    motor_data=demand,
-                    tactile_data_type=self._tactile.next(),
-                )
-            )
+        command = PalmCommand(
+            edc_command=EdcCommand.SENSOR_DATA,
+            from_motor_data_type=kind,
+            which_motors=which_motors,
+            to_motor_data_type=ToMotor.DEMAND_PWM,
+            motor_data=demand,
+            tactile_data_type=self._tactile.next(),
         )
         self._sent_ns = now_ns
         self._counters.cycles += 1
-        return self._take(self._link.receive())
+        return self._take(self._transfer(self._image.encode_command(command)))
+
+    def _transfer(self, payload: bytes) -> list[Datagram]:
+        """Out and back; a link that fails stops the hand as a fault of its own would."""
+        try:
+            self._link.send(payload)
+            return self._link.receive()
+        except DeviceError as error:
+            self._fault = self._fault or Fault(error.what, error.where, error.hint)
+            raise
 
     def _take(self, datagrams: list[Datagram]) -> HandSample | None:
         newest = None
@@ -288,7 +312,7 @@ class ShadowHand:
         if self._counters.lost:
             problems.append(f"{self._counters.lost} of {self._counters.cycles} cycles lost")
         if self._counters.malformed:
-            problems.append(f"{self._counters.malformed} messages were no status of a 0220 palm")
+            problems.append(f"{self._counters.malformed} messages were no status of a {self._settings.palm} palm")
         if self._decoder.counts.stale:
             problems.append(f"{self._decoder.counts.stale} statuses were repetitions of old ones")
         if self._last is not None:

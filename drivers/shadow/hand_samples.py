@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from drivers.links import Datagram
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motor_polling import MotorMemory, MotorReadings
-from drivers.shadow.palm_codec import PalmStatus, decode_status
+from drivers.shadow.palm_codec import PalmStatus
+from drivers.shadow.palm_images import PALMS, PalmImage
 from tactile_lab.geometry.contacts import Array
 
 
@@ -22,7 +23,7 @@ class HandSample:
         motor: latest known motor readings.
         tactile_type: request the fingertips' slots answer.
         tactile_valid: which slots are new: bit 0 FF, 1 MF, 2 RF, 3 LF, 4 TH.
-        tactile: the five slots of 16 bytes in that order, 80 raw bytes.
+        tactile: the five slots of 16 bytes in that order, 80 raw bytes (32 and 160 of a 0230 palm).
         idle_us: spare time in the palm's cycle, microseconds; healthy above 50.
         status: the decoded status it was made of.
     """
@@ -59,10 +60,11 @@ class HandDecoder:
 
     Args:
         calibration: of the hand's joints.
+        image: the palm's process image.
     """
 
-    def __init__(self, calibration: JointCalibration) -> None:
-        self._calibration = calibration
+    def __init__(self, calibration: JointCalibration, image: PalmImage = PALMS["0220"]) -> None:
+        self._calibration, self._image = calibration, image
         self.restart()
 
     def restart(self) -> None:
@@ -74,9 +76,9 @@ class HandDecoder:
         """The sample in a status; None when the palm did not write it in time or it is a repetition.
 
         Raises:
-            CodecError: not a status of the 0220 palm.
+            CodecError: not a status of this palm.
         """
-        status = decode_status(datagram.payload)
+        status = self._image.decode_status(datagram.payload)
         repeated, self._previous = datagram.payload == self._previous, datagram.payload
         if not status.written:
             self.counts.unwritten += 1

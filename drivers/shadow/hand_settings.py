@@ -6,6 +6,7 @@ from pydantic import Field
 
 from drivers.shadow.motor_watch import HeatLimits
 from drivers.shadow.motors import GainTable
+from drivers.shadow.palm_images import PalmName
 from drivers.shadow.tactile_requests import TactileKind
 from tactile_lab.strict_yaml import StrictModel
 
@@ -14,6 +15,7 @@ class HandSettings(StrictModel):
     """How the host drives the hand.
 
     Attributes:
+        palm: which palm the hand has.
         cycle_s: period of the exchanges while connecting and closing, seconds.
         gains: position control.
         tactile: kind of fingertip asked for data through the palm.
@@ -26,6 +28,7 @@ class HandSettings(StrictModel):
         close_cycles: exchanges with zero demands before the link is closed.
     """
 
+    palm: PalmName = "0220"
     cycle_s: float = Field(default=0.01, gt=0.0)
     gains: GainTable = GainTable()
     tactile: TactileKind = "none"

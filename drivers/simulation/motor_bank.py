@@ -9,7 +9,7 @@ from drivers.shadow.motor_data import CONFIG_TYPES, MAX_PWM, FromMotor, MotorFla
 from drivers.shadow.motors import DRIVEN_JOINTS, MotorMap
 from drivers.shadow.palm_codec import MOTORS, PalmCommand
 from drivers.simulation.geared_motors import motor_class
-from drivers.simulation.plant import Plant
+from drivers.simulation.hand_plant import HandPlant
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.geometry.contacts import Array
 
@@ -38,7 +38,7 @@ class MotorBank:
         rng: noise of the strain gauges.
     """
 
-    def __init__(self, plant: Plant, motor_map: MotorMap, rng: np.random.Generator) -> None:
+    def __init__(self, plant: HandPlant, motor_map: MotorMap, rng: np.random.Generator) -> None:
         self._plant, self._rng = plant, rng
         self._sign = motor_map.sign
         self._motor_of_row = np.array([motor_map.numbers[joint] for joint in DRIVEN_JOINTS])

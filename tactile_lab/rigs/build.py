@@ -15,6 +15,7 @@ from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_samples import HandDecoder
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motors import MotorMap
+from drivers.shadow.palm_images import PALMS
 from drivers.shadow.posture import TipEllipsoid
 from drivers.simulation.world import SimulatedWorld
 from sessions.bench import Bench, SensorStream
@@ -97,7 +98,7 @@ def build_interpreter(rig: Rig) -> Interpreter:
     )
     return Interpreter(
         perception,
-        hand=HandDecoder(JointCalibration.load(rig.files["joints"])),
+        hand=HandDecoder(JointCalibration.load(rig.files["joints"]), PALMS[description.hand.palm]),
         base=Positioner(_silent(BASE_LINK), clock, description.base),
         wrenches=tips,
         camera=Camera(_silent(CAMERA_LINK), clock) if "camera" in rig.files else None,

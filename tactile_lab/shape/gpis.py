@@ -140,13 +140,16 @@ class Gpis:
             points_m, normals, self.settings, observations, self.kernel, self.prior, self.noise_scale, factor
         )
 
-    def optimise(self, *, noise: bool = False, max_iterations: int = 30) -> Self:
+    def optimise(
+        self, *, noise: bool = False, max_iterations: int = 30, longest_m: float = _LENGTH_BOUNDS_m[1]
+    ) -> Self:
         """The field with the kernel's parameters (and the noise scale) at a maximum of the marginal likelihood.
 
         L-BFGS on the logarithms of the parameters with the analytic gradient, from the present values and
-        within bounds that keep the covariance well-conditioned. A present value outside them is moved in.
+        within bounds that keep the covariance well-conditioned. A present value outside them is moved in; the
+        kernel's length stays below ``longest_m``.
         """
-        bounds = np.log(self._bounds(noise))
+        bounds = np.log(self._bounds(noise, longest_m))
         start = np.append(self.kernel.log_parameters, np.log(self.noise_scale))[: len(bounds)]
 
         def objective(log_parameters: Array) -> tuple[float, Array]:
@@ -297,9 +300,9 @@ class Gpis:
         for first in range(0, max(count, 1), size):
             yield slice(first, min(first + size, count))
 
-    def _bounds(self, noise: bool) -> Array:
+    def _bounds(self, noise: bool, longest_m: float) -> Array:
         amplitude = np.square(_AMPLITUDE_BOUNDS_m)
-        kernel = [amplitude, _LENGTH_BOUNDS_m][: len(self.kernel.log_parameters)]
+        kernel = [amplitude, (_LENGTH_BOUNDS_m[0], longest_m)][: len(self.kernel.log_parameters)]
         return np.array([*kernel, _NOISE_SCALE_BOUNDS] if noise else kernel)
 
 

@@ -14,6 +14,10 @@ from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.pose_rows import PLANAR, PoseRows
 
 
+WHILE_TRACKING_m = 0.080
+"""Longest kernel while more is to come: contacts on a smooth side would else rule out the edge behind it."""
+
+
 @dataclass(frozen=True)
 class PlacedGrasp:
     """One grasp and where the object was.
@@ -151,9 +155,9 @@ class ContactMap:
             contacts.points_m, contacts.normals, contacts.point_sigma_m, contacts.normal_sigma_rad, self.settings
         )
 
-    def with_best_kernel(self, max_iterations: int = 15) -> ContactMap:
-        """The map with the kernel parameters of largest marginal likelihood (2.16)."""
-        kernel = self.fit().optimise(max_iterations=max_iterations).kernel
+    def with_best_kernel(self, max_iterations: int = 15, longest_m: float = WHILE_TRACKING_m) -> ContactMap:
+        """The map with the kernel parameters of largest marginal likelihood (2.16), its length below a limit."""
+        kernel = self.fit().optimise(max_iterations=max_iterations, longest_m=longest_m).kernel
         found = {"amplitude_m": float(np.sqrt(kernel.amplitude))}
         if (length := getattr(kernel, "length", None)) is not None:
             found["length_m"] = length
