@@ -1,0 +1,1 @@
+"""Links to real wires: UDP sockets, serial ports, CAN buses."""
