@@ -13,7 +13,6 @@ from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.pose_rows import PLANAR, PoseRows
 
-
 WHILE_TRACKING_m = 0.080
 """Longest kernel while more is to come: contacts on a smooth side would else rule out the edge behind it."""
 
@@ -47,6 +46,12 @@ class PlacedGrasp:
     def used(self) -> bool:
         """Some of its contacts are part of the shape."""
         return len(self.left_out) < len(self.contacts_world)
+
+    @property
+    def free_world_m(self) -> Array:
+        """Places that were free, world frame; not those before a contact that is left out, which may be wrong too."""
+        world = self.contacts_world
+        return world.free_m[~np.isin(world.free_of, sorted(self.left_out))]
 
     def put_aside(self) -> PlacedGrasp:
         """The same with none of its contacts in the shape."""
@@ -101,8 +106,8 @@ class ContactMap:
     @property
     def free_points_m(self) -> Array:
         """Places that were free at grasps whose contacts are part of the shape, object frame, shape (q, d)."""
-        known = [grasp for grasp in self.placed if grasp.used and len(grasp.contacts_world.free_m)]
-        places = [self.space.to_object(g.row, g.contacts_world.free_m, g.contacts_world.free_m)[0] for g in known]
+        known = [(grasp.row, grasp.free_world_m) for grasp in self.placed if grasp.used]
+        places = [self.space.to_object(row, free, free)[0] for row, free in known if len(free)]
         return np.vstack([np.empty((0, self.placed[0].contacts_world.dimension)), *places])
 
     @property

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import TrackingError
 from tactile_lab.geometry.contacts import Array, Grasp
-from tactile_lab.tracking.free_space import fingertip_places, places_on_lines
+from tactile_lab.tracking.free_space import fingertip_places, places_on_line
 
 LARGEST_GRASP_m = 0.6
 """No hand spans more; contacts farther apart are in wrong units."""
@@ -30,6 +30,7 @@ class ContactSet:
         point_sigma_m: standard deviation of each point along its normal, shape (n,).
         normal_sigma_rad: standard deviation of each normal's direction, shape (n,).
         free_m: places known to be outside of the object when these contacts were made, shape (q, d), same frame.
+        free_of: the contact whose finger was at each of them, -1 for a finger without contact, shape (q,).
     """
 
     points_m: Array
@@ -37,6 +38,7 @@ class ContactSet:
     point_sigma_m: Array
     normal_sigma_rad: Array
     free_m: Array = field(default_factory=lambda: np.empty((0, 0)))
+    free_of: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
 
     def __len__(self) -> int:
         return len(self.points_m)
@@ -60,16 +62,18 @@ class ContactSet:
         normal_sigma = np.array([contact.normal_sigma_rad for contact in grasp.contacts])
         _check(grasp, points, normals, covariances, normal_sigma)
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        fingers = np.array([contact.finger for contact in grasp.contacts])
         if dimension == 2:
             flat = np.linalg.norm(normals[:, :2], axis=1)
             keep = flat > LARGEST_SLOPE
             points, covariances, flat = points[keep], covariances[keep], flat[keep]
             normals = np.column_stack([normals[keep, :2] / flat[:, None], np.zeros(len(flat))])
-            normal_sigma = normal_sigma[keep] / flat
+            normal_sigma, fingers = normal_sigma[keep] / flat, fingers[keep]
         along_normal = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariances, normals))
         heights = np.array([0.0, 0.0, origin_height_m])
         seen = cls((points - heights)[:, :dimension], normals[:, :dimension].copy(), along_normal, normal_sigma)
-        return replace(seen, free_m=_free_places(grasp, seen, heights))
+        free, free_of = _free_places(grasp, seen, fingers.tolist(), heights)
+        return replace(seen, free_m=free, free_of=free_of)
 
     @classmethod
     def concatenated(cls, parts: Sequence[ContactSet]) -> Self:
@@ -96,11 +100,20 @@ class ContactSet:
         )
 
 
-def _free_places(grasp: Grasp, contacts: ContactSet, origin: Array) -> Array:
-    """By the closing lines; where they are not known, the fingertips themselves."""
+def _free_places(
+    grasp: Grasp, contacts: ContactSet, fingers: list[str], origin: Array
+) -> tuple[Array, NDArray[np.intp]]:
+    """Free places and the contact of each, by the closing lines; where those are not known, in the fingertips."""
     if not grasp.closing_lines:
-        return fingertip_places(contacts.points_m, contacts.normals)
-    return np.asarray((places_on_lines(grasp.closing_lines) - origin)[:, : contacts.dimension])
+        places = [fingertip_places(contacts.points_m[i], contacts.normals[i]) for i in range(len(contacts))]
+        owners = list(range(len(contacts)))
+    else:
+        places = [(places_on_line(line) - origin)[:, : contacts.dimension] for line in grasp.closing_lines]
+        touching = [line.touched and line.finger in fingers for line in grasp.closing_lines]
+        lines = zip(grasp.closing_lines, touching, strict=True)
+        owners = [fingers.index(line.finger) if touches else -1 for line, touches in lines]
+    free_of = np.repeat(np.array(owners, dtype=np.intp), [len(each) for each in places])
+    return np.vstack([np.empty((0, contacts.dimension)), *places]), free_of
 
 
 def planar_rotation(angle_rad: float) -> Array:

@@ -34,7 +34,8 @@ def condensed(contact_map: ContactMap, window: int, remembered: int) -> ContactM
     back = contact_map.space.inverse(last.row)
     points, normals = contact_map.space.to_object(back, chosen.points_m, chosen.normals)
     free, _ = contact_map.space.to_object(back, before.free_points_m, before.free_points_m)
-    world = replace(chosen, points_m=points, normals=normals, free_m=_every(free, 2 * remembered))
+    free = _every(free, 2 * remembered)
+    world = replace(chosen, points_m=points, normals=normals, free_m=free, free_of=np.full(len(free), -1))
     summary = PlacedGrasp(world, last.row, last.covariance, np.zeros_like(last.row))
     return replace(contact_map, placed=(summary, *recent), archive=contact_map.archive + archived)
 

@@ -6,8 +6,6 @@ nothing. Without closing lines the fingertip itself, outward along the normal, i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.special import log_ndtr
 
@@ -31,15 +29,19 @@ _WEIGHT = 0.5
 """Places on one line tell much the same, so each counts half."""
 
 
-def places_on_lines(lines: Sequence[ClosingLine]) -> Array:
-    """Places on closing lines that are free for sure, world frame, shape (q, 3)."""
-    return np.vstack([np.empty((0, 3)), *(_on_line(line) for line in lines)])
+def places_on_line(line: ClosingLine) -> Array:
+    """Places on a closing line that are free for sure, world frame, shape (q, 3)."""
+    back = line.start_world_m - line.end_world_m
+    length = float(np.linalg.norm(back))
+    if length < _CLEARANCE_m:
+        return np.empty((0, 3))
+    distances = BEFORE_CONTACT_m if line.touched else np.arange(_CLEARANCE_m, length, _SPACING_m)
+    return np.asarray(line.end_world_m + distances[distances <= length][:, None] * back / length)
 
 
-def fingertip_places(points_m: Array, normals: Array) -> Array:
-    """Places inside the fingertips that touch contacts of shape (n, d), shape (q, d)."""
-    along = points_m[:, None] + ALONG_NORMAL_m[:, None] * normals[:, None]
-    return np.asarray(along.reshape(-1, points_m.shape[1]))
+def fingertip_places(point_m: Array, normal: Array) -> Array:
+    """Places inside the fingertip that touches a contact, shape (q, d)."""
+    return np.asarray(point_m + ALONG_NORMAL_m[:, None] * normal)
 
 
 def free_space_costs(gpis: Gpis, free_object_m: Array) -> Array:
@@ -57,12 +59,3 @@ def free_space_costs(gpis: Gpis, free_object_m: Array) -> Array:
     sigma = np.sqrt(found.variance_m2 + _TOLERANCE_m**2)
     surely = log_ndtr((found.mean_m + _TOLERANCE_m) / sigma)
     return np.asarray(-_WEIGHT * surely.reshape(count, each).sum(axis=1))
-
-
-def _on_line(line: ClosingLine) -> Array:
-    back = line.start_world_m - line.end_world_m
-    length = float(np.linalg.norm(back))
-    if length < _CLEARANCE_m:
-        return np.empty((0, 3))
-    distances = BEFORE_CONTACT_m if line.touched else np.arange(_CLEARANCE_m, length, _SPACING_m)
-    return np.asarray(line.end_world_m + distances[distances <= length][:, None] * back / length)

@@ -11,23 +11,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gammaln
 
-from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.choice import free_evidence, polygon_of
-from tactile_lab.shape.polyhedron import Polyhedron
-from tactile_lab.shape.surface import extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
-from tactile_lab.tracking.facet_smoothing import smoothed_with_faces
 from tactile_lab.tracking.fixed_lag import condensed
 from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.motion import MotionNoise
-from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.pose_evidence import PoseEvidence
-from tactile_lab.tracking.pose_rows import PLANAR
 
-_ORDERING_RESOLUTION_m = 0.002
-"""Of outlines that only order contacts and are compared with free places."""
+_EXPECTED_RIGHT = 99.0
+"""Contacts that are right for one that is wrong, before any was seen."""
 
 _BREAK_COST = 20.0
 """Negative log probability that the object moves otherwise than with the hand, wherever it then lies."""
@@ -106,51 +100,6 @@ class Judge:
                 return contact_map, value
             contact_map = contact_map.without_contact(int(asked[costs.argmax()]))
 
-    def with_faces(self, contact_map: ContactMap) -> Hypothesis:
-        """The map, or the one with poses smoothed together with flat faces if those explain its contacts better.
-
-        Contacts that did not fit the field get another chance: a face that only they touch may be worth its price.
-        """
-        rated = self.rated(contact_map)
-        sharp = self._faceted(contact_map)
-        if sharp is None or sharp.cost > rated.cost:
-            return rated
-        restored = self._restored(sharp)
-        if restored.map.left_out_count < sharp.map.left_out_count:
-            sharp = min(sharp, self._faceted(restored.map) or sharp, key=lambda one: one.cost)
-        return sharp
-
-    def _faceted(self, contact_map: ContactMap) -> Hypothesis | None:
-        """Poses and faces smoothed together; None if there are no faces that enclose anything."""
-        faceted = smoothed_with_faces(contact_map, self._noise)
-        return self._with_sharp_shape(contact_map.with_rows(faceted.rows)) if faceted else None
-
-    def _with_sharp_shape(self, contact_map: ContactMap) -> Hypothesis | None:
-        """The map as it is, its contacts explained by flat faces."""
-        fitted, contacts, free = contact_map.fit(), contact_map.contacts, contact_map.free_points_m
-        try:
-            if contact_map.dimension == 2:
-                polygon = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
-                intrusion = -free_evidence(polygon.contour(_ORDERING_RESOLUTION_m), free, fitted)
-                evidence = polygon.log_evidence
-            else:
-                on_table = contact_map.space is PLANAR
-                evidence = Polyhedron.fit(fitted, free, upright=on_table).log_evidence
-                intrusion = float(free_space_costs(fitted, free[None])[0])
-        except ShapeError:  # nothing enclosed, or no faces in it
-            return None
-        constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
-        motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
-        return Hypothesis(contact_map, motion - evidence - float(constant), intrusion, self.price(contact_map))
-
-    def _restored(self, sharp: Hypothesis) -> Hypothesis:
-        """With those contacts back that flat faces explain better than nothing does, one after the other."""
-        for index, grasp in enumerate(sharp.map.placed):
-            for contact in sorted(grasp.left_out) if grasp.used else ():
-                fuller = self._with_sharp_shape(sharp.map.with_contact(index, contact))
-                sharp = min(sharp, fuller or sharp, key=lambda one: one.cost)
-        return sharp
-
     def with_covariances(self, contact_map: ContactMap) -> ContactMap:
         """The map with the covariance that all contacts and motions leave to each pose."""
         size, count = contact_map.space.size, len(contact_map.placed)
@@ -160,9 +109,17 @@ class Judge:
         return replace(contact_map, placed=(contact_map.placed[0], *later))
 
     def price(self, contact_map: ContactMap) -> float:
-        """What the contacts cost that are left out, and the steps in which the object did not follow the hand."""
+        """What the contacts cost that are left out, and the steps in which the object did not follow the hand.
+
+        The more contacts are wrong, the less surprising is one more (Beta-binomial: the share of wrong contacts is
+        one in a hundred until the contacts say otherwise).
+        """
+        wrong = contact_map.left_out_count
+        right = len(contact_map.contacts) + _EXPECTED_RIGHT
+        share = float(gammaln(wrong + 1.0) + gammaln(right) - gammaln(wrong + right + 1.0))
+        anywhere = self._unexplained_cost - float(np.log(_EXPECTED_RIGHT + 1.0))
         breaks = int(np.sum(~contact_map.follows_hand))
-        return self._unexplained_cost * contact_map.left_out_count + _BREAK_COST * breaks
+        return wrong * anywhere - share + _BREAK_COST * breaks
 
     def _hypothesis(self, contact_map: ContactMap, misfit: float) -> Hypothesis:
         intrusion = free_space_costs(contact_map.fit(), contact_map.free_points_m[None])[0]

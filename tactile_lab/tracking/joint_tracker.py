@@ -28,6 +28,7 @@ from tactile_lab.tracking.motion_cost import estimated_noise
 from tactile_lab.tracking.particle_filter import PoseEstimate
 from tactile_lab.tracking.proposals import ProposalSettings, propose
 from tactile_lab.tracking.regrouping import regrouped
+from tactile_lab.tracking.sharp_judge import SharpJudge
 
 _LEAST_TO_RELOCATE = 3
 _LEAST_KNOWN = 30
@@ -173,7 +174,8 @@ class JointTracker:
             self._hypotheses = self._likeliest(different(smoothed), self._settings.hypotheses)
             self._share_best_kernel()
         self._hypotheses = [self._placed_late(one) for one in self._hypotheses]
-        faceted = sorted((self._judge.with_faces(one.map) for one in self._hypotheses), key=_cost)
+        sharp = SharpJudge(self._judge, self._noise)
+        faceted = sorted((sharp.better(one.map) for one in self._hypotheses), key=_cost)
         faceted[0] = replace(faceted[0], map=self._judge.with_covariances(faceted[0].map))
         self._hypotheses = [replace(one, map=unfolded(one.map)) for one in faceted]
 

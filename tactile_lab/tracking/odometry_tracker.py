@@ -14,8 +14,11 @@ from gtsam import Pose3
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.hypotheses import Judge
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.particle_filter import PoseEstimate
+from tactile_lab.tracking.proposals import UNEXPLAINED_COST
+from tactile_lab.tracking.sharp_judge import SharpJudge
 
 KNOWN_VARIANCE = 1e-10
 """A pose that is given is certain up to rounding."""
@@ -96,3 +99,8 @@ class KnownPoseTracker(OdometryTracker):
         """Grasps whose pose is not known stay out of the shape."""
         self._trusted = self._given is not None and len(contacts) > 0
         return self._trusted
+
+    def finish(self) -> None:
+        """Leave out contacts that fit no shape: at known poses they are wrong themselves."""
+        self._map = self._map.with_best_kernel()
+        self._map = SharpJudge(Judge(self._noise, UNEXPLAINED_COST), self._noise).without_errors(self._map)

@@ -21,6 +21,9 @@ from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.pose_rows import PLANAR, PoseRows
 
+UNEXPLAINED_COST = 5.0
+"""A contact in a hundred is wrong, and may then be anywhere on the object's scale."""
+
 _ROBUST_SQUARED = 9.0
 """Residuals beyond three sigma lose their pull (Geman-McClure), which keeps basins wide."""
 
@@ -49,7 +52,7 @@ class ProposalSettings(StrictModel):
     kept: int = Limit(default=12, ge=1)
     distinct_m: float = Limit(default=0.0025, gt=0)
     distinct_rad: float = Limit(default=0.08, gt=0)
-    unexplained_cost: float = Limit(default=5.0, gt=0)
+    unexplained_cost: float = Limit(default=UNEXPLAINED_COST, gt=0)
     normal_length_m: float = Limit(default=0.018, gt=0)
 
 

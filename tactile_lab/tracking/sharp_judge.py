@@ -1,0 +1,157 @@
+"""Hypotheses in the light of flat faces: other poses, and another opinion on which contacts to leave out.
+
+A smooth field takes the only contact on a small face for an error, and a wrong contact for a bulge. Faces tell these
+apart: a contact that only a face of its own explains has to be worth that face, and one that was left out may be.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactile_lab.errors import ShapeError
+from tactile_lab.shape.choice import best_shape, free_evidence, polygon_of
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.polyhedron import Polyhedron
+from tactile_lab.shape.polyhedron_planes import segment_planes
+from tactile_lab.shape.prism import Prism
+from tactile_lab.shape.surface import extract_contour
+from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.facet_smoothing import FlatFaces, smoothed_with_faces
+from tactile_lab.tracking.free_space import free_space_costs
+from tactile_lab.tracking.hypotheses import Hypothesis, Judge
+from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.motion_cost import MotionCost
+from tactile_lab.tracking.pose_rows import PLANAR
+
+_ORDERING_RESOLUTION_m = 0.002
+"""Of outlines that only order contacts and are compared with free places."""
+
+_SMALL_FACE = 2
+_DOUBTFUL_CHI_SQUARE = 16.0
+_MOST_DOUBTS = 12
+"""Contacts that are looked at once more: on faces of so few, or so far from theirs, and at most so many."""
+
+
+class SharpJudge:
+    """Rates hypotheses whose object has flat faces."""
+
+    def __init__(self, judge: Judge, noise: MotionNoise) -> None:
+        """
+        Args:
+            judge: for smooth objects, with the price of contacts that are left out.
+            noise: of the motion model.
+        """
+        self._judge, self._noise = judge, noise
+
+    def better(self, contact_map: ContactMap) -> Hypothesis:
+        """The map, or the one with poses smoothed together with flat faces if those explain its contacts better."""
+        smooth = self._judge.rated(contact_map)
+        sharp = self._faceted(contact_map) or self._sharp(contact_map)
+        if sharp is None:
+            return smooth
+        settled = self._reconsidered(sharp)
+        if settled.map is not sharp.map:
+            settled = _likelier(settled, self._faceted(settled.map))
+        return _likelier(smooth, settled)
+
+    def without_errors(self, contact_map: ContactMap) -> ContactMap:
+        """The map at its poses, without the contacts that neither a field nor flat faces explain."""
+        cleaned, _ = self._judge.cleaned(contact_map)
+        sharp = self._sharp(cleaned)
+        if sharp is None:
+            return cleaned
+        return _likelier(self._judge.rated(cleaned), self._reconsidered(sharp)).map
+
+    def _faceted(self, contact_map: ContactMap) -> Hypothesis | None:
+        """Poses and faces smoothed together; None if there are no faces that enclose anything."""
+        faceted = smoothed_with_faces(contact_map, self._noise)
+        return self._sharp(contact_map.with_rows(faceted.rows)) if faceted else None
+
+    def _sharp(self, contact_map: ContactMap) -> Hypothesis | None:
+        """The map as it is, its contacts explained by a sharp shape; None if there is none."""
+        contacts, fitted = contact_map.contacts, contact_map.fit()
+        try:
+            explained, intrusion = _explained(contact_map, fitted)
+        except ShapeError:  # nothing enclosed, or no faces in it
+            return None
+        constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
+        motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
+        misfit = motion - explained - float(constant)
+        return Hypothesis(contact_map, misfit, intrusion, self._judge.price(contact_map))
+
+    def _reconsidered(self, sharp: Hypothesis) -> Hypothesis:
+        """Contacts left out that a sharp shape explains by themselves only, and those back that it explains better."""
+        for _ in range(_MOST_DOUBTS):
+            thinner = [self._sharp(sharp.map.without_contact(position)) for position in _doubtful(sharp.map)]
+            best = min((one for one in thinner if one is not None), key=_cost, default=sharp)
+            if best.cost >= sharp.cost:
+                break
+            sharp = best
+        return self._restored(sharp)
+
+    def _restored(self, sharp: Hypothesis) -> Hypothesis:
+        """With those contacts back that are better explained than left out: all at once, or one after the other."""
+        left_out = [(i, each) for i, grasp in enumerate(sharp.map.placed) if grasp.used for each in grasp.left_out]
+        whole = sharp.map
+        for index, contact in left_out:
+            whole = whole.with_contact(index, contact)
+        fuller = _likelier(sharp, self._sharp(whole)) if left_out else sharp
+        if fuller.map is whole:
+            return fuller
+        for index, contact in sorted(left_out)[:_MOST_DOUBTS]:
+            sharp = _likelier(sharp, self._sharp(sharp.map.with_contact(index, contact)))
+        return sharp
+
+
+def _explained(contact_map: ContactMap, fitted: Gpis) -> tuple[float, float]:
+    """Log evidence of the best sharp shape, and the cost of the free places it fills. Raises ShapeError."""
+    free = contact_map.free_points_m
+    if contact_map.dimension == 2:
+        polygon = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
+        return polygon.log_evidence, -free_evidence(polygon.contour(_ORDERING_RESOLUTION_m), free, fitted)
+    on_table = contact_map.space is PLANAR
+    explained = Polyhedron.fit(fitted, free, upright=on_table).log_evidence
+    if on_table:
+        explained = max(explained, _prism_evidence(fitted))
+    return explained, float(free_space_costs(fitted, free[None])[0])
+
+
+def _prism_evidence(fitted: Gpis) -> float:
+    try:
+        return Prism.fit(fitted, best_shape).log_evidence
+    except ShapeError:  # too few contacts on walls
+        return -np.inf
+
+
+def _doubtful(contact_map: ContactMap) -> list[int]:
+    """Contacts on faces of one or two, and those that do not fit their face, the worst first."""
+    seen, fitted = contact_map.contacts, contact_map.fit()
+    try:
+        faces = _faces(contact_map, fitted)
+    except ShapeError:
+        return []
+    outward = faces.normals[faces.labels]
+    away = np.einsum("nd,nd->n", outward, seen.points_m) - faces.offsets_m[faces.labels]
+    misfit = (away / seen.point_sigma_m) ** 2
+    misfit += np.sum((seen.normals - outward) ** 2, axis=1) / seen.normal_sigma_rad**2
+    lonely = np.bincount(faces.labels, minlength=faces.count)[faces.labels] <= _SMALL_FACE
+    doubts = np.flatnonzero(lonely | (misfit > _DOUBTFUL_CHI_SQUARE))
+    return [int(i) for i in doubts[np.argsort(-misfit[doubts], kind="stable")]][:_MOST_DOUBTS]
+
+
+def _faces(contact_map: ContactMap, fitted: Gpis) -> FlatFaces:
+    """The faces of the present contacts. Raises ShapeError where there are none."""
+    if contact_map.dimension == 2:
+        found = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m)).faces
+        return FlatFaces(found.labels, found.normals, found.offsets_m)
+    seen = contact_map.contacts
+    planes = segment_planes(seen.points_m, seen.normals, seen.point_sigma_m, seen.normal_sigma_rad)
+    return FlatFaces(planes.labels, planes.normals, planes.offsets_m)
+
+
+def _likelier(one: Hypothesis, other: Hypothesis | None) -> Hypothesis:
+    return one if other is None or one.cost <= other.cost else other
+
+
+def _cost(hypothesis: Hypothesis) -> float:
+    return hypothesis.cost
