@@ -1,0 +1,62 @@
+"""Asking a device something and waiting for its answer, over any link and on any clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from drivers.links import Datagram, Link
+from tactile_lab.clock import NANOSECONDS, Clock
+from tactile_lab.errors import CodecError
+
+Answer = TypeVar("Answer")
+
+_STEP_ns = 1_000_000
+
+
+class Conversation:
+    """A link while its device is being set up.
+
+    Args:
+        link: open.
+        clock: the session's clock.
+        listen: gets every received message, as it would later.
+    """
+
+    def __init__(self, link: Link, clock: Clock, listen: Callable[[Datagram], object]) -> None:
+        self.name = link.name
+        self._link, self._clock, self._listen = link, clock, listen
+
+    def send(self, payload: bytes) -> None:
+        """Send one message. Raises DeviceError."""
+        self._link.send(payload)
+
+    def wait(self, seconds: float) -> int:
+        """Listen for a time; the number of bytes that came. Raises DeviceError."""
+        heard, end_ns = 0, self._clock.now_ns() + round(seconds * NANOSECONDS)
+        while True:
+            heard += self._hear()
+            if (now_ns := self._clock.now_ns()) >= end_ns:
+                return heard
+            self._clock.sleep_until_ns(min(end_ns, now_ns + _STEP_ns))
+
+    def until(self, look: Callable[[], Answer | None], seconds: float) -> Answer | None:
+        """Listen until ``look`` gives something; None when it has not in time. Raises DeviceError."""
+        end_ns = self._clock.now_ns() + round(seconds * NANOSECONDS)
+        while True:
+            self._hear()
+            if (answer := look()) is not None:
+                return answer
+            if (now_ns := self._clock.now_ns()) >= end_ns:
+                return None
+            self._clock.sleep_until_ns(now_ns + _STEP_ns)
+
+    def _hear(self) -> int:
+        heard = 0
+        for datagram in self._link.receive():
+            heard += len(datagram.payload)
+            try:
+                self._listen(datagram)
+            except CodecError:
+                continue  # remains of what the device did before we asked
+        return heard

@@ -1,0 +1,176 @@
+"""Every fault of a wire against a driver: a new driver gets these tests by subclassing :class:`DriverSweep`.
+
+    class TestTheBoxDriver(DriverSweep):
+        layout = MessageLayout(...)
+        def bench(self) -> SweptBench: ...
+
+Each fault is injected into an otherwise healthy stream. The driver must count it (its health gains words), or stop in
+order (an error of ours that names the link and says what to do), and it must be connectable again afterwards. Faults
+that a protocol cannot show are named in ``blind`` with the reason; those that must do no harm at all in ``harmless``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Protocol
+
+import pytest
+
+from drivers.faults import FaultyLink, MessageLayout, standard_faults
+from drivers.links import Link
+from tactile_lab.clock import VirtualClock
+from tactile_lab.errors import DeviceError
+
+STEPS = 160
+STEP_ns = 10_000_000
+
+
+class SweptDriver(Protocol):
+    """What the sweep needs of a driver."""
+
+    def connect(self) -> None: ...
+    def close(self) -> None: ...
+    def health(self) -> tuple[str, ...]: ...
+
+
+@dataclass
+class SweptBench:
+    """One driver on one in-memory device.
+
+    Attributes:
+        link: to the device, without faults.
+        clock: of both.
+        build: makes the driver on a link.
+        step: lets the device send its next message, or do whatever it does in one cycle.
+        use: lets the driver take what has arrived and gives what it made of it.
+    """
+
+    link: Link
+    clock: VirtualClock
+    build: Callable[[Link], SweptDriver]
+    step: Callable[[], None]
+    use: Callable[[Any], Any]
+
+
+@dataclass
+class Outcome:
+    """What came of one run: the health's words without figures, the error that ended it, and samples taken."""
+
+    words: set[str]
+    stopped: DeviceError | None
+    samples: int
+
+
+def _without_figures(text: str) -> str:
+    return "".join(letter for letter in text if not letter.isdigit())
+
+
+def run(bench: SweptBench, driver: SweptDriver) -> Outcome:
+    """Run a connected driver for the sweep's number of cycles, or until it stops."""
+    words: set[str] = set()
+    samples = 0
+    for _ in range(STEPS):
+        bench.clock.sleep_until_ns(bench.clock.now_ns() + STEP_ns)
+        bench.step()
+        try:
+            samples += len(bench.use(driver))
+        except DeviceError as error:
+            return Outcome(words, error, samples)
+        words |= {_without_figures(text) for text in driver.health()}
+    return Outcome(words, None, samples)
+
+
+class DriverSweep:
+    """Base of the sweep tests of one driver."""
+
+    layout: ClassVar[MessageLayout]
+    blind: ClassVar[dict[str, str]] = {}
+    harmless: ClassVar[frozenset[str]] = frozenset({"counter wrap"})
+
+    def __init_subclass__(cls) -> None:
+        names = sorted(standard_faults(cls.layout))
+
+        def swept(self: DriverSweep, fault_name: str, record_property: Callable[[str, object], None]) -> None:
+            self.sweep(fault_name, record_property)
+
+        def connecting(self: DriverSweep, fault_name: str) -> None:
+            self.connect_under(fault_name)
+
+        connecting_test = pytest.mark.parametrize("fault_name", names)(connecting)
+        setattr(cls, "test_connecting_under_a_fault_works_or_says_why", connecting_test)  # noqa: B010
+        setattr(  # each subclass has its own faults  # noqa: B010
+            cls, "test_a_fault_is_counted_or_ends_in_order", pytest.mark.parametrize("fault_name", names)(swept)
+        )
+
+    def bench(self) -> SweptBench:
+        """A fresh driver's bench."""
+        raise NotImplementedError
+
+    def sweep(self, fault_name: str, record_property: Callable[[str, object], None]) -> None:
+        """Inject one fault and judge what the driver made of it."""
+        bench = self.bench()
+        healthy = bench.build(bench.link)
+        healthy.connect()
+        clean = run(bench, healthy)
+        healthy.close()
+        assert clean.stopped is None
+
+        bench = self.bench()
+        fault, when = standard_faults(self.layout)[fault_name]
+        link = FaultyLink(bench.link, fault, when)
+        driver = bench.build(link)
+        link.armed = False
+        driver.connect()
+        link.armed = True
+        outcome = run(bench, driver)
+        new = outcome.words - clean.words
+        record_property("injected", link.injected)
+        record_property("counted", "; ".join(sorted(new)) or str(outcome.stopped or "nothing"))
+        assert link.injected > 0, "the fault never struck"
+        self._judge(fault_name, outcome, new, clean)
+        driver.close()
+        driver.close()
+        link.armed = False
+        self._works_again(bench, driver)
+
+    def connect_under(self, fault_name: str) -> None:
+        """Inject one fault from the first message on: the driver connects all the same, or says why not."""
+        bench = self.bench()
+        fault, when = standard_faults(self.layout)[fault_name]
+        link = FaultyLink(bench.link, fault, replace(when, first=0))
+        driver = bench.build(link)
+        try:
+            driver.connect()
+        except DeviceError as error:
+            if not (error.where and error.hint):
+                pytest.fail(f"an error that does not say where and what to do: {error}")
+        driver.close()
+        link.armed = False
+        self._works_again(bench, driver)
+
+    def _judge(self, fault_name: str, outcome: Outcome, new: set[str], clean: Outcome) -> None:
+        if outcome.stopped is not None:
+            assert fault_name == "unplug", f"stopped by {outcome.stopped}"
+            assert outcome.stopped.where
+            assert outcome.stopped.hint
+        elif fault_name in self.harmless:
+            assert not new
+            assert outcome.samples == clean.samples
+        elif fault_name in self.blind:
+            assert not new, f"no longer blind: {new}"
+        else:
+            assert new, "the fault went by in silence"
+
+    @staticmethod
+    def _works_again(bench: SweptBench, driver: SweptDriver) -> None:
+        """After closing, and with the wire plugged in again, the same driver connects and takes samples."""
+        driver.connect()
+        bench.clock.sleep_until_ns(bench.clock.now_ns() + STEP_ns)
+        for _ in range(20):
+            bench.step()
+            if bench.use(driver):
+                break
+        else:
+            pytest.fail("no sample after connecting again")
+        driver.close()
