@@ -12,7 +12,7 @@ from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from drivers.links import Datagram, Link
+from drivers.links import Datagram, Link, link_health
 from tactile_lab.errors import DeviceError
 
 WORKING_COUNTER_LOW = "working counter low"
@@ -349,6 +349,10 @@ class FaultyLink:
         for datagram in self._link.receive():
             arrived += self._treat(datagram)
         return arrived
+
+    def health(self) -> tuple[str, ...]:
+        """What the wrapped link knows to be wrong."""
+        return link_health(self._link)
 
     def inject(self, fault: str) -> None:
         """Pass a far end's fault on. Raises ValueError when the wrapped link knows none."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from tactile_lab.clock import Clock
 from tactile_lab.errors import DeviceError
@@ -38,6 +38,19 @@ class Link(Protocol):
 
     def receive(self) -> list[Datagram]:
         """Everything that has arrived since the last call, oldest first; never blocks for long."""
+
+
+@runtime_checkable
+class WatchedLink(Protocol):
+    """A link that knows what went wrong below the messages: strangers, drops, damaged frames."""
+
+    def health(self) -> tuple[str, ...]:
+        """What went wrong, in words; empty when nothing did."""
+
+
+def link_health(link: Link) -> tuple[str, ...]:
+    """What a link, of any kind, knows to be wrong."""
+    return link.health() if isinstance(link, WatchedLink) else ()
 
 
 class Peer(Protocol):
@@ -132,3 +145,7 @@ class TappedLink:
         for datagram in datagrams:
             self._tap.received(self.name, datagram.payload, datagram.stamp_ns)
         return datagrams
+
+    def health(self) -> tuple[str, ...]:
+        """What the tapped link knows to be wrong."""
+        return link_health(self._link)

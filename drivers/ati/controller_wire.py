@@ -96,4 +96,5 @@ class ControllerWire:
                 where=talk.name,
                 hint="Compare the baud rate with the controller's (9600, 19200 or 38400)",
             )
-        raise DeviceError("the controller does not answer", where=talk.name, hint="Check power, cable and port")
+        hint = "Check power, cable, port and baud rate"
+        raise DeviceError("the controller does not answer", where=talk.name, hint=hint)

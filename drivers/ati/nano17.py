@@ -20,7 +20,7 @@ from drivers.ati.rdt_wire import RdtWire
 from drivers.ati.sequences import SequenceMonitor
 from drivers.ati.wire import ForceWire
 from drivers.fingertip import FingertipCalibration, RigidTransform
-from drivers.links import Datagram, Link
+from drivers.links import Datagram, Link, link_health
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import CodecError, DeviceError
 from tactile_lab.geometry.contacts import Array
@@ -148,7 +148,7 @@ class Nano17(ForceTip):
 
     def health(self) -> tuple[str, ...]:
         """As :meth:`ForceTip.health`, and whether the device still sends, and what its wire says."""
-        problems = [*super().health(), *self.wire.health()]
+        problems = [*super().health(), *self.wire.health(), *link_health(self._link)]
         now_ns = self._clock.now_ns()
         if self.newest and (silent := (now_ns - self.newest.stamp_ns) / 1e6) > self._box.silent_ms:
             problems.append(f"no record for {silent:.0f} ms")

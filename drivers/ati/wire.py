@@ -25,12 +25,14 @@ class ForceWire(Protocol):
     Attributes:
         stuck_after: equal readings in a row after which the sensor counts as stuck.
         step: how far the measuring counter moves from sample to sample; 0 when that is not known.
-        ranges_SI: calibrated range of each axis, N and N m, shape (6,); None when the device has not told.
     """
 
     stuck_after: int
     step: int
-    ranges_SI: Array | None
+
+    @property
+    def ranges_SI(self) -> Array | None:
+        """Calibrated range of each axis, N and N m, shape (6,); None when the device has not told."""
 
     def start(self, talk: Conversation) -> None:
         """Set the device up from whatever state it is in, and start its stream.

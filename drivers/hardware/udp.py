@@ -28,7 +28,8 @@ class UdpLink:
 
     Args:
         name: the device's name in the rig.
-        host, port: the device's address; ``host`` may be a name.
+        host, port: the device's address; ``host`` may be a name. Port 0 takes any port of that host, for a device
+            that only sends.
         clock: the session's clock; its time is CLOCK_MONOTONIC on hardware.
         local: address to receive on; any interface and any free port unless given.
         receive_buffer: size of the kernel's buffer in bytes (4 MB hold half a second of a 7 kHz stream).
@@ -108,7 +109,7 @@ class UdpLink:
             except OSError as error:
                 raise self._failure(f"lost {self._host}:{self._port} ({error.strerror})") from error
             stamp_ns = self._stamp(ancillary, behind_ns)
-            if source == self._address:
+            if source[0] == self._address[0] and source[1] == (self._address[1] or source[1]):
                 taken.append(Datagram(payload, stamp_ns))
             else:
                 self.foreign += 1

@@ -1,0 +1,54 @@
+"""A loop in a thread of its own, begun and ended in order, and the pace of a stream."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Self
+
+
+class Background:
+    """Calls ``turn`` again and again until it is closed. A context manager; closing is idempotent and waits.
+
+    Args:
+        name: of the thread.
+        turn: one turn, a few milliseconds at most.
+    """
+
+    def __init__(self, name: str, turn: Callable[[], None]) -> None:
+        self._turn, self._ending = turn, threading.Event()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the loop and wait for it."""
+        self._ending.set()
+        self._thread.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *ended: object) -> None:
+        self.close()
+
+    def _run(self) -> None:
+        while not self._ending.is_set():
+            self._turn()
+
+
+class Pace:
+    """How many messages of a stream are due. What a busy machine has missed is made up, half a second at most."""
+
+    def __init__(self) -> None:
+        self._last_s = time.monotonic()
+        self._owed = 0.0
+
+    def due(self, rate_hz: float) -> int:
+        """Messages due since the last call."""
+        now_s = time.monotonic()
+        self._owed += min(now_s - self._last_s, 0.5) * rate_hz
+        self._last_s = now_s
+        count = int(self._owed)
+        self._owed -= count
+        return count

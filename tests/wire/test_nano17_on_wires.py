@@ -1,0 +1,310 @@
+"""The product's Nano17 driver over real sockets, pseudo terminals and a CAN bus, against the emulated units."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+
+from drivers.ati import net_box
+from drivers.ati.force_tip import WrenchSample
+from drivers.ati.gauge_volts import encode_volts
+from drivers.ati.nano17 import Nano17, Nano17Settings
+from drivers.ati.wiring import (
+    CanWiring,
+    ControllerWiring,
+    DigitalWiring,
+    NetBoxWiring,
+    VoltsWiring,
+    Wiring,
+    make_link,
+    make_wire,
+)
+from drivers.emulators.ati_sensor import EmulatedSensor
+from drivers.emulators.can_server import CanServer
+from drivers.emulators.can_unit import CanUnit
+from drivers.emulators.controller_unit import COUNTS_PER_N, ControllerUnit, COUNTS_PER_Nm
+from drivers.emulators.digital_unit import DigitalUnit
+from drivers.emulators.net_box_server import NetBoxServer
+from drivers.emulators.net_box_unit import NetBoxUnit
+from drivers.emulators.pty_port import PtyPort
+from drivers.faults import Drop, FaultyLink, Reorder, When
+from drivers.fingertip import load_fingertips
+from drivers.links import Link
+from tactile_lab.clock import MonotonicClock
+from tactile_lab.errors import DeviceError
+
+TIPS = Path(__file__).parents[2] / "tactile_lab" / "rigs" / "calibrations" / "simulated-hand" / "fingertips.yaml"
+CLOCK = MonotonicClock()
+PRESSED = np.array([1.0, -0.5, 2.0, 0.010, -0.004, 0.002])
+COUNT = np.repeat([5e-3, 5e-5], 3)
+
+
+def device(wiring: Wiring, folder: Path = TIPS.parent, wrap: Callable[[Link], Link] = lambda link: link) -> Nano17:
+    link = wrap(make_link(wiring, "ft/FF", CLOCK))
+    return Nano17("FF", link, CLOCK, load_fingertips(TIPS)["FF"], Nano17Settings(), make_wire(wiring, folder))
+
+
+def listen(tip: Nano17, count: int, seconds: float = 10.0) -> list[WrenchSample]:
+    """Poll every 2 ms until ``count`` samples have come."""
+    taken: list[WrenchSample] = []
+    end = time.monotonic() + seconds
+    while len(taken) < count:
+        assert time.monotonic() < end, f"{len(taken)} of {count} samples; {tip.health()}"
+        samples = tip.poll()
+        tip.update(samples)
+        taken += samples
+        time.sleep(0.002)
+    return taken
+
+
+@pytest.fixture
+def sensor() -> EmulatedSensor:
+    made = EmulatedSensor(noise_counts=0.0)
+    made.press(PRESSED)
+    return made
+
+
+@pytest.fixture
+def box(sensor: EmulatedSensor) -> Iterator[NetBoxServer]:
+    with NetBoxServer(NetBoxUnit(sensor), "127.0.0.1", port=0) as server:
+        yield server
+
+
+def box_wiring(box: NetBoxServer, **changes: object) -> NetBoxWiring:
+    place = {"wire": "net-ft", "host": "127.0.0.1", "port": box.port, "http_port": box.http_port, "rate_hz": 500}
+    return NetBoxWiring.model_validate(place | changes)
+
+
+# --- Net F/T -------------------------------------------------------------------------------------------------------
+
+
+def test_a_box_is_found_set_read_and_left_silent(box: NetBoxServer) -> None:
+    tip = device(box_wiring(box, serial="FT00001"))
+    tip.connect()
+    assert box.unit.rate_hz == 500
+    samples = listen(tip, 200)
+    np.testing.assert_allclose(np.mean([sample.wrench for sample in samples], axis=0), PRESSED, atol=COUNT[0])
+    assert (tip.sequences.lost, tip.sequences.skipped, tip.sequences.disordered) == (0, 0, 0)
+    tip.close()
+    for _ in range(100):
+        if not box.unit.streaming:
+            break
+        time.sleep(0.01)
+    assert not box.unit.streaming
+
+
+def test_an_old_stream_of_another_client_is_taken_over(box: NetBoxServer) -> None:
+    first, second = device(box_wiring(box)), device(box_wiring(box))
+    first.connect()
+    listen(first, 20)
+    second.connect()
+    assert len(listen(second, 50)) >= 50
+    second.close()
+    first.close()
+
+
+def test_lost_records_are_counted_exactly(box: NetBoxServer) -> None:
+    box.lose = lambda number: number % 10 == 3
+    tip = device(box_wiring(box))
+    tip.connect()
+    listen(tip, 300)
+    box.lose = lambda number: False
+    listen(tip, 20)
+    assert tip.sequences.lost == box.lost > 0
+    assert any("records lost" in problem for problem in tip.health())
+    tip.close()
+
+
+@pytest.mark.parametrize(("fault", "words"), [(Drop(), "records lost"), (Reorder(), "out of order")])
+def test_a_fault_on_the_real_wire_is_counted(box: NetBoxServer, fault: Drop | Reorder, words: str) -> None:
+    wrapped: list[FaultyLink] = []
+
+    def wrap(link: Link) -> Link:
+        wrapped.append(FaultyLink(link, fault, When(first=20, every=7, count=20)))
+        return wrapped[0]
+
+    tip = device(box_wiring(box), wrap=wrap)
+    tip.connect()
+    listen(tip, 300)
+    assert wrapped[0].injected == 20
+    counted = tip.sequences.lost if words == "records lost" else tip.sequences.disordered
+    # a record behind the next one counts once as lost and once as out of order
+    assert counted == 20
+    assert any(words in problem for problem in tip.health())
+    tip.close()
+
+
+def test_a_forged_record_from_a_foreign_address_never_becomes_a_sample(box: NetBoxServer) -> None:
+    tip = device(box_wiring(box))
+    tip.connect()
+    listen(tip, 10)
+    link = tip._link
+    port = link._socket.getsockname()[1]  # type: ignore[attr-defined]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        stranger.bind(("127.0.0.9", 0))
+        for _ in range(5):
+            stranger.sendto(bytes(36), ("127.0.0.1", port))
+    samples = listen(tip, 50)
+    assert all(sample.rdt_sequence for sample in samples)
+    assert link.foreign == 5  # type: ignore[attr-defined]
+    assert any("5 datagrams from other addresses" in problem for problem in tip.health())
+    tip.close()
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"serial": "FT99999"}, "the box uses the calibration of FT00001, the rig file names FT99999"),
+        ({"counts_per_N": 20480.0}, "counts 1e\\+06 per N .* the rig file says 20480"),
+    ],
+)
+def test_a_box_set_otherwise_than_the_rig_says_is_refused(
+    box: NetBoxServer, changes: dict[str, object], complaint: str
+) -> None:
+    with pytest.raises(DeviceError, match=complaint):
+        device(box_wiring(box, **changes)).connect()
+
+
+def test_a_box_that_keeps_its_rate_is_refused(box: NetBoxServer) -> None:
+    box.unit.rate_locked = True
+    with pytest.raises(DeviceError, match="asked for 500 records a second, the box stays at 7000"):
+        device(box_wiring(box)).connect()
+
+
+def test_no_box_and_another_web_server_are_told_apart(box: NetBoxServer) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        nothing = free.getsockname()[1]
+    with pytest.raises(DeviceError, match="no web page from the box"):
+        device(box_wiring(box, http_port=nothing)).connect()
+    with pytest.raises(DeviceError, match="refuses /other"):
+        net_box._get("127.0.0.1", box.http_port, "/other", 2.0)
+
+
+def test_a_box_whose_records_are_kept_back_is_told(box: NetBoxServer) -> None:
+    box.lose = lambda number: True
+    with pytest.raises(DeviceError, match=r"answers, but no record arrives\. Check the firewall"):
+        device(box_wiring(box)).connect()
+
+
+def test_a_box_that_dies_is_silent_and_says_so(sensor: EmulatedSensor) -> None:
+    server = NetBoxServer(NetBoxUnit(sensor), port=0)
+    tip = device(box_wiring(server))
+    tip.connect()
+    listen(tip, 20)
+    server.close()
+    time.sleep(0.15)
+    tip.update(tip.poll())
+    time.sleep(0.15)
+    assert any(problem.startswith("no record for") for problem in tip.health())
+    tip.close()
+
+
+# --- serial lines --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("baud", [1_250_000, 115_200, 19_200])
+def test_a_digital_sensor_streams_at_each_of_its_rates(sensor: EmulatedSensor, baud: int) -> None:
+    with PtyPort(DigitalUnit(sensor, rate_hz=1000.0), baud) as port:
+        tip = device(DigitalWiring.model_validate({"wire": "digital", "port": port.path, "baud": baud, "parity": "N"}))
+        tip.connect()
+        samples = listen(tip, 300)
+        np.testing.assert_allclose(np.mean([sample.wrench for sample in samples], axis=0), PRESSED, atol=COUNT[0])
+        assert tip.wire.health() == ()
+        stamps = [sample.stamp_ns for sample in samples]
+        assert stamps == sorted(stamps)
+        tip.close()
+        tip.connect()  # a second time, with the line as the first left it
+        listen(tip, 50)
+        tip.close()
+
+
+def test_a_stream_that_an_old_program_left_running_is_ended_first(sensor: EmulatedSensor) -> None:
+    unit = DigitalUnit(sensor, rate_hz=2000.0)
+    unit.streaming = True
+    with PtyPort(unit, 115_200) as port:
+        tip = device(DigitalWiring(wire="digital", port=port.path, baud=115_200, parity="N"))
+        tip.connect()
+        listen(tip, 100)
+        tip.close()
+
+
+@pytest.mark.parametrize("mode", ["ascii", "binary"])
+def test_a_controller_answers_in_both_forms(sensor: EmulatedSensor, mode: str) -> None:
+    with PtyPort(ControllerUnit(sensor, rate_hz=100.0), 9600) as port:
+        settings = {"wire": "controller", "port": port.path, "mode": mode}
+        scale = {"counts_per_N": COUNTS_PER_N, "counts_per_Nm": COUNTS_PER_Nm}
+        tip = device(ControllerWiring.model_validate(settings | scale))
+        tip.connect()
+        samples = listen(tip, 20)
+        np.testing.assert_allclose(np.mean([sample.wrench for sample in samples], axis=0), PRESSED, atol=COUNT[0])
+        assert tip.wire.health() == ()
+        tip.close()
+
+
+def test_a_line_at_another_speed_is_no_sensor(sensor: EmulatedSensor) -> None:
+    with PtyPort(DigitalUnit(sensor), 19_200) as port:
+        tip = device(DigitalWiring(wire="digital", port=port.path, baud=115_200, parity="N"))
+        with pytest.raises(DeviceError, match=r"ft/FF: the sensor does not answer\. .*baud rate"):
+            tip.connect()
+
+
+def test_an_adapter_that_is_pulled_out_ends_the_driver_in_order(sensor: EmulatedSensor) -> None:
+    port = PtyPort(DigitalUnit(sensor, rate_hz=500.0), 115_200)
+    tip = device(DigitalWiring(wire="digital", port=port.path, baud=115_200, parity="N"))
+    tip.connect()
+    listen(tip, 20)
+    port.close()
+    with pytest.raises(DeviceError, match=r"the serial port .* is gone"):
+        listen(tip, 1000)
+    tip.close()
+    tip.close()
+
+
+# --- CAN and volts -------------------------------------------------------------------------------------------------
+
+
+def test_a_board_on_a_can_bus_answers_and_others_do_not_disturb(sensor: EmulatedSensor) -> None:
+    wiring = CanWiring(wire="can-oem", interface="virtual", channel="nano17")
+    with (
+        CanServer(CanUnit(sensor), can.Bus(interface="virtual", channel="nano17")),
+        CanServer(CanUnit(base=0x21), can.Bus(interface="virtual", channel="nano17")),
+    ):
+        tip = device(wiring)
+        tip.connect()
+        samples = listen(tip, 30)
+        np.testing.assert_allclose(samples[-1].wrench, PRESSED, atol=COUNT[0])
+        assert tip.wire.health() == ()
+        tip.close()
+
+
+def test_no_board_at_the_base_identifier_is_told() -> None:
+    wiring = CanWiring(wire="can-oem", interface="virtual", channel="empty", base=0x33)
+    with pytest.raises(DeviceError, match=r"no board answers at base identifier 0x33"):
+        device(wiring).connect()
+
+
+def test_volts_arrive_from_an_acquisition_program(lab_data: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    wiring = VoltsWiring(wire="gauge-volts", calibration="FT14048.cal", local_port=port)
+    tip = device(wiring, lab_data / "ati_cal")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as program:
+        program.bind(("127.0.0.1", 0))
+        tip._link.open()
+        for number in range(40):
+            program.sendto(encode_volts(number, (0.1, 0.2, -0.1, 0.0, 0.05, 0.01 * (number % 2))), ("127.0.0.1", port))
+        tip.connect()
+        for number in range(40, 60):
+            program.sendto(encode_volts(number, (0.1, 0.2, -0.1, 0.0, 0.05, 0.01 * (number % 2))), ("127.0.0.1", port))
+        samples = listen(tip, 20)
+    assert [sample.rdt_sequence for sample in samples][-1] == 59
+    assert tip.sequences.lost == 0
+    tip.close()
