@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.polygon_segmentation import Faces, PlanarContacts
@@ -12,11 +13,16 @@ from tactile_lab.shape.polygon_uncertainty import FaceUncertainty
 from tactile_lab.shape.sampling import distances_to_polygon
 from tactile_lab.shape.surface import Contour
 
+Indices = NDArray[np.int64]
+
 _LEAST_TURN = 0.12
 """Sine of the least angle between two faces whose lines are intersected, 7 degrees; flatter ones are bridged."""
 
 _SLACK_SIGMAS = 8.0
 """A corner may lie so many standard deviations of a contact behind the outermost contacts of its faces."""
+
+_MANY = 6
+"""On a face of so many contacts one of them may be beyond the corner."""
 
 _LARGEST_CORNER_SIGMA_m = 0.015
 """A corner that is known worse than this is a guess."""
@@ -66,13 +72,18 @@ class JointMaker:
 
     def between(self, face: int, following: int) -> Joint:
         """The joint after ``face``."""
-        last, first = self._faces.members(face)[-1], self._faces.members(following)[0]
-        ends = np.array([self._foot(face, int(last)), self._foot(following, int(first))])
-        slack = _SLACK_SIGMAS * float(self._contacts.point_sigma_m[[last, first]].max())
+        before, after = self._faces.members(face), self._faces.members(following)
         corner = self._intersection(face, following)
-        if corner is not None and self._is_plausible(face, following, corner, ends, slack):
+        if corner is not None and any(
+            self._is_plausible(face, following, corner, int(last), int(first))
+            for last, first in _outermost(before, after)
+        ):
             return Joint(corner[None], np.full(1, np.nan))
-        return self._bridge(ends)
+        return self._bridge(self._ends(face, following, int(before[-1]), int(after[0])))
+
+    def _ends(self, face: int, following: int, last: int, first: int) -> Array:
+        """Where two faces were touched last and first."""
+        return np.array([self._foot(face, last), self._foot(following, first)])
 
     def _foot(self, face: int, contact: int) -> Array:
         """A contact moved onto the line of a face."""
@@ -86,9 +97,10 @@ class JointMaker:
             return None
         return np.asarray(np.linalg.solve(normals, self._faces.offsets_m[pair]))
 
-    def _is_plausible(self, face: int, following: int, corner: Array, ends: Array, slack_m: float) -> bool:
+    def _is_plausible(self, face: int, following: int, corner: Array, last: int, first: int) -> bool:
         """The corner lies ahead of the one face and before the other, leaves out no contacts, and is known well."""
-        tangents = self._faces.tangents
+        ends, tangents = self._ends(face, following, last, first), self._faces.tangents
+        slack_m = _SLACK_SIGMAS * float(self._contacts.point_sigma_m[[last, first]].max())
         leaps = np.array([(corner - ends[0]) @ tangents[face], (ends[1] - corner) @ tangents[following]])
         if leaps.min() < -slack_m:
             return False
@@ -126,3 +138,14 @@ class JointMaker:
         if len(indices) == 0 or length > longest_m:
             return None
         return Contour(points[indices], self._provisional.sigma_m[indices], is_closed=False)
+
+
+def _outermost(before: Indices, after: Indices) -> list[tuple[np.int64, np.int64]]:
+    """The last contact of a face and the first of the next; either may be left out of account on a face of many.
+
+    Grasps that touch parallel faces only slide along them unseen, and carry a contact beyond the corner.
+    """
+    pairs = [(before[-1], after[0])]
+    pairs += [(before[-2], after[0])] if len(before) >= _MANY else []
+    pairs += [(before[-1], after[1])] if len(after) >= _MANY else []
+    return pairs

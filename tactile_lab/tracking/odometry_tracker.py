@@ -24,6 +24,8 @@ KNOWN_VARIANCE = 1e-10
 """A pose that is given is certain up to rounding."""
 
 _STEP = 1e-6
+_KERNEL_EVERY = 4
+"""Kernel parameters are estimated anew after so many grasps."""
 
 
 class OdometryTracker:
@@ -88,6 +90,7 @@ class KnownPoseTracker(OdometryTracker):
         truth_T_map = start.inverse() * space.pose(first.placed[-1].row, 0.0)
         self._ahead = [None if pose is None else space.motion(pose * truth_T_map) for pose in poses[1:]]
         self._given: Array | None = None
+        self._judge = Judge(noise, UNEXPLAINED_COST)
 
     def predict(self, motion: Array) -> None:
         super().predict(motion)
@@ -100,7 +103,13 @@ class KnownPoseTracker(OdometryTracker):
         self._trusted = self._given is not None and len(contacts) > 0
         return self._trusted
 
+    def update_shape(self, contacts: ContactSet, certain: bool) -> None:
+        """Contacts that fit nothing are left out: at known poses they are wrong themselves."""
+        super().update_shape(contacts, certain)
+        self._map, _ = self._judge.cleaned(self._map, len(self._map.placed) - 1)
+        if len(self._map.placed) % _KERNEL_EVERY == 0:
+            self._map = self._map.with_best_kernel()
+
     def finish(self) -> None:
-        """Leave out contacts that fit no shape: at known poses they are wrong themselves."""
-        self._map = self._map.with_best_kernel()
-        self._map = SharpJudge(Judge(self._noise, UNEXPLAINED_COST), self._noise).without_errors(self._map)
+        """Look at all contacts once more, when the shape is known best."""
+        self._map = SharpJudge(self._judge, self._noise).without_errors(self._map.with_best_kernel())
