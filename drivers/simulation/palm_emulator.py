@@ -183,7 +183,8 @@ class PalmEmulator:
 
     def _packets(self, kind: int, parity: int) -> tuple[int, int, NDArray[np.int16], NDArray[np.uint16]]:
         """Arrived and error masks, and the ten packets' words."""
-        torque, misc = (words[parity::2].copy() for words in self._motors.answer(kind))
+        torques, miscs = self._motors.answer(kind)
+        torque, misc = torques[parity::2].copy(), miscs[parity::2].copy()
         if kind == FromMotor.INVALID:
             return 0, 0, torque, misc
         arrived, had_errors = _ALL_OF[parity], 0

@@ -1,0 +1,170 @@
+"""The emulated hand in a process of its own, on one end of a cable: ``python -m drivers.emulators.ethercat_server``.
+
+Takes its settings and later orders as lines of JSON on standard input and answers each with one line; it ends with
+its standard input, so that it never outlives the program that started it.
+
+Orders: ``{"cable": {...}}`` sets fields of :class:`~drivers.emulators.ethercat_ring.CableFaults`; ``{"hung": true}``
+stops the palm's processor; ``{"service_ns": n}`` slows it; ``{"silent": [motors]}``; ``{"fall": [state, code]}`` lets
+the palm leave its state; ``{"power_cycle": true}``. Every answer holds the counts.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import select
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from drivers.emulators.motor_can import MotorCanBuses
+from drivers.emulators.shadow_chain import ChainSettings, EmulatedHand, emulated_hand
+from drivers.ethercat.ports import Port, RawPort
+from drivers.ethercat.registers import AlState
+from drivers.shadow.joint_calibration import JointCalibration
+from tactile_lab.clock import MonotonicClock
+from tactile_lab.errors import DeviceError, TactileLabError
+
+_IDLE_s = 0.02
+_START_s, _ANSWER_s = 30.0, 5.0
+
+
+class HandServer:
+    """Serves frames and orders until its orders end."""
+
+    def __init__(self, hand: EmulatedHand, port: Port) -> None:
+        self._hand, self._port = hand, port
+
+    def run(self) -> None:
+        """Serve. Raises DeviceError when the interface goes."""
+        while True:
+            if (frame := self._port.receive(_IDLE_s)) is not None:
+                for answer in self._hand.ring.process(frame):
+                    self._port.send(answer)
+            if select.select([sys.stdin], [], [], 0)[0]:
+                if not (line := sys.stdin.readline()):
+                    return
+                _say(self._obey(json.loads(line)))
+
+    def _obey(self, order: dict[str, Any]) -> dict[str, Any]:
+        hand = self._hand
+        for name, value in order.get("cable", {}).items():
+            setattr(hand.ring.faults, name, value)
+        hand.palm.hung = order.get("hung", hand.palm.hung)
+        hand.palm.service_ns = order.get("service_ns", hand.palm.service_ns)
+        hand.palm.palm.faults.silent = set(order.get("silent", hand.palm.palm.faults.silent))
+        if "fall" in order:
+            state, code = order["fall"]
+            hand.palm_slave.fall_to(AlState(state), code)
+        if "power_cycle" in order:
+            for slave in hand.ring.slaves:
+                slave.power_cycle()
+        return self._counts()
+
+    def _counts(self) -> dict[str, Any]:
+        hand = self._hand
+        counts = dataclasses.asdict(hand.ring.counts) | dataclasses.asdict(hand.palm_slave.counts)
+        return counts | {"served": hand.palm.served, "state": str(hand.palm_slave.al_status)}
+
+
+def _say(answer: dict[str, Any]) -> None:
+    sys.stdout.write(json.dumps(answer) + "\n")
+    sys.stdout.flush()
+
+
+def main() -> None:
+    """Read the first line, make the hand, serve it."""
+    start = json.loads(sys.stdin.readline())
+    clock = MonotonicClock()
+    try:
+        calibration = JointCalibration.load(Path(start["joints"]))
+        hand = emulated_hand(clock, calibration, ChainSettings(**start["settings"]), can=MotorCanBuses())
+        port = RawPort(start["interface"])
+        port.open()
+        _say({"ready": True})
+        HandServer(hand, port).run()
+    except TactileLabError as error:
+        _say({"error": str(error)})
+        sys.exit(error.exit_code)
+
+
+class EmulatedHandProcess:
+    """The emulated hand in another process, as a context.
+
+    Args:
+        interface: network interface it serves.
+        joints: joint calibration file, read backwards.
+        settings: what kind of hand.
+    """
+
+    def __init__(self, interface: str, joints: Path, settings: ChainSettings | None = None) -> None:
+        self._start = {
+            "interface": interface,
+            "joints": str(joints),
+            "settings": dataclasses.asdict(settings or ChainSettings()),
+        }
+        self._process: subprocess.Popen[str] | None = None
+
+    def __enter__(self) -> EmulatedHandProcess:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def start(self) -> None:
+        """Start it and wait until it serves.
+
+        Raises:
+            DeviceError: it does not come up, with its own words.
+        """
+        command = [sys.executable, "-m", "drivers.emulators.ethercat_server"]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        answer = self._exchange(self._start, _START_s)
+        if "error" in answer:
+            self.close()
+            raise DeviceError(answer["error"], where="emulated hand")
+
+    def order(self, **order: Any) -> dict[str, Any]:
+        """Give an order (see the module); the counts after it.
+
+        Raises:
+            DeviceError: the process is gone.
+        """
+        return self._exchange(order, _ANSWER_s)
+
+    def kill(self) -> None:
+        """End it at once, as a power cut would."""
+        if self._process is not None:
+            self._process.kill()
+        self.close()
+
+    def close(self) -> None:
+        """End it; idempotent."""
+        if self._process is None:
+            return
+        process, self._process = self._process, None
+        try:
+            process.communicate(timeout=_ANSWER_s)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+
+    def _exchange(self, message: dict[str, Any], patience_s: float) -> dict[str, Any]:
+        process = self._process
+        if process is None or process.stdin is None or process.stdout is None:
+            raise DeviceError("is not running", where="emulated hand", hint="Start it first")
+        try:
+            process.stdin.write(json.dumps(message) + "\n")
+            process.stdin.flush()
+        except BrokenPipeError:
+            raise DeviceError("has ended by itself", where="emulated hand") from None
+        if not select.select([process.stdout], [], [], patience_s)[0] or not (line := process.stdout.readline()):
+            raise DeviceError("does not answer", where="emulated hand", hint="See its messages above")
+        answer: dict[str, Any] = json.loads(line)
+        return answer
+
+
+if __name__ == "__main__":
+    main()

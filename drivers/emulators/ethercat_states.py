@@ -1,0 +1,51 @@
+"""The state machine of an emulated slave's application layer, with its refusals (ETG.1000.6)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from drivers.ethercat.registers import AL_ERROR, AL_STATE_MASK, AlCode, AlState, AlStatus
+
+_NEXT = {AlState.INIT: AlState.PREOP, AlState.PREOP: AlState.SAFEOP, AlState.SAFEOP: AlState.OP}
+
+
+class StateMachine:
+    """States INIT, PREOP, SAFEOP and OP.
+
+    Args:
+        setup_error: asked on the way to SAFEOP and OP what is missing in the SyncManagers: None nothing, True
+            outputs, False inputs.
+    """
+
+    def __init__(self, setup_error: Callable[[], bool | None]) -> None:
+        self._setup_error = setup_error
+        self.status = AlStatus(AlState.INIT)
+
+    def request(self, control: int) -> None:
+        """The master wrote the control register. While an error stands, only an acknowledging request is heard."""
+        wanted, acknowledged = control & AL_STATE_MASK, bool(control & AL_ERROR)
+        if self.status.error and not acknowledged:
+            return
+        present = AlState(self.status.state)
+        if wanted == AlState.BOOT:
+            self._refuse(AlCode.BOOT_NOT_SUPPORTED)
+        elif wanted not in set(AlState):
+            self._refuse(AlCode.UNKNOWN_STATE)
+        elif wanted > present and wanted != _NEXT[present]:
+            self._refuse(AlCode.INVALID_STATE_CHANGE)
+        elif wanted >= AlState.SAFEOP and (missing := self._setup_error()) is not None:
+            code = AlCode.INVALID_OUTPUTS if missing else AlCode.INVALID_INPUTS
+            self.fall(min(present, AlState.PREOP), code)
+        else:
+            self.status = AlStatus(AlState(wanted))
+
+    def fall(self, state: AlState, code: int) -> None:
+        """Go to a state with an error."""
+        self.status = AlStatus(state, True, code)
+
+    def watchdog(self) -> None:
+        """No process data came in time."""
+        self.fall(AlState.SAFEOP, AlCode.WATCHDOG)
+
+    def _refuse(self, code: AlCode) -> None:
+        self.fall(AlState(self.status.state), code)

@@ -1,0 +1,77 @@
+"""A hand in free air, without physics: joints turn in proportion to their motors' duty cycle, up to their limits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivers.shadow.kinematics import JOINT_INDEX, JOINTS, JOINT_LIMITS_rad
+from drivers.shadow.motors import DRIVEN_JOINTS, angles_of_driven
+from drivers.simulation.geared_motors import motor_class
+from drivers.simulation.motor_bank import DEMAND_TIMEOUT_ns
+from tactile_lab.clock import NANOSECONDS, Clock
+from tactile_lab.geometry.contacts import Array
+
+FULL_SPEED_rad_s = 4.0
+"""Speed of every joint at full duty cycle (assumed)."""
+
+
+class FreeHand:
+    """Joints that follow their motors on a clock's time; at a limit the motor pushes with its stall torque.
+
+    It is moved when someone looks, and nobody may look before the motors halt for want of a demand: so the halt is kept
+    here as well.
+
+    Args:
+        clock: whose time passes.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._spread = _shares_of_motors()
+        self._stall_Nm = np.array([motor_class(joint).stall_Nm for joint in DRIVEN_JOINTS])
+        self._angles_rad: Array = np.asarray(np.mean(JOINT_LIMITS_rad, axis=1))
+        self._duty = np.zeros(len(DRIVEN_JOINTS))
+        self._moved_ns = self._driven_ns = clock.now_ns()
+
+    @property
+    def stamp_ns(self) -> int:
+        """Present time."""
+        return self._clock.now_ns()
+
+    @property
+    def joints_rad(self) -> Array:
+        """Joint angles, shape (24,), radians."""
+        self._move()
+        return np.array(self._angles_rad)
+
+    @property
+    def motor_torque_Nm(self) -> Array:
+        """Torque of each driven joint's motor, shape (20,): none unless it pushes against a limit."""
+        self._move()
+        low, high = self._spread.T @ JOINT_LIMITS_rad[:, 0], self._spread.T @ JOINT_LIMITS_rad[:, 1]
+        angle = self._spread.T @ self._angles_rad
+        pushing = ((angle <= low) & (self._duty < 0)) | ((angle >= high) & (self._duty > 0))
+        return np.asarray(np.where(pushing, self._duty * self._stall_Nm, 0.0))
+
+    def drive(self, duty: Array) -> None:
+        """Duty cycles -1 to 1 from now on, shape (20,), order of ``DRIVEN_JOINTS``."""
+        self._move()
+        self._duty = np.asarray(duty, float).copy()
+        self._driven_ns = self._moved_ns
+
+    def _move(self) -> None:
+        now_ns = self._clock.now_ns()
+        turning_ns = max(min(now_ns, self._driven_ns + DEMAND_TIMEOUT_ns) - self._moved_ns, 0)
+        turned = self._spread @ self._duty * FULL_SPEED_rad_s * turning_ns / NANOSECONDS
+        self._angles_rad = np.clip(self._angles_rad + turned, JOINT_LIMITS_rad[:, 0], JOINT_LIMITS_rad[:, 1])
+        self._moved_ns = now_ns
+
+
+def _shares_of_motors() -> Array:
+    """Share of each driven joint's motion that every joint takes, shape (24, 20); a coupled pair shares evenly."""
+    shares = np.zeros((len(JOINTS), len(DRIVEN_JOINTS)))
+    for column, name in enumerate(DRIVEN_JOINTS):
+        joints = angles_of_driven(name)
+        for joint in joints:
+            shares[JOINT_INDEX[joint], column] = 1.0 / len(joints)
+    return shares

@@ -1,0 +1,155 @@
+"""The hand as an EtherCAT master meets it: a bridge, and behind it a palm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from drivers.emulators.ethercat_eeprom import SlaveIdentity, bare_eeprom, mapped_eeprom
+from drivers.emulators.ethercat_ring import EmulatedRing
+from drivers.emulators.ethercat_slave import Application, NoApplication, SlaveController
+from drivers.emulators.free_hand import FreeHand
+from drivers.ethercat.registers import SyncManager
+from drivers.shadow.joint_calibration import JointCalibration
+from drivers.shadow.motors import MotorMap
+from drivers.shadow.palm_images import BRIDGE_PRODUCT, CAN_BYTES, PALMS, SHADOW_VENDOR, PalmImage, PalmName
+from drivers.simulation.motor_bank import MotorBank
+from drivers.simulation.palm_emulator import CanBuses, JointSensors, NoTactile, PalmEmulator
+from drivers.simulation.settings import JointSensorSettings
+from tactile_lab.clock import Clock
+
+EepromKind = Literal["bare", "mapped"]
+
+_NOT_SERVED_EDC, _NOT_SERVED_WORD = 0xCC, 0xDEAD
+_SERVICE_ns = 600_000
+
+
+class PalmApplication:
+    """The palm's processor: hands commands on to the palm, keeps its motors' time.
+
+    Args:
+        palm: answers commands.
+        motors: its motors, which halt when no demand comes.
+        image: which palm it is.
+        clock: for the motors.
+        service_ns: from a command's arrival to its status.
+    """
+
+    def __init__(
+        self, palm: PalmEmulator, motors: MotorBank, image: PalmImage, clock: Clock, service_ns: int = _SERVICE_ns
+    ) -> None:
+        self.palm, self._motors, self._image, self._clock = palm, motors, image, clock
+        self.sync_managers: tuple[SyncManager, ...] = image.sync_managers()
+        self.service_ns = service_ns
+        self.hung = False
+        self.served = 0
+
+    def start(self) -> tuple[bytes, ...]:
+        """Before its first service the palm's buffer holds marks (protocols A.4)."""
+        size = self._image.status_bytes - CAN_BYTES
+        words = np.full((size - 4) // 2, _NOT_SERVED_WORD, "<u2").tobytes()
+        return _NOT_SERVED_EDC.to_bytes(4, "little") + words, bytes(CAN_BYTES)
+
+    def serve(self, blocks: tuple[bytes, ...], *, operating: bool) -> tuple[bytes, ...] | None:
+        """One cycle. Outside OP the demands are taken for zero."""
+        self._halt_late_motors()
+        if self.hung:
+            return None
+        payload = b"".join(blocks)
+        status = self.palm.serve(payload if operating else bytes(len(payload)))
+        if status is None:
+            return None
+        self.served += 1
+        return status[:-CAN_BYTES], status[-CAN_BYTES:]
+
+    def _halt_late_motors(self) -> None:
+        due_ns = self._motors.next_event_ns
+        if due_ns is not None and self._clock.now_ns() >= due_ns:
+            self._motors.tick()
+
+
+@dataclass(frozen=True)
+class ChainSettings:
+    """What is emulated.
+
+    Attributes:
+        palm: kind of palm.
+        eeprom: what the slaves' EEPROMs hold.
+        serial: the hand's.
+        product: product code of the palm; its usual one unless given.
+        vendor: of both slaves.
+        service_ns: how long the palm takes for a command.
+        seed: of noise and losses.
+    """
+
+    palm: PalmName = "0220"
+    eeprom: EepromKind = "bare"
+    serial: int = 634
+    product: int | None = None
+    vendor: int = SHADOW_VENDOR
+    service_ns: int = _SERVICE_ns
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class EmulatedHand:
+    """A hand in free air on a ring, with its parts in reach."""
+
+    ring: EmulatedRing
+    palm: PalmApplication
+    plant: FreeHand
+
+    @property
+    def palm_slave(self) -> SlaveController:
+        """The palm's slave controller."""
+        return self.ring.slaves[1]
+
+    @property
+    def bridge_slave(self) -> SlaveController:
+        """The bridge's slave controller."""
+        return self.ring.slaves[0]
+
+
+def emulated_hand(
+    clock: Clock,
+    calibration: JointCalibration,
+    settings: ChainSettings | None = None,
+    motor_map: MotorMap | None = None,
+    can: CanBuses | None = None,
+) -> EmulatedHand:
+    """A stand-alone hand in free air.
+
+    Args:
+        clock: its time.
+        calibration: joint tables, read backwards.
+        settings: what kind of hand.
+        motor_map: which motor pulls which joint.
+        can: the motors' buses.
+    """
+    settings = settings or ChainSettings()
+    image, plant = PALMS[settings.palm], FreeHand(clock)
+    rng = np.random.default_rng(settings.seed)
+    joints = JointSensors(calibration, JointSensorSettings(), rng)
+    motors = MotorBank(plant, motor_map or MotorMap.load(), rng)
+    palm = PalmEmulator(plant, joints, motors, NoTactile(), rng, image, can)
+    application = PalmApplication(palm, motors, image, clock, settings.service_ns)
+    return EmulatedHand(_ring(application, image, clock, settings), application, plant)
+
+
+def _ring(palm: PalmApplication, image: PalmImage, clock: Clock, settings: ChainSettings) -> EmulatedRing:
+    product = image.products[0] if settings.product is None else settings.product
+    identities = (
+        (SlaveIdentity(settings.vendor, BRIDGE_PRODUCT), "bridge", NoApplication()),
+        (SlaveIdentity(settings.vendor, product, serial=settings.serial), "palm", palm),
+    )
+    slaves = [_slave(identity, name, part, clock, settings.eeprom) for identity, name, part in identities]
+    return EmulatedRing(slaves, settings.seed)
+
+
+def _slave(
+    identity: SlaveIdentity, name: str, application: Application, clock: Clock, kind: EepromKind
+) -> SlaveController:
+    eeprom = bare_eeprom(identity) if kind == "bare" else mapped_eeprom(identity, name, application.sync_managers)
+    return SlaveController(eeprom, application, clock)

@@ -1,0 +1,194 @@
+"""Bringing the hand's slaves, bridge and palm, into operation, in the order of Shadow's own master (protocols A.2)."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from drivers.ethercat.frames import Command, Telegram
+from drivers.ethercat.master import EtherCatMaster, Slave
+from drivers.ethercat.registers import FMMU_BYTES, SYNC_MANAGER_BYTES, AlState, Register
+from drivers.shadow.palm_images import (
+    BRIDGE_PRODUCT,
+    IMAGE_BASE,
+    SHADOW_VENDOR,
+    PalmImage,
+    PalmName,
+    describe_product,
+    palm_of_product,
+)
+from tactile_lab.clock import NANOSECONDS
+from tactile_lab.errors import DeviceError
+
+_VENDOR, _PRODUCT, _REVISION, _SERIAL = 0x08, 0x0A, 0x0C, 0x0E
+_ALL_REGISTERS = bytes(256)
+_FIRST_EXCHANGES = 20
+_LOOP_CONTROL_MASK = 0x3FFF
+_NANOSECONDS_PER_TICK = 40
+
+
+@dataclass(frozen=True)
+class BoardIdentity:
+    """Who a board is, from its EEPROM."""
+
+    vendor: int
+    product: int
+    revision: int
+    serial: int
+
+
+@dataclass(frozen=True)
+class HandIdentity:
+    """The hand found on the ring.
+
+    Attributes:
+        bridge, palm: its boards; the palm's serial number is the hand's.
+        image: the palm's process image.
+        watchdog_s: time without commands after which the palm would leave OP, as read back; None when nothing feeds
+            its watchdog, so that it never trips.
+    """
+
+    bridge: BoardIdentity
+    palm: BoardIdentity
+    image: PalmImage
+    watchdog_s: float | None
+
+    @property
+    def serial(self) -> int:
+        """The hand's serial number."""
+        return self.palm.serial
+
+
+class HandRing:
+    """The hand's ring.
+
+    Args:
+        master: on the interface the hand is plugged into.
+        palm: the palm that must be there; any that can be driven when None.
+        serial: the hand that must be there; any when None.
+        watchdog_s: let commands feed the palm's watchdog, and set it to this time; unused when None.
+    """
+
+    BRIDGE, PALM = Slave(0, 1), Slave(1, 2)
+
+    def __init__(
+        self,
+        master: EtherCatMaster,
+        palm: PalmName | None = None,
+        serial: int | None = None,
+        watchdog_s: float | None = None,
+    ) -> None:
+        self._master, self._palm, self._serial, self._watchdog_s = master, palm, serial, watchdog_s
+
+    def bring_up(self) -> HandIdentity:
+        """From power-up, or from wherever the slaves are, to OP with an all-zero image exchanged.
+
+        Raises:
+            DeviceError: what is missing or wrong, and what to do.
+        """
+        self._check_ring()
+        bridge, palm = self._identify(0), self._identify(1)
+        image = self._checked_image(bridge, palm)
+        self._master.broadcast(Register.FMMU, _ALL_REGISTERS)
+        self._master.broadcast(Register.SYNC_MANAGER, _ALL_REGISTERS)
+        self._give_addresses()
+        self._all_to(AlState.PREOP)
+        self._open_loop_port()
+        watchdog_s = self._map(image)
+        self._all_to(AlState.SAFEOP)
+        self._all_to(AlState.OP)
+        self._exchange_zeros(image)
+        return HandIdentity(bridge, palm, image, watchdog_s)
+
+    # --- who is there ------------------------------------------------------------------------------------------
+
+    def _check_ring(self) -> None:
+        count = self._master.count_slaves()
+        if count != 2:
+            hint = "Only the hand may be on this interface: check its cable, its power, and the name of the interface"
+            raise self._wrong(f"{count} EtherCAT slaves instead of the hand's bridge and palm", hint)
+
+    def _identify(self, position: int) -> BoardIdentity:
+        slave = Slave(position)
+        words = [self._master.read_eeprom(slave, word) for word in (_PRODUCT, _REVISION, _SERIAL, _VENDOR)]
+        product, revision, serial, vendor = words
+        return BoardIdentity(vendor, product, revision, serial)
+
+    def _checked_image(self, bridge: BoardIdentity, palm: BoardIdentity) -> PalmImage:
+        for name, board in (("first", bridge), ("second", palm)):
+            if board.vendor != SHADOW_VENDOR:
+                what = f"the {name} slave is of vendor 0x{board.vendor:X}, not of Shadow Robot (0x{SHADOW_VENDOR:X})"
+                raise self._wrong(what, "Plug the hand itself into this interface")
+        if bridge.product != BRIDGE_PRODUCT:
+            what = (
+                f"the first slave is {describe_product(bridge.product)} (product {bridge.product:#x}), not the bridge"
+            )
+            raise self._wrong(what, "Plug the cable into the input of the hand's bridge")
+        image = palm_of_product(palm.product)
+        if image is None:
+            what = f"the second slave is {describe_product(palm.product)} (product {palm.product:#x})"
+            raise self._wrong(what, "Palms 0220, 0230 and 0240 can be driven")
+        self._check_expected(image, palm)
+        return image
+
+    def _check_expected(self, image: PalmImage, palm: BoardIdentity) -> None:
+        if self._palm is not None and image.name != self._palm:
+            raise self._wrong(f"a {image.name} palm, not a {self._palm}", f'Set hand.palm to "{image.name}"')
+        if self._serial is not None and palm.serial != self._serial:
+            hint = "Use the rig file and the calibration of the hand that is plugged in"
+            raise self._wrong(f"hand {palm.serial}, not hand {self._serial}", hint)
+
+    # --- set-up ------------------------------------------------------------------------------------------------
+
+    def _give_addresses(self) -> None:
+        for slave in (self.BRIDGE, self.PALM):
+            unnamed = Slave(slave.position)
+            self._master.change_state(unnamed, AlState.INIT)
+            self._master.write(unnamed, Register.STATION_ADDRESS, struct.pack("<H", slave.station))
+
+    def _all_to(self, state: AlState) -> None:
+        for slave in (self.BRIDGE, self.PALM):
+            self._master.change_state(slave, state)
+
+    def _open_loop_port(self) -> None:
+        """The bridge's port that leads on to the palm follows its link by itself, as Shadow's driver sets it."""
+        (control,) = struct.unpack("<H", self._master.read(self.BRIDGE, Register.DL_CONTROL, 2))
+        self._master.write(self.BRIDGE, Register.DL_CONTROL, struct.pack("<H", control & _LOOP_CONTROL_MASK))
+
+    def _map(self, image: PalmImage) -> float | None:
+        """Program the palm's process image; the watchdog's time as it reads back."""
+        watched = self._watchdog_s is not None
+        self._write_all(Register.FMMU, FMMU_BYTES, (each.encode() for each in image.fmmus()))
+        managers = image.sync_managers(watched=watched)
+        self._write_all(Register.SYNC_MANAGER, SYNC_MANAGER_BYTES, (each.encode() for each in managers))
+        if self._watchdog_s is None:
+            return None
+        ticks = max(round(self._watchdog_s / self._watchdog_tick_s()), 1)
+        self._master.write(self.PALM, Register.WATCHDOG_TIME, struct.pack("<H", min(ticks, 0xFFFF)))
+        (set_ticks,) = struct.unpack("<H", self._master.read(self.PALM, Register.WATCHDOG_TIME, 2))
+        return float(set_ticks * self._watchdog_tick_s())
+
+    def _watchdog_tick_s(self) -> float:
+        (divider,) = struct.unpack("<H", self._master.read(self.PALM, Register.WATCHDOG_DIVIDER, 2))
+        return (int(divider) + 2) * _NANOSECONDS_PER_TICK / NANOSECONDS
+
+    def _write_all(self, register: int, size: int, contents: Iterable[bytes]) -> None:
+        for number, content in enumerate(contents):
+            self._master.write(self.PALM, register + size * number, content)
+
+    def _exchange_zeros(self, image: PalmImage) -> None:
+        for _ in range(_FIRST_EXCHANGES):
+            if self._master.ask(image_telegram(image, bytes(image.command_bytes))).working_counter:
+                return
+            self._master.wait(0.001)
+        hint = "Switch the hand off and on, and connect again"
+        raise self._wrong(f"the palm took no process image in {_FIRST_EXCHANGES} tries", hint)
+
+    def _wrong(self, what: str, hint: str) -> DeviceError:
+        return DeviceError(what, where=self._master.where, hint=hint)
+
+
+def image_telegram(image: PalmImage, command: bytes) -> Telegram:
+    """The one telegram of a cycle: the command, and room for the status behind it."""
+    return Telegram(Command.LRW, IMAGE_BASE, command + bytes(image.status_bytes))

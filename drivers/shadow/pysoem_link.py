@@ -1,0 +1,212 @@
+"""The hand's link over SOEM, the widespread EtherCAT master in C, by way of pysoem (the ``[ethercat]`` extra).
+
+SOEM's licence is the GPL with an exception, or a commercial one: that is why it is optional. It maps process data
+from the slaves' EEPROMs; a hand whose EEPROM holds its identity alone needs our own master
+(:class:`~drivers.shadow.ethercat_link.EthercatLink`), and is refused here with that advice.
+
+Two weaknesses of SOEM are made good. A lost frame blocks it for several milliseconds, unless its socket is set not to
+block. And it tells answers apart by an index of sixteen values only, so that after a stall it can go on with old data
+for ever: a status is used only when it echoes the command before the last.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import importlib
+import os
+import socket
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+from drivers.ethercat.registers import AL_ERROR, AL_STATE_MASK, AlState, AlStatus
+from drivers.links import Datagram
+from drivers.shadow.ethercat_link import EthercatSettings
+from drivers.shadow.palm_codec import PalmStatus
+from drivers.shadow.palm_images import SHADOW_VENDOR, PalmImage, describe_product, palm_of_product
+from tactile_lab.clock import Clock
+from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
+
+_STATE_us, _OP_TRIES = 50_000, 40
+_READ_WORKING_COUNTER = 1
+
+
+class PysoemLink:
+    """A link to the palm through pysoem.
+
+    Args:
+        name: the device's name in the rig.
+        settings: as for our own master; ``watchdog_s`` has to be left out.
+        clock: the session's.
+
+    Raises:
+        ConfigurationError: pysoem is not installed, or the watchdog is asked for.
+    """
+
+    def __init__(self, name: str, settings: EthercatSettings, clock: Clock) -> None:
+        if settings.watchdog_s is not None:
+            hint = "Leave watchdog_s out, or use our own master"
+            raise ConfigurationError("pysoem does not set the palm's watchdog", where=name, hint=hint)
+        self.name, self._settings, self._clock = name, settings, clock
+        self._soem = _pysoem(name)
+        self._master: Any = None
+        self._image: PalmImage | None = None
+        self._echoes: deque[tuple[int, int]] = deque(maxlen=2)
+        self.stale = self.lost = self.cycles = 0
+
+    def open(self) -> None:
+        """Bring the ring to OP. All or nothing, repeatable.
+
+        Raises:
+            DeviceError: what is missing or wrong, and what to do.
+        """
+        if self._master is not None:
+            return
+        master = self._soem.Master()
+        before = _packet_sockets()
+        try:
+            self._open_interface(master)
+            for descriptor in _packet_sockets() - before:
+                flags = fcntl.fcntl(descriptor, fcntl.F_GETFL)
+                fcntl.fcntl(descriptor, fcntl.F_SETFL, flags | os.O_NONBLOCK)
+            self._image = self._mapped(master)
+            self._operate(master)
+        except BaseException:
+            master.close()
+            raise
+        self._master = master
+        self._echoes.clear()
+        self.stale = self.lost = self.cycles = 0
+
+    def close(self) -> None:
+        """Bring the slaves to INIT and release the interface. Idempotent."""
+        if self._master is not None:
+            master, self._master = self._master, None
+            master.state = self._soem.INIT_STATE
+            master.write_state()
+            master.close()
+
+    def send(self, payload: bytes) -> None:
+        """Send a command image; :meth:`receive` takes the status.
+
+        Raises:
+            CodecError: not of the size of this palm's command.
+            DeviceError: the link is not open.
+        """
+        image = self._opened()
+        if len(payload) != image.command_bytes:  # pysoem would copy what there is, unchecked
+            raise CodecError(f"a command of {len(payload)} bytes instead of {image.command_bytes}", where=self.name)
+        command = image.decode_command(payload)
+        self._echoes.append((command.from_motor_data_type, command.which_motors))
+        self._master.slaves[1].output = payload
+        self._master.send_processdata()
+        self.cycles += 1
+
+    def receive(self) -> list[Datagram]:
+        """The status of this cycle; nothing when the frame was lost, the palm was late or the answer was old.
+
+        Raises:
+            DeviceError: a slave has left OP.
+        """
+        image = self._opened()
+        counter = self._master.receive_processdata(round(self._settings.master.answer_s * 1e6), release_gil=True)
+        stamp_ns = self._clock.now_ns()
+        if self.cycles % self._settings.poll_every == 0:
+            self._check_states()
+        if counter < 0:
+            self.lost += 1
+            return []
+        if not counter & _READ_WORKING_COUNTER:
+            return []
+        payload = bytes(self._master.slaves[1].input)
+        if self._is_old(image.decode_status(payload)):
+            self.stale += 1
+            return []
+        return [Datagram(payload, stamp_ns)]
+
+    def _is_old(self, status: PalmStatus) -> bool:
+        known = status.written and len(self._echoes) == 2
+        return known and (status.motor_data_type, status.which_motors) != self._echoes[0]
+
+    def _opened(self) -> PalmImage:
+        if self._master is None or self._image is None:
+            raise DeviceError("link is not open", where=self.name, hint="Connect the device first")
+        return self._image
+
+    def _open_interface(self, master: Any) -> None:
+        interface = self._settings.interface
+        present = [name for _, name in socket.if_nameindex()]
+        if interface not in present:
+            raise self._wrong(f"no network interface {interface}", f"Present are {', '.join(present)}")
+        try:
+            master.open(interface)
+        except ConnectionError as error:
+            hint = "pysoem needs the rights cap_net_raw and cap_net_admin"
+            raise self._wrong(f"can not open {interface} ({error})", hint) from error
+
+    def _mapped(self, master: Any) -> PalmImage:
+        count = master.config_init()
+        if count != 2:
+            raise self._wrong(f"{max(count, 0)} EtherCAT slaves instead of 2", "Check the hand's cable and power")
+        palm = master.slaves[1]
+        image = palm_of_product(palm.id)
+        if palm.man != SHADOW_VENDOR or image is None:
+            what = f"the second slave is {describe_product(palm.id)} of vendor 0x{palm.man:X}"
+            raise self._wrong(what, "Palms 0220, 0230 and 0240 can be driven")
+        if self._settings.palm is not None and image.name != self._settings.palm:
+            raise self._wrong(f"a {image.name} palm, not a {self._settings.palm}", f'Set hand.palm to "{image.name}"')
+        master.config_map()
+        if (len(palm.output), len(palm.input)) != (image.command_bytes, image.status_bytes):
+            what = f"its EEPROM describes {len(palm.output)} + {len(palm.input)} bytes of process data"
+            raise self._wrong(what, "Use our own master, which knows the palm's process image")
+        return image
+
+    def _operate(self, master: Any) -> None:
+        master.state_check(self._soem.SAFEOP_STATE, _STATE_us)
+        master.send_processdata()
+        master.receive_processdata(2000)
+        master.state = self._soem.OP_STATE
+        master.write_state()
+        for _ in range(_OP_TRIES):
+            if master.state_check(self._soem.OP_STATE, _STATE_us) == self._soem.OP_STATE:
+                return
+            master.send_processdata()
+            master.receive_processdata(2000)
+        master.read_state()
+        raise self._wrong(f"does not reach OP: it is in {self._status(master.slaves[1])}", "Switch the hand off and on")
+
+    def _check_states(self) -> None:
+        self._master.read_state()
+        for name, slave in zip(("bridge", "palm"), self._master.slaves, strict=True):
+            if slave.state != AlState.OP:
+                raise self._wrong(f"the {name} has left operation: it is in {self._status(slave)}", "Connect again")
+
+    @staticmethod
+    def _status(slave: Any) -> AlStatus:
+        return AlStatus(slave.state & AL_STATE_MASK, bool(slave.state & AL_ERROR), slave.al_status)
+
+    def _wrong(self, what: str, hint: str) -> DeviceError:
+        return DeviceError(what, where=self.name, hint=hint)
+
+
+def _pysoem(name: str) -> Any:
+    try:
+        return importlib.import_module("pysoem")
+    except ImportError as error:
+        hint = "Install it with: pip install 'tactile-lab[ethercat]', or use our own master"
+        raise ConfigurationError("pysoem is not installed", where=name, hint=hint) from error
+
+
+def _packet_sockets() -> set[int]:
+    """Descriptors of this process's packet sockets; pysoem does not tell which is its own."""
+    found = set()
+    for entry in Path("/proc/self/fd").iterdir():
+        try:
+            if not str(entry.readlink()).startswith("socket:"):
+                continue
+            with socket.socket(fileno=os.dup(int(entry.name))) as copy:
+                if copy.family == socket.AF_PACKET:
+                    found.add(int(entry.name))
+        except OSError:
+            continue  # closed since the folder was listed
+    return found
