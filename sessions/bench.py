@@ -17,7 +17,14 @@ from gtsam import Pose3
 from drivers.fingertip import FingertipCalibration, FingertipSensor
 from drivers.links import Link
 from drivers.shadow.kinematics import JOINTS
-from sessions.instruments import BaseInstrument, CameraInstrument, HandInstrument, Instrument, PolledInstrument
+from sessions.instruments import (
+    AskedInstrument,
+    BaseInstrument,
+    CameraInstrument,
+    HandInstrument,
+    Instrument,
+    PolledInstrument,
+)
 from sessions.interpreter import Observer
 from sessions.marks import Mark, MarkKind
 from sessions.perception import Outcome, Perception, TareReport, TruthFrame
@@ -70,8 +77,10 @@ class SensorStream:
         self._device.close()
 
     def poll(self) -> None:
-        """Take everything that waits on the link. Raises DeviceError."""
+        """Take everything that waits on the link, and ask for more where the device needs it. Raises DeviceError."""
         self._link.receive()
+        if isinstance(self._device, AskedInstrument):
+            self._device.ask()
 
 
 class Bench:

@@ -7,7 +7,7 @@ into a sample and does nothing else; live and in replay the session's understand
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from drivers.fingertip import FingertipSensor
 from drivers.links import Datagram
@@ -114,6 +114,14 @@ class PolledInstrument(Instrument, Protocol):
 
     def poll(self) -> object:
         """Take everything that has arrived."""
+
+
+@runtime_checkable
+class AskedInstrument(Protocol):
+    """A device that may send only when it is asked."""
+
+    def ask(self) -> None:
+        """Ask for the next reading where the device needs it. Raises DeviceError."""
 
 
 class CameraInstrument(Instrument, Protocol):

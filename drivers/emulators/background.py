@@ -52,3 +52,7 @@ class Pace:
         count = int(self._owed)
         self._owed -= count
         return count
+
+    def rest(self) -> None:
+        """Nothing to do for a moment."""
+        time.sleep(0.001)

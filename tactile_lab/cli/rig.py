@@ -8,6 +8,8 @@ import typer
 
 from tactile_lab.cli.options import Json, NoInput
 
+_FOR_EVER_s = 1e8
+
 app = typer.Typer(help="Rigs: the devices of a laboratory, and their calibration.", no_args_is_help=True)
 
 
@@ -34,7 +36,9 @@ def check(
 ) -> None:
     """Read a rig file and its calibration, connect every device, and tell what each one says.
 
-    Nothing moves. Exit code 0: all well; 2: the files; 4: a device is not ready.
+    Nothing moves. A rig of force fingertips alone, without a hand, can be checked too.
+
+    Exit code 0: all well; 2: the files; 4: a device is not ready.
     """
     from tactile_lab.cli.console import emit_json, say, show_table
     from tactile_lab.rigs.check import check_rig
@@ -51,3 +55,28 @@ def check(
         say("ready" if ready else "not ready", "bold green" if ready else "bold red")
     if not ready:
         raise typer.Exit(4)
+
+
+@app.command("emulate")
+def emulate(
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file of kind fingertips.")],
+    seconds: Annotated[float, typer.Option(min=0.0, help="How long; 0 until Ctrl+C.")] = 0.0,
+    no_input: NoInput = False,
+) -> None:
+    """Stand in for the sensors of a fingertip rig, at the addresses its file names, until Ctrl+C.
+
+    Serial ports that do not exist are made; a real one is never replaced. Network addresses must be loopback ones.
+    """
+    import time
+    from pathlib import Path
+
+    from tactile_lab.cli.console import say
+    from tactile_lab.rigs.emulate import emulated
+    from tactile_lab.rigs.fingertip_rig import load_fingertip_rig
+
+    del no_input
+    with emulated(load_fingertip_rig(Path(rig))) as places:
+        for finger, place in places.items():
+            say(f"{finger}: {place}")
+        say(f"tactile-lab rig check {rig}  in another terminal; Ctrl+C ends this")
+        time.sleep(seconds or _FOR_EVER_s)

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from pathlib import Path
 
 from drivers.fingertip import FingertipSensor
 from drivers.simulation.objects import CATALOGUE
 from sessions.bench import Bench
 from sessions.recorder import NullTraffic, Recorder
+from tactile_lab.clock import MonotonicClock
 from tactile_lab.errors import DeviceError
 from tactile_lab.geometry.contacts import FINGERS
 from tactile_lab.rigs.build import build_bench, check_calibration, simulated_world
+from tactile_lab.rigs.check_fingertips import check_fingertips
 from tactile_lab.rigs.description import load_rig
+from tactile_lab.rigs.findings import Finding
+from tactile_lab.rigs.fingertip_rig import is_fingertip_rig, load_fingertip_rig
 
 LISTEN_ns = 300_000_000
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What one device said."""
-
-    device: str
-    ok: bool
-    detail: str
 
 
 def check_rig(name: str, seed: int = 0) -> list[Finding]:
@@ -31,6 +26,8 @@ def check_rig(name: str, seed: int = 0) -> list[Finding]:
     Raises:
         ConfigurationError: the rig file, or a calibration file it names.
     """
+    if Path(name).suffix in {".yaml", ".yml"} and is_fingertip_rig(Path(name)):
+        return check_fingertips(load_fingertip_rig(Path(name)), MonotonicClock())
     rig = load_rig(name)
     check_calibration(rig)
     bench = build_bench(rig, simulated_world(rig, seed, next(iter(CATALOGUE))), Recorder(NullTraffic()))

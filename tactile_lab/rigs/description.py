@@ -18,7 +18,7 @@ from sessions.conductor import ConductorSettings
 from sessions.perception import PerceptionSettings
 from sessions.session import Session
 from tactile_lab.errors import ConfigurationError
-from tactile_lab.strict_yaml import StrictModel, load_model, validate
+from tactile_lab.strict_yaml import StrictModel, load, validate
 from tactile_lab.tracking.motion import MotionNoise
 
 OTHER_VERSION = "Use the version of tactile-lab that recorded it; tactile-lab session show names it"
@@ -104,7 +104,12 @@ def load_rig(name_or_path: str) -> Rig:
     if path.suffix not in {".yaml", ".yml"}:
         known = ", ".join(shipped_rigs())
         raise ConfigurationError("no such rig", where=name_or_path, hint=f"Name one of {known}, or a .yaml file")
-    description = load_model(path, RigDescription)
+    content = load(path)
+    if isinstance(content, dict) and content.get("kind") == "fingertips":
+        raise ConfigurationError(
+            "has fingertips alone, and no hand to run a session with", where=str(path), hint="Use it with rig check"
+        )
+    description = validate(content, RigDescription, where=str(path))
     named = description.calibration.model_dump(exclude_none=True)
     files = {role: path.parent / file for role, file in named.items()}
     return Rig(description, _present(files, str(path)), str(path))

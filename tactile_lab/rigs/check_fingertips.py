@@ -1,0 +1,107 @@
+"""Are the force fingertips of a rig fit to work? Connect each, listen for a second, and tell. Nothing moves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from drivers.ati import controller_wire, digital_wire
+from drivers.ati.force_tip import WrenchSample
+from drivers.ati.nano17 import Nano17
+from drivers.ati.wiring import ControllerWiring, DigitalWiring
+from tactile_lab.clock import NANOSECONDS, Clock
+from tactile_lab.errors import DeviceError
+from tactile_lab.rigs.findings import Finding
+from tactile_lab.rigs.fingertip_rig import FingertipRig, place_of
+
+LISTEN_ns = NANOSECONDS
+_POLL_ns = 2_000_000
+_NOISY = 6.0
+"""How many times the calibrated noise a still sensor may show."""
+
+
+def check_fingertips(rig: FingertipRig, clock: Clock) -> list[Finding]:
+    """One finding a finger.
+
+    Raises:
+        ConfigurationError: a calibration file that a wire names.
+    """
+    tips = {finger: rig.device(finger, clock) for finger in rig.description.wires}  # files first
+    return [_check(rig, finger, tip, clock) for finger, tip in tips.items()]
+
+
+def _check(rig: FingertipRig, finger: str, tip: Nano17, clock: Clock) -> Finding:
+    device = f"fingertip {finger}"
+    try:
+        tip.connect()
+        samples = _listen(tip, clock)
+    except DeviceError as error:
+        return Finding(device, False, f"{error}{_other_baud(rig, finger, clock)}")
+    finally:
+        tip.close()
+    place = place_of(rig.description.wires[finger])
+    problems = [text for text in tip.health() if text != "not tared"]
+    usable = np.array([sample.wrench for sample in samples if np.isfinite(sample.wrench).all()])
+    if len(usable) < 2:
+        return Finding(device, False, f"{place}: {'; '.join(problems) or 'no usable sample'}")
+    problems += _noise_problem(tip, usable)
+    return Finding(device, not problems, f"{place}: {'; '.join((*problems, _figures(tip, samples, usable)))}")
+
+
+def _listen(tip: Nano17, clock: Clock) -> list[WrenchSample]:
+    taken: list[WrenchSample] = []
+    end_ns = clock.now_ns() + LISTEN_ns
+    while clock.now_ns() < end_ns:
+        samples = tip.poll()
+        tip.update(samples)
+        taken += samples
+        clock.sleep_until_ns(clock.now_ns() + _POLL_ns)
+    return taken
+
+
+def _figures(tip: Nano17, samples: list[WrenchSample], usable: np.ndarray[Any, np.dtype[np.float64]]) -> str:
+    span_s = (samples[-1].stamp_ns - samples[0].stamp_ns) / NANOSECONDS
+    rate = f"{(len(samples) - 1) / span_s:.0f} samples/s" if span_s > 0 else f"{len(samples)} samples"
+    noise, bias = usable.std(axis=0), np.abs(usable.mean(axis=0))
+    serial = _serial(tip)
+    return (
+        f"{serial + ', ' if serial else ''}{rate}, {tip.sequences.lost} lost, "
+        f"noise {1e3 * noise[:3].max():.0f} mN and {1e3 * noise[3:].max():.2f} N mm, "
+        f"untared reading {bias[:3].max():.2f} N and {1e3 * bias[3:].max():.1f} N mm"
+    )
+
+
+def _serial(tip: Nano17) -> str:
+    """The sensor's serial number where its wire has told it."""
+    told: Any = getattr(tip.wire, "page", None) or getattr(tip.wire, "calibration", None)
+    return told.serial if told is not None else ""
+
+
+def _noise_problem(tip: Nano17, usable: np.ndarray[Any, np.dtype[np.float64]]) -> list[str]:
+    noise, known = usable.std(axis=0), tip.calibration
+    allowed = _NOISY * np.repeat([known.force_sigma_N, known.moment_sigma_Nm], 3)
+    if np.all(noise <= allowed):
+        return []
+    return ["noisier than its calibration says: is it touched, or is a cable loose?"]
+
+
+def _other_baud(rig: FingertipRig, finger: str, clock: Clock) -> str:
+    """Whether a silent serial device answers at another rate than the rig file's, in words."""
+    wiring = rig.description.wires[finger]
+    if not isinstance(wiring, DigitalWiring | ControllerWiring):
+        return ""
+    rates = digital_wire.BAUD_RATES if isinstance(wiring, DigitalWiring) else controller_wire.BAUD_RATES
+    for baud in rates:
+        if baud != wiring.baud and _answers(rig.device(finger, clock, wiring.model_copy(update={"baud": baud}))):
+            return f". It answers at {baud} baud: correct wires.{finger}.baud in the rig file"
+    return ""
+
+
+def _answers(tip: Nano17) -> bool:
+    try:
+        tip.connect()
+    except DeviceError:
+        return False
+    tip.close()
+    return True

@@ -1,0 +1,98 @@
+"""Stand-ins for the sensors of a fingertip rig, at the addresses its file names: to try a rig without hardware."""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import can
+import numpy as np
+
+from drivers.ati import cal_file
+from drivers.ati.gauge_volts import encode_volts
+from drivers.ati.wiring import CanWiring, ControllerWiring, DigitalWiring, NetBoxWiring, VoltsWiring, Wiring, open_bus
+from drivers.emulators.ati_sensor import EmulatedSensor, emulated_calibration
+from drivers.emulators.background import Background, Pace
+from drivers.emulators.can_server import CanServer
+from drivers.emulators.can_unit import CanUnit
+from drivers.emulators.controller_unit import ControllerUnit
+from drivers.emulators.digital_unit import DigitalUnit
+from drivers.emulators.net_box_server import NetBoxServer
+from drivers.emulators.net_box_unit import NetBoxUnit
+from drivers.emulators.pty_port import PtyPort
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.rigs.fingertip_rig import FingertipRig, place_of
+
+_VOLTS_RATE_Hz = 1000.0
+
+
+@contextmanager
+def emulated(rig: FingertipRig) -> Iterator[dict[str, str]]:
+    """Sensors of all fingers while the context lasts; gives finger to where it can be found, in words.
+
+    Raises:
+        ConfigurationError: a place that can not be emulated here, or is taken.
+    """
+    with ExitStack() as running:
+        for seed, (finger, wiring) in enumerate(rig.description.wires.items()):
+            serial = getattr(wiring, "serial", "") or f"FT{seed + 1:05d}"
+            sensor = EmulatedSensor(emulated_calibration(serial), seed=seed)
+            try:
+                _start(running, wiring, sensor, rig.folder)
+            except (OSError, can.CanError, ValueError) as error:
+                words = getattr(error, "strerror", None) or str(error)
+                raise _refusal(rig, finger, f"{place_of(wiring)} cannot be emulated ({words})") from error
+        yield {finger: place_of(wiring) for finger, wiring in rig.description.wires.items()}
+
+
+def _start(running: ExitStack, wiring: Wiring, sensor: EmulatedSensor, folder: Path) -> None:
+    """Raises OSError, CanError or ValueError when the place can not be had."""
+    match wiring:
+        case NetBoxWiring():
+            if not ipaddress.ip_address(wiring.host).is_loopback:
+                raise ValueError("only loopback addresses such as 127.0.0.2 are")
+            running.enter_context(NetBoxServer(NetBoxUnit(sensor), wiring.host, wiring.port, wiring.http_port))
+        case DigitalWiring():
+            port = running.enter_context(PtyPort(DigitalUnit(sensor, rate_hz=1000.0), wiring.baud))
+            running.callback(_linked(port.path, Path(wiring.port)).unlink)
+        case ControllerWiring():
+            port = running.enter_context(PtyPort(ControllerUnit(sensor), wiring.baud))
+            running.callback(_linked(port.path, Path(wiring.port)).unlink)
+        case CanWiring():
+            if wiring.interface == "virtual":
+                raise ValueError("a virtual bus does not leave this program")
+            running.enter_context(CanServer(CanUnit(sensor, wiring.base), open_bus(wiring)))
+        case VoltsWiring():
+            running.enter_context(_volts(wiring, sensor, folder))
+
+
+def _linked(path: str, port: Path) -> Path:
+    """A link at the port's path to a pseudo terminal; a real port is never replaced. Raises OSError."""
+    port.symlink_to(path)
+    return port
+
+
+@contextmanager
+def _volts(wiring: VoltsWiring, sensor: EmulatedSensor, folder: Path) -> Iterator[None]:
+    """An acquisition program that sends what the sensor feels, through the rig's own calibration backwards."""
+    to_volts = np.linalg.inv(cal_file.load(folder / wiring.calibration).working_matrix)
+    pace, sent = Pace(), 0
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as program:
+        program.bind(("127.0.0.1", 0))
+
+        def turn() -> None:
+            nonlocal sent
+            for _ in range(pace.due(_VOLTS_RATE_Hz)):
+                sent += 1
+                program.sendto(encode_volts(sent, tuple(to_volts @ sensor.wrench())), ("127.0.0.1", wiring.local_port))
+            pace.rest()
+
+        with Background("acquisition", turn):
+            yield
+
+
+def _refusal(rig: FingertipRig, finger: str, what: str) -> ConfigurationError:
+    return ConfigurationError(what, where=f"{rig.source}: wires.{finger}", hint="Name a place that is free here")

@@ -1,0 +1,111 @@
+"""A rig of force fingertips alone: which sensor hangs on which wire. It can be checked, not run: there is no hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from drivers.ati.nano17 import Nano17, Nano17Settings
+from drivers.ati.wiring import CanWiring, ControllerWiring, DigitalWiring, NetBoxWiring, VoltsWiring, Wiring
+from drivers.ati.wiring import make_link as link_of
+from drivers.ati.wiring import make_wire as wire_of
+from drivers.fingertip import FingertipCalibration, load_fingertips
+from sessions.interpreter import fingertip_link
+from tactile_lab.clock import Clock
+from tactile_lab.errors import CodecError, ConfigurationError
+from tactile_lab.geometry.contacts import FINGERS
+from tactile_lab.strict_yaml import StrictModel, load, validate
+
+KIND = "fingertips"
+
+
+def place_of(wiring: Wiring) -> str:
+    """Where a wire ends, in words; two sensors never share it."""
+    match wiring:
+        case NetBoxWiring():
+            return f"the box at {wiring.host}:{wiring.port}"
+        case DigitalWiring() | ControllerWiring():
+            return f"port {wiring.port}"
+        case CanWiring():
+            return f"{wiring.interface} {wiring.channel}, base 0x{wiring.base:x}"
+        case VoltsWiring():
+            return f"local port {wiring.local_port}"
+
+
+def _one_place_each(wires: dict[str, Wiring]) -> dict[str, Wiring]:
+    if unknown := sorted(set(wires) - set(FINGERS)):
+        raise ValueError(f"unknown finger {', '.join(unknown)}; the fingers are {', '.join(FINGERS)}")
+    taken: dict[str, str] = {}
+    for finger, wiring in wires.items():
+        if (place := place_of(wiring)) in taken:
+            raise ValueError(f"{taken[place]} and {finger} both name {place}")
+        taken[place] = finger
+    return wires
+
+
+class FingertipRigDescription(StrictModel):
+    """A rig file of kind ``fingertips``.
+
+    Attributes:
+        name, summary: for people.
+        calibration: the fingertips' calibration file, relative to the rig file.
+        nano17: settings of every sensor.
+        wires: finger to wire.
+    """
+
+    name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
+    summary: str
+    kind: Literal["fingertips"]
+    calibration: str = Field(min_length=1)
+    nano17: Nano17Settings = Nano17Settings()
+    wires: Annotated[dict[str, Wiring], Field(min_length=1), AfterValidator(_one_place_each)]
+
+
+@dataclass(frozen=True)
+class FingertipRig:
+    """A description with what its files say."""
+
+    description: FingertipRigDescription
+    calibrations: dict[str, FingertipCalibration]
+    folder: Path
+    source: str
+
+    def device(self, finger: str, clock: Clock, wiring: Wiring | None = None) -> Nano17:
+        """The sensor of a finger on its wire, or on another that is tried; not connected.
+
+        Raises:
+            ConfigurationError: a calibration file that the wire names can not be used.
+        """
+        used, calibration = wiring or self.description.wires[finger], self.calibrations[finger]
+        try:
+            wire = wire_of(used, self.folder)
+        except CodecError as error:
+            raise ConfigurationError(error.what, where=f"{self.source}: wires.{finger}", hint=error.hint) from error
+        link = link_of(used, fingertip_link(finger), clock)
+        return Nano17(finger, link, clock, calibration, self.description.nano17, wire)
+
+
+def is_fingertip_rig(path: Path) -> bool:
+    """Whether a file calls itself a rig of fingertips. Raises ConfigurationError when it is no YAML."""
+    content = load(path)
+    return isinstance(content, dict) and content.get("kind") == KIND
+
+
+def load_fingertip_rig(path: Path) -> FingertipRig:
+    """Read a rig file of kind ``fingertips`` and every file that it names.
+
+    Raises:
+        ConfigurationError: a file that does not fit, or a finger without calibration.
+    """
+    description = validate(load(path), FingertipRigDescription, where=str(path))
+    calibrations = load_fingertips(path.parent / description.calibration)
+    if missing := sorted(set(description.wires) - set(calibrations)):
+        raise ConfigurationError(
+            f"the fingertip calibration {description.calibration} does not name {', '.join(missing)}",
+            where=str(path),
+            hint="Calibrate the finger, or take it out of wires",
+        )
+    return FingertipRig(description, calibrations, path.parent, str(path))
