@@ -5,7 +5,8 @@ its standard input, so that it never outlives the program that started it.
 
 Orders: ``{"cable": {...}}`` sets fields of :class:`~drivers.emulators.ethercat_ring.CableFaults`; ``{"hung": true}``
 stops the palm's processor; ``{"service_ns": n}`` slows it; ``{"silent": [motors]}``; ``{"fall": [state, code]}`` lets
-the palm leave its state; ``{"power_cycle": true}``. Every answer holds the counts.
+the palm leave its state; ``{"power_cycle": true}``; ``{"announce": [bus, identifier, hex]}`` lets a motor speak on its
+CAN bus. Every answer holds the counts.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from drivers.emulators.shadow_chain import ChainSettings, EmulatedHand, emulated
 from drivers.ethercat.ports import Port, RawPort
 from drivers.ethercat.registers import AlState
 from drivers.shadow.joint_calibration import JointCalibration
+from drivers.shadow.palm_codec import CanFrame
 from tactile_lab.clock import MonotonicClock
 from tactile_lab.errors import DeviceError, TactileLabError
 
@@ -33,8 +35,8 @@ _START_s, _ANSWER_s = 30.0, 5.0
 class HandServer:
     """Serves frames and orders until its orders end."""
 
-    def __init__(self, hand: EmulatedHand, port: Port) -> None:
-        self._hand, self._port = hand, port
+    def __init__(self, hand: EmulatedHand, port: Port, can: MotorCanBuses) -> None:
+        self._hand, self._port, self._can = hand, port, can
 
     def run(self) -> None:
         """Serve. Raises DeviceError when the interface goes."""
@@ -60,11 +62,16 @@ class HandServer:
         if "power_cycle" in order:
             for slave in hand.ring.slaves:
                 slave.power_cycle()
+        if "announce" in order:
+            bus, identifier, data = order["announce"]
+            payload = bytes.fromhex(data)
+            self._can.announce(CanFrame(bus, len(payload), identifier, payload.ljust(8, b"\0")))
         return self._counts()
 
     def _counts(self) -> dict[str, Any]:
         hand = self._hand
         counts = dataclasses.asdict(hand.ring.counts) | dataclasses.asdict(hand.palm_slave.counts)
+        counts |= {"can_frames": len(self._can.heard)}
         return counts | {"served": hand.palm.served, "state": str(hand.palm_slave.al_status)}
 
 
@@ -79,11 +86,12 @@ def main() -> None:
     clock = MonotonicClock()
     try:
         calibration = JointCalibration.load(Path(start["joints"]))
-        hand = emulated_hand(clock, calibration, ChainSettings(**start["settings"]), can=MotorCanBuses())
+        can = MotorCanBuses()
+        hand = emulated_hand(clock, calibration, ChainSettings(**start["settings"]), can=can)
         port = RawPort(start["interface"])
         port.open()
         _say({"ready": True})
-        HandServer(hand, port).run()
+        HandServer(hand, port, can).run()
     except TactileLabError as error:
         _say({"error": str(error)})
         sys.exit(error.exit_code)

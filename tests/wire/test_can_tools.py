@@ -1,0 +1,63 @@
+"""python-can's own command line tools on the hand's motor buses, over a real wire."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import can
+import pytest
+from ethercat_wire import JOINTS, cable
+
+from drivers.emulators.ethercat_server import EmulatedHandProcess
+from drivers.shadow.bootloader import bootloader_versions
+
+
+@pytest.fixture(scope="module")
+def ends() -> Iterator[tuple[str, str]]:
+    with cable("c") as names:
+        yield names
+
+
+def tool(name: str, interface: str, *words: str) -> list[str]:
+    return [sys.executable, "-m", f"can.{name}", "-i", "shadow_bridge", "-c", interface, *words]
+
+
+def test_all_bootloaders_answer_over_the_wire(ends: tuple[str, str]) -> None:
+    with EmulatedHandProcess(ends[1], JOINTS), can.Bus(interface="shadow_bridge", channel=ends[0]) as bus:
+        assert None not in bootloader_versions(bus, tries=3).values()
+
+
+def test_the_player_plays_a_log_onto_the_buses(ends: tuple[str, str], tmp_path: Path) -> None:
+    log = tmp_path / "questions.asc"
+    with can.Logger(log) as writer:
+        for number in range(10):
+            question = can.Message(
+                timestamp=1000.0 + 0.005 * number, arbitration_id=0x604 | number << 5, is_extended_id=False, channel=2
+            )
+            writer(question)
+    with EmulatedHandProcess(ends[1], JOINTS) as emulator:
+        done = subprocess.run(
+            tool("player", ends[0], str(log)), capture_output=True, text=True, timeout=60, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        assert emulator.order()["can_frames"] == 10
+
+
+def test_the_logger_records_what_the_motors_say(ends: tuple[str, str], tmp_path: Path) -> None:
+    log = tmp_path / "motors.blf"
+    with EmulatedHandProcess(ends[1], JOINTS) as emulator:
+        for number in range(5):
+            emulator.order(announce=[1 + number % 2, 0x4A3, f"0{number}000000"])
+        logger = subprocess.Popen(tool("logger", ends[0], "-f", str(log)), stdout=subprocess.PIPE, text=True)
+        until = time.monotonic() + 30.0
+        while emulator.order()["served"] < 20 and time.monotonic() < until:
+            time.sleep(0.05)
+        logger.send_signal(signal.SIGINT)
+        logger.communicate(timeout=30)
+    with can.LogReader(log) as reader:
+        assert [(each.channel, each.data[0]) for each in reader] == [(1, 0), (2, 1), (1, 2), (2, 3), (1, 4)]
