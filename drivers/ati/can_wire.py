@@ -64,7 +64,7 @@ class CanWire:
         self.calibration: DigitalCalibration | None = None
         self.lost = 0
         self._base, self._slot, self._serial = base, slot, serial
-        self._samples, self._turn = GaugeSamples(limit=32767), Turn()
+        self._samples, self._turn = GaugeSamples(limit=32767), Turn(patience=10)
         self._lesson: _Lesson | None = None
         self._half: tuple[int, tuple[int, int, int]] | None = None
         self._answers: dict[Op, int] = {}

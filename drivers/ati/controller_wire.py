@@ -36,7 +36,7 @@ class ControllerWire:
         self._mode = mode
         self._scale = np.repeat([counts_per_N, counts_per_Nm], 3)
         self._records: AsciiLines | BinaryAnswers = AsciiLines() if mode == "ascii" else BinaryAnswers()
-        self._turn = Turn()
+        self._turn = Turn(patience=20)  # a record takes 20 ms at 9600 baud
         self._count = 0
         self._heard = b""
 

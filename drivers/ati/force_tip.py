@@ -248,11 +248,13 @@ class ForceTip:
     def _sequence_problems(self) -> list[str]:
         monitor, problems = self.sequences, []
         if monitor.stuck:
-            problems.append("the sensor behind the box has stopped measuring (its counter does not move)")
+            problems.append("the sensor has stopped measuring: its readings do not move")
         if monitor.lost > self._settings.lost_share * (monitor.seen + monitor.lost):
             problems.append(f"{monitor.lost} of {monitor.seen + monitor.lost} records lost")
         if monitor.skipped > self._settings.lost_share * (monitor.seen + monitor.skipped):
             problems.append(f"the box left out {monitor.skipped} records that its rate asks for")
+        if monitor.restarts:
+            problems.append(f"the stream began again {monitor.restarts} times")
         if monitor.disordered:
             problems.append(f"{monitor.disordered} records out of order or twice")
         return problems

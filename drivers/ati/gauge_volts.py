@@ -66,6 +66,7 @@ class GaugeVoltsWire:
         self.counter: int | None = None
         self.ranges_SI: Array | None = calibration.ranges_SI
         self._calibration = calibration
+        self._changes, self._measured = 0, 0  # the counter of the message in which the readings last changed
         self._samples = GaugeSamples(limit=_SATURATED_SHARE * calibration.output_range_V / 2.0)
 
     def start(self, talk: Conversation) -> None:
@@ -91,7 +92,9 @@ class GaugeVoltsWire:
             gauges, self._calibration.working_matrix, [datagram.stamp_ns], [""], corrected=corrected
         )
         self.counter = counter
-        return [replace(sample, rdt_sequence=counter)]
+        measured = self._measured if sample.ft_sequence == self._changes else counter
+        self._changes, self._measured = sample.ft_sequence, measured
+        return [replace(sample, rdt_sequence=counter, ft_sequence=measured)]
 
     def health(self) -> tuple[str, ...]:
         """The messages carry a counter, which says all."""

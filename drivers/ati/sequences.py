@@ -6,6 +6,9 @@ WORD = 1 << 32
 STUCK_AFTER = 3
 """Records with the same ft_sequence in a row after which the sensor's loop counts as stuck (protocols F.4)."""
 
+RESTART_AFTER = 10
+"""Old records in a row after which they count as a new stream of a device that was switched off and on."""
+
 
 def _step(newer: int, older: int) -> int:
     """Signed difference of two 32-bit counters that wrap."""
@@ -31,6 +34,7 @@ class SequenceMonitor:
         self.seen = self.lost = self.skipped = self.disordered = self.restarts = 0
         self._stuck_after, self._expected = stuck_after, step
         self._rdt: int | None = None
+        self._old_in_a_row = 0
         self._ft = 0
         self._repeats = 0
 
@@ -38,7 +42,11 @@ class SequenceMonitor:
         """Note one record's counters; False for a record older than one already seen."""
         if self._rdt is not None and not self._follows(rdt_sequence, ft_sequence, self._rdt):
             self.disordered += 1
-            return False
+            self._old_in_a_row += 1
+            if self._old_in_a_row < RESTART_AFTER:
+                return False
+            self.restarts += 1
+        self._old_in_a_row = 0
         self._repeats = self._repeats + 1 if self.seen and ft_sequence == self._ft else 0
         self._rdt, self._ft = rdt_sequence, ft_sequence
         self.seen += 1

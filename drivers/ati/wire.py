@@ -137,7 +137,7 @@ class Turn:
         unanswered: questions given up.
     """
 
-    def __init__(self, patience: int = 50) -> None:
+    def __init__(self, patience: int) -> None:
         self.unanswered = 0
         self._patience, self._waited = patience, 0
         self._open = False

@@ -81,6 +81,15 @@ def test_a_rotated_tool_frame_turns_force_and_torque(tmp_path: Path) -> None:
     np.testing.assert_allclose(push, [0, 0, -1, 0.006, 0, 0], atol=1e-12)
 
 
+def test_temperature_terms_are_read_where_the_file_has_them(tmp_path: Path) -> None:
+    terms = "<BiasSlope values='1 2 3 4 5 6'/><GainSlope values='0 0 0 0 0 1'/><Thermistor value='2.5'/></Calibration>"
+    calibration = cal_file.load(write(tmp_path / "a.cal", sensor_text().replace("</Calibration>", terms)))
+    assert calibration.temperature is not None
+    corrected = calibration.temperature.corrected(np.zeros(6), np.array(2.6))
+    np.testing.assert_allclose(corrected, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6 / 0.9])
+    assert cal_file.load(write(tmp_path / "b.cal", sensor_text())).temperature is None
+
+
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [

@@ -285,6 +285,22 @@ def test_losses_disorder_and_restarts_are_counted() -> None:
     assert monitor.restarts == 1
 
 
+def test_a_box_that_was_switched_off_and_on_is_followed_again() -> None:
+    """Both counters begin again: the first records look old, but not for ever."""
+    monitor = SequenceMonitor()
+    assert all(monitor.is_new(5000 + n, 7 * (5000 + n)) for n in range(20))
+    taken = [monitor.is_new(n, 7 * n) for n in range(1, 31)]
+    assert taken == [False] * 9 + [True] * 21
+    assert (monitor.restarts, monitor.disordered, monitor.lost) == (1, 10, 0)
+
+
+def test_what_the_box_should_have_sent_and_did_not_is_counted() -> None:
+    monitor = SequenceMonitor(step=7)
+    for rdt, ft in ((1, 7), (2, 14), (3, 35), (4, 42), (6, 56)):  # two left out by the box, one lost on the way
+        assert monitor.is_new(rdt, ft)
+    assert (monitor.skipped, monitor.lost) == (2, 1)
+
+
 def test_the_counters_may_wrap() -> None:
     monitor = SequenceMonitor()
     assert all(monitor.is_new(n % 2**32, n % 2**32) for n in range(2**32 - 2, 2**32 + 3))

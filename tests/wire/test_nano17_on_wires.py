@@ -33,6 +33,7 @@ from drivers.emulators.digital_unit import DigitalUnit
 from drivers.emulators.net_box_server import NetBoxServer
 from drivers.emulators.net_box_unit import NetBoxUnit
 from drivers.emulators.pty_port import PtyPort
+from drivers.emulators.slcan_unit import SlcanUnit
 from drivers.faults import Drop, FaultyLink, Reorder, When
 from drivers.fingertip import load_fingertips
 from drivers.links import Link
@@ -308,3 +309,33 @@ def test_volts_arrive_from_an_acquisition_program(lab_data: Path) -> None:
     assert [sample.rdt_sequence for sample in samples][-1] == 59
     assert tip.sequences.lost == 0
     tip.close()
+
+
+def slcan(port: PtyPort) -> CanWiring:
+    return CanWiring(wire="can-oem", interface="slcan", channel=port.path)
+
+
+def test_a_board_behind_a_serial_can_adapter_answers_and_damaged_lines_are_counted(sensor: EmulatedSensor) -> None:
+    adapter = SlcanUnit(CanUnit(sensor))
+    with PtyPort(adapter, 115_200) as port:
+        tip = device(slcan(port))
+        tip.connect()
+        samples = listen(tip, 20)
+        np.testing.assert_allclose(samples[-1].wrench, PRESSED, atol=COUNT[0])
+        assert tip.wire.health() == ()
+        count = 0
+
+        def damage(line: bytes) -> bytes:
+            nonlocal count
+            count += 1
+            return b"t2X" + line[3:] if count % 8 == 0 else line
+
+        adapter.damage = damage
+        listen(tip, 20)
+        adapter.damage = lambda line: line
+        listen(tip, 10)
+        problems = "; ".join(tip.health())
+        tip.close()
+    assert "damaged readings of the adapter" in problems
+    assert "lost half of their frames" in problems or "questions without an answer" in problems
+    assert adapter.refused == 0
