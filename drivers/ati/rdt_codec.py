@@ -7,7 +7,7 @@ newtons and newton metres by the box's own counts per force and counts per torqu
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -153,6 +153,18 @@ def _check_length(payload: bytes) -> None:
             where="RDT record",
             hint="Check that this port receives from the force sensor's box only",
         )
+
+
+def encode_record(rdt_sequence: int, ft_sequence: int, status: int, counts: Sequence[int]) -> bytes:
+    """One record, for emulators; the counters wrap at 2^32.
+
+    Raises:
+        CodecError: not six counts, or one that does not fit 32 bits.
+    """
+    try:
+        return _RECORD.pack(rdt_sequence & 0xFFFFFFFF, ft_sequence & 0xFFFFFFFF, status & 0xFFFFFFFF, *counts)
+    except struct.error as error:
+        raise CodecError(f"counts {counts} do not fit a record", where="RDT record") from error
 
 
 def encode_records(

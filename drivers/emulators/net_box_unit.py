@@ -69,9 +69,8 @@ class NetBoxUnit:
             return None
         self._left -= self._left > 0
         self.sent += 1
-        counts = np.rint((self.sensor.wrench() - self._bias) * COUNTS_PER_UNIT)
-        one = np.ones(1, np.int64)
-        return rdt_codec.encode_records(one * self.sent, one * self._measured, one * self.status, counts[None])
+        counts = np.rint((self.sensor.wrench() - self._bias) * COUNTS_PER_UNIT).astype(int).tolist()
+        return rdt_codec.encode_record(self.sent, self._measured, self.status, counts)
 
     def page(self, target: str) -> bytes | None:
         """What the web server gives for a path with its query; None for a page that does not exist."""

@@ -88,6 +88,14 @@ def test_counts_that_do_not_fit_are_refused(counts: np.ndarray) -> None:
         rdt_codec.encode_records(np.zeros(1), np.zeros(1), np.zeros(1), counts)
 
 
+def test_one_record_is_encoded_as_many_are() -> None:
+    one, row = np.array([7]), np.arange(-3, 3)
+    assert rdt_codec.encode_record(2**32 + 7, 7, 7, row.tolist()) == rdt_codec.encode_records(one, one, one, row[None])
+    for counts in ([0] * 5, [2**31] * 6):
+        with pytest.raises(CodecError, match="do not fit"):
+            rdt_codec.encode_record(1, 1, 0, counts)
+
+
 @pytest.mark.parametrize("count", [-1, 2**32])
 def test_a_sample_count_beyond_32_bits_is_refused(count: int) -> None:
     with pytest.raises(CodecError, match="32 bits"):
