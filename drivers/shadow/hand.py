@@ -12,8 +12,9 @@ from drivers.links import Datagram, Link
 from drivers.shadow.hand_samples import HandDecoder, HandSample
 from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.joint_calibration import JointCalibration
+from drivers.shadow.motor_configuration import MotorConfiguration, configure_motors
 from drivers.shadow.motor_data import ToMotor
-from drivers.shadow.motor_polling import MotorPolling
+from drivers.shadow.motor_polling import MotorPolling, MotorReadings
 from drivers.shadow.motor_watch import Fault, MotorWatch
 from drivers.shadow.motors import MotorMap
 from drivers.shadow.palm_codec import MOTORS, EdcCommand, PalmCommand
@@ -28,6 +29,9 @@ __all__ = ["HandCounters", "HandDecoder", "HandSample", "HandSettings", "ShadowH
 
 MOTOR_PATIENCE_ns = 20_000_000
 """A motor halts itself when it has seen no demand for 20 ms."""
+
+LARGEST_NUDGE = 250
+"""Largest duty cycle of a nudge, counts: a quarter of full duty can not hurt a joint in a moment."""
 
 _NO_DEMAND = np.zeros(MOTORS, dtype=np.int16)
 
@@ -61,6 +65,7 @@ class ShadowHand:
         calibration: of the hand's joints.
         settings: see :class:`HandSettings`.
         motors: which motor pulls which joint; the simulated hand's (rh_E_v3) unless given. A real hand needs its own.
+        boards: settings of the motor boards, by driven joint, uploaded after connecting; they keep theirs when None.
     """
 
     def __init__(
@@ -70,21 +75,24 @@ class ShadowHand:
         calibration: JointCalibration,
         settings: HandSettings | None = None,
         motors: MotorMap | None = None,
+        boards: Mapping[str, MotorConfiguration] | None = None,
     ) -> None:
         self._link, self._clock = link, clock
         self._settings = settings or HandSettings()
-        motors = motors or MotorMap.load()
-        self._control = PositionControl(motors, self._settings.gains)
-        self._watch = MotorWatch(motors, self._settings.heat, link.name)
+        self._motors, self._boards = motors or MotorMap.load(), boards
+        self._control = PositionControl(self._motors, self._settings.gains)
+        self._watch = MotorWatch(self._motors, self._settings.heat, link.name)
         self._image = PALMS[self._settings.palm]
         self._decoder = HandDecoder(calibration, self._image)
+        self._nudge: NDArray[np.int16] | None = None
         self._connected = False
         self._reset()
 
     def _reset(self) -> None:
         """As new: nothing received, nothing sent, no target."""
         self._decoder.restart()
-        self._polling, self._tactile = MotorPolling(), TactileRotation(self._settings.tactile)
+        self._polling = MotorPolling(self._settings.polling)
+        self._tactile = TactileRotation(self._settings.tactile)
         self._counters = HandCounters()
         self._last: HandSample | None = None
         self._sent_ns: int | None = None
@@ -94,10 +102,12 @@ class ShadowHand:
     # --- lifecycle ---------------------------------------------------------------------------------------------
 
     def connect(self) -> None:
-        """Open the link, send the all-zero image and wait for the palm's first status. All or nothing, repeatable.
+        """Open the link, send the all-zero image, wait for the palm's first status, set up the motor boards.
+
+        All or nothing, repeatable.
 
         Raises:
-            DeviceError: the link does not open or the palm does not answer.
+            DeviceError: the link does not open, the palm does not answer, or a motor refuses its settings.
         """
         if self._connected:
             return
@@ -105,6 +115,8 @@ class ShadowHand:
         try:
             self._reset()
             self._wake_palm()
+            if self._boards is not None:
+                configure_motors(self._setup_cycle, self._motors, self._boards, self._link.name)
         except BaseException:
             self._link.close()
             raise
@@ -169,6 +181,26 @@ class ShadowHand:
             DeviceError: a name is not a driven joint, or a target is not a finite number. Nothing is changed then.
         """
         self._control.set_targets(targets_rad)
+        self._nudge = None
+
+    def nudge(self, joint: str, pwm: float) -> None:
+        """Drive one motor alone with a small duty cycle from now on, in place of all position control.
+
+        Args:
+            joint: driven joint; the motor its map names.
+            pwm: counts of 1023 towards larger angles, at most :data:`LARGEST_NUDGE`; 0 ends it and nothing moves.
+
+        Raises:
+            DeviceError: not a driven joint, or too large.
+        """
+        if joint not in self._motors.numbers or not abs(pwm) <= LARGEST_NUDGE:
+            what = f"can not nudge {joint} with {pwm} counts"
+            raise DeviceError(what, where=self._link.name, hint=f"At most {LARGEST_NUDGE} for a driven joint")
+        self._control.clear()
+        motor = self._motors.numbers[joint]
+        self._nudge = np.zeros(MOTORS, dtype=np.int16) if pwm else None
+        if self._nudge is not None:
+            self._nudge[motor] = round(pwm) * self._motors.sign[motor]
 
     @property
     def targets_rad(self) -> dict[str, float]:
@@ -188,6 +220,7 @@ class ShadowHand:
         self._fault: Fault | None = None
         self._counters.lost_in_a_row = 0
         self._motion_since_ns: int | None = None
+        self._nudge = None
         self._control.clear()
 
     # --- the cycle ---------------------------------------------------------------------------------------------
@@ -222,17 +255,24 @@ class ShadowHand:
         """
         return self._decoder.receive(datagram)
 
-    def _cycle(self, demand: NDArray[np.int16]) -> HandSample | None:
+    def _setup_cycle(self, kind: ToMotor, words: NDArray[np.int16]) -> MotorReadings | None:
+        self._pause()
+        sample = self._cycle(words, kind)
+        self._last = sample or self._last
+        return None if sample is None else sample.motor
+
+    def _cycle(self, words: NDArray[np.int16], to_motor: ToMotor = ToMotor.DEMAND_PWM) -> HandSample | None:
         now_ns = self._clock.now_ns()
-        if self._sent_ns is None or now_ns - self._sent_ns > MOTOR_PATIENCE_ns:
+        silent = self._sent_ns is None or now_ns - self._sent_ns > MOTOR_PATIENCE_ns
+        if silent or to_motor != ToMotor.DEMAND_PWM:
             self._demands_since_ns = now_ns
         which_motors, kind = self._polling.next(now_ns)
         command = PalmCommand(
             edc_command=EdcCommand.SENSOR_DATA,
             from_motor_data_type=kind,
             which_motors=which_motors,
-            to_motor_data_type=ToMotor.DEMAND_PWM,
-            motor_data=demand,
+            to_motor_data_type=to_motor,
+            motor_data=words,
             tactile_data_type=self._tactile.next(),
         )
         self._sent_ns = now_ns
@@ -265,6 +305,8 @@ class ShadowHand:
         if self._stopped or self._fault is not None or self._counters.lost_in_a_row >= self._settings.blind_after:
             self._motion_since_ns = None
             return _NO_DEMAND
+        if self._nudge is not None:
+            return self._nudge
         return self._control.demand(last.joints_rad, self._limit_share(last))
 
     def _limit_share(self, last: HandSample) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from drivers.shadow.motor_polling import PollingRates
 from drivers.shadow.motor_watch import HeatLimits
 from drivers.shadow.motors import GainTable
 from drivers.shadow.palm_images import PalmName
@@ -18,6 +19,7 @@ class HandSettings(StrictModel):
         palm: which palm the hand has.
         cycle_s: period of the exchanges while connecting and closing, seconds.
         gains: position control.
+        polling: how often the motors are asked for what.
         tactile: kind of fingertip asked for data through the palm.
         lost_limit: so many cycles in a row without a valid status stop the hand.
         blind_after: so many lost cycles in a row already take the demands away, until a status comes again.
@@ -31,6 +33,7 @@ class HandSettings(StrictModel):
     palm: PalmName = "0220"
     cycle_s: float = Field(default=0.01, gt=0.0)
     gains: GainTable = GainTable()
+    polling: PollingRates = PollingRates()
     tactile: TactileKind = "none"
     lost_limit: int = Field(default=10, ge=1)
     blind_after: int = Field(default=2, ge=1)

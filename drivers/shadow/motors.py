@@ -35,6 +35,19 @@ class _MotorFile(StrictModel):
     reversed: tuple[str, ...] = ()
 
 
+class _ShadowMapFile(StrictModel):
+    joint_to_motor_mapping: tuple[int, ...] = Field(min_length=28, max_length=28)
+
+
+_SHADOW_JOINTS = (
+    *(f"{finger}J{number}" for finger in ("FF", "MF", "RF") for number in range(5)),
+    *(f"LFJ{number}" for number in range(6)),
+    *(f"THJ{number}" for number in range(1, 6)),
+    *("WRJ1", "WRJ2"),
+)
+"""The 28 joints in the order of Shadow's own map files; -1 stands for one that no motor drives by itself."""
+
+
 class MotorMap:
     """Which motor pulls which joint.
 
@@ -67,7 +80,8 @@ class MotorMap:
         """Read a motor map.
 
         Args:
-            path: the hand's file; None for the simulated hand's, whose numbers are those of Shadow's rh_E_v3.
+            path: the hand's file, in our format or in that of Shadow's ``default_mappings``; None for the simulated
+                hand's, whose numbers are those of Shadow's rh_E_v3.
 
         Raises:
             ConfigurationError: the file cannot be used.
@@ -76,8 +90,13 @@ class MotorMap:
             packaged = resources.files("tactile_lab") / "rigs" / "calibrations" / "simulated-hand" / "motors.yaml"
             with resources.as_file(packaged) as file:
                 return cls.load(file)
-        content = strict_yaml.load_model(path, _MotorFile)
-        return cls(content.motors, content.reversed, str(path))
+        content = strict_yaml.load(path)
+        if isinstance(content, dict) and "joint_to_motor_mapping" in content:
+            listed = strict_yaml.validate(content, _ShadowMapFile, where=str(path)).joint_to_motor_mapping
+            named = dict(zip(_SHADOW_JOINTS, listed, strict=True))
+            return cls({joint: motor for joint, motor in named.items() if motor >= 0}, where=str(path))
+        own = strict_yaml.validate(content, _MotorFile, where=str(path))
+        return cls(own.motors, own.reversed, str(path))
 
     def _matrix(self) -> Array:
         matrix = np.zeros((MOTORS, len(JOINTS)))

@@ -30,12 +30,16 @@ _SLOW_WORDS = (0, 1200, 1200, 0, 4711, 0, 131, 2020, 0x0A1F, 300, 4500, 0, 0, 0,
 class MotorBank:
     """All motor boards together, vectors by motor number.
 
-    PWM demands, configurations and resets are served; torque demands are not, so such motors halt after 20 ms.
+    PWM demands, configurations, backlash controls and resets are served; torque demands are not, so that such motors
+    halt after 20 ms.
 
     Args:
         plant: whose motors turn.
         motor_map: which motor pulls which joint.
         rng: noise of the strain gauges.
+
+    Attributes:
+        backlash_compensated: which motors have it switched on, shape (20,).
     """
 
     def __init__(self, plant: HandPlant, motor_map: MotorMap, rng: np.random.Generator) -> None:
@@ -51,10 +55,11 @@ class MotorBank:
         self._celsius = np.full(MOTORS, _AMBIENT_C)
         self._config = np.zeros((MOTORS, len(CONFIG_TYPES)), int)
         self._max_pwm = np.full(MOTORS, MAX_PWM)
+        self.backlash_compensated = np.zeros(MOTORS, bool)
         self._frames = np.zeros(MOTORS, int)
         self._halts_at_ns: int | None = None
         self._warmed_at_ns = plant.stamp_ns
-        self._slow_type = 0
+        self._slow_turns = 0
 
     @property
     def next_event_ns(self) -> int | None:
@@ -81,13 +86,17 @@ class MotorBank:
             self._config[:, kind - CONFIG_TYPES[0]] = words & 0xFFFF
         elif kind == ToMotor.CONFIG_CRC:
             self._activate(words & 0xFFFF)
+        elif kind == ToMotor.SYSTEM_CONTROLS:
+            self.backlash_compensated[words & 0x1 > 0] = True
+            self.backlash_compensated[words & 0x2 > 0] = False
 
     def answer(self, kind: int) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
         """The (torque, misc) words of all motors for a requested data type, each of shape (20,)."""
         gauges = self._gauge_difference()
         if kind == FromMotor.SLOW_MISC:
-            self._slow_type = self._slow_type % (len(_SLOW_WORDS) - 1) + 1
-            return np.full(MOTORS, self._slow_type, np.int16), np.full(MOTORS, _SLOW_WORDS[self._slow_type], np.uint16)
+            kind_now = self._slow_turns // 2 % (len(_SLOW_WORDS) - 1) + 1  # even and odd motors each go through all
+            self._slow_turns += 1
+            return np.full(MOTORS, kind_now, np.int16), np.full(MOTORS, _SLOW_WORDS[kind_now], np.uint16)
         return gauges.astype(np.int16), (np.rint(self._misc(kind, gauges)).astype(int) & 0xFFFF).astype(np.uint16)
 
     def _misc(self, kind: int, gauges: Array) -> Array:
@@ -143,11 +152,14 @@ class MotorBank:
     def _activate(self, checksums: NDArray[np.int_]) -> None:
         """Take over the uploaded configuration of every motor whose checksum is not 0, if it is right."""
         for motor in np.flatnonzero(checksums):
-            if config_crc(self._config[motor].tolist()) == checksums[motor]:
-                self._flags[motor] &= ~int(MotorFlag.CONFIG_CRC_MISMATCH)
-                self._max_pwm[motor] = self._config[motor, CONFIG_TYPES.index(ToMotor.MAX_PWM)]
-            else:
+            self._flags[motor] &= ~int(MotorFlag.CONFIG_CRC_MISMATCH | MotorFlag.CONFIG_OUT_OF_RANGE)
+            max_pwm = self._config[motor, CONFIG_TYPES.index(ToMotor.MAX_PWM)]
+            if config_crc(self._config[motor].tolist()) != checksums[motor]:
                 self._flags[motor] |= int(MotorFlag.CONFIG_CRC_MISMATCH)
+            elif max_pwm > MAX_PWM:
+                self._flags[motor] |= int(MotorFlag.CONFIG_OUT_OF_RANGE)
+            else:
+                self._max_pwm[motor] = max_pwm
 
     def _warm(self) -> None:
         """Windings approach the temperature of their present load; too hot, they halt for good."""
