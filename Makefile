@@ -27,7 +27,7 @@ check: $(READY)  ## Linters, types and the layer contract
 bench: $(READY)  ## Speed and memory, printed beside the reference
 	$(BIN)/tactile-lab bench
 
-EXPERIMENTS := methods-2d methods-3d random-contacts figure-2.7 figure-2.12 figure-3.12 figure-3.14 figure-3.15 figure-3.16 graph-stress
+EXPERIMENTS := methods-2d methods-3d methods-6dof random-contacts figure-2.7 figure-2.12 figure-3.12 figure-3.14 figure-3.15 figure-3.16 graph-stress
 
 results: $(READY)  ## All experiments over the reported seeds (hours), their tables and plots into docs/results.md
 	for name in $(EXPERIMENTS); do $(BIN)/tactile-lab experiment $$name --into docs/results.md || exit 1; done

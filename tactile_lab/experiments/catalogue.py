@@ -137,6 +137,11 @@ def _methods_on_table(grasps: int) -> list[Setting]:
     return grid(noise=[100], shape=solids, method=METHODS, grasps=[grasps])
 
 
+def _methods_in_space(grasps: int) -> list[Setting]:
+    solids = ("box-12x6x6", "triangular-prism", "l-block", "ellipsoid")
+    return grid(noise=[50], shape=solids, method=("known-pose", "joint", "icp", "odometry"), grasps=[grasps])
+
+
 def _noise_levels(grasps: int) -> list[Setting]:
     methods = ("known-pose", "joint", "particle", "thesis-pf")
     return grid(shape=THREE_SHAPES, method=methods, noise=[0, 25, 50, 75, 100], outliers=[0], grasps=[grasps])
@@ -239,6 +244,16 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             pooled=("shape",),
             grasps=SPATIAL_GRASPS,
             left_out=_scans_left_out,
+        ),
+        Experiment(
+            "methods-6dof",
+            "Methods on solids held free in space, six degrees of freedom, at 50 % motion noise.",
+            _methods_in_space,
+            tracking_runs.track_in_space,
+            TRACKING_COLUMNS,
+            _ranges("method", _HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: str(cell["shape"])),
+            pooled=("shape",),
+            grasps=SPATIAL_GRASPS,
         ),
         Experiment(
             "random-contacts",

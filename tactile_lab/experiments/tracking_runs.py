@@ -50,8 +50,15 @@ def track_on_table(cell: Cell) -> dict[str, Any]:
     return _tracked(data, cell, dimension=3)
 
 
-def _tracked(data: SimulatedGrasps, cell: Cell, dimension: int) -> dict[str, Any]:
-    settings = _slam_settings(cell, dimension)
+def track_in_space(cell: Cell) -> dict[str, Any]:
+    """A method on grasps of a solid that is held free, with all six degrees of freedom. Cell: as on the table."""
+    scale = cell["noise"] / 100
+    data = spatial_data.simulate(cell["shape"], cell.seed, motion="free", motion_scale=scale, count=cell["grasps"])
+    return _tracked(data, cell, dimension=3, freedom="space")
+
+
+def _tracked(data: SimulatedGrasps, cell: Cell, dimension: int, freedom: str = "table") -> dict[str, Any]:
+    settings = _slam_settings(cell, dimension, freedom)
     slam = TactileSlam(settings, cell.seed, data.world_T_body if settings.method == "known-pose" else None)
     for grasp in data.grasps:
         slam.take(grasp)
@@ -61,12 +68,13 @@ def _tracked(data: SimulatedGrasps, cell: Cell, dimension: int) -> dict[str, Any
     return {**slam_figures(data, result), "finish_ms": round(1e3 * finishing_s, 1)}
 
 
-def _slam_settings(cell: Cell, dimension: int) -> SlamSettings:
+def _slam_settings(cell: Cell, dimension: int, freedom: str) -> SlamSettings:
     """The method is told the noise of the motion, as the thesis's simulations tell theirs."""
     scale, method = max(cell["noise"] / 100, _LEAST_NOISE), cell["method"]
     given: dict[str, Any] = {
         "method": "particle" if method == WITHOUT_GRAPH else method,
         "dimension": dimension,
+        "freedom": freedom,
         "motion": {"translation_m": scale * SLIP_SIGMA_m, "rotation_rad": scale * SLIP_SIGMA_rad},
     }
     if method == WITHOUT_GRAPH:

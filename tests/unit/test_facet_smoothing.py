@@ -1,0 +1,141 @@
+"""Poses and flat faces smoothed together, and what faces say about contacts that do not fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tactile_lab.experiments import planar_data, spatial_data
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.choice import polygon_of
+from tactile_lab.shape.polyhedron_planes import segment_planes
+from tactile_lab.shape.sampling import distances_to_polygon
+from tactile_lab.shape.settings import GpisSettings
+from tactile_lab.shape.surface import extract_contour
+from tactile_lab.slam import SlamSettings, TactileSlam
+from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.facet_smoothing import FacetSmoother, FlatFaces, smoothed_with_faces
+from tactile_lab.tracking.hypotheses import Judge
+from tactile_lab.tracking.motion import MotionNoise, deviation, planar_motion
+from tactile_lab.tracking.pose_evidence import PoseEvidence
+from tactile_lab.tracking.sharp_judge import SharpJudge
+
+NOISE = MotionNoise()
+
+
+def true_map(shape: str, count: int = 12, seed: int = 0, dimension: int = 2) -> ContactMap:
+    data = (planar_data if dimension == 2 else spatial_data).simulate(shape, seed, count=count)
+    placed = tuple(
+        PlacedGrasp(
+            ContactSet.of_grasp(grasp, dimension, 0.0),
+            planar_motion(pose),
+            np.eye(3) * 1e-6,
+            planar_motion(grasp.hand_motion_world),
+        )
+        for grasp, pose in zip(data.grasps, data.world_T_body, strict=True)
+    )
+    return ContactMap(placed, GpisSettings())
+
+
+def shaken(contact_map: ContactMap, scale: float) -> Array:
+    shake = np.random.default_rng(0).normal(size=contact_map.rows.shape) * [0.002, 0.002, 0.03] * scale
+    shake[0] = 0.0
+    return np.asarray(contact_map.rows + shake)
+
+
+def heading_error_rad(contact_map: ContactMap, rows: Array) -> float:
+    """Of headings only: along parallel faces a grasp slides unseen."""
+    return float(np.sqrt(np.mean(deviation(rows, contact_map.rows)[:, 2] ** 2)))
+
+
+def true_faces(contact_map: ContactMap) -> FlatFaces:
+    seen, fitted = contact_map.contacts, contact_map.fit()
+    if contact_map.dimension == 2:
+        found = polygon_of(fitted, extract_contour(fitted)).faces
+        return FlatFaces(found.labels, found.normals, found.offsets_m)
+    planes = segment_planes(seen.points_m, seen.normals, seen.point_sigma_m, seen.normal_sigma_rad)
+    return FlatFaces(planes.labels, planes.normals, planes.offsets_m)
+
+
+@pytest.mark.parametrize(("shape", "dimension"), [("rectangle", 2), ("L", 2), ("box-12x6x6", 3)])
+def test_faces_pull_shaken_poses_back(shape: str, dimension: int) -> None:
+    contact_map = true_map(shape, dimension=dimension)
+    start = shaken(contact_map, 2.0)
+    found = FacetSmoother(contact_map, NOISE).fitted(start, true_faces(contact_map), 20)
+    assert heading_error_rad(contact_map, found.rows) < 0.5 * heading_error_rad(contact_map, start)
+
+
+def test_a_rectangle_has_four_faces_at_right_angles() -> None:
+    contact_map = true_map("rectangle", count=16)
+    found = smoothed_with_faces(contact_map.with_rows(shaken(contact_map, 0.4)), NOISE)
+    assert found is not None
+    assert found.faces.count == 4
+    products = np.abs(found.faces.normals @ found.faces.normals.T)
+    assert np.all((products < 0.1) | (products > 0.99))
+
+
+def test_smoothing_never_raises_the_cost_and_keeps_the_first_pose() -> None:
+    contact_map = true_map("hexagon")
+    smoother, rows = FacetSmoother(contact_map, NOISE), shaken(contact_map, 1.0)
+    angles = np.arctan2(*contact_map.contacts.normals.T[::-1])
+    labels = np.digitize(angles, np.linspace(-np.pi, np.pi, 7)[1:-1])
+    normals = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(-np.pi, np.pi, 13)[1::2]])
+    faces = FlatFaces(labels, normals, np.full(6, 0.035))
+    few, many = smoother.fitted(rows, faces, 1), smoother.fitted(rows, faces, 10)
+    assert many.cost <= few.cost
+    assert np.array_equal(many.rows[0], rows[0])
+
+
+def test_merged_faces_hold_the_contacts_of_both() -> None:
+    faces = FlatFaces(np.array([0, 1, 2, 2, 1]), np.eye(3)[:, :2] + [[0, 0], [0, 0], [1, 0]], np.arange(3.0))
+    merged = faces.merged(0, 1)
+    assert merged.labels.tolist() == [0, 0, 1, 1, 0]
+    assert merged.offsets_m.tolist() == [pytest.approx(2 / 3), 2.0]
+    assert np.linalg.norm(merged.normals[0]) == pytest.approx(1.0)
+
+
+def sharp_judge(contact_map: ContactMap) -> SharpJudge:
+    return SharpJudge(Judge(NOISE, 5.0), NOISE)
+
+
+@pytest.mark.parametrize("shape", ["ellipse", "trapezoid", "stadium"])
+def test_wrong_contacts_are_left_out_and_hardly_any_right_one(shape: str) -> None:
+    data = planar_data.simulate(shape, 4, count=14, outlier_share=0.1)
+    slam = TactileSlam(SlamSettings(method="known-pose"), 0, known_poses=data.world_T_body)
+    wrong = used = 0
+    for grasp, pose in zip(data.grasps, data.world_T_body, strict=True):
+        used += slam.take(grasp).contacts_used
+        bodies = np.array([pose.transformTo(contact.point_world_m)[:2] for contact in grasp.contacts])
+        wrong += int(np.sum(distances_to_polygon(bodies, data.outline_m) > 0.005))
+    left_out = sum(len(grasp.contacts) for grasp in data.grasps) - used
+    assert wrong >= 2
+    assert wrong <= left_out <= wrong + 9
+
+
+def test_contacts_left_out_by_mistake_come_back() -> None:
+    contact_map = true_map("rectangle", count=14)
+    thinner = contact_map.without_contact(7).without_contact(20)
+    assert thinner.left_out_count == 2
+    assert sharp_judge(thinner).better(thinner).map.left_out_count == 0
+
+
+def test_the_way_to_a_contact_that_is_left_out_is_no_evidence() -> None:
+    grasp = true_map("rectangle", count=3).placed[1]
+    assert len(grasp.free_world_m) == len(grasp.contacts_world.free_m) > 0
+    fewer = replace(grasp, left_out=frozenset({0}))
+    dropped = len(grasp.free_world_m) - len(fewer.free_world_m)
+    assert dropped == np.sum(grasp.contacts_world.free_of == 0) > 0
+
+
+def test_covariances_of_all_poses_hold_their_errors() -> None:
+    contact_map = true_map("ellipse", count=10)
+    rows, _ = PoseEvidence(contact_map, NOISE).maximised(contact_map.rows, 60)
+    rated = Judge(NOISE, 5.0).with_covariances(contact_map.with_rows(rows))
+    errors = [
+        contact_map.space.deviation(grasp.row, true.row) @ np.linalg.solve(grasp.covariance, grasp.row - true.row)
+        for grasp, true in zip(rated.placed[1:], contact_map.placed[1:], strict=True)
+    ]
+    assert np.median(errors) < 7.8
