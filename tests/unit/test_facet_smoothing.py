@@ -47,8 +47,8 @@ def shaken(contact_map: ContactMap, scale: float) -> Array:
 
 
 def heading_error_rad(contact_map: ContactMap, rows: Array) -> float:
-    """Of headings only: along parallel faces a grasp slides unseen."""
-    return float(np.sqrt(np.mean(deviation(rows, contact_map.rows)[:, 2] ** 2)))
+    """Of headings only, without what all have in common: along parallel faces a grasp slides unseen."""
+    return float(np.std(deviation(rows, contact_map.rows)[:, 2]))
 
 
 def true_faces(contact_map: ContactMap) -> FlatFaces:
@@ -63,7 +63,7 @@ def true_faces(contact_map: ContactMap) -> FlatFaces:
 @pytest.mark.parametrize(("shape", "dimension"), [("rectangle", 2), ("L", 2), ("box-12x6x6", 3)])
 def test_faces_pull_shaken_poses_back(shape: str, dimension: int) -> None:
     contact_map = true_map(shape, dimension=dimension)
-    start = shaken(contact_map, 2.0)
+    start = shaken(contact_map, 4.0)
     found = FacetSmoother(contact_map, NOISE).fitted(start, true_faces(contact_map), 20)
     assert heading_error_rad(contact_map, found.rows) < 0.5 * heading_error_rad(contact_map, start)
 
