@@ -64,7 +64,7 @@ class CanWire:
         self.calibration: DigitalCalibration | None = None
         self.lost = 0
         self._base, self._slot, self._serial = base, slot, serial
-        self._samples, self._turn = GaugeSamples(limit=32767), Turn(patience=10)
+        self._samples, self._turn = GaugeSamples(limit=32767), Turn(patience_s=0.1)
         self._lesson: _Lesson | None = None
         self._half: tuple[int, tuple[int, int, int]] | None = None
         self._answers: dict[Op, int] = {}
@@ -89,9 +89,9 @@ class CanWire:
             )
         raise DeviceError(f"calibration {self._slot} of the board is not usable", where=talk.name, hint="Check the bus")
 
-    def ask(self, link: Link) -> None:
+    def ask(self, link: Link, now_ns: int) -> None:
         """Ask for the next reading, once the one before has come. Raises DeviceError."""
-        if self._turn.mine():
+        if self._turn.mine(now_ns):
             link.send(self._question(Op.GAUGES))
 
     def stop(self, link: Link) -> None:

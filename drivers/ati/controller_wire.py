@@ -36,7 +36,7 @@ class ControllerWire:
         self._mode = mode
         self._scale = np.repeat([counts_per_N, counts_per_Nm], 3)
         self._records: AsciiLines | BinaryAnswers = AsciiLines() if mode == "ascii" else BinaryAnswers()
-        self._turn = Turn(patience=20)  # a record takes 20 ms at 9600 baud
+        self._turn = Turn(patience_s=0.25)  # a record takes 25 ms at 9600 baud
         self._count = 0
         self._heard = b""
 
@@ -55,9 +55,9 @@ class ControllerWire:
         if self._mode == "ascii":
             talk.send(b"QS\r")
 
-    def ask(self, link: Link) -> None:
+    def ask(self, link: Link, now_ns: int) -> None:
         """In binary, ask for the next record. Raises DeviceError."""
-        if self._mode == "binary" and self._turn.mine():
+        if self._mode == "binary" and self._turn.mine(now_ns):
             link.send(b"QR\r")
 
     def stop(self, link: Link) -> None:

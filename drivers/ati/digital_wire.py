@@ -100,7 +100,7 @@ class DigitalWire:
         if not self._streaming:
             raise DeviceError("the sensor refuses to stream", where=talk.name, hint="Switch it off and on")
 
-    def ask(self, link: Link) -> None:
+    def ask(self, link: Link, now_ns: int) -> None:
         """Nothing to ask: the sensor streams."""
 
     def stop(self, link: Link) -> None:

@@ -77,7 +77,7 @@ class GaugeVoltsWire:
                 "no gauge volts arrive", where=talk.name, hint="Start the acquisition program; compare address and port"
             )
 
-    def ask(self, link: Link) -> None:
+    def ask(self, link: Link, now_ns: int) -> None:
         """Nothing to ask: the acquisition program sends."""
 
     def stop(self, link: Link) -> None:

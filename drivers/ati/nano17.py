@@ -110,7 +110,7 @@ class Nano17(ForceTip):
 
     def ask(self) -> None:
         """Ask for the next reading where the wire needs it. Raises DeviceError."""
-        self.wire.ask(self._link)
+        self.wire.ask(self._link, self._clock.now_ns())
 
     def poll(self) -> list[WrenchSample]:
         """Everything that waits on the link, decoded, oldest first; messages of strangers are counted.

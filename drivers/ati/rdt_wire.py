@@ -78,7 +78,7 @@ class RdtWire:
                     hint="Check the firewall and that no other program reads this box; else switch the box off and on",
                 )
 
-    def ask(self, link: Link) -> None:
+    def ask(self, link: Link, now_ns: int) -> None:
         """Nothing to ask: the box streams."""
 
     def stop(self, link: Link) -> None:

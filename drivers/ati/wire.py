@@ -14,6 +14,7 @@ import numpy as np
 from drivers.ati.conversation import Conversation
 from drivers.ati.force_tip import WrenchSample
 from drivers.links import Datagram, Link
+from tactile_lab.clock import NANOSECONDS
 from tactile_lab.geometry.contacts import Array
 
 GAUGES = 6
@@ -41,7 +42,7 @@ class ForceWire(Protocol):
             DeviceError: it does not answer, or is not the device it should be; says why.
         """
 
-    def ask(self, link: Link) -> None:
+    def ask(self, link: Link, now_ns: int) -> None:
         """Ask for the next reading where the device sends only when asked. Raises DeviceError."""
 
     def stop(self, link: Link) -> None:
@@ -131,32 +132,31 @@ class Turn:
     """Whose turn it is on a wire of question and answer: ask again when the answer has come, or will not any more.
 
     Args:
-        patience: turns to wait for an answer.
+        patience_s: how long to wait for an answer.
 
     Attributes:
         unanswered: questions given up.
     """
 
-    def __init__(self, patience: int) -> None:
+    def __init__(self, patience_s: float) -> None:
         self.unanswered = 0
-        self._patience, self._waited = patience, 0
-        self._open = False
+        self._patience_ns = round(patience_s * NANOSECONDS)
+        self._asked_ns: int | None = None
 
     def restart(self) -> None:
         """Nothing is asked, as after connecting."""
-        self._open, self._waited = False, 0
+        self._asked_ns = None
 
     def answered(self) -> None:
         """An answer has come."""
-        self._open = False
+        self._asked_ns = None
 
-    def mine(self) -> bool:
+    def mine(self, now_ns: int) -> bool:
         """Whether to ask now; then the question counts as asked."""
-        self._waited += 1
-        if self._open and self._waited < self._patience:
+        if self._asked_ns is not None and now_ns - self._asked_ns < self._patience_ns:
             return False
-        self.unanswered += self._open
-        self._open, self._waited = True, 0
+        self.unanswered += self._asked_ns is not None
+        self._asked_ns = now_ns
         return True
 
     def health(self) -> tuple[str, ...]:

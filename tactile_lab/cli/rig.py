@@ -14,8 +14,19 @@ app = typer.Typer(help="Rigs: the devices of a laboratory, and their calibration
 
 
 @app.command("list")
-def list_rigs(as_json: Json = False, no_input: NoInput = False) -> None:
-    """List the rigs that come with the program."""
+def list_rigs(
+    ports: Annotated[bool, typer.Option("--ports", help="List serial ports and CAN interfaces instead.")] = False,
+    watch: Annotated[float, typer.Option(min=0.0, help="With --ports: wait so many seconds for one to change.")] = 0.0,
+    as_json: Json = False,
+    no_input: NoInput = False,
+) -> None:
+    """List the rigs that come with the program, or what a sensor could be plugged into.
+
+    Unplug an adapter while "--ports --watch 30" waits, and it tells which port that was.
+    """
+    if ports:
+        _list_ports(watch, as_json)
+        return
     from tactile_lab.cli.console import emit_json, show_table
     from tactile_lab.rigs.description import load_rig, shipped_rigs
 
@@ -25,6 +36,31 @@ def list_rigs(as_json: Json = False, no_input: NoInput = False) -> None:
         emit_json([rig.model_dump(mode="json", include={"name", "summary", "kind", "fingertips"}) for rig in rigs])
         return
     show_table("Rigs", ["name", "fingertips", "summary"], [[rig.name, rig.fingertips, rig.summary] for rig in rigs])
+
+
+def _list_ports(watch_s: float, as_json: bool) -> None:
+    from dataclasses import asdict
+
+    from tactile_lab.cli.console import emit_json, say, show_table
+    from tactile_lab.clock import MonotonicClock
+    from tactile_lab.rigs.ports import list_all_ports, wait_for_change
+
+    found = list_all_ports()
+    if not as_json:
+        show_table(
+            "Ports", ["kind", "name", "description"], [[port.kind, port.name, port.description] for port in found]
+        )
+    gone, come = wait_for_change(MonotonicClock(), found, watch_s) if watch_s else ([], [])
+    if as_json:
+        rows = {"ports": found, "gone": gone, "come": come}
+        emit_json({name: [asdict(port) for port in ports] for name, ports in rows.items()})
+        return
+    for port in gone:
+        say(f"{port.name} went: {port.description}")
+    for port in come:
+        say(f"{port.name} came: {port.description}")
+    if watch_s and not (gone or come):
+        say("nothing changed")
 
 
 @app.command("check")
@@ -61,6 +97,7 @@ def check(
 def emulate(
     rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file of kind fingertips.")],
     seconds: Annotated[float, typer.Option(min=0.0, help="How long; 0 until Ctrl+C.")] = 0.0,
+    as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
     """Stand in for the sensors of a fingertip rig, at the addresses its file names, until Ctrl+C.
@@ -70,12 +107,14 @@ def emulate(
     import time
     from pathlib import Path
 
-    from tactile_lab.cli.console import say
+    from tactile_lab.cli.console import emit_json, say
     from tactile_lab.rigs.emulate import emulated
     from tactile_lab.rigs.fingertip_rig import load_fingertip_rig
 
     del no_input
     with emulated(load_fingertip_rig(Path(rig))) as places:
+        if as_json:
+            emit_json({"rig": rig, "fingertips": places})
         for finger, place in places.items():
             say(f"{finger}: {place}")
         say(f"tactile-lab rig check {rig}  in another terminal; Ctrl+C ends this")

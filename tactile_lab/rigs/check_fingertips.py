@@ -36,12 +36,12 @@ def _check(rig: FingertipRig, finger: str, tip: Nano17, clock: Clock) -> Finding
     try:
         tip.connect()
         samples = _listen(tip, clock)
+        problems = [text for text in tip.health() if text != "not tared"]
     except DeviceError as error:
         return Finding(device, False, f"{error}{_other_baud(rig, finger, clock)}")
     finally:
         tip.close()
     place = place_of(rig.description.wires[finger])
-    problems = [text for text in tip.health() if text != "not tared"]
     usable = np.array([sample.wrench for sample in samples if np.isfinite(sample.wrench).all()])
     if len(usable) < 2:
         return Finding(device, False, f"{place}: {'; '.join(problems) or 'no usable sample'}")
@@ -75,7 +75,10 @@ def _figures(tip: Nano17, samples: list[WrenchSample], usable: np.ndarray[Any, n
 def _serial(tip: Nano17) -> str:
     """The sensor's serial number where its wire has told it."""
     told: Any = getattr(tip.wire, "page", None) or getattr(tip.wire, "calibration", None)
-    return told.serial if told is not None else ""
+    if told is None:
+        return ""
+    firmware = getattr(told, "firmware", "")
+    return f"{told.serial}, firmware {firmware}" if firmware else str(told.serial)
 
 
 def _noise_problem(tip: Nano17, usable: np.ndarray[Any, np.dtype[np.float64]]) -> list[str]:

@@ -31,6 +31,7 @@ COMMANDS = (
     "rig",
     "rig list",
     "rig check",
+    "rig emulate",
 )
 
 

@@ -36,6 +36,7 @@ def rig(tmp_path: Path) -> Path:
         "summary": "Three fingertips on the bench",
         "kind": "fingertips",
         "calibration": "tips.yaml",
+        "nano17": {"silent_ms": 5000},  # a busy machine may hold the emulated units back
         "wires": {
             "FF": {
                 "wire": "net-ft",

@@ -1,0 +1,51 @@
+"""What a fingertip or a bridge could be plugged into: serial ports and CAN interfaces of this computer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import can
+from serial.tools import list_ports
+
+from tactile_lab.clock import NANOSECONDS, Clock
+
+_STABLE_NAMES = Path("/dev/serial/by-id")
+_LOOK_ns = NANOSECONDS // 5
+
+
+@dataclass(frozen=True)
+class PortFound:
+    """One port.
+
+    Attributes:
+        kind: ``serial`` or ``can``.
+        name: what to write into a rig file: the name that stays the same where the system has one.
+        description: what the adapter says of itself.
+    """
+
+    kind: str
+    name: str
+    description: str
+
+
+def list_all_ports() -> list[PortFound]:
+    """Serial ports, then CAN interfaces of the kernel."""
+    stable = {str(link.resolve()): str(link) for link in _STABLE_NAMES.glob("*")}
+    serial_ports = [
+        PortFound("serial", stable.get(port.device, port.device), port.description or "")
+        for port in sorted(list_ports.comports())
+    ]
+    buses = can.detect_available_configs(interfaces="socketcan")
+    return serial_ports + [PortFound("can", str(bus["channel"]), str(bus["interface"])) for bus in buses]
+
+
+def wait_for_change(clock: Clock, before: list[PortFound], seconds: float) -> tuple[list[PortFound], list[PortFound]]:
+    """Wait until a port goes or comes; which went and which came, both empty when none did in time."""
+    end_ns = clock.now_ns() + round(seconds * NANOSECONDS)
+    while clock.now_ns() < end_ns:
+        clock.sleep_until_ns(clock.now_ns() + _LOOK_ns)
+        now = list_all_ports()
+        if now != before:
+            return [port for port in before if port not in now], [port for port in now if port not in before]
+    return [], []

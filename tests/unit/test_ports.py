@@ -1,0 +1,56 @@
+"""Which ports there are, and which one went."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import pytest
+from typer.testing import CliRunner
+
+from tactile_lab.cli.app import app
+from tactile_lab.clock import VirtualClock
+from tactile_lab.rigs import ports
+from tactile_lab.rigs.ports import PortFound, list_all_ports, wait_for_change
+
+
+class Port(SimpleNamespace):
+    def __lt__(self, other: Port) -> bool:
+        return bool(self.device < other.device)
+
+
+@pytest.fixture
+def plugged(monkeypatch: pytest.MonkeyPatch) -> list[Port]:
+    """Two adapters and a CAN interface; take one out of the list to unplug it."""
+    found = [Port(device="/dev/ttyUSB1", description="RS-485"), Port(device="/dev/ttyUSB0", description="RS-232")]
+    monkeypatch.setattr(ports.list_ports, "comports", lambda: list(found))
+    buses = [{"interface": "socketcan", "channel": "can0"}]
+    monkeypatch.setattr(ports.can, "detect_available_configs", lambda interfaces: buses)
+    return found
+
+
+def test_serial_ports_and_can_interfaces_are_listed(plugged: list[Port]) -> None:
+    assert list_all_ports() == [
+        PortFound("serial", "/dev/ttyUSB0", "RS-232"),
+        PortFound("serial", "/dev/ttyUSB1", "RS-485"),
+        PortFound("can", "can0", "socketcan"),
+    ]
+
+
+def test_the_port_that_goes_or_comes_is_named(plugged: list[Port]) -> None:
+    before = list_all_ports()
+    assert wait_for_change(VirtualClock(), before, 3.0) == ([], [])
+    pulled = plugged.pop()
+    assert wait_for_change(VirtualClock(), before, 3.0) == ([PortFound("serial", "/dev/ttyUSB0", "RS-232")], [])
+    plugged.append(pulled)
+    gone, come = wait_for_change(VirtualClock(), [port for port in before if port.name != "can0"], 3.0)
+    assert (gone, [port.name for port in come]) == ([], ["can0"])
+
+
+def test_the_command_lists_them_for_people_and_programs(plugged: list[Port]) -> None:
+    answer = CliRunner().invoke(app, ["rig", "list", "--ports", "--json"])
+    assert answer.exit_code == 0
+    assert [port["name"] for port in json.loads(answer.stdout)["ports"]] == ["/dev/ttyUSB0", "/dev/ttyUSB1", "can0"]
+    told = CliRunner().invoke(app, ["rig", "list", "--ports", "--watch", "0.3"])
+    assert "/dev/ttyUSB1" in told.output
+    assert "nothing changed" in told.output
