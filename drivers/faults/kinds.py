@@ -1,18 +1,12 @@
-"""Things that go wrong on a wire, on purpose: a wrapper around any link, and the faults it can inject.
-
-One wrapper injects one fault and counts how often; wrappers can be nested. What a fault must know of a driver's
-messages (where its counters and values stand) is said once by the driver's tests in a :class:`MessageLayout`.
-"""
+"""The ways in which a wire, or what hangs on it, goes wrong."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Literal, Protocol, runtime_checkable
+from dataclasses import replace
+from typing import Protocol, runtime_checkable
 
-import numpy as np
-
-from drivers.links import Datagram, Link, link_health
+from drivers.faults.schedule import MessageLayout, When
+from drivers.links import Datagram
 from tactile_lab.errors import DeviceError
 
 WORKING_COUNTER_LOW = "working counter low"
@@ -25,64 +19,6 @@ class Injectable(Protocol):
 
     def inject(self, fault: str) -> None:
         """Let the far end do ``fault`` once. Raises ValueError for one it does not know."""
-
-
-@dataclass(frozen=True)
-class When:
-    """Which received messages a fault strikes: every ``every``-th from number ``first`` on, ``count`` in all.
-
-    ``share`` strikes at random instead; ``count`` 0 is without end.
-    """
-
-    first: int = 10
-    every: int = 1
-    count: int = 1
-    share: float | None = None
-
-    def strikes(self, number: int, struck: int, rng: np.random.Generator) -> bool:
-        """Whether message ``number`` (from 0) is struck when ``struck`` were before it."""
-        if number < self.first or (self.count and struck >= self.count):
-            return False
-        return bool(rng.random() < self.share) if self.share is not None else (number - self.first) % self.every == 0
-
-
-@dataclass(frozen=True)
-class Field:
-    """An unsigned counter inside a message."""
-
-    offset: int
-    size: int
-    order: Literal["big", "little"] = "big"
-
-    def read(self, payload: bytes) -> int:
-        """Its value."""
-        return int.from_bytes(payload[self.offset : self.offset + self.size], self.order)
-
-    def write(self, payload: bytes, value: int) -> bytes:
-        """The message with another value, which wraps."""
-        word = (value % (1 << 8 * self.size)).to_bytes(self.size, self.order)
-        return payload[: self.offset] + word + payload[self.offset + self.size :]
-
-
-@dataclass(frozen=True)
-class MessageLayout:
-    """What faults must know of a driver's messages; left out where a message has no such thing.
-
-    Attributes:
-        counters: sequence counters.
-        values: where the measured values begin and end (one past the last byte).
-        seal: makes check bytes right again after a field was changed.
-        saturate: the message with a value at its limit, as the device would send it.
-    """
-
-    counters: tuple[Field, ...] = ()
-    values: tuple[int, int] | None = None
-    seal: Callable[[bytes], bytes] | None = None
-    saturate: Callable[[bytes], bytes] | None = None
-
-    def sealed(self, payload: bytes) -> bytes:
-        """The message with right check bytes."""
-        return self.seal(payload) if self.seal else payload
 
 
 class Fault:
@@ -302,79 +238,6 @@ class FarEnd(Fault):
     def strike(self, datagram: Datagram) -> list[Datagram]:
         self._link.inject(self.name)
         return [datagram]
-
-
-class FaultyLink:
-    """Any link, with a fault.
-
-    Args:
-        link: what to wrap.
-        fault: what goes wrong.
-        when: which messages it strikes.
-        seed: of the random ones.
-
-    Attributes:
-        injected: how often the fault struck.
-        received: messages that came from the wrapped link while armed.
-        armed: whether the fault can strike; while it is not, messages pass.
-    """
-
-    def __init__(self, link: Link, fault: Fault, when: When | None = None, seed: int = 0) -> None:
-        self.name, self._link, self.fault = link.name, link, fault
-        self.injected = self.received = 0
-        self._when, self._rng = when or When(), np.random.default_rng(seed)
-        self.armed = True
-        self._unplugged = False
-
-    def open(self) -> None:
-        """Open the wrapped link; plugs an unplugged wire in."""
-        self._link.open()
-        self._unplugged = False
-
-    def close(self) -> None:
-        """Close the wrapped link."""
-        self._link.close()
-
-    def send(self, payload: bytes) -> None:
-        """Send one message. Raises DeviceError, also while unplugged."""
-        self._check_plug()
-        self._link.send(payload)
-
-    def receive(self) -> list[Datagram]:
-        """What arrives, faults included. Raises DeviceError, also while unplugged."""
-        self._check_plug()
-        if not self.armed:
-            return self._link.receive()
-        arrived = self.fault.held()
-        for datagram in self._link.receive():
-            arrived += self._treat(datagram)
-        return arrived
-
-    def health(self) -> tuple[str, ...]:
-        """What the wrapped link knows to be wrong."""
-        return link_health(self._link)
-
-    def inject(self, fault: str) -> None:
-        """Pass a far end's fault on. Raises ValueError when the wrapped link knows none."""
-        if not isinstance(self._link, Injectable):
-            raise ValueError(f"{self.name}: the far end of this link has no fault {fault!r}")
-        self._link.inject(fault)
-
-    def _treat(self, datagram: Datagram) -> list[Datagram]:
-        struck = self._when.strikes(self.received, self.injected, self._rng)
-        self.received += 1
-        if not struck:
-            return self.fault.spare(datagram)
-        self.injected += 1
-        try:
-            return self.fault.strike(datagram)
-        except DeviceError as error:
-            self._unplugged = True
-            raise DeviceError(error.what, where=self.name, hint=error.hint) from error
-
-    def _check_plug(self) -> None:
-        if self._unplugged:
-            raise DeviceError("the wire is unplugged", where=self.name, hint="Plug it in and connect again")
 
 
 def standard_faults(layout: MessageLayout) -> dict[str, tuple[Fault, When]]:
