@@ -6,7 +6,8 @@
 
 Each fault is injected into an otherwise healthy stream. The driver must count it (its health gains words), or stop in
 order (an error of ours that names the link and says what to do), and it must be connectable again afterwards. Faults
-that a protocol cannot show are named in ``blind`` with the reason; those that must do no harm at all in ``harmless``.
+that a protocol cannot show are named in ``blind`` with the reason, those that must do no harm at all in ``harmless``,
+and those by which the driver may end in ``stops``.
 """
 
 from __future__ import annotations
@@ -87,6 +88,7 @@ class DriverSweep:
     layout: ClassVar[MessageLayout]
     blind: ClassVar[dict[str, str]] = {}
     harmless: ClassVar[frozenset[str]] = frozenset({"counter wrap"})
+    stops: ClassVar[frozenset[str]] = frozenset({"unplug"})
 
     def __init_subclass__(cls) -> None:
         names = sorted(standard_faults(cls.layout))
@@ -151,7 +153,7 @@ class DriverSweep:
 
     def _judge(self, fault_name: str, outcome: Outcome, new: set[str], clean: Outcome) -> None:
         if outcome.stopped is not None:
-            assert fault_name == "unplug", f"stopped by {outcome.stopped}"
+            assert fault_name in self.stops, f"stopped by {outcome.stopped}"
             assert outcome.stopped.where
             assert outcome.stopped.hint
         elif fault_name in self.harmless:
