@@ -26,7 +26,8 @@ from sessions.safety import InterruptGuard, SafetySettings, SafetySupervisor
 from tactile_lab.clock import VirtualClock
 from tactile_lab.errors import TactileLabError
 from tactile_lab.geometry.contacts import Grasp
-from tactile_lab.slam import SlamStep, TactileSlam
+from tactile_lab.slam import TactileSlam
+from tactile_lab.slam_result import SlamStep
 from tactile_lab.strict_yaml import StrictModel
 
 Answer = TypeVar("Answer")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -151,7 +152,7 @@ def _check_sizes(grasps: Sequence[GraspEntry]) -> None:
     together = np.concatenate([grasp.points_m for grasp in grasps])
     if (extent := _extent_m(together)) > _LARGEST_WORKSPACE_m:
         raise ValueError(f"the grasps lie {extent:.4g} m apart; are the lengths in millimetres?")
-    for index, (before, grasp) in enumerate(zip(grasps, grasps[1:], strict=False), start=1):
+    for index, (before, grasp) in enumerate(pairwise(grasps), start=1):
         if (carried := _carried_m(before, grasp)) > _LARGEST_OBJECT_m:
             raise ValueError(f"the hand moved by {carried:.4g} m before grasp {index}; are the lengths in millimetres?")
 

@@ -21,8 +21,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 from gtsam import Pose3
@@ -31,11 +30,11 @@ from pydantic import Field
 from tactile_lab.errors import ConfigurationError, ShapeError, TrackingError
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.graph.back_end import BackEnd, BackEndSettings
-from tactile_lab.graph.pose_graph import LoopReport
 from tactile_lab.graph.relocation import relocation_candidates
 from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.models import ShapeName, fit_shape
 from tactile_lab.shape.surface import Contour, SurfaceMesh
+from tactile_lab.slam_result import SlamResult, SlamStep, Verdict
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.observability import observability, planar_observability
@@ -51,8 +50,6 @@ from tactile_lab.tracking.trackers import (
     make_tracker,
     palm_heading,
 )
-
-Verdict = Literal["first", "tracked", "uncertain", "untracked"]
 
 
 class SlamSettings(TrackingSettings):
@@ -74,70 +71,6 @@ class SlamSettings(TrackingSettings):
     shape_model: ShapeName = "auto"
     contour_resolution_m: float = Field(default=0.001, gt=0)
     mesh_resolution_m: float = Field(default=0.003, gt=0)
-
-
-@dataclass(frozen=True)
-class SlamStep:
-    """What one grasp told.
-
-    Attributes:
-        index, stamp_ns: of the grasp.
-        world_T_object: pose after this grasp, None before the object frame is born.
-        covariance: of (x m, y m, yaw rad) in the world, shape (3, 3), None as the pose.
-        effective_count: effective number of particles or hypotheses.
-        observability: smallest eigenvalue of (3.18) of this grasp's contacts for motions on the table.
-        verdict: "first", "tracked", "uncertain" or "untracked".
-        reason: the verdict in words.
-        contacts: number of contacts of this dimension.
-        contacts_used: how many of them entered the shape.
-        seconds: computing time.
-    """
-
-    index: int
-    stamp_ns: int
-    world_T_object: Pose3 | None
-    covariance: Array | None
-    effective_count: float
-    observability: float
-    verdict: Verdict
-    reason: str
-    contacts: int
-    contacts_used: int
-    seconds: float
-
-
-@dataclass(frozen=True)
-class SlamResult:
-    """A finished session.
-
-    Attributes:
-        method, seed, dimension: as asked for.
-        world_T_object: the pose at each grasp, None where the object was not known.
-        covariances: of (x, y, yaw), None as the poses.
-        steps: what each grasp told when it was taken; later corrections are in ``world_T_object``.
-        loops: every loop of the pose graph with its verdict.
-        surface: the final field in the object frame, None if there was no usable grasp.
-        contour: the final outline (dimension 2), object frame.
-        mesh: the final surface (dimension 3), object frame.
-        status: "ok" or "lost".
-    """
-
-    method: str
-    seed: int
-    dimension: int
-    world_T_object: tuple[Pose3 | None, ...]
-    covariances: tuple[Array | None, ...]
-    steps: tuple[SlamStep, ...]
-    loops: tuple[LoopReport, ...]
-    surface: Gpis | None
-    contour: Contour | None
-    mesh: SurfaceMesh | None
-    status: Literal["ok", "lost"]
-
-    @property
-    def step_seconds(self) -> tuple[float, ...]:
-        """Computing time of each step."""
-        return tuple(step.seconds for step in self.steps)
 
 
 class TactileSlam:

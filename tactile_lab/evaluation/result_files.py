@@ -29,7 +29,7 @@ from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.shape.mesh_io import write_glb, write_ply
 from tactile_lab.shape.surface import Contour, SurfaceMesh
-from tactile_lab.slam import SlamResult, SlamStep
+from tactile_lab.slam_result import SlamResult, SlamStep
 
 SCHEMA_VERSION = 1
 _LEAST_HEIGHT_m = 0.001

@@ -26,7 +26,7 @@ from tactile_lab.shape.alignment import align_contours, align_meshes
 from tactile_lab.shape.metrics import ShapeErrors, contour_errors, mesh_errors
 from tactile_lab.shape.sampling import distances_to_mesh, distances_to_polygon
 from tactile_lab.shape.surface import Contour, SurfaceMesh
-from tactile_lab.slam import SlamResult
+from tactile_lab.slam_result import SlamResult
 
 NO_SHAPE: dict[str, Any] = {"hausdorff_mm": None, "mean_mm": None, "iou": None, "within_2_sigma": None}
 

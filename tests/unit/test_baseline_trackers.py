@@ -14,7 +14,8 @@ from tactile_lab.experiments import spatial_data
 from tactile_lab.experiments.planar_data import simulate
 from tactile_lab.experiments.sensing import SimulatedGrasps
 from tactile_lab.geometry.poses import planar, spatial
-from tactile_lab.slam import SlamResult, SlamSettings, TactileSlam
+from tactile_lab.slam import SlamSettings, TactileSlam
+from tactile_lab.slam_result import SlamResult
 
 
 def run(data: SimulatedGrasps, method: str, known=None, **changes: object) -> SlamResult:

@@ -12,7 +12,8 @@ from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.experiments import planar_data, spatial_data
 from tactile_lab.experiments.sensing import SimulatedGrasps
 from tactile_lab.geometry.contacts import Grasp
-from tactile_lab.slam import SlamResult, SlamSettings, TactileSlam
+from tactile_lab.slam import SlamSettings, TactileSlam
+from tactile_lab.slam_result import SlamResult
 
 
 def registration_mm(data: SimulatedGrasps, result: SlamResult) -> float:

@@ -13,7 +13,8 @@ from sessions.contact_log import ContactLog, MotionSigma, ObjectTruth, write_con
 from tactile_lab.errors import ConfigurationError, SessionError, ShapeError
 from tactile_lab.experiments.planar_data import PlanarGrasps, simulate
 from tactile_lab.geometry.contacts import FINGERS, Contact, Grasp
-from tactile_lab.slam import SlamResult, SlamSettings, TactileSlam
+from tactile_lab.slam import SlamSettings, TactileSlam
+from tactile_lab.slam_result import SlamResult
 from tactile_lab.workflow.reconstructing import Wishes, log_settings, log_truth, reconstruct, reconstruct_log
 
 DATA = simulate("rectangle", 3, count=6)

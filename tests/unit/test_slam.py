@@ -17,7 +17,8 @@ from tactile_lab.experiments.sensing import SimulatedGrasps
 from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.geometry.poses import spatial
 from tactile_lab.shape.metrics import contour_errors
-from tactile_lab.slam import SlamResult, SlamSettings, TactileSlam
+from tactile_lab.slam import SlamSettings, TactileSlam
+from tactile_lab.slam_result import SlamResult
 from tactile_lab.tracking.trackers import palm_heading
 
 

@@ -20,7 +20,8 @@ from tactile_lab.evaluation.prism import open_ring, prism, signed_area_m2, trian
 from tactile_lab.evaluation.result_files import write_results
 from tactile_lab.evaluation.results import read_results
 from tactile_lab.evaluation.tables import contacts_text, contour_text, read_contacts, read_contour
-from tactile_lab.slam import SlamResult, SlamSettings, TactileSlam
+from tactile_lab.slam import SlamSettings, TactileSlam
+from tactile_lab.slam_result import SlamResult
 
 ELL = np.array([[0, 0], [0.10, 0], [0.10, 0.03], [0.03, 0.03], [0.03, 0.06], [0, 0.06]])
 ELL_AREA_m2 = 0.10 * 0.03 + 0.03 * 0.03
