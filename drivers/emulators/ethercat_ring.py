@@ -70,6 +70,16 @@ class EmulatedRing:
         answer = encode_frame([self._round(telegram) for telegram in telegrams], source)
         return [] if self._lost("drop_answers") else self._in_order(answer)
 
+    @property
+    def due_ns(self) -> int | None:
+        """When the next slave will have work to do; None when all have done theirs."""
+        return min((due_ns for slave in self.slaves if (due_ns := slave.due_ns) is not None), default=None)
+
+    def work(self) -> None:
+        """Let the slaves do what is due, so that the next frame need not wait for it."""
+        for slave in self.slaves:
+            slave.work()
+
     def _round(self, telegram: Telegram) -> Telegram:
         passed = replace(telegram, circulated=False)
         for slave in self.slaves[: self.faults.connected]:

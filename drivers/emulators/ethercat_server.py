@@ -25,7 +25,8 @@ from drivers.ethercat.ports import Port, RawPort
 from drivers.ethercat.registers import AlState
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.palm_codec import CanFrame
-from tactile_lab.clock import MonotonicClock
+from drivers.shadow.real_time import request_real_time
+from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock
 from tactile_lab.errors import DeviceError, TactileLabError
 
 _IDLE_s = 0.02
@@ -35,19 +36,25 @@ _START_s, _ANSWER_s = 30.0, 5.0
 class HandServer:
     """Serves frames and orders until its orders end."""
 
-    def __init__(self, hand: EmulatedHand, port: Port, can: MotorCanBuses) -> None:
-        self._hand, self._port, self._can = hand, port, can
+    def __init__(self, hand: EmulatedHand, port: Port, can: MotorCanBuses, clock: Clock) -> None:
+        self._hand, self._port, self._can, self._clock = hand, port, can, clock
 
     def run(self) -> None:
         """Serve. Raises DeviceError when the interface goes."""
         while True:
-            if (frame := self._port.receive(_IDLE_s)) is not None:
+            if (frame := self._port.receive(self._patience_s())) is not None:
                 for answer in self._hand.ring.process(frame):
                     self._port.send(answer)
+                continue
+            self._hand.ring.work()
             if select.select([sys.stdin], [], [], 0)[0]:
                 if not (line := sys.stdin.readline()):
                     return
                 _say(self._obey(json.loads(line)))
+
+    def _patience_s(self) -> float:
+        due_ns = self._hand.ring.due_ns
+        return _IDLE_s if due_ns is None else max(due_ns - self._clock.now_ns(), 0) / NANOSECONDS
 
     def _obey(self, order: dict[str, Any]) -> dict[str, Any]:
         hand = self._hand
@@ -91,7 +98,8 @@ def main() -> None:
         port = RawPort(start["interface"])
         port.open()
         _say({"ready": True})
-        HandServer(hand, port, can).run()
+        request_real_time()
+        HandServer(hand, port, can, clock).run()
     except TactileLabError as error:
         _say({"error": str(error)})
         sys.exit(error.exit_code)

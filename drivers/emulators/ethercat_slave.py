@@ -144,7 +144,7 @@ class SlaveController:
 
     def process(self, telegram: Telegram) -> Telegram:
         """A telegram as it leaves this slave."""
-        self._work()
+        self.work()
         command = telegram.command
         if command in _LOGICAL:
             return self._logical(telegram)
@@ -319,11 +319,15 @@ class SlaveController:
 
     # --- the slave's own side ----------------------------------------------------------------------------------
 
-    def _work(self) -> None:
+    @property
+    def due_ns(self) -> int | None:
+        """When the application will have finished with the last command; None when it has."""
+        return None if self._pending_since_ns is None else self._pending_since_ns + self.application.service_ns
+
+    def work(self) -> None:
         """What the slave has done since the last frame: the application's turn, the watchdog."""
         now_ns = self._clock.now_ns()
-        waiting_ns = self._pending_since_ns
-        if waiting_ns is not None and now_ns - waiting_ns >= self.application.service_ns:
+        if (due_ns := self.due_ns) is not None and now_ns >= due_ns:
             self._pending_since_ns = None
             self._serve()
         if self._states.status.state == AlState.OP and self._watchdog_expired(now_ns):

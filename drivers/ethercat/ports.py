@@ -43,14 +43,12 @@ class Port(Protocol):
 class RawPort:
     """A network interface on a raw packet socket; Linux, with the right to use raw sockets.
 
-    The socket never blocks: waiting is done by polling with a time limit, which keeps a lost frame from costing more
-    than that limit.
+    The socket never blocks: waiting is done with a time limit of its own, which keeps a lost frame from costing more.
     """
 
     def __init__(self, interface: str) -> None:
         self.name = interface
         self._socket: socket.socket | None = None
-        self._poll = select.poll()
         self._hardware_address = bytes(6)
 
     @property
@@ -69,8 +67,7 @@ class RawPort:
         except OSError as error:
             raw.close()
             raise self._failed(error) from error
-        self._socket, self._poll = raw, select.poll()
-        self._poll.register(raw, select.POLLIN)
+        self._socket = raw
 
     def close(self) -> None:
         if self._socket is not None:
@@ -90,7 +87,7 @@ class RawPort:
         try:
             with contextlib.suppress(BlockingIOError):
                 return raw.recv(_LARGEST_FRAME)
-            if not self._poll.poll(max(timeout_s, 0.0) * 1000.0):
+            if not select.select([raw], [], [], max(timeout_s, 0.0))[0]:  # poll() would round up to milliseconds
                 return None
             return raw.recv(_LARGEST_FRAME)
         except BlockingIOError:

@@ -46,8 +46,8 @@ class PollingRates(StrictModel):
     """How often the motors are asked for each type, in the words of Shadow's ``motor_data_polling.yaml``.
 
     Each is -1 for every turn, -2 for after connecting only, a period in seconds, or left out for never. Flags have to
-    be asked in every turn or at least once a second, as the hand's safety rests on them, and temperatures at least every
-    five seconds.
+    be asked in every turn or at least once a second, as the hand's safety rests on them, and temperatures at least
+    every five seconds.
     """
 
     flags: float = _EVERY_TURN
