@@ -6,7 +6,7 @@ from the slaves' EEPROMs; a hand whose EEPROM holds its identity alone needs our
 
 Two weaknesses of SOEM are made good. A lost frame blocks it for several milliseconds, unless its socket is set not to
 block. And it tells answers apart by an index of sixteen values only, so that after a stall it can go on with old data
-for ever: a status is used only when it echoes the command before the last.
+for ever: a status is used only when it echoes the last command that the palm had taken before.
 """
 
 from __future__ import annotations
@@ -15,20 +15,18 @@ import fcntl
 import importlib
 import os
 import socket
-from collections import deque
 from pathlib import Path
 from typing import Any
 
 from drivers.ethercat.registers import AL_ERROR, AL_STATE_MASK, AlState, AlStatus
 from drivers.links import Datagram
 from drivers.shadow.ethercat_link import EthercatSettings
-from drivers.shadow.palm_codec import PalmStatus
 from drivers.shadow.palm_images import SHADOW_VENDOR, PalmImage, describe_product, palm_of_product
 from tactile_lab.clock import Clock
 from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
 
 _STATE_us, _OP_TRIES = 50_000, 40
-_READ_WORKING_COUNTER = 1
+_WRITTEN, _READ = 2, 1
 
 
 class PysoemLink:
@@ -51,7 +49,8 @@ class PysoemLink:
         self._soem = _pysoem(name)
         self._master: Any = None
         self._image: PalmImage | None = None
-        self._echoes: deque[tuple[int, int]] = deque(maxlen=2)
+        self._sent: tuple[int, int] | None = None
+        self._taken: tuple[int, int] | None = None
         self.stale = self.lost = self.cycles = 0
 
     def open(self) -> None:
@@ -75,7 +74,7 @@ class PysoemLink:
             master.close()
             raise
         self._master = master
-        self._echoes.clear()
+        self._sent = self._taken = None
         self.stale = self.lost = self.cycles = 0
 
     def close(self) -> None:
@@ -97,7 +96,7 @@ class PysoemLink:
         if len(payload) != image.command_bytes:  # pysoem would copy what there is, unchecked
             raise CodecError(f"a command of {len(payload)} bytes instead of {image.command_bytes}", where=self.name)
         command = image.decode_command(payload)
-        self._echoes.append((command.from_motor_data_type, command.which_motors))
+        self._sent = command.from_motor_data_type, command.which_motors
         self._master.slaves[1].output = payload
         self._master.send_processdata()
         self.cycles += 1
@@ -113,20 +112,19 @@ class PysoemLink:
         stamp_ns = self._clock.now_ns()
         if self.cycles % self._settings.poll_every == 0:
             self._check_states()
+        expected, self._taken = self._taken, self._sent if counter > 0 and counter & _WRITTEN else self._taken
         if counter < 0:
             self.lost += 1
+            self._taken = None  # the palm may have taken that command, or not
             return []
-        if not counter & _READ_WORKING_COUNTER:
+        if not counter & _READ:
             return []
         payload = bytes(self._master.slaves[1].input)
-        if self._is_old(image.decode_status(payload)):
+        status = image.decode_status(payload)
+        if status.written and expected not in (None, (status.motor_data_type, status.which_motors)):
             self.stale += 1
             return []
         return [Datagram(payload, stamp_ns)]
-
-    def _is_old(self, status: PalmStatus) -> bool:
-        known = status.written and len(self._echoes) == 2
-        return known and (status.motor_data_type, status.which_motors) != self._echoes[0]
 
     def _opened(self) -> PalmImage:
         if self._master is None or self._image is None:
