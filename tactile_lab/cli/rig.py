@@ -95,26 +95,30 @@ def check(
 
 @app.command("emulate")
 def emulate(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file of kind fingertips.")],
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file of kind fingertips or hand.")],
     seconds: Annotated[float, typer.Option(min=0.0, help="How long; 0 until Ctrl+C.")] = 0.0,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Stand in for the sensors of a fingertip rig, at the addresses its file names, until Ctrl+C.
+    """Stand in for the sensors of a fingertip rig, or for the hand of a hand rig, at the places its file names.
 
-    Serial ports that do not exist are made; a real one is never replaced. Network addresses must be loopback ones.
+    Until Ctrl+C. Serial ports that do not exist are made; a real one is never replaced. Network addresses must be
+    loopback ones; a hand is served at the interface that far_end names.
     """
     import time
     from pathlib import Path
 
     from tactile_lab.cli.console import emit_json, say
-    from tactile_lab.rigs.emulate import emulated
+    from tactile_lab.rigs.emulate import emulated, emulated_hand
     from tactile_lab.rigs.fingertip_rig import load_fingertip_rig
+    from tactile_lab.rigs.hand_rig import is_hand_rig, load_hand_rig
 
     del no_input
-    with emulated(load_fingertip_rig(Path(rig))) as places:
+    path = Path(rig)
+    of_hand = is_hand_rig(path)
+    with emulated_hand(load_hand_rig(path)) if of_hand else emulated(load_fingertip_rig(path)) as places:
         if as_json:
-            emit_json({"rig": rig, "fingertips": places})
+            emit_json({"rig": rig, "devices" if of_hand else "fingertips": places})
         for finger, place in places.items():
             say(f"{finger}: {place}")
         say(f"tactile-lab rig check {rig}  in another terminal; Ctrl+C ends this")

@@ -13,9 +13,11 @@ from tactile_lab.errors import DeviceError
 from tactile_lab.geometry.contacts import FINGERS
 from tactile_lab.rigs.build import build_bench, check_calibration, simulated_world
 from tactile_lab.rigs.check_fingertips import check_fingertips
+from tactile_lab.rigs.check_hand import check_hand
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.rigs.findings import Finding
 from tactile_lab.rigs.fingertip_rig import is_fingertip_rig, load_fingertip_rig
+from tactile_lab.rigs.hand_rig import is_hand_rig, load_hand_rig
 
 LISTEN_ns = 300_000_000
 
@@ -28,6 +30,8 @@ def check_rig(name: str, seed: int = 0) -> list[Finding]:
     """
     if Path(name).suffix in {".yaml", ".yml"} and is_fingertip_rig(Path(name)):
         return check_fingertips(load_fingertip_rig(Path(name)), MonotonicClock())
+    if Path(name).suffix in {".yaml", ".yml"} and is_hand_rig(Path(name)):
+        return check_hand(load_hand_rig(Path(name)), MonotonicClock())
     rig = load_rig(name)
     check_calibration(rig)
     bench = build_bench(rig, simulated_world(rig, seed, next(iter(CATALOGUE))), Recorder(NullTraffic()))

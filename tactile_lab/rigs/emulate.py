@@ -1,4 +1,4 @@
-"""Stand-ins for the sensors of a fingertip rig, at the addresses its file names: to try a rig without hardware."""
+"""Stand-ins for the devices of a rig of fingertips or of a hand, at the places its file names, for tries without."""
 
 from __future__ import annotations
 
@@ -20,12 +20,16 @@ from drivers.emulators.can_server import CanServer
 from drivers.emulators.can_unit import CanUnit
 from drivers.emulators.controller_unit import ControllerUnit
 from drivers.emulators.digital_unit import DigitalUnit
+from drivers.emulators.ethercat_server import EmulatedHandProcess
 from drivers.emulators.net_box_server import NetBoxServer
 from drivers.emulators.net_box_unit import NetBoxUnit
 from drivers.emulators.pty_port import PtyPort
+from drivers.emulators.shadow_chain import ChainSettings
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.fingertip_rig import FingertipRig, place_of
+from tactile_lab.rigs.hand_rig import HandRig
 
+_EMULATED_SERIAL = 634
 _VOLTS_RATE_Hz = 1000.0
 
 
@@ -46,6 +50,24 @@ def emulated(rig: FingertipRig) -> Iterator[dict[str, str]]:
                 words = getattr(error, "strerror", None) or str(error)
                 raise _refusal(rig, finger, f"{place_of(wiring)} cannot be emulated ({words})") from error
         yield {finger: place_of(wiring) for finger, wiring in rig.description.wires.items()}
+
+
+@contextmanager
+def emulated_hand(rig: HandRig) -> Iterator[dict[str, str]]:
+    """A hand at the far end of the rig's cable while the context lasts; gives where it can be found, in words.
+
+    Raises:
+        ConfigurationError: the rig names no far end.
+        DeviceError: the far end can not be served.
+    """
+    description = rig.description
+    if description.far_end is None:
+        hint = "Make a cable (ip link add A type veth peer name B), name A in ethercat.interface and B in far_end"
+        raise ConfigurationError("far_end is not named, so there is nothing to serve", where=rig.source, hint=hint)
+    serial = _EMULATED_SERIAL if description.ethercat.serial is None else description.ethercat.serial
+    settings = ChainSettings(palm=description.hand.palm, serial=serial, eeprom="mapped")
+    with EmulatedHandProcess(description.far_end, rig.folder / description.calibration.joints, settings):
+        yield {"hand": f"hand {serial} at {description.far_end}"}
 
 
 def _start(running: ExitStack, wiring: Wiring, sensor: EmulatedSensor, folder: Path) -> None:

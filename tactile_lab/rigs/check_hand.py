@@ -1,0 +1,94 @@
+"""Is a real hand fit to work? Connect it, listen for a second with zero demands, and tell. Nothing moves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivers.links import Link
+from drivers.shadow.cycle_statistics import CycleStatistics
+from drivers.shadow.ethercat_link import EthercatLink
+from drivers.shadow.hand import ShadowHand
+from drivers.shadow.hand_samples import HandSample
+from drivers.shadow.motors import MotorMap
+from drivers.shadow.palm_codec import SENSORS
+from tactile_lab.clock import NANOSECONDS, Clock
+from tactile_lab.errors import DeviceError
+from tactile_lab.rigs.findings import Finding
+from tactile_lab.rigs.hand_rig import HandRig
+
+LISTEN_ns = 1_500_000_000
+_COUNTS = range(1, 4095)
+_JOINT_CHANNELS = 26
+
+
+def check_hand(rig: HandRig, clock: Clock) -> list[Finding]:
+    """Findings of ring, cycle, motors and joint sensors; a hand that does not connect ends the list.
+
+    Raises:
+        ConfigurationError: a file the rig names, or a master that is not installed.
+    """
+    link = rig.link(clock)
+    hand = rig.hand(link, clock, set_up_boards=False)
+    try:
+        hand.connect()
+        sample, statistics = _listen(hand, clock, round(rig.settings.cycle_s * NANOSECONDS))
+        motors = MotorMap.load(rig.folder / rig.description.calibration.motors)
+        return [_ring(link), _cycle(hand, link, statistics), _motors(hand, sample, motors), _joints(sample)]
+    except DeviceError as error:
+        return [Finding("hand", False, str(error))]
+    finally:
+        _close(hand)
+
+
+def _close(hand: ShadowHand) -> None:
+    try:
+        hand.close()
+    except DeviceError:
+        return  # it failed while it was listened to, which has been told
+
+
+def _listen(hand: ShadowHand, clock: Clock, cycle_ns: int) -> tuple[HandSample, CycleStatistics]:
+    statistics, start_ns = CycleStatistics(), clock.now_ns()
+    next_ns = start_ns
+    while clock.now_ns() - start_ns < LISTEN_ns:
+        next_ns = max(next_ns + cycle_ns, clock.now_ns())
+        clock.sleep_until_ns(next_ns)
+        statistics.add(clock.now_ns() - next_ns)
+        sample = hand.exchange()
+    return sample, statistics
+
+
+def _ring(link: Link) -> Finding:
+    if not isinstance(link, EthercatLink):
+        return Finding("ring", True, "bridge and palm, in operation")
+    found = link.hand
+    watchdog = "no watchdog" if found.watchdog_s is None else f"watchdog {1000 * found.watchdog_s:.0f} ms"
+    words = f"hand {found.serial}, palm {found.image.name} revision {found.palm.revision}, in operation, {watchdog}"
+    return Finding("ring", True, words)
+
+
+def _cycle(hand: ShadowHand, link: Link, statistics: CycleStatistics) -> Finding:
+    counters, remarks = hand.counters, link.health() if isinstance(link, EthercatLink) else ()
+    share = counters.lost / max(counters.cycles, 1)
+    words = f"{statistics.summary()}; {counters.lost} of {counters.cycles} without a status"
+    return Finding("cycle", share < 0.01, "; ".join((words, *remarks)))
+
+
+def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
+    problems = [words for words in hand.health() if "cycles lost" not in words]
+    temperature, supply = sample.motor.temperature_C, sample.motor.voltage_V
+    heard = np.isfinite(temperature)
+    if not heard.any():
+        return Finding("motors", False, "; ".join((*problems, "none has told its temperature")))
+    hottest = int(np.nanargmax(temperature))
+    figures = f"{int(heard.sum())} of 20 answer, warmest {motors.names[hottest]} {temperature[hottest]:.0f} C"
+    if np.isfinite(supply).any():
+        figures += f", supply {np.nanmin(supply):.1f} V"
+    return Finding("motors", not problems and bool(heard.all()), "; ".join((*problems, figures)))
+
+
+def _joints(sample: HandSample) -> Finding:
+    """A joint sensor at the end of its range has lost its magnet or its cable."""
+    counts = sample.status.sensors[:_JOINT_CHANNELS].tolist()
+    dead = [f"{name} reads {count}" for name, count in zip(SENSORS, counts, strict=False) if count not in _COUNTS]
+    return Finding("joint sensors", not dead, "; ".join(dead) or "all 26 within their range")

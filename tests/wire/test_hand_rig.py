@@ -1,0 +1,77 @@
+"""A rig file of kind ``hand``: what ``rig check`` says of an emulated hand, and of what is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from ethercat_wire import JOINTS, cable
+
+from drivers.emulators.ethercat_server import EmulatedHandProcess
+from drivers.emulators.shadow_chain import ChainSettings
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.rigs.check import check_rig
+from tactile_lab.rigs.emulate import emulated_hand
+from tactile_lab.rigs.hand_rig import load_hand_rig
+
+
+def rig_file(folder: Path, interface: str, **changes: Any) -> Path:
+    content = {
+        "name": "bench-hand",
+        "summary": "The hand on the bench",
+        "kind": "hand",
+        "calibration": {"joints": str(JOINTS), "motors": str(JOINTS.with_name("motors.yaml"))},
+        "ethercat": {"interface": interface, "master": {"answer_s": 0.05, "setup_answer_s": 0.1}},
+    }
+    file = folder / "hand.yaml"
+    file.write_text(yaml.safe_dump(content | changes))
+    return file
+
+
+def test_a_sound_hand_is_told_part_by_part(tmp_path: Path) -> None:
+    with cable("r") as (near, far):
+        file = rig_file(tmp_path, near, far_end=far)
+        with emulated_hand(load_hand_rig(file)) as places:
+            assert places == {"hand": f"hand 634 at {far}"}
+            findings = {finding.device: finding for finding in check_rig(str(file))}
+    assert set(findings) == {"ring", "cycle", "motors", "joint sensors"}
+    assert findings["ring"].detail == "hand 634, palm 0220 revision 1, in operation, no watchdog"
+    assert "20 of 20 answer, warmest" in findings["motors"].detail
+    assert "supply 24.0 V" in findings["motors"].detail
+    assert findings["joint sensors"].ok
+    assert "without a status" in findings["cycle"].detail
+
+
+def test_a_silent_motor_is_named(tmp_path: Path) -> None:
+    with cable("r") as (near, far), EmulatedHandProcess(far, JOINTS) as emulator:
+        emulator.order(silent=[5])
+        findings = {finding.device: finding for finding in check_rig(str(rig_file(tmp_path, near)))}
+    assert not findings["motors"].ok
+    assert "THJ2 (motor 5): silent" in findings["motors"].detail
+
+
+def test_another_palm_than_the_files_is_told_with_what_to_write(tmp_path: Path) -> None:
+    with cable("r") as (near, far), EmulatedHandProcess(far, JOINTS, ChainSettings(palm="0240")):
+        (finding,) = check_rig(str(rig_file(tmp_path, near)))
+    assert not finding.ok
+    assert 'a 0240 palm, not a 0220. Set hand.palm to "0240"' in finding.detail
+
+
+def test_a_missing_interface_is_told(tmp_path: Path) -> None:
+    (finding,) = check_rig(str(rig_file(tmp_path, "nosuch0")))
+    assert "nosuch0: no such network interface" in finding.detail
+
+
+def test_files_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+    with (
+        pytest.raises(ConfigurationError, match="far_end is not named"),
+        emulated_hand(load_hand_rig(rig_file(tmp_path, "lo"))),
+    ):
+        pass
+    with pytest.raises(ConfigurationError, match=r"hand.palm and ethercat.palm differ"):
+        load_hand_rig(rig_file(tmp_path, "lo", ethercat={"interface": "lo", "palm": "0230"}))
+    missing = {"joints": "none.yaml", "motors": "none.yaml"}
+    with pytest.raises(ConfigurationError, match=r"none.yaml"):
+        check_rig(str(rig_file(tmp_path, "lo", calibration=missing)))
