@@ -48,7 +48,7 @@ def _close(hand: ShadowHand) -> None:
 
 
 def _listen(hand: ShadowHand, clock: Clock, cycle_ns: int) -> tuple[HandSample, CycleStatistics]:
-    """Whole cycles, each from the start of the one before: a late one must not leave the palm less time for the next."""
+    """Each cycle from the start of the one before: a late one must not leave the palm less time for the next."""
     statistics, start_ns = CycleStatistics(), clock.now_ns()
     while clock.now_ns() - start_ns < LISTEN_ns:
         next_ns = clock.now_ns() + cycle_ns
