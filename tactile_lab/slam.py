@@ -31,6 +31,7 @@ from tactile_lab.errors import ConfigurationError, ShapeError, TrackingError
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.graph.relocation import relocation_candidates
+from tactile_lab.one_thread import on_one_thread
 from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.models import ShapeName, fit_shape
 from tactile_lab.shape.surface import Contour, SurfaceMesh
@@ -120,6 +121,7 @@ class TactileSlam:
         """Grasps taken into account so far."""
         return len(self._steps)
 
+    @on_one_thread
     def step(self, grasp: Grasp) -> SlamStep:
         """Take one grasp into account (algorithm 3.1, then the graph).
 
@@ -148,6 +150,7 @@ class TactileSlam:
             self._steps[-1] = replace(step, reason=str(error))
             return self._steps[-1]
 
+    @on_one_thread
     def finish(self) -> SlamResult:
         """Correct all poses a last time, and build the final shape with the best kernel parameters."""
         if self._tracker is not None:
@@ -185,6 +188,7 @@ class TactileSlam:
         return self._origin_height_m
 
     @property
+    @on_one_thread
     def surface(self) -> Gpis | None:
         """The present field in the object frame; None before there are contacts."""
         if self._tracker is None:

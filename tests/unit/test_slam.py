@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from gtsam import Pose2, Pose3, Rot3
 from pydantic import ValidationError
+from threadpoolctl import threadpool_limits
 
 from tactile_lab.errors import TrackingError
 from tactile_lab.evaluation.registration import registration_rms_mm
@@ -228,3 +229,15 @@ def test_refused_grasp_is_taken_as_one_without_contacts() -> None:
     assert slam.step_count == 2
     assert step.contacts == 0
     assert "grasp 1" in step.reason
+
+
+def test_the_number_of_threads_changes_nothing() -> None:
+    data = simulate("L", 5, count=6)
+    results = []
+    for threads in (1, 2):
+        with threadpool_limits(threads):
+            results.append(run(data, joint={"backwards": False}))
+    for one, other in zip(results[0].world_T_object, results[1].world_T_object, strict=True):
+        assert one is not None
+        assert other is not None
+        assert np.array_equal(one.matrix(), other.matrix())
