@@ -277,11 +277,12 @@ def _forward(backward: ContactMap, present: ContactMap) -> ContactMap:
     """A map of the same grasps in the opposite order, turned round and brought into the present object frame."""
     space, grasps = present.space, backward.placed[::-1]
     body_T_frame = space.compose(space.inverse(grasps[0].row), present.placed[0].row)
-    placed = tuple(
+    placed = [
         replace(ours, row=space.compose(theirs.row, body_T_frame), left_out=theirs.left_out)
         for ours, theirs in zip(present.placed, grasps, strict=True)
-    )
-    return replace(present, placed=placed)
+    ]
+    first = replace(placed[0], row=present.placed[0].row)  # equal but for rounding
+    return replace(present, placed=(first, *placed[1:]))
 
 
 def _trailing_unplaced(contact_map: ContactMap) -> int:

@@ -81,4 +81,6 @@ def _turned(contact_map: ContactMap, members: NDArray[np.bool_], old_T_new: Arra
     space, rows = contact_map.space, contact_map.rows
     rows[members] = space.compose(rows[members], old_T_new)
     gauge = space.compose(space.inverse(rows[0]), contact_map.rows[0])
-    return contact_map.with_rows(space.compose(rows, gauge))
+    turned = space.compose(rows, gauge)
+    turned[0] = contact_map.rows[0]  # equal but for rounding
+    return contact_map.with_rows(turned)

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from sessions import traffic
+from tests.support.interruptible import interruptible
 
 COMMAND = [sys.executable, "-m", "tactile_lab.cli.main", "run"]
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -22,7 +23,9 @@ ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"
 
 def start(root: Path, grasps: int = 8) -> subprocess.Popen[str]:
     words = [*COMMAND, "--grasps", str(grasps), "--seed", "1", "--out", str(root)]
-    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
+    return subprocess.Popen(
+        interruptible(words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT
+    )
 
 
 def read_until(process: subprocess.Popen[str], pattern: str) -> str:

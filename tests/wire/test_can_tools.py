@@ -15,6 +15,7 @@ from ethercat_wire import JOINTS, cable
 
 from drivers.emulators.ethercat_server import EmulatedHandProcess
 from drivers.shadow.bootloader import bootloader_versions
+from tests.support.interruptible import interruptible
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +54,9 @@ def test_the_logger_records_what_the_motors_say(ends: tuple[str, str], tmp_path:
     with EmulatedHandProcess(ends[1], JOINTS) as emulator:
         for number in range(5):
             emulator.order(announce=[1 + number % 2, 0x4A3, f"0{number}000000"])
-        logger = subprocess.Popen(tool("logger", ends[0], "-f", str(log)), stdout=subprocess.PIPE, text=True)
+        logger = subprocess.Popen(
+            interruptible(tool("logger", ends[0], "-f", str(log))), stdout=subprocess.PIPE, text=True
+        )
         until = time.monotonic() + 30.0
         while emulator.order()["served"] < 20 and time.monotonic() < until:
             time.sleep(0.05)
