@@ -11,6 +11,10 @@ from tactile_lab.geometry.contacts import Array
 Triangles = NDArray[np.int64]
 
 
+SAME_POINT_m = 1e-6
+"""Readers of meshes take points this close for one, which would tear the walls between them."""
+
+
 def open_ring(points_m: Array) -> Array:
     """The contour's points once each, counter-clockwise: a repeated first point and doubles are removed.
 
@@ -18,7 +22,7 @@ def open_ring(points_m: Array) -> Array:
         ShapeError: fewer than three different points.
     """
     points = np.asarray(points_m, dtype=float)
-    keep = np.any(points != np.roll(points, 1, axis=0), axis=1)
+    keep = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > SAME_POINT_m
     ring = points[keep]
     if len(ring) < 3:
         raise ShapeError("contour has fewer than three different points", hint="The session needs more contacts")
