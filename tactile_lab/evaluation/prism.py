@@ -23,7 +23,7 @@ def open_ring(points_m: Array) -> Array:
     """
     points = np.asarray(points_m, dtype=float)
     keep = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > SAME_POINT_m
-    ring = points[keep]
+    ring: Array = points[keep]
     if len(ring) < 3:
         raise ShapeError("contour has fewer than three different points", hint="The session needs more contacts")
     return ring if signed_area_m2(ring) > 0 else ring[::-1]
