@@ -39,11 +39,10 @@ from tactile_lab.slam_result import SlamResult, SlamStep, Verdict
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.observability import observability, planar_observability
-from tactile_lab.tracking.particle_filter import PoseEstimate
+from tactile_lab.tracking.particle_filter import CERTAIN_VARIANCE, PoseEstimate
 from tactile_lab.tracking.pose_rows import PoseRows
 from tactile_lab.tracking.spatial_rows import SPATIAL
 from tactile_lab.tracking.trackers import (
-    FIRST_VARIANCE,
     GRAPH_METHODS,
     THESIS_METHODS,
     Tracker,
@@ -219,7 +218,7 @@ class TactileSlam:
         self._origin_height_m = float(grasp.points_world_m[:, 2].mean()) if on_table else 0.0
         contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
         row = first_row(grasp, contacts, on_table=on_table)
-        first = PlacedGrasp(contacts, row, FIRST_VARIANCE * np.eye(self._space.size), np.zeros(self._space.size))
+        first = PlacedGrasp(contacts, row, CERTAIN_VARIANCE * np.eye(self._space.size), np.zeros(self._space.size))
         relocate = relocated_rows if on_table else None
         self._tracker = make_tracker(self._settings, first, self._rng, following, relocate)
         return self._record(grasp, contacts, "first", "object frame born", started)

@@ -99,9 +99,7 @@ class ContactMap:
     @property
     def contacts(self) -> ContactSet:
         """Contacts that make up the shape, object frame."""
-        world = self.contacts_world
-        points, normals = self.space.to_object(self.rows[self.grasp_indices], world.points_m, world.normals)
-        return replace(world, points_m=points, normals=normals)
+        return self.contacts_world.in_object_frame(self.rows[self.grasp_indices], self.space)
 
     @property
     def free_points_m(self) -> Array:
@@ -140,9 +138,7 @@ class ContactMap:
 
     def seen_by(self, index: int) -> ContactSet:
         """Contacts of one grasp, object frame."""
-        world = self.placed[index].contacts_world
-        points, normals = self.space.to_object(self.placed[index].row, world.points_m, world.normals)
-        return replace(world, points_m=points, normals=normals)
+        return self.placed[index].contacts_world.in_object_frame(self.placed[index].row, self.space)
 
     def with_grasp(self, grasp: PlacedGrasp) -> ContactMap:
         """The map with one more grasp."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tactile_lab.errors import TrackingError
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.tracking.free_space import fingertip_places, places_on_line
+from tactile_lab.tracking.pose_rows import PLANAR, PoseRows
 
 LARGEST_GRASP_m = 0.6
 """No hand spans more; contacts farther apart are in wrong units."""
@@ -85,12 +86,14 @@ class ContactSet:
             np.concatenate([part.normal_sigma_rad for part in parts]),
         )
 
-    def in_object_frame(self, world_T_object: Array) -> ContactSet:
-        """World contacts seen from an object at the planar pose (x_m, y_m, yaw_rad)."""
-        points, normals = self.points_m.copy(), self.normals.copy()
-        object_R_world = planar_rotation(-world_T_object[2])
-        points[:, :2] = (points[:, :2] - world_T_object[:2]) @ object_R_world.T
-        normals[:, :2] = normals[:, :2] @ object_R_world.T
+    def in_object_frame(self, world_T_object: Array, space: PoseRows = PLANAR) -> ContactSet:
+        """World contacts seen from the object, without the free places.
+
+        Args:
+            world_T_object: one pose of shape (size,), or one for each contact, shape (n, size).
+            space: what rows of poses mean.
+        """
+        points, normals = space.to_object(world_T_object, self.points_m, self.normals)
         return ContactSet(points, normals, self.point_sigma_m, self.normal_sigma_rad)
 
     def selected(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> ContactSet:

@@ -126,16 +126,21 @@ class Judge:
         return Hypothesis(contact_map, misfit, float(intrusion), self.price(contact_map))
 
 
+def cost(hypothesis: Hypothesis) -> float:
+    """What hypotheses are sorted by."""
+    return hypothesis.cost
+
+
 def likeliest(hypotheses: list[Hypothesis], count: int, gap: float) -> list[Hypothesis]:
     """The best ones, but none that is less likely than the best by more than ``gap`` (natural logarithm)."""
-    ranked = sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)[:count]
+    ranked = sorted(hypotheses, key=cost)[:count]
     return [one for one in ranked if one.cost < ranked[0].cost + gap]
 
 
 def different(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
     """The likeliest of those that ended at the same trajectory."""
     kept: list[Hypothesis] = []
-    for one in sorted(hypotheses, key=lambda hypothesis: hypothesis.cost):
+    for one in sorted(hypotheses, key=cost):
         if not any(_same(one.map, other.map) for other in kept):
             kept.append(one)
     return kept

@@ -21,7 +21,7 @@ from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.fixed_lag import unfolded
 from tactile_lab.tracking.free_space import free_space_costs
-from tactile_lab.tracking.hypotheses import Hypothesis, Judge, different, likeliest, weights
+from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost, different, likeliest, weights
 from tactile_lab.tracking.late_placing import Relocate, placed_late, relocated
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import estimated_noise
@@ -121,7 +121,7 @@ class JointTracker:
         unplaced = [self._unplaced(hypothesis, contacts) for hypothesis in self._hypotheses]
         branches = likeliest(unplaced + self._branched(contacts), self._settings.smoothed, self._settings.branch_gap)
         smoothed = [self._judge.smoothed(branch.map, self._settings.iterations) for branch in branches]
-        smoothed += self._relocated(min(smoothed, key=_cost))
+        smoothed += self._relocated(min(smoothed, key=cost))
         self._branches = self._likeliest(different(smoothed), self._settings.hypotheses)
         self.effective_count = float(1 / np.sum(weights(self._branches) ** 2))
         return self._branches[0].map.placed[-1].used
@@ -148,7 +148,7 @@ class JointTracker:
             self._share_best_kernel()
             if self._settings.estimate_motion:
                 self._trust(estimated_noise(self._hypotheses[0].map, self._configured))
-            self._hypotheses = sorted((self._judge.rated(one.map) for one in self._hypotheses), key=_cost)
+            self._hypotheses = sorted((self._judge.rated(one.map) for one in self._hypotheses), key=cost)
         lag = self._settings
         if count > 2 * lag.window:
             self._hypotheses = [self._judge.condensed(one, lag.window, lag.remembered) for one in self._hypotheses]
@@ -166,7 +166,7 @@ class JointTracker:
         readable = len(self.map.placed) > 2 and len(self.map.placed[-1].contacts_world) > 0
         if self._settings.backwards and is_short and readable:
             self._hypotheses = different(self._hypotheses + self._backwards())
-        self._hypotheses = different(self._hypotheses + self._regrouped(min(self._hypotheses, key=_cost)))
+        self._hypotheses = different(self._hypotheses + self._regrouped(min(self._hypotheses, key=cost)))
         self._hypotheses = self._likeliest(self._hypotheses, self._settings.hypotheses)
         for _ in range(2):
             iterations = self._settings.final_iterations
@@ -175,7 +175,7 @@ class JointTracker:
             self._share_best_kernel()
         self._hypotheses = [self._placed_late(one) for one in self._hypotheses]
         sharp = SharpJudge(self._judge, self._noise)
-        faceted = sorted((sharp.better(one.map) for one in self._hypotheses), key=_cost)
+        faceted = sorted((sharp.better(one.map) for one in self._hypotheses), key=cost)
         faceted[0] = replace(faceted[0], map=self._judge.with_covariances(faceted[0].map))
         self._hypotheses = [replace(one, map=unfolded(one.map)) for one in faceted]
 
@@ -199,7 +199,7 @@ class JointTracker:
     def _regrouped(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """The hypothesis joined otherwise at its unlikeliest steps."""
         others = [self._judge.rated(one) for one in regrouped(hypothesis.map, self._noise, self._settings.proposals)]
-        promising = sorted(others, key=_cost)[: self._settings.smoothed]
+        promising = sorted(others, key=cost)[: self._settings.smoothed]
         return [self._judge.smoothed(other.map, self._settings.iterations) for other in promising]
 
     def _relocated(self, best: Hypothesis) -> list[Hypothesis]:
@@ -252,9 +252,9 @@ class JointTracker:
         ]
         return [
             Hypothesis(
-                hypothesis.map.with_grasp(grasp), hypothesis.misfit + float(cost), float(free), hypothesis.left_out
+                hypothesis.map.with_grasp(grasp), hypothesis.misfit + float(misfit), float(free), hypothesis.left_out
             )
-            for grasp, cost, free in zip(grasps, fit.cost, intrusions, strict=True)
+            for grasp, misfit, free in zip(grasps, fit.cost, intrusions, strict=True)
         ]
 
     def _likeliest(self, hypotheses: list[Hypothesis], count: int) -> list[Hypothesis]:
@@ -267,10 +267,6 @@ class JointTracker:
     def _share_best_kernel(self) -> None:
         best = self._hypotheses[0].map.with_best_kernel()
         self._hypotheses = [replace(one, map=replace(one.map, settings=best.settings)) for one in self._hypotheses]
-
-
-def _cost(hypothesis: Hypothesis) -> float:
-    return hypothesis.cost
 
 
 def _forward(backward: ContactMap, present: ContactMap) -> ContactMap:

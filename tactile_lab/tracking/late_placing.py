@@ -16,7 +16,7 @@ import numpy as np
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.hypotheses import Hypothesis, Judge
+from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.proposals import ProposalSettings, propose
 
@@ -61,7 +61,7 @@ def placed_late(
         candidates = _placed_at(hypothesis, index, near, judge, moved_freely=False)
         if relocate is not None:
             candidates += _placed_at(hypothesis, index, relocate(others, contacts), judge, moved_freely=True)
-        hypothesis = min([hypothesis, *candidates], key=lambda one: one.cost)
+        hypothesis = min([hypothesis, *candidates], key=cost)
     return hypothesis
 
 
@@ -88,7 +88,7 @@ def _following(hypothesis: Hypothesis, index: int, judge: Judge) -> Hypothesis:
     """The hypothesis with one grasp as the motion model has it after all, if that is no less likely."""
     placed = list(hypothesis.map.placed)
     placed[index] = replace(placed[index], moved_freely=False)
-    return min(judge.rated(replace(hypothesis.map, placed=tuple(placed))), hypothesis, key=lambda one: one.cost)
+    return min(judge.rated(replace(hypothesis.map, placed=tuple(placed))), hypothesis, key=cost)
 
 
 def _with(contact_map: ContactMap, index: int, grasp: PlacedGrasp) -> ContactMap:

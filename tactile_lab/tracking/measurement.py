@@ -24,6 +24,7 @@ from tactile_lab.shape.field_grid import Field, FieldGrid
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.observability import SCALE_m
+from tactile_lab.tracking.pose_rows import PLANAR
 
 SMALLEST_SLOPE = 0.3
 """Far from all data the field flattens; distances are not divided by less than this slope."""
@@ -86,7 +87,7 @@ class ThesisMeasurement:
     label_distance_m: float
 
     def log_likelihood(self, rows: Array, contacts: ContactSet, known: Known) -> Array:
-        points, normals = placed(rows, contacts)
+        points, normals = PLANAR.to_object(rows[:, None], contacts.points_m, contacts.normals)
         values = known.field.predict(points.reshape(-1, contacts.dimension)).mean_m.reshape(len(rows), -1)
         matching = -np.abs(values / self.label_distance_m).sum(axis=1)
         return np.where(self._passes(points, normals, values, known.previous), matching, -np.inf)
@@ -137,7 +138,7 @@ class CalibratedMeasurement:
     def log_likelihood(self, rows: Array, contacts: ContactSet, known: Known) -> Array:
         if isinstance(known.field, FieldGrid) and len(rows) * len(contacts) >= COMPILED_FROM:
             return self._compiled(rows, contacts, known.field)
-        points, normals = placed(rows, contacts)
+        points, normals = PLANAR.to_object(rows[:, None], contacts.points_m, contacts.normals)
         found = known.field.predict(points.reshape(-1, contacts.dimension), gradient=True, variance=True)
         assert found.gradient is not None
         assert found.variance_m2 is not None
@@ -174,20 +175,6 @@ class CalibratedMeasurement:
         """Density of a contact that says nothing, up to the constants left out of the other."""
         uniform = 1 / (self.settings.outlier_range_m * np.pi**angles)
         return float(np.log(self.settings.outlier_share * uniform) + 0.5 * (1 + angles) * np.log(2 * np.pi))
-
-
-def placed(rows: Array, contacts: ContactSet) -> tuple[Array, Array]:
-    """World contacts as each of n particles' object frames sees them: points and normals of shape (n, m, d)."""
-    cosine, sine = np.cos(rows[:, 2, None]), np.sin(rows[:, 2, None])
-    shape = (len(rows), *contacts.points_m.shape)
-    points, normals = np.empty(shape), np.empty(shape)
-    along_x = contacts.points_m[:, 0] - rows[:, 0, None]
-    along_y = contacts.points_m[:, 1] - rows[:, 1, None]
-    points[..., 0], points[..., 1] = cosine * along_x + sine * along_y, cosine * along_y - sine * along_x
-    normal_x, normal_y = contacts.normals[:, 0], contacts.normals[:, 1]
-    normals[..., 0], normals[..., 1] = cosine * normal_x + sine * normal_y, cosine * normal_y - sine * normal_x
-    points[..., 2:], normals[..., 2:] = contacts.points_m[:, 2:], contacts.normals[:, 2:]
-    return points, normals
 
 
 def _smallest_eigenvalues(points: Array, normals: Array, close: NDArray[np.bool_]) -> Array:

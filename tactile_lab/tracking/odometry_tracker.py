@@ -16,12 +16,9 @@ from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.hypotheses import Judge
 from tactile_lab.tracking.motion import MotionNoise
-from tactile_lab.tracking.particle_filter import PoseEstimate
+from tactile_lab.tracking.particle_filter import CERTAIN_VARIANCE, PoseEstimate
 from tactile_lab.tracking.proposals import UNEXPLAINED_COST
 from tactile_lab.tracking.sharp_judge import SharpJudge
-
-KNOWN_VARIANCE = 1e-10
-"""A pose that is given is certain up to rounding."""
 
 _STEP = 1e-6
 _KERNEL_EVERY = 4
@@ -96,7 +93,7 @@ class KnownPoseTracker(OdometryTracker):
         super().predict(motion)
         self._given = self._ahead.pop(0) if self._ahead else None
         if self._given is not None:
-            self._now = PoseEstimate(self._given, KNOWN_VARIANCE * np.eye(len(self._given)))
+            self._now = PoseEstimate(self._given, CERTAIN_VARIANCE * np.eye(len(self._given)))
 
     def weigh(self, contacts: ContactSet) -> bool:
         """Grasps whose pose is not known stay out of the shape."""

@@ -9,6 +9,9 @@ import numpy as np
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.tracking.motion import MotionNoise, deviation, sample_motion
 
+CERTAIN_VARIANCE = 1e-10
+"""Of a pose that is given, or that defines the object frame: certain up to rounding."""
+
 
 @dataclass(frozen=True)
 class PoseEstimate:

@@ -9,9 +9,7 @@ while poses are corrected, and its derivative by every contact is known in close
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, singledispatch
-from importlib import import_module
-from types import ModuleType
+from functools import singledispatch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +31,13 @@ _LEAST_INFORMATION = 1e-9
 
 @dataclass(frozen=True)
 class _Placed:
-    """Contacts in the object frame for some poses, and the factorised covariance of what they observe."""
+    """Contacts in the object frame for some poses, their squared distances with the kernel's profile there, and the
+    factorised covariance of what they observe."""
 
     points: Array
     normals: Array
+    squared: Array
+    phi: Profile
     factor: Array
     residual: Array
     weights: Array
@@ -160,36 +161,33 @@ class PoseEvidence:
         return moved(found.x), float(found.fun)
 
     def _placed(self, rows: Array) -> _Placed:
+        from tactile_lab.tracking.evidence_kernels import assemble  # compiled loops are slow to import
+
         points, normals = self._space.to_object(rows[self._grasp_of], self._world.points_m, self._world.normals)
-        phi = self._kernel.profile(_squared_distances(points))
-        matrix = evidence_kernels().assemble(points, *phi, self._noise_variance, _JITTER)
+        squared = _squared_distances(points)
+        phi = self._kernel.profile(squared)
+        matrix = assemble(points, *phi, self._noise_variance, _JITTER)
         diagonal = np.diag(matrix).copy()
         factor, problem = lapack.dpotrf(matrix.T, lower=1, clean=1, overwrite_a=1)
         if problem:  # contacts thrown onto each other by a wild step of the line search
             factor, _ = lapack.dpotrf(np.diag(diagonal), lower=1)
         residual = np.concatenate([-self._prior.value(points), (normals - self._prior.gradient(points)).T.ravel()])
         weights, _ = lapack.dpotrs(factor, residual, lower=1)
-        return _Placed(points, normals, factor, residual, np.asarray(weights))
+        return _Placed(points, normals, squared, phi, factor, residual, np.asarray(weights))
 
     def _by_contacts(self, rows: Array, placed: _Placed) -> Array:
         """Derivative of the misfit by the pose of each contact's grasp, shape (n, size)."""
-        points, normals, weights = placed.points, placed.normals, placed.weights
+        from tactile_lab.tracking.evidence_kernels import pull  # compiled loops are slow to import
+
+        points, normals, weights, phi = placed.points, placed.normals, placed.weights, placed.phi
         count, dimension = points.shape
         by_normals = np.ascontiguousarray(weights[count:].reshape(dimension, count).T)
-        squared = _squared_distances(points)
-        phi = self._kernel.profile(squared)
-        third = third_derivative(self._kernel, squared, phi)
+        third = third_derivative(self._kernel, placed.squared, phi)
         inverse, _ = lapack.dpotri(placed.factor, lower=1)
-        by_points = evidence_kernels().pull(points, phi.first, phi.second, third, inverse, weights)
+        by_points = pull(points, phi.first, phi.second, third, inverse, weights)
         by_points -= weights[:count, None] * self._prior.gradient(points)
         by_points -= _directional_change(self._prior, points, by_normals)
         return self._space.by_row(rows[self._grasp_of], points, normals, by_points, by_normals)
-
-
-@cache
-def evidence_kernels() -> ModuleType:
-    """The compiled loops; loaded when first needed, because the compiler takes half a second to import."""
-    return import_module("tactile_lab.tracking.evidence_kernels")
 
 
 def _squared_distances(points: Array) -> Array:

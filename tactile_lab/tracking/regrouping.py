@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.tracking.contact_map import ContactMap
-from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.proposals import ProposalSettings, propose
@@ -51,7 +50,7 @@ def _joined_anew(
     if min(int(moved.sum()), int((~moved).sum())) < _LEAST_CONTACTS:
         return []
     motion = contact_map.motions[step] if moves_later else space.inverse(contact_map.motions[step])
-    submap = _at(contact_map.contacts.selected(moved), space.inverse(rows[anchor]), contact_map)
+    submap = contact_map.contacts.selected(moved).in_object_frame(space.inverse(rows[anchor]), space)
     field = _half(contact_map, keep_later=not moves_later, step=step).fit()
     found, _ = propose(space.compose(motion, rows[other]), submap, field, noise, settings, space)
     different = _far_from(found, rows[anchor], contact_map, settings)[:_KEPT]
@@ -62,11 +61,6 @@ def _joined_anew(
 def _half(contact_map: ContactMap, *, keep_later: bool, step: int) -> ContactMap:
     placed = contact_map.placed[step:] if keep_later else contact_map.placed[:step]
     return replace(contact_map, placed=placed)
-
-
-def _at(contacts: ContactSet, row: Array, contact_map: ContactMap) -> ContactSet:
-    points, normals = contact_map.space.to_object(row, contacts.points_m, contacts.normals)
-    return replace(contacts, points_m=points, normals=normals)
 
 
 def _far_from(found: Array, row: Array, contact_map: ContactMap, settings: ProposalSettings) -> Array:

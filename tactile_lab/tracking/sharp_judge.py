@@ -18,7 +18,7 @@ from tactile_lab.shape.surface import extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.facet_smoothing import FlatFaces, smoothed_with_faces
 from tactile_lab.tracking.free_space import free_space_costs
-from tactile_lab.tracking.hypotheses import Hypothesis, Judge
+from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.pose_rows import PLANAR
@@ -83,7 +83,7 @@ class SharpJudge:
         """Contacts left out that a sharp shape explains by themselves only, and those back that it explains better."""
         for _ in range(_MOST_DOUBTS):
             thinner = [self._sharp(sharp.map.without_contact(position)) for position in _doubtful(sharp.map)]
-            best = min((one for one in thinner if one is not None), key=_cost, default=sharp)
+            best = min((one for one in thinner if one is not None), key=cost, default=sharp)
             if best.cost >= sharp.cost:
                 break
             sharp = best
@@ -151,7 +151,3 @@ def _faces(contact_map: ContactMap, fitted: Gpis) -> FlatFaces:
 
 def _likelier(one: Hypothesis, other: Hypothesis | None) -> Hypothesis:
     return one if other is None or one.cost <= other.cost else other
-
-
-def _cost(hypothesis: Hypothesis) -> float:
-    return hypothesis.cost

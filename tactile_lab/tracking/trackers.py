@@ -33,9 +33,6 @@ from tactile_lab.tracking.particle_tracker import ParticleTracker
 from tactile_lab.tracking.pose_rows import PLANAR, PoseRows
 from tactile_lab.tracking.spatial_rows import SPATIAL
 
-FIRST_VARIANCE = 1e-10
-"""The first grasp defines the object frame: its pose is certain up to rounding."""
-
 GRID_MARGIN_m = 0.040
 
 Method: TypeAlias = Literal["joint", "particle", "thesis-pf", "thesis-pf-graph", "known-pose", "odometry", "icp"]

@@ -16,7 +16,6 @@ from tactile_lab.tracking.measurement import (
     GateSettings,
     Known,
     ThesisMeasurement,
-    placed,
 )
 from tactile_lab.tracking.motion import compose, inverse
 
@@ -49,15 +48,6 @@ CORNERS = ContactSet(
     np.full(5, 0.1),
 )
 NOWHERE = np.array([0.5, 0.5, 0.0])
-
-
-def test_contacts_are_placed_as_each_particle_sees_them() -> None:
-    rows = np.random.default_rng(0).normal(size=(4, 3))
-    points, normals = placed(rows, CORNERS)
-    for row, point, normal in zip(rows, points, normals, strict=True):
-        seen = CORNERS.in_object_frame(row)
-        assert np.allclose(point, seen.points_m)
-        assert np.allclose(normal, seen.normals)
 
 
 def test_equation_3_9_is_minus_the_sum_of_field_values() -> None:
