@@ -39,11 +39,13 @@ class Candidate:
         world_T_grasp: grasp frame on the table.
         closing: name of the closing ("pinch", "radial").
         rays: its closing rays in the grasp frame.
+        time_s: how long it takes to go there from where the hand is, to close, and to open again.
     """
 
     world_T_grasp: Pose2
     closing: str
     rays: ClosingRays
+    time_s: float = 1.0
 
 
 @dataclass(frozen=True)
