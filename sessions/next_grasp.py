@@ -67,8 +67,9 @@ def contact_centre(grasp: Grasp, plan: GraspPlan) -> Array:
     they close from the sides, else away from the fingers that met nothing.
     """
     frame = plan.frame.pose
-    points_m = transform_points(frame.inverse(), grasp.points_world_m)[:, :2]
-    touched = dict(zip((contact.finger for contact in grasp.contacts), points_m, strict=True))
+    closed = [contact for contact in grasp.contacts if not contact.probed]
+    points_m = transform_points(frame.inverse(), np.array([c.point_world_m for c in closed]).reshape(-1, 3))[:, :2]
+    touched = dict(zip((contact.finger for contact in closed), points_m, strict=True))
     centre_m = np.array([_across(touched), _along(touched, plan.closing), 0.0])
     return np.asarray(transform_points(frame, centre_m[None])[0, :2])
 

@@ -26,6 +26,8 @@ class Contact:
         point_covariance_m2: covariance of the point, shape (3, 3), world frame, square metres.
         normal_sigma_rad: standard deviation of the normal's direction, per axis, radians.
         force_N: magnitude of the contact force.
+        probed: touched on its own before the hand closed (a tap on the top, a probe from the side), the object at
+            rest where the grasp then found it.
     """
 
     finger: str
@@ -34,6 +36,7 @@ class Contact:
     point_covariance_m2: Array
     normal_sigma_rad: float
     force_N: float
+    probed: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class Grasp:
     Attributes:
         index: number of the grasp in the session, from 0.
         stamp_ns: time in the middle of the capture, session clock.
-        contacts: at most one contact a finger.
+        contacts: at most one contact a finger from the closing; behind them those that were probed before it.
         world_T_palm: the palm's pose at capture.
         hand_motion_world: how the hand moved while it held the object since the previous grasp, so that
             predicted ``world_T_object = hand_motion_world * previous world_T_object`` (eq. 3.8); identity
@@ -74,6 +77,11 @@ class Grasp:
     world_T_palm: Pose3
     hand_motion_world: Pose3 = field(default_factory=Pose3)
     closing_lines: tuple[ClosingLine, ...] = ()
+
+    @property
+    def touching(self) -> frozenset[str]:
+        """Fingers that touch the object in this grasp, those that only probed it left out."""
+        return frozenset(contact.finger for contact in self.contacts if not contact.probed)
 
     @property
     def points_world_m(self) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import TrackingError
-from tactile_lab.geometry.contacts import Array, Grasp
+from tactile_lab.geometry.contacts import Array, ClosingLine, Contact, Grasp
 from tactile_lab.tracking.free_space import fingertip_places, places_on_line
 from tactile_lab.tracking.pose_rows import PLANAR, PoseRows
 
@@ -63,17 +63,17 @@ class ContactSet:
         normal_sigma = np.array([contact.normal_sigma_rad for contact in grasp.contacts])
         _check(grasp, points, normals, covariances, normal_sigma)
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-        fingers = np.array([contact.finger for contact in grasp.contacts])
+        counted = list(grasp.contacts)
         if dimension == 2:
             flat = np.linalg.norm(normals[:, :2], axis=1)
             keep = flat > LARGEST_SLOPE
             points, covariances, flat = points[keep], covariances[keep], flat[keep]
             normals = np.column_stack([normals[keep, :2] / flat[:, None], np.zeros(len(flat))])
-            normal_sigma, fingers = normal_sigma[keep] / flat, fingers[keep]
+            normal_sigma, counted = normal_sigma[keep] / flat, [counted[index] for index in np.flatnonzero(keep)]
         along_normal = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariances, normals))
         heights = np.array([0.0, 0.0, origin_height_m])
         seen = cls((points - heights)[:, :dimension], normals[:, :dimension].copy(), along_normal, normal_sigma)
-        free, free_of = _free_places(grasp, seen, fingers.tolist(), heights)
+        free, free_of = _free_places(grasp, seen, counted, heights)
         return replace(seen, free_m=free, free_of=free_of)
 
     @classmethod
@@ -104,19 +104,36 @@ class ContactSet:
 
 
 def _free_places(
-    grasp: Grasp, contacts: ContactSet, fingers: list[str], origin: Array
+    grasp: Grasp, contacts: ContactSet, counted: Sequence[Contact], origin: Array
 ) -> tuple[Array, NDArray[np.intp]]:
-    """Free places and the contact of each, by the closing lines; where those are not known, in the fingertips."""
+    """Free places and the contact of each, by the closing lines; where those are not known, in the fingertips.
+
+    Args:
+        grasp, contacts, counted: what was touched, and what of it counts.
+        origin: of the object frame, world frame.
+    """
     if not grasp.closing_lines:
         places = [fingertip_places(contacts.points_m[i], contacts.normals[i]) for i in range(len(contacts))]
         owners = list(range(len(contacts)))
     else:
-        places = [(places_on_line(line) - origin)[:, : contacts.dimension] for line in grasp.closing_lines]
-        touching = [line.touched and line.finger in fingers for line in grasp.closing_lines]
-        lines = zip(grasp.closing_lines, touching, strict=True)
-        owners = [fingers.index(line.finger) if touches else -1 for line, touches in lines]
+        lines = [line for line in grasp.closing_lines if contacts.dimension == 3 or not _comes_down(line)]
+        places = [(places_on_line(line) - origin)[:, : contacts.dimension] for line in lines]
+        owners = [_contact_at_end(line, counted) for line in lines]
     free_of = np.repeat(np.array(owners, dtype=np.intp), [len(each) for each in places])
     return np.vstack([np.empty((0, contacts.dimension)), *places]), free_of
+
+
+def _comes_down(line: ClosingLine) -> bool:
+    """A way from above tells nothing about the contour: the object may be under it."""
+    way = line.end_world_m - line.start_world_m
+    return abs(way[2]) > LARGEST_SLOPE * float(np.linalg.norm(way))
+
+
+def _contact_at_end(line: ClosingLine, counted: Sequence[Contact]) -> int:
+    """Index of the contact that a line ends at, -1 for a finger that met nothing, or whose contact does not count."""
+    own = [index for index, contact in enumerate(counted) if line.touched and contact.finger == line.finger]
+    away_m = [float(np.linalg.norm(counted[index].point_world_m - line.end_world_m)) for index in own]
+    return own[int(np.argmin(away_m))] if own else -1
 
 
 def planar_rotation(angle_rad: float) -> Array:
