@@ -27,7 +27,7 @@ from sessions.instruments import (
 )
 from sessions.interpreter import Observer
 from sessions.marks import Mark, MarkKind
-from sessions.perception import Outcome, Perception, TareReport, TruthFrame
+from sessions.perception import Outcome, Perception, TareReport, TruthFrame, Undone
 from sessions.recorder import Level, Recorder
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import DeviceError, SessionError, TactileLabError
@@ -176,6 +176,11 @@ class Bench:
         self.hand.stop()
         self.base.stop()
 
+    def resume(self) -> None:
+        """Motion is possible again after :meth:`stop`; nothing moves before new targets are set."""
+        self.hand.resume()
+        self.base.resume()
+
     def _instruments(self) -> list[Instrument]:
         camera = [] if self.camera is None else [self.camera]
         return [self.hand, self.base, *self.wrench_devices.values(), *camera]
@@ -274,6 +279,10 @@ class Bench:
         self._record_truth()
         return grasp
 
+    def end_touch(self) -> None:
+        """Keep the contacts of the samples since :meth:`begin_capture` for the next grasp."""
+        self._mark(MarkKind.TOUCH_END)
+
     def begin_hold(self) -> None:
         """From here on the object moves with the palm."""
         self._mark(MarkKind.HOLD_BEGIN)
@@ -296,6 +305,12 @@ class Bench:
             raise DeviceError("the picture can not be read", where="camera", hint="Check the camera's link")
         self._record_truth()
         return outcome
+
+    def undo(self) -> Undone:
+        """Take the last grasp back. Raises SessionError when there is none."""
+        undone = self._mark(MarkKind.UNDO)
+        assert isinstance(undone, Undone)
+        return undone
 
     def event(self, level: Level, source: str, message: str) -> None:
         """Record something a person should be able to read later."""

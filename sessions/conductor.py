@@ -1,4 +1,7 @@
-"""The conductor: an autonomous session, grasp after grasp, until there are enough or a reason to end."""
+"""The conductor: a session, grasp after grasp, until there are enough or a reason to end.
+
+Who decides about the grasps and who does them is a :class:`~sessions.decisions.Crew`.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +18,26 @@ from pydantic import Field
 from drivers.shadow.posture import TipEllipsoid
 from sessions.bench import Bench
 from sessions.cycle_settings import CycleSettings
+from sessions.decisions import (
+    AutonomousDecisions,
+    Crew,
+    DoGrasp,
+    End,
+    GraspAbandonedError,
+    Pause,
+    UndoGrasp,
+    Veto,
+    Wait,
+)
 from sessions.explorer import ExplorationSettings
 from sessions.grasp_cycle import GraspCycle, GraspPlan
 from sessions.motion import Motion
 from sessions.next_grasp import FixedRule, PlanSettings
-from sessions.planner import Planner
+from sessions.planner import Planner, Reorientation
 from sessions.progress import GraspReport, NullProgress, Progress
 from sessions.recorder import Level
 from sessions.safety import InterruptGuard, SafetySettings, SafetySupervisor
+from sessions.slam_memory import SlamMemory
 from tactile_lab.clock import VirtualClock
 from tactile_lab.errors import TactileLabError
 from tactile_lab.geometry.contacts import Grasp
@@ -34,7 +49,7 @@ Answer = TypeVar("Answer")
 
 
 class ConductorSettings(StrictModel):
-    """An autonomous session.
+    """A session.
 
     Attributes:
         grasps: how many.
@@ -82,6 +97,18 @@ class SessionOutcome:
     error: TactileLabError | None = None
 
 
+def autonomous_crew(
+    bench: Bench, slam: TactileSlam, settings: ConductorSettings, *, seed: int = 0, dimension: int = 2
+) -> Crew:
+    """The crew of a session without a person: the hand moves by itself, the planner decides."""
+    supervisor = SafetySupervisor(bench, settings.safety, bench.cycle_ns)
+    tip, window = tip_shape(bench), settings.plan.yaw_window_rad
+    cycle = GraspCycle(Motion(bench, supervisor), settings.cycle, tip, window)
+    rule = FixedRule(settings.plan, np.random.default_rng(seed), dimension)
+    planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension)
+    return Crew(supervisor, cycle, AutonomousDecisions(planner))
+
+
 class Conductor:
     """Runs a session on a connected bench.
 
@@ -89,9 +116,8 @@ class Conductor:
         bench: connected; the caller closes it.
         slam: fresh; the caller finishes it.
         settings: of the session.
-        seed: of the session's own choices.
+        crew: who decides about the grasps and does them.
         progress: is told what happens.
-        dimension: the estimation's, 2 or 3.
     """
 
     def __init__(
@@ -99,19 +125,16 @@ class Conductor:
         bench: Bench,
         slam: TactileSlam,
         settings: ConductorSettings,
-        *,
-        seed: int = 0,
-        dimension: int = 2,
+        crew: Crew,
         progress: Progress | None = None,
     ) -> None:
         self._bench, self._slam, self._settings = bench, slam, settings
         self._progress = progress or NullProgress()
-        self._supervisor = SafetySupervisor(bench, settings.safety, bench.cycle_ns)
-        tip, window = _tip_shape(bench), settings.plan.yaw_window_rad
-        self._cycle = GraspCycle(Motion(bench, self._supervisor), settings.cycle, tip, window)
-        rule = FixedRule(settings.plan, np.random.default_rng(seed), dimension)
-        self._planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension)
+        self._supervisor, self._cycle, self._decisions = crew.supervisor, crew.performer, crew.decisions
+        self._memory = SlamMemory(slam)
         self._guard = InterruptGuard()
+        self._thought_of: int | None = None
+        self._paused = False
         self._interruption_told = False
         self._grasps: list[Grasp] = []
         self._misses = 0
@@ -138,7 +161,53 @@ class Conductor:
         while True:
             if ended := self._reason_to_end():
                 return ended
-            self._one_grasp(len(self._grasps))
+            try:
+                if ended := self._follow_decision(len(self._grasps)):
+                    return ended
+            except TactileLabError as error:
+                self._survive(error)
+
+    def _follow_decision(self, index: int) -> tuple[Ending, str] | None:
+        """Ask what to do next, and do it."""
+        self._number = index + 1
+        self._consider(index)
+        decision = self._decisions.decide(index)
+        self._pause(decision if isinstance(decision, Pause) else None)
+        match decision:
+            case DoGrasp(plan):
+                self._thought_of = None
+                self._one_grasp(plan)
+            case UndoGrasp(reason):
+                self._undo(reason)
+            case End(reason):
+                return Ending.COMPLETE, reason
+            case Wait() | Pause():
+                self._cycle.idle()
+        return None
+
+    def _consider(self, index: int) -> None:
+        if self._thought_of != index:
+            self._think(lambda: self._decisions.think(index))
+            self._thought_of = index
+
+    def _pause(self, wanted: Pause | None) -> None:
+        if wanted is not None and not self._paused:
+            self._bench.stop()
+            self._tell(Level.INFO, f"paused: {wanted.reason}")
+        elif wanted is None and self._paused:
+            self._bench.resume()
+            self._tell(Level.INFO, "goes on")
+        self._paused = wanted is not None
+
+    def _survive(self, error: TactileLabError) -> None:
+        """Stop everything and go on, if whoever decides wants to. Raises the error otherwise."""
+        if not self._decisions.failed(error):
+            raise error
+        problems = self._supervisor.stop()
+        if self._bench.perception.is_holding:
+            self._bench.end_hold()
+        self._paused, self._thought_of = True, None
+        self._tell(Level.ERROR, "; ".join([f"stopped: {error}", *problems]))
 
     def _reason_to_end(self) -> tuple[Ending, str] | None:
         if self._guard.requested:
@@ -149,7 +218,7 @@ class Conductor:
             return Ending.OBJECT_LOST, f"no way down to the table in {self._misses} approaches"
         if reason := self._supervisor.time_over(self._bench.clock.now_ns()):
             return Ending.LIMIT, reason
-        if reason := self._supervisor.object_lost(*self._planner.centre_m):
+        if reason := self._supervisor.object_lost(*self._decisions.centre_m):
             return Ending.OBJECT_LOST, reason
         return None
 
@@ -161,50 +230,81 @@ class Conductor:
 
     # --- one grasp ---------------------------------------------------------------------------------------------
 
-    def _one_grasp(self, index: int) -> None:
+    def _one_grasp(self, plan: GraspPlan) -> None:
         """Descend, close, settle, capture, squeeze, re-orient, release, lift; then estimate."""
-        cycle, self._number = self._cycle, index + 1
-        self._phase("descend")
-        plan = self._think(lambda: self._planner.plan(index))
-        if not self._arrive(plan):
+        try:
+            grasp = self._measure(plan)
+        except GraspAbandonedError as given_up:
+            self._tell(Level.INFO, str(given_up))
+            self._let_go()
             return
+        if grasp is None:
+            return
+        missing = dict(self._bench.perception.dropped)
+        wanted = self._decisions.captured(grasp, self._cycle.plan)
+        if isinstance(wanted, Veto):
+            self._bench.undo()
+            self._tell(Level.INFO, f"grasp {self._number} does not count: {wanted.reason}")
+            self._let_go()
+            return
+        self._grasps.append(grasp)
+        try:
+            self._carry(grasp, wanted)
+            self._let_go()
+        except TactileLabError as error:
+            self._survive(error)
+        self._phase("estimate")
+        step = self._estimate(grasp)
+        self._progress.grasp_done(self._report(grasp, plan, step, missing))
+
+    def _measure(self, plan: GraspPlan) -> Grasp | None:
+        """Down to the captured grasp; None when the hand did not get there, or is not to go on."""
+        cycle = self._cycle
+        self._phase("descend")
+        if not self._arrive(plan):
+            return None
         self._phase("close")
         cycle.close()
         cycle.settle()
         if self._guard.requested:
             self._let_go()
-            return
+            return None
         self._phase("capture")
-        grasp = cycle.capture()
-        self._grasps.append(grasp)
-        missing = dict(self._bench.perception.dropped)
-        self._carry(grasp)
-        self._let_go()
-        self._phase("estimate")
-        step = self._estimate(grasp)
-        self._progress.grasp_done(self._report(grasp, plan, step, missing))
+        return cycle.capture()
+
+    def _undo(self, reason: str) -> None:
+        """Forget the last grasp; the next one has its number, and what the hand carried is not forgotten."""
+        if not self._grasps:
+            self._tell(Level.WARNING, "there is no grasp to take back")
+            return
+        undone = self._bench.undo()
+        self._grasps.pop()
+        self._memory.undo()
+        self._decisions.undone(self._bench.perception.hand_motion_world)
+        self._thought_of = None
+        self._tell(Level.INFO, f"grasp {undone.index + 1} is taken back: {reason}")
 
     def _arrive(self, plan: GraspPlan) -> bool:
         arrived = self._cycle.descend(plan)
-        self._planner.landed(self._cycle.landings_world_m)
+        self._decisions.arrived(self._cycle.landings_world_m)
         self._misses = 0 if arrived else self._misses + 1
         if not arrived:
             landings = len(self._cycle.landings_world_m)
             self._tell(Level.WARNING, f"the hand came down on the object {landings} times: another grasp")
         return arrived
 
-    def _carry(self, grasp: Grasp) -> None:
+    def _carry(self, grasp: Grasp, wanted: Reorientation) -> None:
         """Squeeze, and re-orient the object, unless too few fingers hold it or no grasp will follow."""
         cycle, touching = self._cycle, frozenset(contact.finger for contact in grasp.contacts)
         self._supervisor.count_contacts(len(touching))
-        wanted, hand_motion = self._planner.grasped(grasp, cycle.plan), Pose3()
+        hand_motion = Pose3()
         last = len(self._grasps) >= self._settings.grasps or self._guard.requested
         if _holds(touching) and not last:
             self._phase("squeeze")
             cycle.squeeze(touching)
             self._phase("re-orient")
             hand_motion = cycle.reorient(wanted.turn_rad, wanted.shift_world_m, touching)
-        self._planner.carried(hand_motion)
+        self._decisions.carried(hand_motion)
 
     def _let_go(self) -> None:
         self._phase("release")
@@ -216,8 +316,9 @@ class Conductor:
 
     def _estimate(self, grasp: Grasp) -> SlamStep:
         """One step of the estimation."""
+        self._memory.remember()
         step = self._think(lambda: self._slam.take(grasp))
-        self._think(lambda: self._planner.estimated(grasp.index))
+        self._think(lambda: self._decisions.estimated(step))
         state = {"index": step.index, "verdict": step.verdict, "reason": step.reason, "seconds": step.seconds}
         self._bench.recorder.slam(self._bench.clock.now_ns(), step.world_T_object, state, step.covariance)
         return step
@@ -236,7 +337,7 @@ class Conductor:
 
     def _report(self, grasp: Grasp, plan: GraspPlan, step: SlamStep, missing: dict[str, str]) -> GraspReport:
         covariance = step.covariance
-        known = self._planner.known_shape()
+        known = self._decisions.known_shape()
         return GraspReport(
             number=len(self._grasps),
             planned=self._settings.grasps,
@@ -268,7 +369,7 @@ def _holds(touching: frozenset[str]) -> bool:
     return ("TH" in touching and len(touching) > 1) or {"FF", "LF"} <= touching
 
 
-def _tip_shape(bench: Bench) -> TipEllipsoid:
+def tip_shape(bench: Bench) -> TipEllipsoid:
     """The fingertip's shape by calibration; the default one where a rig has none."""
     for calibration in bench.fingertip_calibrations.values():
         return TipEllipsoid(calibration.semi_axes_m, calibration.centre_distal_m)

@@ -92,6 +92,9 @@ class HandInstrument(Instrument, Protocol):
     def stop(self) -> None:
         """No demand from now on; never raises."""
 
+    def resume(self) -> None:
+        """Take back a stop or a fault; nothing moves before new targets are set."""
+
     def health(self) -> tuple[str, ...]:
         """What is wrong, in words; empty when all is well."""
 
@@ -107,6 +110,9 @@ class BaseInstrument(Instrument, Protocol):
 
     def stop(self) -> None:
         """Stay here; never raises."""
+
+    def resume(self) -> None:
+        """Take back a stop or a fault; the target is where it stands."""
 
 
 class PolledInstrument(Instrument, Protocol):

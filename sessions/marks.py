@@ -26,12 +26,16 @@ class MarkKind(StrEnum):
     """The grasp has settled: gather samples from here on."""
     CAPTURE_END = "capture_end"
     """Enough samples: make a grasp of them."""
+    TOUCH_END = "touch_end"
+    """Enough samples of a probe: its contacts belong to the next grasp, which finds the object at rest there."""
     HOLD_BEGIN = "hold_begin"
     """The object is held firmly: from here on it moves with the palm."""
     HOLD_END = "hold_end"
     """The object is about to be let go: it stays where it is."""
     TRUTH_FRAME = "truth_frame"
     """The newest camera frame shows the object of the current grasp at rest."""
+    UNDO = "undo"
+    """The last grasp does not count: what the hand carried before and after it belongs to the next one."""
 
 
 @dataclass(frozen=True)

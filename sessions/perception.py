@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -59,7 +59,14 @@ class TareReport:
     refused: Mapping[str, str]
 
 
-Outcome: TypeAlias = Grasp | TruthFrame | TareReport
+@dataclass(frozen=True)
+class Undone:
+    """The grasp with this number was taken back; the next one has its number."""
+
+    index: int
+
+
+Outcome: TypeAlias = Grasp | TruthFrame | TareReport | Undone
 
 
 class Perception:
@@ -104,9 +111,11 @@ class Perception:
         self._capture: _Capture | None = None
         self._tip_surfaces = dict(tip_surfaces or {})
         self._closing_start: HandGeometry | None = None
+        self._probed = _Probed()
         self._hold_start: Pose3 | None = None
         self._hand_motion_world = Pose3()
-        self._grasp_count = 0
+        self._motions: list[Pose3] = []
+        """``hand_motion_world`` of every grasp that counts."""
         self.dropped: dict[str, str] = {}
         """Fingers without a contact in the last grasp, and why; what a sensor says of itself is in problems()."""
         self.drop_counts: Counter[str] = Counter()
@@ -152,7 +161,17 @@ class Perception:
     @property
     def grasp_count(self) -> int:
         """Grasps made so far."""
-        return self._grasp_count
+        return len(self._motions)
+
+    @property
+    def is_holding(self) -> bool:
+        """A hold has begun and not ended."""
+        return self._hold_start is not None
+
+    @property
+    def hand_motion_world(self) -> Pose3:
+        """How the hand has carried the object since the last grasp, as far as that is complete."""
+        return self._hand_motion_world
 
     @property
     def joints_rad(self) -> Array:
@@ -218,14 +237,19 @@ class Perception:
                 return None
             case MarkKind.CAPTURE_END:
                 return self._grasp(mark)
+            case MarkKind.TOUCH_END:
+                self._probed.add(self._captured(mark))
+                return None
             case MarkKind.HOLD_BEGIN:
-                self._hold_start = self.world_T_palm
+                self._hold_start, self._probed = self.world_T_palm, _Probed()
                 return None
             case MarkKind.HOLD_END:
                 self._carry(None)
                 return None
             case MarkKind.TRUTH_FRAME:
                 return self._truth_frame()
+            case MarkKind.UNDO:
+                return self._undo()
 
     def _tare(self, mark: Mark) -> TareReport:
         self._latest()
@@ -247,25 +271,34 @@ class Perception:
         self._capture = _Capture(mark.stamp_ns, [], [])
 
     def _grasp(self, mark: Mark) -> Grasp:
-        capture, self._capture = self._capture, None
-        if capture is None:
-            raise SessionError("capture_end without capture_begin", where="/marks", hint="The marks are out of order")
-        joints_rad, base_q = self._latest()
-        geometry = self._place(_mean(capture.joints_rad, joints_rad), _mean(capture.base_q, base_q))
-        tips = self._touches(geometry, heard=bool(capture.joints_rad))
+        measured, probed = self._captured(mark), self._probed
+        self._probed = _Probed()
         if self._hold_start is not None:
             self._carry(self.world_T_palm)
         motion, self._hand_motion_world = self._hand_motion_world, Pose3()
-        index, self._grasp_count = self._grasp_count, self._grasp_count + 1
-        contacts = geometry.contacts(tips, self.settings.joint_sigma_rad, self._mount)
+        index = len(self._motions)
+        self._motions.append(motion)
         return Grasp(
             index=index,
-            stamp_ns=(capture.stamp_ns + mark.stamp_ns) // 2,
-            contacts=contacts,
-            world_T_palm=Pose3(geometry.world_T_palm),
+            stamp_ns=measured.stamp_ns,
+            contacts=(*measured.contacts, *probed.contacts),
+            world_T_palm=Pose3(measured.world_T_palm),
             hand_motion_world=motion if index else Pose3(),
-            closing_lines=self._ways(geometry, contacts),
+            closing_lines=(*measured.ways, *probed.ways),
         )
+
+    def _captured(self, mark: Mark) -> _Measured:
+        """What the samples since the capture began say."""
+        capture, self._capture = self._capture, None
+        if capture is None:
+            text = f"{mark.kind.value} without capture_begin"
+            raise SessionError(text, where="/marks", hint="The marks are out of order")
+        joints_rad, base_q = self._latest()
+        geometry = self._place(_mean(capture.joints_rad, joints_rad), _mean(capture.base_q, base_q))
+        tips = self._touches(geometry, heard=bool(capture.joints_rad))
+        contacts = geometry.contacts(tips, self.settings.joint_sigma_rad, self._mount)
+        stamp_ns = (capture.stamp_ns + mark.stamp_ns) // 2
+        return _Measured(stamp_ns, geometry.world_T_palm, contacts, self._ways(geometry, contacts))
 
     def _ways(self, geometry: HandGeometry, contacts: Sequence[Contact]) -> tuple[ClosingLine, ...]:
         """How the fingers came to this grasp; of a second capture after one closing nothing is known."""
@@ -301,8 +334,15 @@ class Perception:
         frame, self._frame = self._frame, None
         if frame is None:
             return None
-        current = self._grasp_count if self._capture is not None else self._grasp_count - 1
+        current = self.grasp_count if self._capture is not None else self.grasp_count - 1
         return TruthFrame(current if current >= 0 else None, frame)
+
+    def _undo(self) -> Undone:
+        if not self._motions:
+            raise SessionError("undo without a grasp", where="/marks", hint="The marks are out of order")
+        self._capture = None
+        self._hand_motion_world = self._hand_motion_world * self._motions.pop()
+        return Undone(len(self._motions))
 
     # --- geometry ----------------------------------------------------------------------------------------------
 
@@ -330,6 +370,28 @@ class _Capture:
     stamp_ns: int
     joints_rad: list[Array]
     base_q: list[Array]
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """What one capture tells."""
+
+    stamp_ns: int
+    world_T_palm: Array
+    contacts: tuple[Contact, ...]
+    ways: tuple[ClosingLine, ...]
+
+
+@dataclass
+class _Probed:
+    """Contacts and ways of the probes since the object was last moved; they wait for the next grasp."""
+
+    contacts: list[Contact] = field(default_factory=list)
+    ways: list[ClosingLine] = field(default_factory=list)
+
+    def add(self, measured: _Measured) -> None:
+        self.contacts += [replace(contact, probed=True) for contact in measured.contacts]
+        self.ways += measured.ways
 
 
 def _mean(samples: list[Array], otherwise: Array) -> Array:

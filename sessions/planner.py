@@ -126,6 +126,10 @@ class Planner:
         self._hand_motion, self._landings_m = hand_motion_world, []
         self._rule.centre_m = np.asarray(planar(hand_motion_world).transformFrom(self.centre_m))
 
+    def undone(self, hand_motion_world: Pose3) -> None:
+        """Take note that the last grasp was taken back; the hand carried the object so far since the one before."""
+        self._hand_motion, self._doubted = hand_motion_world, False
+
     def estimated(self, index: int) -> None:
         """Take note that grasp number ``index`` has been estimated: from here on its middle may count."""
         known, expected = self.known_shape(), self._expected_pose()

@@ -16,14 +16,26 @@ read. A file that was cut off replays up to the cut.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from sessions import schemas
 from sessions.interpreter import Interpreter
 from sessions.marks import Mark
-from sessions.perception import Outcome
+from sessions.perception import Outcome, Undone
 from sessions.session import Session
 from sessions.traffic_reader import Loss, TrafficReader
+from tactile_lab.geometry.contacts import Grasp
+
+
+def kept_grasps(outcomes: Iterable[Outcome]) -> list[Grasp]:
+    """The grasps of a session, without those that were taken back."""
+    grasps: list[Grasp] = []
+    for outcome in outcomes:
+        if isinstance(outcome, Grasp):
+            grasps.append(outcome)
+        elif isinstance(outcome, Undone):
+            del grasps[outcome.index :]
+    return grasps
 
 
 class Replay:

@@ -65,6 +65,8 @@ def marked_pictures(messages: Iterable[TrafficMessage]) -> dict[int, Datagram]:
         elif message.topic == MARKS_TOPIC:
             mark = Mark.from_bytes(message.data)
             counter.take(mark.kind)
+            if mark.kind is MarkKind.UNDO:
+                found.pop(counter.finished, None)
             if mark.kind is MarkKind.TRUTH_FRAME and picture is not None:
                 found.setdefault(counter.current, picture)
                 picture = None
@@ -73,19 +75,21 @@ def marked_pictures(messages: Iterable[TrafficMessage]) -> dict[int, Datagram]:
 
 
 class _GraspCounter:
-    """Numbers the grasps as perception does: one for every capture that was ended."""
+    """Numbers the grasps as perception does: one for every capture that was ended and not taken back."""
 
     def __init__(self) -> None:
-        self._finished, self._is_open = 0, False
+        self.finished, self._is_open = 0, False
 
     def take(self, kind: MarkKind) -> None:
         """Follow one mark."""
         if kind is MarkKind.CAPTURE_BEGIN:
             self._is_open = True
         elif kind is MarkKind.CAPTURE_END:
-            self._finished, self._is_open = self._finished + 1, False
+            self.finished, self._is_open = self.finished + 1, False
+        elif kind is MarkKind.UNDO:
+            self.finished -= 1
 
     @property
     def current(self) -> int:
         """The grasp that a picture taken now belongs to; -1 before the first."""
-        return self._finished if self._is_open else self._finished - 1
+        return self.finished if self._is_open else self.finished - 1

@@ -10,10 +10,10 @@ import numpy as np
 
 from sessions.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
 from sessions.manifest import write_whole
-from sessions.replay import Replay
+from sessions.replay import Replay, kept_grasps
 from sessions.session import Session
 from tactile_lab.errors import SessionError
-from tactile_lab.geometry.contacts import Contact, Grasp
+from tactile_lab.geometry.contacts import Contact
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import rig_of_session
 from tactile_lab.tracking.motion import MotionNoise
@@ -36,7 +36,7 @@ def export_contacts(session: Session, path: Path, dimension: int | None = None) 
     """
     settings = recorded_slam(session)
     replay = Replay(session, build_interpreter(rig_of_session(session)))
-    grasps = tuple(outcome for outcome in replay.outcomes() if isinstance(outcome, Grasp))
+    grasps = tuple(kept_grasps(replay.outcomes()))
     contacts = [contact for grasp in grasps for contact in grasp.contacts]
     if not contacts:
         raise SessionError("no grasp with a contact was recorded", where=str(session.folder))

@@ -8,12 +8,11 @@ from pathlib import Path
 from gtsam import Pose3
 
 from sessions.progress import NullProgress, Progress
-from sessions.replay import Replay
+from sessions.replay import Replay, kept_grasps
 from sessions.session import Session
 from sessions.traffic_reader import Loss
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.evaluation.session_truth import session_truth
-from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import OTHER_VERSION, rig_of_session
 from tactile_lab.slam import SlamSettings, TactileSlam
@@ -51,7 +50,7 @@ def replay_session(
     replay = Replay(session, build_interpreter(rig))
     progress = progress or NullProgress()
     progress.phase(0, "read")
-    grasps = [outcome for outcome in replay.outcomes() if isinstance(outcome, Grasp)]
+    grasps = kept_grasps(replay.outcomes())
     known_poses = true_poses(session, len(grasps)) if settings.method == "known-pose" else None
     slam = TactileSlam(settings, seed, known_poses)
     estimate_rest(slam, grasps, progress)

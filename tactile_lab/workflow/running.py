@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from drivers.simulation.world import SimulatedWorld
-from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome
+from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome, autonomous_crew
 from sessions.manifest import Status
 from sessions.progress import Progress
 from sessions.session import RunningSession, create_session
@@ -98,8 +98,8 @@ def _record(
         bench.connect()
         settings, dimension = _conductor_settings(rig, request), request.dimension
         try:
-            conductor = Conductor(bench, slam, settings, seed=request.seed, dimension=dimension, progress=progress)
-            outcome = conductor.run()
+            crew = autonomous_crew(bench, slam, settings, seed=request.seed, dimension=dimension)
+            outcome = Conductor(bench, slam, settings, crew, progress).run()
         finally:
             bench.close()
         _close(session, outcome, bench.counts.overruns, bench.undecodable)

@@ -14,7 +14,7 @@ from drivers.shadow.palm_codec import decode_command
 from drivers.simulation.settings import ObjectStart
 from drivers.simulation.world import SimulatedWorld
 from sessions.bench import Bench
-from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome
+from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome, autonomous_crew
 from sessions.marks import Mark, MarkKind
 from sessions.progress import GraspReport, NullProgress
 from sessions.recorder import Recorder
@@ -89,7 +89,8 @@ def run(
     settings = ConductorSettings(grasps=grasps, safety=safety or SafetySettings())
     bench.connect()
     try:
-        conductor = Conductor(bench, TactileSlam(SlamSettings(), SEED), settings, seed=SEED, progress=watcher)
+        slam = TactileSlam(SlamSettings(), SEED)
+        conductor = Conductor(bench, slam, settings, autonomous_crew(bench, slam, settings, seed=SEED), watcher)
         outcome = conductor.run()
     finally:
         bench.close()

@@ -16,7 +16,7 @@ from drivers.fingertip import TipContact
 from drivers.positioner import mount_T_forearm
 from drivers.shadow.kinematics import JOINT_INDEX, JOINTS
 from sessions.marks import Mark, MarkKind
-from sessions.perception import Perception, TareReport
+from sessions.perception import Perception, TareReport, Undone
 from sessions.recorder import Level, NullRecorder
 from tactile_lab.clock import VirtualClock
 from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
@@ -86,10 +86,10 @@ class DiscTip:
 
 
 class Mover:
-    """The hand or the positioner: takes targets, counts stops."""
+    """The hand or the positioner: takes targets, counts stops and what takes them back."""
 
     def __init__(self, take: Callable[[object], None]) -> None:
-        self._take, self.stops = take, 0
+        self._take, self.stops, self.resumes = take, 0, 0
 
     def set_targets(self, targets_rad: Mapping[str, float]) -> None:
         self._take(targets_rad)
@@ -99,6 +99,9 @@ class Mover:
 
     def stop(self) -> None:
         self.stops += 1
+
+    def resume(self) -> None:
+        self.resumes += 1
 
 
 class DiscWorld:
@@ -213,6 +216,15 @@ class DiscWorld:
 
     def truth_frame(self) -> None:
         self._mark(MarkKind.TRUTH_FRAME)
+
+    def undo(self) -> Undone:
+        undone = self._mark(MarkKind.UNDO)
+        assert isinstance(undone, Undone)
+        return undone
+
+    def resume(self) -> None:
+        self.hand.resume()
+        self.base.resume()
 
     def stop(self) -> None:
         self.hand.stop()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,14 +12,17 @@ import pytest
 from gtsam import Pose3, Rot3
 
 from drivers.shadow.closing import closing
-from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome
+from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome, autonomous_crew
+from sessions.decisions import AutonomousDecisions, Decision, End, Pause, UndoGrasp, Veto
 from sessions.explorer import closing_rays
 from sessions.grasp_cycle import GraspPlan
 from sessions.marks import MarkKind
 from sessions.motion import GraspFrame
 from sessions.next_grasp import FixedRule, PlanSettings, contact_centre
+from sessions.planner import Planner, Reorientation
 from sessions.progress import GraspReport, NullProgress
-from tactile_lab.errors import ConfigurationError, DeviceError
+from sessions.recorder import Level
+from tactile_lab.errors import ConfigurationError, DeviceError, TactileLabError
 from tactile_lab.geometry.contacts import Contact, Grasp
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.strict_yaml import validate
@@ -51,8 +55,9 @@ def settings(grasps: int = 2, **overrides: Any) -> ConductorSettings:
 
 def run(world: DiscWorld, grasps: int = 2, watcher: Watcher | None = None, **overrides: Any) -> SessionOutcome:
     slam = TactileSlam(SlamSettings(particles=200), seed=1)
-    conductor = Conductor(world, slam, settings(grasps, **overrides), seed=3, progress=watcher or Watcher())  # type: ignore[arg-type]
-    return conductor.run()
+    wanted = settings(grasps, **overrides)
+    crew = autonomous_crew(world, slam, wanted, seed=3)  # type: ignore[arg-type]
+    return Conductor(world, slam, wanted, crew, watcher or Watcher()).run()  # type: ignore[arg-type]
 
 
 def disc(x: float = 0.005, y: float = -0.004, **shape: float) -> Disc:
@@ -382,3 +387,124 @@ def test_rays_are_the_usable_parts_of_the_lines() -> None:
 def test_senseless_plans_are_refused(content: dict[str, Any]) -> None:
     with pytest.raises(ConfigurationError):
         validate(content, PlanSettings, where="rig.yaml")
+
+
+# --- decisions other than the planner's ---------------------------------------------------------------------------
+
+
+class Scripted(AutonomousDecisions):
+    """The planner's decisions with others put in between; keeps what it is told."""
+
+    def __init__(self, planner: Planner, script: list[Decision | None], vetoes: set[int] | None = None) -> None:
+        super().__init__(planner)
+        self.script, self.vetoes, self.undos = script, vetoes or set(), 0
+        self.errors: list[str] = []
+
+    def decide(self, index: int) -> Decision:
+        return (self.script.pop(0) if self.script else None) or super().decide(index)
+
+    def captured(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
+        wanted = super().captured(grasp, plan)
+        if grasp.index in self.vetoes:
+            self.vetoes.remove(grasp.index)
+            return Veto("too few fingers")
+        return wanted
+
+    def undone(self, hand_motion_world: Pose3) -> None:
+        self.undos += 1
+        super().undone(hand_motion_world)
+
+    def failed(self, error: TactileLabError) -> bool:
+        self.errors.append(str(error))
+        return len(self.errors) < 2
+
+
+def scripted(
+    world: DiscWorld, script: list[Decision | None], grasps: int = 3, vetoes: set[int] | None = None
+) -> tuple[SessionOutcome, Scripted, TactileSlam]:
+    slam, wanted = TactileSlam(SlamSettings(particles=200), seed=1), settings(grasps)
+    crew = autonomous_crew(world, slam, wanted, seed=3)  # type: ignore[arg-type]
+    assert isinstance(crew.decisions, AutonomousDecisions)
+    decisions = Scripted(crew.decisions.planner, script, vetoes)
+    crew = replace(crew, decisions=decisions)
+    return Conductor(world, slam, wanted, crew).run(), decisions, slam  # type: ignore[arg-type]
+
+
+def test_grasp_taken_back_is_forgotten_by_session_and_estimate() -> None:
+    world = DiscWorld(disc())
+    outcome, decisions, slam = scripted(world, [None, None, UndoGrasp("it slipped"), None, None])
+    assert [grasp.index for grasp in outcome.grasps] == [0, 1, 2]
+    assert world.mark_counts[MarkKind.UNDO] == decisions.undos == 1
+    assert world.mark_counts[MarkKind.CAPTURE_END] == 4
+    again = TactileSlam(SlamSettings(particles=200), seed=1)
+    for grasp in outcome.grasps:
+        again.step(grasp)
+    assert again.world_T_object is not None
+    assert slam.world_T_object is not None
+    np.testing.assert_array_equal(again.world_T_object.matrix(), slam.world_T_object.matrix())
+    assert slam.step_count == 3
+
+
+def test_motion_of_a_grasp_taken_back_belongs_to_the_next_one() -> None:
+    target = disc()
+    start_m = target.centre_m.copy()
+    outcome, _, _ = scripted(DiscWorld(target), [None, None, UndoGrasp("again")], grasps=2)
+    motion = outcome.grasps[1].hand_motion_world
+    moved_m = np.asarray(motion.transformFrom(np.array([*start_m, 0.0])))[:2]
+    np.testing.assert_allclose(moved_m, target.centre_m, atol=4e-3)
+
+
+def test_nothing_to_take_back_is_told() -> None:
+    world = DiscWorld(disc())
+    outcome, _, _ = scripted(world, [UndoGrasp("oops")], grasps=1)
+    assert outcome.ending is Ending.COMPLETE
+    assert (Level.WARNING, "there is no grasp to take back") in world.events
+
+
+def test_vetoed_grasp_does_not_count() -> None:
+    world = DiscWorld(disc())
+    outcome, _, slam = scripted(world, [], grasps=2, vetoes={1})
+    assert [grasp.index for grasp in outcome.grasps] == [0, 1]
+    assert world.mark_counts[MarkKind.CAPTURE_END] == 3
+    assert slam.step_count == 2
+
+
+def test_hand_is_without_demand_for_as_long_as_the_session_pauses() -> None:
+    world = DiscWorld(disc())
+    outcome, _, _ = scripted(world, [None, *[Pause("coffee")] * 5], grasps=2)
+    assert outcome.ending is Ending.COMPLETE
+    assert world.hand.stops == 2  # the pause, the end
+    assert world.hand.resumes == 1
+    assert [text for _, text in world.events if "coffee" in text or text == "goes on"] == ["paused: coffee", "goes on"]
+
+
+def test_whoever_decides_ends_the_session() -> None:
+    outcome, _, _ = scripted(DiscWorld(disc()), [None, End("seen enough")])
+    assert (outcome.ending, outcome.reason, len(outcome.grasps)) == (Ending.COMPLETE, "seen enough", 1)
+
+
+def test_session_goes_on_after_a_failure_where_whoever_decides_says_so() -> None:
+    """A failure while the object is carried: the captured grasp counts and is estimated."""
+
+    def fail_once(world: DiscWorld) -> None:
+        if world.marks and world.marks[-1] is MarkKind.HOLD_BEGIN and not failures:
+            failures.append(True)
+            raise DeviceError("cable pulled", where="FF")
+
+    failures: list[bool] = []
+    world = DiscWorld(disc(), fail_once)
+    outcome, decisions, slam = scripted(world, [], grasps=2)
+    assert outcome.ending is Ending.COMPLETE
+    assert len(outcome.grasps) == slam.step_count == 2
+    assert decisions.errors == ["FF: cable pulled"]
+    assert world.mark_counts[MarkKind.HOLD_BEGIN] == world.mark_counts[MarkKind.HOLD_END] == 1
+
+
+def test_second_failure_ends_the_session_where_whoever_decides_says_so() -> None:
+    def fail(world: DiscWorld) -> None:
+        if world.cycles > 100:
+            raise DeviceError("cable pulled", where="FF")
+
+    outcome, decisions, _ = scripted(DiscWorld(disc(), fail), [])
+    assert outcome.ending is Ending.STOPPED
+    assert len(decisions.errors) == 2

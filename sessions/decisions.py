@@ -1,0 +1,178 @@
+"""Who decides what a session does next: the planner of an autonomous session, or a person.
+
+The conductor asks a decision maker before every grasp and tells it what came of it. Whoever decides moves nothing:
+the grasps are done by a performer, which follows the plan by itself or leads a person through it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias
+
+from gtsam import Pose3
+
+from sessions.explorer import KnownShape
+from sessions.grasp_cycle import GraspPlan
+from sessions.planner import Planner, Reorientation
+from sessions.safety import SafetySupervisor
+from tactile_lab.errors import TactileLabError
+from tactile_lab.geometry.contacts import Array, Grasp
+from tactile_lab.slam_result import SlamStep
+
+
+@dataclass(frozen=True)
+class DoGrasp:
+    """Do this grasp."""
+
+    plan: GraspPlan
+
+
+@dataclass(frozen=True)
+class UndoGrasp:
+    """Take the last grasp back: the estimate is what it was before it, and it is no part of the session."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class Wait:
+    """Nothing is decided yet: run a cycle and ask again."""
+
+
+@dataclass(frozen=True)
+class Pause:
+    """The hand is without demand and the positioner holds for as long as this is the answer."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class End:
+    """The session is done."""
+
+    reason: str
+
+
+Decision: TypeAlias = DoGrasp | UndoGrasp | Wait | Pause | End
+
+
+@dataclass(frozen=True)
+class Veto:
+    """A captured grasp that does not count."""
+
+    reason: str
+
+
+class GraspAbandonedError(Exception):
+    """Raised by a performer: whoever decides has given up the grasp in hand before it was captured."""
+
+
+class DecisionMaker(Protocol):
+    """Asked before each grasp, told after it. Grasps are numbered from 0."""
+
+    @property
+    def centre_m(self) -> Array:
+        """Where the middle of the object is thought to be, world x, y."""
+
+    def think(self, index: int) -> None:
+        """Prepare the decision about grasp ``index``; may take its time, in another thread."""
+
+    def decide(self, index: int) -> Decision:
+        """What to do now that grasp ``index`` is next; at once."""
+
+    def arrived(self, landings_world_m: list[Array]) -> None:
+        """The approach has ended; fingertips stood on the object at these places, (3,) each."""
+
+    def captured(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
+        """A grasp was measured, where ``plan`` says: how to carry the object now, or why the grasp does not count."""
+
+    def carried(self, hand_motion_world: Pose3) -> None:
+        """The hand carried the object since the grasp."""
+
+    def estimated(self, step: SlamStep) -> None:
+        """The estimation has taken the grasp."""
+
+    def undone(self, hand_motion_world: Pose3) -> None:
+        """The last grasp was taken back; the hand carried the object so far since the one before it."""
+
+    def failed(self, error: TactileLabError) -> bool:
+        """A device failed or a limit was passed, and everything stops: whether the session waits and goes on."""
+
+    def known_shape(self) -> KnownShape | None:
+        """The shape as estimated now; None before there is one."""
+
+
+class Performer(Protocol):
+    """Does grasps: the verbs of one, in the order in which they are called. See :class:`GraspCycle`."""
+
+    landings_world_m: list[Array]
+
+    @property
+    def plan(self) -> GraspPlan: ...
+    def descend(self, plan: GraspPlan) -> bool: ...
+    def close(self) -> None: ...
+    def settle(self) -> None: ...
+    def capture(self) -> Grasp: ...
+    def squeeze(self, touching: frozenset[str]) -> None: ...
+    def reorient(self, turn_rad: float, shift_world_m: Array, touching: frozenset[str]) -> Pose3: ...
+    def release(self) -> None: ...
+    def lift(self) -> None: ...
+    def idle(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Who runs a session.
+
+    Attributes:
+        supervisor: looks at every cycle.
+        performer: does the grasps.
+        decisions: decides about them.
+    """
+
+    supervisor: SafetySupervisor
+    performer: Performer
+    decisions: DecisionMaker
+
+
+class AutonomousDecisions:
+    """The planner decides, and every grasp counts.
+
+    Attributes:
+        planner: it.
+    """
+
+    def __init__(self, planner: Planner) -> None:
+        self.planner = planner
+        self._plan: GraspPlan | None = None
+
+    @property
+    def centre_m(self) -> Array:
+        return self.planner.centre_m
+
+    def think(self, index: int) -> None:
+        self._plan = self.planner.plan(index)
+
+    def decide(self, index: int) -> Decision:
+        return Wait() if self._plan is None else DoGrasp(self._plan)
+
+    def arrived(self, landings_world_m: list[Array]) -> None:
+        self.planner.landed(landings_world_m)
+
+    def captured(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
+        return self.planner.grasped(grasp, plan)
+
+    def carried(self, hand_motion_world: Pose3) -> None:
+        self.planner.carried(hand_motion_world)
+
+    def estimated(self, step: SlamStep) -> None:
+        self.planner.estimated(step.index)
+
+    def undone(self, hand_motion_world: Pose3) -> None:
+        self.planner.undone(hand_motion_world)
+
+    def failed(self, error: TactileLabError) -> bool:
+        return False
+
+    def known_shape(self) -> KnownShape | None:
+        return self.planner.known_shape()
