@@ -14,8 +14,9 @@ import numpy as np
 from gtsam import Pose3, Rot3
 from pydantic import AfterValidator, Field
 
+from tactile_lab.calibration_file import load_parameters
 from tactile_lab.geometry.contacts import FINGERS, Array
-from tactile_lab.strict_yaml import StrictModel, load_model
+from tactile_lab.strict_yaml import StrictModel
 
 GRAVITY = 9.80665
 """Standard gravity, m/s^2."""
@@ -130,4 +131,4 @@ def load_fingertips(path: Path) -> dict[str, FingertipCalibration]:
     Raises:
         ConfigurationError: the file is missing, not strict YAML, or does not fit the model.
     """
-    return load_model(path, FingertipCalibrationFile).fingertips
+    return load_parameters(path, FingertipCalibrationFile).fingertips

@@ -19,9 +19,10 @@ from drivers.biotac.electrodes import BallAndCylinder, ElectrodeCount, Ellipsoid
 from drivers.biotac.estimator import contact_from_electrodes, squeezed
 from drivers.biotac.slot_codec import SLOT_BYTES, SLOTS, Channel, decode_slot, electrode_channel
 from drivers.fingertip import RigidTransform, TipContact, Vector3
+from tactile_lab.calibration_file import load_parameters
 from tactile_lab.errors import CodecError, DeviceError
 from tactile_lab.geometry.contacts import FINGERS, Array
-from tactile_lab.strict_yaml import StrictModel, load_model
+from tactile_lab.strict_yaml import StrictModel
 
 
 class TactileReading(Protocol):
@@ -111,7 +112,7 @@ class _CalibrationFile(StrictModel):
 
 def load_biotacs(path: Path) -> dict[str, BioTacCalibration]:
     """Read a BioTac calibration file: finger name to calibration. Raises ConfigurationError."""
-    return load_model(path, _CalibrationFile).biotacs
+    return load_parameters(path, _CalibrationFile).biotacs
 
 
 class BioTac:

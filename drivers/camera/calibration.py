@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 from pydantic import Field, field_validator
 
+from tactile_lab.calibration_file import load_parameters
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.strict_yaml import StrictModel, load_model, validate
+from tactile_lab.strict_yaml import StrictModel, validate
 
 _DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 
@@ -83,7 +84,7 @@ def load_camera(path: Path) -> CameraCalibration:
             head = file.read(9)
     except OSError as error:
         raise ConfigurationError(f"cannot be read ({error.strerror})", where=str(path)) from error
-    return _opencv(path) if head == b"%YAML:1.0" else load_model(path, CameraCalibration)
+    return _opencv(path) if head == b"%YAML:1.0" else load_parameters(path, CameraCalibration)
 
 
 def _opencv(path: Path) -> CameraCalibration:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from drivers.shadow.interpolation import Curves, Plane
 from drivers.shadow.kinematics import JOINT_INDEX, JOINTS
 from drivers.shadow.palm_codec import OPTIONAL_CHANNELS, SENSORS
-from tactile_lab import strict_yaml
+from tactile_lab.calibration_file import load_parameters
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.strict_yaml import StrictModel
@@ -71,7 +71,7 @@ class JointCalibration:
         Raises:
             ConfigurationError: the file or one of its tables cannot be used; names the joint.
         """
-        content = strict_yaml.load_model(path, _CalibrationFile)
+        content = load_parameters(path, _CalibrationFile)
         _refuse_repeats([joint for joint, _ in content.sr_calibrations], str(path))
         _refuse_repeats([joint for pair, _ in content.sr_calibrations_coupled for joint in pair], str(path))
         return cls(dict(content.sr_calibrations), dict(content.sr_calibrations_coupled), str(path))

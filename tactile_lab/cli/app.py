@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli import bench, evaluate, experiment, reconstruct, report, rig, run, session, sweep
+from tactile_lab.cli import bench, calibrate, evaluate, experiment, reconstruct, report, rig, run, session, sweep
 
 app = typer.Typer(
     help="Tactile SLAM in the laboratory: the shape and pose of an unknown object from a few fingertip contacts.",
@@ -22,6 +22,7 @@ app.command("report")(report.report)
 app.command("sweep")(sweep.sweep)
 app.command("bench")(bench.bench)
 app.command("experiment")(experiment.experiment)
+app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(session.app, name="session")
 app.add_typer(rig.app, name="rig")
 

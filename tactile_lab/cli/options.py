@@ -48,4 +48,11 @@ SessionName = Annotated[
     str, typer.Argument(metavar="SESSION", help="A session's folder, its name under --root, or 'last'.")
 ]
 RigName = Annotated[str, typer.Option("--rig", help="Name of a shipped rig, or a rig file.")]
+AllowUncalibrated = Annotated[
+    bool,
+    typer.Option(
+        "--allow-uncalibrated",
+        help="Begin though a calibration is missing, expired, failed or foreign; the session records that.",
+    ),
+]
 NoInput = Annotated[bool, typer.Option("--no-input", help="Never ask (no command does so far).")]

@@ -35,6 +35,8 @@ def conclude(finished: FinishedSession, as_json: bool, extra: Mapping[str, Any] 
         show_evaluation(finished.evaluation.as_json())
     _tell_files(finished)
     _tell_losses(finished)
+    for objection in finished.overlooked:
+        warn(f"{objection}: allowed, and recorded")
     for reservation in finished.evaluation.warnings if finished.evaluation else ():
         warn(reservation)
     if finished.problem:

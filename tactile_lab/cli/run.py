@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tactile_lab.cli.loading import interruptions_held
-from tactile_lab.cli.options import METHOD_HELP, Json, Method, NoInput, RigName
+from tactile_lab.cli.options import METHOD_HELP, AllowUncalibrated, Json, Method, NoInput, RigName
 
 
 def run(
@@ -24,6 +24,7 @@ def run(
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder in which the session's folder is made.")] = Path("runs"),
     notes: Annotated[str, typer.Option(help="The operator's notes, kept with the session.")] = "",
+    allow_uncalibrated: AllowUncalibrated = False,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -37,7 +38,7 @@ def run(
         from tactile_lab.workflow.running import SessionRequest, run_session
 
     del no_input  # an autonomous session asks nothing; the option is there so that scripts can always give it
-    request = SessionRequest(rig, object_name, out, method, dimension, seed, grasps, notes)
+    request = SessionRequest(rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated)
     with LiveProgress(f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}") as progress:
         finished = run_session(request, progress)
     conclude(finished, as_json)

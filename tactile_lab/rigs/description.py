@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
+from calibration.admission import Installation
 from drivers.ati.nano17 import Nano17Settings
 from drivers.positioner import PositionerSettings
 from drivers.shadow.hand import HandSettings
@@ -59,6 +60,9 @@ class RigDescription(StrictModel):
         cycle_s: period of the common cycle, seconds.
         fingertips: the kind of fingertip on all fingers.
         calibration: files to use.
+        station: the installation that the calibrations belong to, so that several rig files of one can share them;
+            the rig's own name unless given.
+        devices: serial numbers by device name (hand, base, camera, ft/FF ...); a calibration of another is refused.
         hand, nano17, base, perception, conductor: settings of the parts.
         motion: how far a re-oriented object strays from the hand's motion on this rig, one standard deviation.
         simulation: the simulated world (its fingertips follow ``fingertips``).
@@ -70,6 +74,8 @@ class RigDescription(StrictModel):
     cycle_s: float = Field(ge=0.001, le=0.02)
     fingertips: Literal["nano17", "biotac"]
     calibration: CalibrationFiles
+    station: str = ""
+    devices: dict[str, str] = Field(default_factory=dict)
     hand: HandSettings = HandSettings()
     nano17: Nano17Settings = Nano17Settings()
     base: PositionerSettings = PositionerSettings()
@@ -86,6 +92,11 @@ class Rig:
     description: RigDescription
     files: dict[str, Path]
     source: str
+
+    @property
+    def installation(self) -> Installation:
+        """What a calibration has to belong to."""
+        return Installation(self.description.station or self.description.name, self.description.devices)
 
     def plain(self) -> dict[str, Any]:
         """The description as plain data, the form kept in ``session.yaml``."""

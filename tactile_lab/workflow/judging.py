@@ -51,6 +51,7 @@ class FinishedSession:
         data_loss: what was dropped or not recorded while the session ran, by kind.
         unread: what of the recording could not be read, in words; "" when all of it was.
         problem: why there is no evaluation, "" when there is one.
+        overlooked: calibrations that were used though they should not be, in words.
     """
 
     folder: Path
@@ -60,6 +61,7 @@ class FinishedSession:
     data_loss: Mapping[str, int] = field(default_factory=dict)
     unread: str = ""
     problem: str = ""
+    overlooked: tuple[str, ...] = ()
 
 
 def evaluate_session(session: Session) -> FinishedSession:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from calibration.admission import UNCALIBRATED, admit
 from drivers.simulation.world import SimulatedWorld
 from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome, autonomous_crew
 from sessions.manifest import Status
@@ -32,6 +33,7 @@ class SessionRequest:
         seed: of everything that is left to chance.
         grasps: how many; the rig's own number when None.
         notes: the operator's.
+        allow_uncalibrated: begin though a calibration is missing, expired, failed or foreign; the session records it.
     """
 
     rig: str
@@ -42,6 +44,7 @@ class SessionRequest:
     seed: int = 0
     grasps: int | None = None
     notes: str = ""
+    allow_uncalibrated: bool = False
 
 
 def slam_settings(method: str, dimension: int, motion: MotionNoise) -> SlamSettings:
@@ -69,9 +72,10 @@ def run_session(request: SessionRequest, progress: Progress) -> FinishedSession:
     refuse_known_pose(request.method)
     rig = load_rig(request.rig)
     check_calibration(rig)
+    overlooked = admit(rig.files, rig.installation, allow_uncalibrated=request.allow_uncalibrated)
     world = simulated_world(rig, request.seed, request.object_name)
     slam = TactileSlam(slam_settings(request.method, request.dimension, rig.description.motion), request.seed)
-    session = _new_session(rig, world, slam, request)
+    session = _new_session(rig, world, slam, request, overlooked)
     try:
         outcome = _record(session, rig, world, slam, request, progress)
         progress.phase(len(outcome.grasps), "model and evaluation")
@@ -80,7 +84,7 @@ def run_session(request: SessionRequest, progress: Progress) -> FinishedSession:
     except KeyboardInterrupt:
         hint = f"What was recorded is kept: tactile-lab session replay {session.folder}"
         raise InterruptionError("interrupted before it was done", where=str(session.folder), hint=hint) from None
-    return replace(finished, outcome=outcome, data_loss=session.manifest.data_loss)
+    return replace(finished, outcome=outcome, data_loss=session.manifest.data_loss, overlooked=overlooked)
 
 
 def _record(
@@ -106,7 +110,9 @@ def _record(
     return outcome
 
 
-def _new_session(rig: Rig, world: SimulatedWorld, slam: TactileSlam, request: SessionRequest) -> RunningSession:
+def _new_session(
+    rig: Rig, world: SimulatedWorld, slam: TactileSlam, request: SessionRequest, overlooked: tuple[str, ...]
+) -> RunningSession:
     return create_session(
         request.root,
         rig=rig.description.name,
@@ -118,6 +124,7 @@ def _new_session(rig: Rig, world: SimulatedWorld, slam: TactileSlam, request: Se
             "slam": slam.settings.model_dump(mode="json"),
             "grasps": _conductor_settings(rig, request).grasps,
             "markers": world.marker_settings.model_dump(mode="json"),
+            **({UNCALIBRATED: list(overlooked)} if overlooked else {}),
         },
         notes=request.notes,
         truth_mesh_ply=_ply(world),

@@ -9,6 +9,10 @@ from pathlib import Path
 
 import pytest
 import trimesh
+import yaml
+
+from tactile_lab.calibration_file import is_stored
+from tactile_lab.strict_yaml import load
 
 RIGS = Path(str(resources.files("tactile_lab.rigs")))
 CALIBRATION = "calibrations/simulated-hand"
@@ -16,8 +20,11 @@ CALIBRATION = "calibrations/simulated-hand"
 
 @pytest.fixture
 def rig_file(tmp_path: Path) -> Path:
-    """A rig file of one's own, with calibration beside it."""
+    """A rig file of one's own, with calibration beside it, in plain form: one may write such files by hand."""
     shutil.copytree(RIGS / "calibrations", tmp_path / "calibrations")
+    for file in (tmp_path / CALIBRATION).iterdir():
+        if is_stored(content := load(file)):
+            file.write_text(yaml.safe_dump(content["parameters"], sort_keys=False, default_flow_style=None))
     return Path(shutil.copy(RIGS / "sim.yaml", tmp_path / "mine.yaml"))
 
 
@@ -92,9 +99,24 @@ def test_a_broken_calibration_is_found_before_anything_is_recorded(inside, rig_f
     assert not (rig_file.parent / "runs").exists()
 
 
+def test_a_session_refuses_a_calibration_without_a_record_unless_allowed(inside, rig_file):
+    words = ("forearm calibration", "is not a stored calibration", "--allow-uncalibrated")
+    one_line(inside("run", "--rig", rig_file, "--out", rig_file.parent / "runs"), 2, "rig simulated-hand", *words)
+    assert not (rig_file.parent / "runs").exists()
+
+
+def test_a_session_refuses_a_calibration_changed_by_hand(inside, rig_file):
+    stored = (RIGS / CALIBRATION / "forearm.yaml").read_text()
+    changed = stored.replace("translation_m: [0.0, 0.0, 0.0]", "translation_m: [0.0, 0.0, 0.01]")
+    (rig_file.parent / CALIBRATION / "forearm.yaml").write_text(changed)
+    one_line(inside("run", "--rig", rig_file, "--out", rig_file.parent / "runs"), 2, "forearm.yaml", "changed by hand")
+
+
 def test_a_finger_without_a_calibrated_tip_is_told(inside, rig_file):
     fingertips = rig_file.parent / CALIBRATION / "fingertips.yaml"
-    fingertips.write_text(fingertips.read_text().replace("  MF: *tip\n", ""))
+    content = load(fingertips)
+    del content["fingertips"]["MF"]
+    fingertips.write_text(yaml.safe_dump(content))
     answer = inside("rig", "check", rig_file)
     assert answer.code == 0
     assert re.search(r"fingertip MF +ok +none", answer.err)

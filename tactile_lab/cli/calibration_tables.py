@@ -1,0 +1,55 @@
+"""How calibrations are shown to people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from calibration.store import CalibrationRecord
+from tactile_lab.cli.console import say, show_facts
+
+_LONGEST = 12
+
+
+def show_record(title: str, record: CalibrationRecord) -> None:
+    """One stored calibration."""
+    facts = [
+        ("kind", record.kind),
+        ("rig", record.rig),
+        ("method", record.method),
+        ("made", record.created_utc),
+        ("valid until", record.valid_until_utc or "for ever"),
+        ("devices", ", ".join(f"{device} {serial}" for device, serial in record.devices.items())),
+        *_lines(record.parameters),
+        *_lines(record.details),
+        *_lines(record.residuals),
+        *((f"limit {name}", f"{value:g}") for name, value in record.limits.items()),
+        ("notes", record.notes),
+    ]
+    show_facts(title, facts)
+    tell_verdict(record)
+
+
+def tell_verdict(record: CalibrationRecord) -> None:
+    """PASS or FAIL, in its colour."""
+    say(record.verdict, "bold green" if record.verdict == "PASS" else "bold red")
+
+
+def _lines(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Nested names with their values; long lists by their length."""
+    for name, value in content.items():
+        place = f"{prefix}{name}"
+        if isinstance(value, Mapping):
+            yield from _lines(value, f"{place}.")
+        else:
+            yield place, _text(value)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list | tuple):
+        if len(value) > _LONGEST or any(isinstance(part, list | tuple | Mapping) for part in value):
+            return f"{len(value)} entries"
+        return "  ".join(map(_text, value))
+    return str(value)
