@@ -15,6 +15,7 @@ from drivers.ethercat.registers import SyncManager
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motors import MotorMap
 from drivers.shadow.palm_images import BRIDGE_PRODUCT, CAN_BYTES, PALMS, SHADOW_VENDOR, PalmImage, PalmName
+from drivers.simulation.hand_plant import HandPlant
 from drivers.simulation.motor_bank import MotorBank
 from drivers.simulation.palm_emulator import CanBuses, JointSensors, NoTactile, PalmEmulator
 from drivers.simulation.settings import JointSensorSettings
@@ -95,11 +96,11 @@ class ChainSettings:
 
 @dataclass(frozen=True)
 class EmulatedHand:
-    """A hand in free air on a ring, with its parts in reach."""
+    """A hand on a ring, with its parts in reach."""
 
     ring: EmulatedRing
     palm: PalmApplication
-    plant: FreeHand
+    plant: HandPlant
 
     @property
     def palm_slave(self) -> SlaveController:
@@ -118,8 +119,10 @@ def emulated_hand(
     settings: ChainSettings | None = None,
     motor_map: MotorMap | None = None,
     can: CanBuses | None = None,
+    plant: HandPlant | None = None,
+    sensors: JointSensorSettings | None = None,
 ) -> EmulatedHand:
-    """A stand-alone hand in free air.
+    """A hand on a ring.
 
     Args:
         clock: its time.
@@ -127,11 +130,13 @@ def emulated_hand(
         settings: what kind of hand.
         motor_map: which motor pulls which joint.
         can: the motors' buses.
+        plant: what its motors move; a hand in free air unless given.
+        sensors: errors of its joint sensors.
     """
-    settings = settings or ChainSettings()
-    image, plant = PALMS[settings.palm], FreeHand(clock)
+    settings, plant = settings or ChainSettings(), plant or FreeHand(clock)
+    image = PALMS[settings.palm]
     rng = np.random.default_rng(settings.seed)
-    joints = JointSensors(calibration, JointSensorSettings(), rng)
+    joints = JointSensors(calibration, sensors or JointSensorSettings(), rng)
     motors = MotorBank(plant, motor_map or MotorMap.load(), rng)
     palm = PalmEmulator(plant, joints, motors, NoTactile(), rng, image, can)
     application = PalmApplication(palm, motors, image, clock, settings.service_ns)

@@ -8,8 +8,8 @@ import numpy as np
 from drivers.camera.camera import TRIGGER
 from drivers.links import Datagram
 from drivers.simulation.camera_renderer import Placed, TableCamera
+from drivers.simulation.hand_plant import SeenPlant
 from drivers.simulation.objects import ObjectModel
-from drivers.simulation.plant import Plant
 from tactile_lab.errors import CodecError
 from tactile_lab.geometry.poses import transform_points
 
@@ -28,7 +28,7 @@ class CameraEmulator:
 
     def __init__(
         self,
-        plant: Plant,
+        plant: SeenPlant,
         camera: TableCamera,
         target: ObjectModel,
         table_marker: Placed,

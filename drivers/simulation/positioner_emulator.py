@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from drivers.links import Datagram
 from drivers.positioner_codec import PositionerStatus, decode_command, encode_status
-from drivers.simulation.plant import Plant
+from drivers.simulation.hand_plant import CarriedPlant
 
 
 class PositionerEmulator:
@@ -14,7 +14,7 @@ class PositionerEmulator:
         plant: what it moves.
     """
 
-    def __init__(self, plant: Plant) -> None:
+    def __init__(self, plant: CarriedPlant) -> None:
         self._plant = plant
         self._outbox: list[Datagram] = []
 

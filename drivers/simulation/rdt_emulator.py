@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from drivers.ati import rdt_codec
 from drivers.ati.rdt_codec import RECORD, Command
 from drivers.links import Datagram
+from drivers.simulation.hand_plant import LoadedPlant
 from drivers.simulation.plant import Plant
 from drivers.simulation.settings import ForceSensorSettings
 from tactile_lab.clock import NANOSECONDS
@@ -39,7 +40,7 @@ class NanoSensors:
         rng: where they come from.
     """
 
-    def __init__(self, plant: Plant, settings: ForceSensorSettings, rng: np.random.Generator) -> None:
+    def __init__(self, plant: LoadedPlant, settings: ForceSensorSettings, rng: np.random.Generator) -> None:
         self._plant, self._rng = plant, rng
         self._offset = _six(settings.offset_N, settings.offset_Nm) * rng.standard_normal(_SHAPE)
         self._keep = float(np.exp(-1 / (settings.rate_hz * settings.drift_time_s)))

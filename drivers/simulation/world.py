@@ -21,6 +21,7 @@ from drivers.simulation.biotac_emulator import BiotacSection, BiotacSkin
 from drivers.simulation.calibration import SimulatedCalibration
 from drivers.simulation.camera_emulator import CameraEmulator
 from drivers.simulation.camera_renderer import PrintedMarker, TableCamera
+from drivers.simulation.hand_plant import SeenPlant
 from drivers.simulation.model import build_model
 from drivers.simulation.motor_bank import MotorBank
 from drivers.simulation.objects import ObjectModel, object_model
@@ -119,7 +120,7 @@ class SimulatedWorld:
         self._peers["base"] = PositionerEmulator(self._plant)
         if settings.fingertips == "nano17":
             self._add_force_sensors()
-        self._peers["camera"] = self._build_camera()
+        self._peers["camera"] = self.build_camera(self._plant)
         self._plugs = {name: _Plug(peer) for name, peer in self._peers.items()}
         self.clock = SimulatedClock(self)
 
@@ -134,6 +135,11 @@ class SimulatedWorld:
     def plug_in(self, name: str) -> None:
         """Put a device's cable in again; what was sent meanwhile is lost."""
         self._plugs[name].plugged = True
+
+    @property
+    def plant(self) -> Plant:
+        """The physics itself, for whoever steps it in another way than by the clock."""
+        return self._plant
 
     @property
     def marker_settings(self) -> MarkerSettings:
@@ -217,13 +223,14 @@ class SimulatedWorld:
         }
         return BiotacSection(self._plant, biotacs)
 
-    def _build_camera(self) -> CameraEmulator:
+    def build_camera(self, plant: SeenPlant) -> CameraEmulator:
+        """This rig's camera over a plant."""
         markers = self.marker_settings
         camera = TableCamera(self.calibration.camera, self.settings.camera, self._random["camera"])
         table = PrintedMarker(markers.dictionary, markers.world_id, markers.world_side_m)
         glued = PrintedMarker(markers.dictionary, markers.object_id, markers.object_side_m)
         return CameraEmulator(
-            self._plant,
+            plant,
             camera,
             self.object_model,
             (table, markers.world_T_worldmarker.pose()),

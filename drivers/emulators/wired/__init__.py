@@ -1,0 +1,1 @@
+"""Emulators on real wires that share one simulated plant: a process each, so that any of them can fail alone."""

@@ -1,0 +1,43 @@
+"""The positioner on a UDP socket, fed by the plant."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import sys
+from pathlib import Path
+from typing import Any
+
+from drivers.emulators.wired.plant_mirror import PlantMirror
+from drivers.emulators.wired.sockets import bound
+from drivers.simulation.positioner_emulator import PositionerEmulator
+from tactile_lab.clock import Clock
+from tactile_lab.errors import CodecError
+
+
+class BaseStation:
+    """Answers each command at once."""
+
+    def __init__(self, emulator: PositionerEmulator, wire: socket.socket) -> None:
+        self._emulator, self._wire = emulator, wire
+
+    def serve(self) -> None:
+        """Serve until standard input ends."""
+        while sys.stdin not in (ready := select.select([sys.stdin, self._wire], [], [])[0]):
+            if ready:
+                self._answer()
+        self._wire.close()
+
+    def _answer(self) -> None:
+        with contextlib.suppress(CodecError, ConnectionError):  # a device does not care who listens
+            payload, client = self._wire.recvfrom(1000)
+            self._emulator.write(payload)
+            for status in self._emulator.read():
+                self._wire.sendto(status.payload, client)
+
+
+def make(start: dict[str, Any], clock: Clock) -> BaseStation:
+    """The positioner at ``host`` and ``port``."""
+    mirror = PlantMirror(Path(start["mirror"]), clock)
+    return BaseStation(PositionerEmulator(mirror), bound(socket.SOCK_DGRAM, start["host"], start["port"], "base"))

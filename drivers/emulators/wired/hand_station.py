@@ -1,0 +1,51 @@
+"""The hand's two EtherCAT slaves on the far end of its cable, fed by the plant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from drivers.emulators.ethercat_server import HandServer
+from drivers.emulators.motor_can import MotorCanBuses
+from drivers.emulators.shadow_chain import ChainSettings, EmulatedHand, emulated_hand
+from drivers.emulators.wired.plant_mirror import PlantMirror
+from drivers.ethercat.ports import RawPort
+from drivers.shadow.joint_calibration import JointCalibration
+from drivers.shadow.motors import MotorMap
+from drivers.shadow.real_time import request_real_time
+from drivers.simulation.settings import JointSensorSettings
+from tactile_lab.clock import Clock
+
+
+class HandStation:
+    """A hand that serves frames."""
+
+    def __init__(self, hand: EmulatedHand, interface: str, can: MotorCanBuses, clock: Clock) -> None:
+        self._hand, self._can, self._clock = hand, can, clock
+        self._port = RawPort(interface)
+        self._port.open()
+
+    def serve(self) -> None:
+        """Serve until standard input ends. Raises DeviceError when the interface goes."""
+        request_real_time()
+        HandServer(self._hand, self._port, self._can, self._clock).run()
+
+
+def make(start: dict[str, Any], clock: Clock) -> HandStation:
+    """The hand at the interface ``far_end``, with the joint and motor tables of the files named.
+
+    Raises:
+        DeviceError: the interface can not be used.
+        ConfigurationError: a file that can not be used.
+    """
+    can = MotorCanBuses()
+    hand = emulated_hand(
+        clock,
+        JointCalibration.load(Path(start["joints"])),
+        ChainSettings(palm=start["palm"], eeprom="mapped", serial=start["serial"], seed=start["seed"]),
+        MotorMap.load(Path(start["motors"])),
+        can,
+        PlantMirror(Path(start["mirror"]), clock),
+        JointSensorSettings.model_validate(start["joint_sensors"]),
+    )
+    return HandStation(hand, start["far_end"], can, clock)

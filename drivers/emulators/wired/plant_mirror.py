@@ -1,0 +1,153 @@
+"""What the emulators of one laboratory share: the plant's newest state, and what drives it, in shared memory.
+
+The plant's process writes the state after every step and reads the demands before the next. Emulators, each in its own
+process, read the state whenever their device would measure and write their own demand. Nobody waits for anybody.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+from pathlib import Path
+
+import numpy as np
+from gtsam import Pose3
+from numpy.typing import NDArray
+
+from tactile_lab.clock import Clock
+from tactile_lab.errors import DeviceError
+from tactile_lab.geometry.contacts import Array
+
+_STATE = np.dtype(
+    [
+        ("joints_rad", "<f8", 24),
+        ("motor_torque_Nm", "<f8", 20),
+        ("base", "<f8", 6),
+        ("wrenches", "<f8", (5, 6)),
+        ("world_T_object", "<f8", (4, 4)),
+    ]
+)
+_MEMORY = np.dtype(
+    [
+        ("beat", "<u8"),  # odd while the state is being written
+        ("stamp_ns", "<i8"),
+        ("lost_ns", "<i8"),
+        ("state", _STATE),
+        ("duty", "<f8", 20),
+        ("base_target", "<f8", 6),
+    ]
+)
+_TRIES = 1000
+
+
+class PlantMirror:
+    """A plant seen through shared memory, as an emulator needs it; times are those of the common clock.
+
+    Args:
+        path: the file that holds the memory, made by :meth:`create`.
+        clock: for :attr:`stamp_ns`; a device measures when it is asked.
+
+    Raises:
+        DeviceError: no such file, or another program's.
+    """
+
+    def __init__(self, path: Path, clock: Clock) -> None:
+        self._clock = clock
+        try:
+            with path.open("r+b") as file:
+                if os.fstat(file.fileno()).st_size != _MEMORY.itemsize:
+                    raise DeviceError("is no plant's memory", where=str(path), hint="Start the laboratory again")
+                self._memory = np.frombuffer(mmap.mmap(file.fileno(), _MEMORY.itemsize), _MEMORY)
+        except OSError as error:
+            raise DeviceError(f"no plant's memory ({error.strerror})", where=str(path)) from error
+
+    @classmethod
+    def create(cls, path: Path, clock: Clock, base: Array) -> PlantMirror:
+        """Make the memory, with the positioner's target where it stands."""
+        path.write_bytes(bytes(_MEMORY.itemsize))
+        mirror = cls(path, clock)
+        mirror._memory["base_target"][0] = base
+        return mirror
+
+    # --- for emulators -----------------------------------------------------------------------------------------
+
+    @property
+    def stamp_ns(self) -> int:
+        """Now."""
+        return self._clock.now_ns()
+
+    @property
+    def joints_rad(self) -> Array:
+        """True joint angles, shape (24,)."""
+        return np.asarray(self._state()["joints_rad"])
+
+    @property
+    def motor_torque_Nm(self) -> Array:
+        """Torque of each driven joint's motor, shape (20,)."""
+        return np.asarray(self._state()["motor_torque_Nm"])
+
+    @property
+    def base(self) -> Array:
+        """True positioner joints, shape (6,)."""
+        return np.asarray(self._state()["base"])
+
+    @property
+    def wrenches(self) -> Array:
+        """Loads on the five fingertips, shape (5, 6), sensor frames."""
+        return np.asarray(self._state()["wrenches"])
+
+    @property
+    def world_T_object(self) -> Pose3:
+        """True pose of the object."""
+        return Pose3(np.asarray(self._state()["world_T_object"]))
+
+    def drive(self, duty: Array) -> None:
+        """Duty cycles from now on, shape (20,), -1 to 1."""
+        self._memory["duty"][0] = duty
+
+    def move_base(self, target: Array) -> None:
+        """The positioner's targets from now on, shape (6,)."""
+        self._memory["base_target"][0] = target
+
+    # --- for the plant -----------------------------------------------------------------------------------------
+
+    @property
+    def demands(self) -> tuple[Array, Array]:
+        """Duty cycles, shape (20,), and the positioner's targets, shape (6,)."""
+        return self._memory["duty"][0].copy(), self._memory["base_target"][0].copy()
+
+    def publish(
+        self, stamp_ns: int, joints_rad: Array, torque_Nm: Array, base: Array, wrenches: Array, world_T_object: Pose3
+    ) -> None:
+        """Show a new state; see the properties for shapes."""
+        memory = self._memory
+        memory["beat"] += 1
+        memory["state"][0] = (joints_rad, torque_Nm, base, wrenches, world_T_object.matrix())
+        memory["stamp_ns"] = stamp_ns
+        memory["beat"] += 1
+
+    def count_lost(self, lost_ns: int) -> None:
+        """The plant was so late that this time is left out of it."""
+        self._memory["lost_ns"] += lost_ns
+
+    # --- for people --------------------------------------------------------------------------------------------
+
+    @property
+    def lost_ns(self) -> int:
+        """Time by which the plant stayed behind the clock, for good."""
+        return int(self._memory["lost_ns"][0])
+
+    @property
+    def age_ns(self) -> int:
+        """How old the state is."""
+        return self._clock.now_ns() - int(self._memory["stamp_ns"][0])
+
+    def _state(self) -> NDArray[np.void]:
+        """A state that was not being written while it was read; the newest look after too many tries."""
+        memory = self._memory
+        for _ in range(_TRIES):
+            before = int(memory["beat"][0])
+            state: NDArray[np.void] = memory["state"][0].copy()
+            if not before & 1 and int(memory["beat"][0]) == before:
+                break
+        return state

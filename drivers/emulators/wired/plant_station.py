@@ -1,0 +1,72 @@
+"""The physics in real time: steps with the clock, shows its state, takes demands."""
+
+from __future__ import annotations
+
+import select
+import sys
+from pathlib import Path
+from typing import Any
+
+from drivers.emulators.wired.plant_mirror import PlantMirror
+from drivers.simulation.plant import Plant, STEP_ns
+from drivers.simulation.settings import SimulationSettings
+from drivers.simulation.world import SimulatedWorld
+from tactile_lab.clock import Clock
+
+_LONGEST_ns = 100_000_000
+"""A delay that the physics makes up for; of a longer one the rest is left out, and counted."""
+
+_LOOK_EVERY = 50
+
+
+class PlantStation:
+    """Drives a plant.
+
+    Args:
+        plant: at rest.
+        mirror: where others see it.
+        clock: its time.
+    """
+
+    def __init__(self, plant: Plant, mirror: PlantMirror, clock: Clock) -> None:
+        self._plant, self._mirror, self._clock = plant, mirror, clock
+        self._publish()
+
+    def serve(self) -> None:
+        """Step until standard input ends."""
+        behind_ns, turns = self._clock.now_ns() - self._plant.stamp_ns, 0
+        while turns % _LOOK_EVERY or not select.select([sys.stdin], [], [], 0)[0]:
+            behind_ns += self._catch_up(self._clock.now_ns() - behind_ns)
+            turns += 1
+            self._clock.sleep_until_ns(self._plant.stamp_ns + behind_ns + STEP_ns)
+
+    def _catch_up(self, due_ns: int) -> int:
+        """Step up to a time of the plant's own; by how much it stayed behind for good, nanoseconds."""
+        late_ns = due_ns - self._plant.stamp_ns
+        lost_ns = max(late_ns - _LONGEST_ns, 0)
+        duty, base_target = self._mirror.demands
+        self._plant.drive(duty)
+        self._plant.move_base(base_target)
+        self._plant.advance((late_ns - lost_ns) // STEP_ns)
+        self._mirror.count_lost(lost_ns)
+        self._publish()
+        return lost_ns
+
+    def _publish(self) -> None:
+        plant = self._plant
+        self._mirror.publish(
+            self._clock.now_ns(),
+            plant.joints_rad,
+            plant.motor_torque_Nm,
+            plant.base,
+            plant.wrenches,
+            plant.world_T_object,
+        )
+
+
+def make(start: dict[str, Any], clock: Clock) -> PlantStation:
+    """The plant of a simulated rig's settings and seed, shown in the memory at ``mirror``."""
+    world = SimulatedWorld(SimulationSettings.model_validate(start["simulation"]), start["seed"])
+    mirror = PlantMirror(Path(start["mirror"]), clock)
+    mirror.move_base(world.plant.base)
+    return PlantStation(world.plant, mirror, clock)
