@@ -8,21 +8,22 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from pathlib import Path
-from typing import Annotated, Literal, Protocol
+from typing import Protocol
 
 import numpy as np
-from pydantic import Field
 
 from drivers.biotac.channels import Channels
-from drivers.biotac.electrodes import BallAndCylinder, ElectrodeCount, EllipsoidSkin, Skin, electrode_layout
+from drivers.biotac.electrodes import electrode_layout
 from drivers.biotac.estimator import contact_from_electrodes, squeezed
-from drivers.biotac.slot_codec import SLOT_BYTES, SLOTS, Channel, decode_slot, electrode_channel
-from drivers.fingertip import RigidTransform, TipContact, Vector3
-from tactile_lab.calibration_file import load_parameters
-from tactile_lab.errors import CodecError, DeviceError
+from drivers.biotac.learned_normal import LearnedNormals
+from drivers.biotac.settings import BioTacCalibration, BioTacSettings, EllipsoidSkinSettings, load_biotacs
+from drivers.biotac.slot_codec import SLOT_BYTES, SLOTS, Channel, Slot, decode_slot, electrode_channel
+from drivers.fingertip import TipContact
+from tactile_lab.clock import NANOSECONDS
+from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
 from tactile_lab.geometry.contacts import FINGERS, Array
-from tactile_lab.strict_yaml import StrictModel
+
+__all__ = ["BioTac", "BioTacCalibration", "BioTacSettings", "EllipsoidSkinSettings", "TactileReading", "load_biotacs"]
 
 
 class TactileReading(Protocol):
@@ -38,89 +39,33 @@ class TactileReading(Protocol):
     def tactile(self) -> bytes: ...
 
 
-class BallAndCylinderSkin(StrictModel):
-    """Skin of the 19-electrode model."""
-
-    kind: Literal["ball-and-cylinder"]
-    radius_m: float = Field(default=0.007, gt=0.0)
-
-    def surface(self) -> Skin:
-        """The skin described."""
-        return BallAndCylinder(self.radius_m)
-
-
-class EllipsoidSkinSettings(StrictModel):
-    """Skin as an ellipsoid in the BioTac frame."""
-
-    kind: Literal["ellipsoid"]
-    semi_axes_m: Vector3
-    centre_m: Vector3 = (0.0, 0.0, 0.0)
-
-    def surface(self) -> Skin:
-        """The skin described."""
-        return EllipsoidSkin(self.semi_axes_m, self.centre_m)
-
-
-class BioTacCalibration(StrictModel):
-    """One BioTac: model, mounting and what its signals mean.
-
-    Attributes:
-        electrodes: 19, or 24 for the BioTac SP.
-        distal_T_sensor: BioTac frame (x to the tip, z to the back of the finger) in the distal frame.
-        skin: the touched surface; the model's own when left out.
-        N_per_pdc_count: force per count of fluid pressure while the skin does not rest on the core.
-        N_per_electrode_count: force per count of squeezed electrodes, for harder contacts.
-        touch_pdc_counts: pressure above the tare that means contact (10 counts, protocols D.4).
-        electrode_noise_counts: smaller changes of an electrode are noise.
-        weight_power: exponent of equation 2.24's weights.
-        point_sigma_m: of the contact point along the skin, per axis; across it a third of that.
-        normal_sigma_rad: of the normal, per axis.
-    """
-
-    electrodes: ElectrodeCount
-    distal_T_sensor: RigidTransform
-    skin: Annotated[BallAndCylinderSkin | EllipsoidSkinSettings, Field(discriminator="kind")] | None = None
-    N_per_pdc_count: float = Field(default=0.005, gt=0.0)
-    N_per_electrode_count: float = Field(default=0.001, gt=0.0)
-    touch_pdc_counts: float = Field(default=10.0, gt=0.0)
-    electrode_noise_counts: float = Field(default=15.0, ge=0.0)
-    weight_power: float = Field(default=1.0, gt=0.0)
-    point_sigma_m: float = Field(default=0.00085, gt=0.0)
-    normal_sigma_rad: float = Field(default=0.12, gt=0.0)
-
-
-class BioTacSettings(StrictModel):
-    """How readings are judged.
-
-    Attributes:
-        tare_samples: newest readings of each channel that a tare averages.
-        tare_pdc_spread, tare_electrode_spread: how far they may lie apart, counts, largest minus smallest.
-        touch_samples: pressure readings in a row that must mean contact before a capture counts as touched.
-        stale_ms: age after which a channel counts as silent.
-    """
-
-    tare_samples: int = Field(default=5, ge=2)
-    tare_pdc_spread: float = Field(default=8.0, gt=0.0)
-    tare_electrode_spread: float = Field(default=60.0, gt=0.0)
-    touch_samples: int = Field(default=3, ge=1)
-    stale_ms: float = Field(default=200.0, gt=0.0)
-
-
-class _CalibrationFile(StrictModel):
-    biotacs: Annotated[dict[str, BioTacCalibration], Field(min_length=1)]
-
-
-def load_biotacs(path: Path) -> dict[str, BioTacCalibration]:
-    """Read a BioTac calibration file: finger name to calibration. Raises ConfigurationError."""
-    return load_parameters(path, _CalibrationFile).biotacs
-
-
 class BioTac:
-    """One BioTac (a :class:`~drivers.fingertip.FingertipSensor`)."""
+    """One BioTac (a :class:`~drivers.fingertip.FingertipSensor`).
 
-    def __init__(self, finger: str, calibration: BioTacCalibration, settings: BioTacSettings | None = None) -> None:
+    Args:
+        finger: where it sits.
+        calibration: of this sensor.
+        settings: how its readings are judged.
+        normals: what was learned of its normals; those of the skin at equation 2.24's point when None.
+
+    Raises:
+        ConfigurationError: the learned normals are of another number of electrodes.
+    """
+
+    def __init__(
+        self,
+        finger: str,
+        calibration: BioTacCalibration,
+        settings: BioTacSettings | None = None,
+        normals: LearnedNormals | None = None,
+    ) -> None:
+        if normals is not None and normals.electrodes != calibration.electrodes:
+            what = f"normals learned with {normals.electrodes} electrodes, on a sensor with {calibration.electrodes}"
+            hint = "Train with a recording of this sensor"
+            raise ConfigurationError(what, where=f"BioTac {finger}", hint=hint)
         self.finger = finger
         self.calibration = calibration
+        self._normals = normals
         self._settings = settings = settings or BioTacSettings()
         self._slot = FINGERS.index(finger)
         skin = calibration.skin.surface() if calibration.skin else None
@@ -130,6 +75,7 @@ class BioTac:
         self._tare_pdc: float | None = None
         self._tare_electrodes = np.zeros(len(self._electrodes))
         self._touches: deque[bool] = deque(maxlen=settings.touch_samples)
+        self._followed_ns = 0
 
     def update(self, sample: TactileReading) -> None:
         """Take the finger's slot of one hand sample; slots and values not marked valid leave the last ones in place.
@@ -142,10 +88,16 @@ class BioTac:
         if len(sample.tactile) != SLOTS * SLOT_BYTES:
             raise CodecError(f"{len(sample.tactile)} bytes of tactile data where {SLOTS * SLOT_BYTES} belong")
         start = self._slot * SLOT_BYTES
-        slot = decode_slot(sample.tactile[start : start + SLOT_BYTES], sample.tactile_type)
-        self.channels.take(slot, sample.stamp_ns)
-        if Channel.PDC in slot.values and self._tare_pdc is not None:
-            self._touches.append(self._pdc_rise() > self.calibration.touch_pdc_counts)
+        self.take(decode_slot(sample.tactile[start : start + SLOT_BYTES], sample.tactile_type), sample.stamp_ns)
+
+    def take(self, slot: Slot, stamp_ns: int) -> None:
+        """Take one decoded slot, or one reading of a stand-alone sensor's log (:mod:`drivers.biotac.cheetah_log`)."""
+        self.channels.take(slot, stamp_ns)
+        if Channel.PDC not in slot.values or self._tare_pdc is None or not self.channels.fitted:
+            return
+        self._touches.append(self._pdc_rise() > self.calibration.touch_pdc_counts)
+        if self._settings.follow_s:
+            self._follow(stamp_ns)
 
     def tare(self, world_R_distal: Array, *, reason: str = "") -> None:
         """Take the newest readings as untouched. A BioTac has no weight to take off: the orientation does not matter.
@@ -162,6 +114,22 @@ class BioTac:
         self._tare_pdc = float(self.channels.recent(Channel.PDC).mean())
         self._tare_electrodes = np.array([self.channels.recent(channel).mean() for channel in self._electrodes])
         self._touches.clear()
+        self._followed_ns = self.channels.newest_ns
+
+    def _follow(self, stamp_ns: int) -> None:
+        """Let the tare follow slow changes (temperature, inflation) while nothing touches for sure.
+
+        The gate: no reading near the touch threshold lately, and no electrode squeezed beyond its noise.
+        """
+        elapsed_s, self._followed_ns = (stamp_ns - self._followed_ns) / NANOSECONDS, stamp_ns
+        change = self.channels.newest(self._electrodes) - self._tare_electrodes
+        rises = self.channels.recent(Channel.PDC) - (self._tare_pdc or 0.0)
+        near_touch = np.abs(rises).max() > 0.5 * self.calibration.touch_pdc_counts
+        if near_touch or any(self._touches) or squeezed(change, self.calibration.electrode_noise_counts).any():
+            return
+        share = 1.0 - math.exp(-max(elapsed_s, 0.0) / self._settings.follow_s)
+        self._tare_pdc = (self._tare_pdc or 0.0) + share * float(rises[-1])
+        self._tare_electrodes = self._tare_electrodes + share * change
 
     def load_N(self, world_R_distal: Array) -> float:
         """Approximate contact force: from the pressure, or from the electrodes once the skin rests on the core.
@@ -198,7 +166,11 @@ class BioTac:
         )
         if found.squeeze[0] == 0.0:
             return None
-        return self._in_distal_frame(found.points_m[0], found.normals[0], self._force_N(pdc_rise, change))
+        normal, sigma_rad = found.normals[0], self.calibration.normal_sigma_rad
+        if self._normals is not None:
+            normals, sigmas = self._normals.normals(change[None])
+            normal, sigma_rad = normals[0], float(sigmas[0])
+        return self._in_distal_frame(found.points_m[0], normal, sigma_rad, self._force_N(pdc_rise, change))
 
     def health(self) -> tuple[str, ...]:
         """What is wrong with the sensor, in words; empty when all is well."""
@@ -233,7 +205,7 @@ class BioTac:
             return f"an electrode moves by {worst:.0f} counts"
         return ""
 
-    def _in_distal_frame(self, point_m: Array, normal: Array, force_N: float) -> TipContact:
+    def _in_distal_frame(self, point_m: Array, normal: Array, sigma_rad: float, force_N: float) -> TipContact:
         mounting = self.calibration.distal_T_sensor.pose()
         outward = mounting.rotation().matrix() @ normal
         along, across = self.calibration.point_sigma_m**2, (self.calibration.point_sigma_m / 3.0) ** 2
@@ -241,7 +213,7 @@ class BioTac:
             point_distal_m=np.asarray(mounting.transformFrom(point_m)),
             normal_distal=-outward,
             point_covariance_m2=along * np.eye(3) + (across - along) * np.outer(outward, outward),
-            normal_sigma_rad=self.calibration.normal_sigma_rad,
+            normal_sigma_rad=sigma_rad,
             force_N=force_N,
             torsion_Nm=0.0,
         )

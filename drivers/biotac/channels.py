@@ -24,13 +24,14 @@ class Channels:
         self._stamps_ns: dict[int, int] = {}
         self._impossible: dict[int, bool] = {}
         self._sums: dict[int, tuple[int, int]] = {}
-        self._newest_ns = 0
+        self.newest_ns = 0
+        """Stamp of the newest slot."""
         self.vibration: tuple[int, ...] = ()
         """The newest readings of the vibration channel (PAC), at most two, counts."""
 
     def take(self, slot: Slot, stamp_ns: int) -> None:
         """Note what one slot says."""
-        self._newest_ns = stamp_ns
+        self.newest_ns = stamp_ns
         self.vibration = slot.vibration or self.vibration
         for channel, value in slot.values.items():
             if channel in self._readings:
@@ -78,5 +79,5 @@ class Channels:
 
     def older_than(self, age_ms: float) -> int:
         """How many channels have not been heard for that long, against the newest slot's stamp."""
-        limit_ns = self._newest_ns - age_ms * 1e6
+        limit_ns = self.newest_ns - age_ms * 1e6
         return sum(self._stamps_ns.get(channel, 0) < limit_ns for channel in self._readings)

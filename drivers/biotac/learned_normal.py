@@ -1,0 +1,209 @@
+"""The contact normal as learned from presses whose normal is known, with a spread for each answer.
+
+Kernel ridge regression on the pattern of all electrodes, on top of equation 2.24: what is learned is how far the
+skin's normal at that equation's point is off. Far from everything in the recording the answer falls back to equation
+2.24 and the stated spread grows to what was seen there.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from drivers.biotac.electrodes import ElectrodeCount, electrode_layout
+from drivers.biotac.estimator import contact_from_electrodes
+from tactile_lab.calibration_file import load_parameters
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.geometry.contacts import FINGERS, Array
+from tactile_lab.strict_yaml import StrictModel
+
+PositiveFloat = Annotated[float, Field(gt=0.0)]
+
+
+class KernelSettings(StrictModel):
+    """What the regression's kernel looks like; chosen by cross-validation.
+
+    Attributes:
+        saturation_counts: patterns are divided by their size plus this, so that a light press looks like a hard one.
+        length: of the squared exponential kernel between patterns.
+        ridge: weight of the penalty, against a kernel of 1 at distance 0.
+    """
+
+    saturation_counts: PositiveFloat
+    length: PositiveFloat
+    ridge: PositiveFloat
+
+
+class Spread(StrictModel):
+    """Standard deviation of an answer per axis, radians: ``near`` at a recorded pattern, ``far`` is added in squares.
+
+    ``far`` counts by how little the recording says of the pattern (the regression's variance, 0 to 1).
+    """
+
+    near_rad: PositiveFloat
+    far_rad: float = Field(ge=0.0)
+
+    def sigma_rad(self, variance: Array) -> Array:
+        """For each variance."""
+        return np.sqrt(self.near_rad**2 + self.far_rad**2 * variance)
+
+
+@dataclass(frozen=True, eq=False)
+class Presses:
+    """Presses with a known normal, BioTac frame.
+
+    Attributes:
+        changes: electrode readings minus their tare, counts, shape (n, electrodes).
+        normals: the skin's outward unit normal where it touches, shape (n, 3).
+    """
+
+    changes: Array
+    normals: Array
+
+    def __len__(self) -> int:
+        return len(self.changes)
+
+    def part(self, rows: slice | Array) -> Presses:
+        """Some of them."""
+        return Presses(self.changes[rows], self.normals[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedNormals:
+    """A trained regression.
+
+    Attributes:
+        electrodes: 19 or 24.
+        examples: what it remembers.
+        kernel: see there.
+        spread: see there.
+        noise_counts: smaller changes are noise in equation 2.24.
+    """
+
+    electrodes: ElectrodeCount
+    examples: Presses
+    kernel: KernelSettings
+    spread: Spread
+    noise_counts: float
+
+    def normals(self, changes: Array) -> tuple[Array, Array]:
+        """Outward unit normals (n, 3) in the BioTac frame and their spread per axis (n,), radians.
+
+        Args:
+            changes: electrode readings minus their tare, counts, shape (n, electrodes).
+        """
+        likeness = kernel_values(
+            patterns(changes, self.kernel), patterns(self.examples.changes, self.kernel), self.kernel
+        )
+        found = self._usual(changes) + likeness @ self._weights
+        told = np.einsum("ij,jk,ik->i", likeness, self._inverse, likeness)
+        sigma = self.spread.sigma_rad(np.clip(1.0 - told, 0.0, 1.0))
+        return found / np.linalg.norm(found, axis=1, keepdims=True), sigma
+
+    def _usual(self, changes: Array) -> Array:
+        return usual_normals(changes, self.electrodes, self.noise_counts, self.examples.normals.mean(axis=0))
+
+    @cached_property
+    def _inverse(self) -> Array:
+        known = patterns(self.examples.changes, self.kernel)
+        return np.asarray(
+            np.linalg.inv(kernel_values(known, known, self.kernel) + self.kernel.ridge * np.eye(len(known)))
+        )
+
+    @cached_property
+    def _weights(self) -> Array:
+        return np.asarray(self._inverse @ (self.examples.normals - self._usual(self.examples.changes)))
+
+
+def patterns(changes: Array, kernel: KernelSettings) -> Array:
+    """Electrode changes as patterns of a size below one, shape as ``changes``."""
+    return np.asarray(changes / (np.linalg.norm(changes, axis=1, keepdims=True) + kernel.saturation_counts))
+
+
+def kernel_values(a: Array, b: Array, kernel: KernelSettings) -> Array:
+    """Squared exponential kernel between patterns, shape (len(a), len(b))."""
+    squared = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1)[None] - 2.0 * a @ b.T
+    return np.asarray(np.exp(-0.5 * np.maximum(squared, 0.0) / kernel.length**2))
+
+
+def usual_normals(changes: Array, electrodes: ElectrodeCount, noise_counts: float, otherwise: Array) -> Array:
+    """Normals of equation 2.24 (n, 3); ``otherwise`` where no electrode is squeezed."""
+    found = contact_from_electrodes(changes, electrode_layout(electrodes), noise_counts=noise_counts).normals
+    return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, otherwise)
+
+
+# --- as a file -----------------------------------------------------------------------------------------------------
+
+
+class StoredNormals(StrictModel):
+    """A regression in a file; numbers as little-endian 32-bit floats in base 64, row by row."""
+
+    electrodes: ElectrodeCount
+    kernel: KernelSettings
+    spread: Spread
+    noise_counts: float = Field(ge=0.0)
+    examples: int = Field(gt=0)
+    changes_base64: str
+    normals_base64: str
+
+
+class NormalsFile(StrictModel):
+    """Parameters of a calibration of kind ``normals``: finger to regression."""
+
+    normals: Annotated[dict[str, StoredNormals], Field(min_length=1)]
+
+
+def stored(learned: LearnedNormals) -> StoredNormals:
+    """A regression in the form of a file."""
+    return StoredNormals(
+        electrodes=learned.electrodes,
+        kernel=learned.kernel,
+        spread=learned.spread,
+        noise_counts=learned.noise_counts,
+        examples=len(learned.examples),
+        changes_base64=_packed(learned.examples.changes),
+        normals_base64=_packed(learned.examples.normals),
+    )
+
+
+def load_normals(path: Path) -> dict[str, LearnedNormals]:
+    """Read a calibration of kind ``normals``: finger to regression.
+
+    Raises:
+        ConfigurationError: the file does not fit; says how.
+    """
+    found = load_parameters(path, NormalsFile).normals
+    if unknown := sorted(set(found) - set(FINGERS)):
+        hint = f"The fingers are {', '.join(FINGERS)}"
+        raise ConfigurationError(f"unknown finger {', '.join(unknown)}", where=str(path), hint=hint)
+    return {finger: _restored(each, f"{path}: normals.{finger}") for finger, each in found.items()}
+
+
+def _restored(file: StoredNormals, where: str) -> LearnedNormals:
+    changes = _unpacked(file.changes_base64, (file.examples, file.electrodes), where)
+    normals = _unpacked(file.normals_base64, (file.examples, 3), where)
+    return LearnedNormals(file.electrodes, Presses(changes, normals), file.kernel, file.spread, file.noise_counts)
+
+
+def _packed(values: Array) -> str:
+    return base64.b64encode(values.astype("<f4").tobytes()).decode()
+
+
+def _unpacked(text: str, shape: tuple[int, int], where: str) -> Array:
+    try:
+        values = np.frombuffer(base64.b64decode(text, validate=True), "<f4").reshape(shape).astype(float)
+    except (binascii.Error, ValueError) as error:
+        hint = "Train again with tactile-lab calibrate biotac"
+        raise ConfigurationError(
+            f"does not hold {shape[0]} rows of {shape[1]} numbers", where=where, hint=hint
+        ) from error
+    if not np.isfinite(values).all():
+        raise ConfigurationError("holds values that are no numbers", where=where, hint="Train again")
+    return values

@@ -1,0 +1,220 @@
+"""Training of :mod:`drivers.biotac.learned_normal`, and how well each way to a normal does on presses it has not seen.
+
+Samples next to each other in time are nearly equal, so everything is chosen by leaving out whole stretches of time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from drivers.biotac.electrodes import ElectrodeCount, electrode_layout
+from drivers.biotac.estimator import contact_from_electrodes, force_direction
+from drivers.biotac.learned_normal import (
+    KernelSettings,
+    LearnedNormals,
+    Presses,
+    Spread,
+    kernel_values,
+    patterns,
+    usual_normals,
+)
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.geometry.contacts import Array
+
+STRETCHES = 5
+"""Stretches of time left out in turn."""
+
+FEWEST = 100
+"""Presses that a training needs."""
+
+_SATURATIONS_counts = (20.0, 50.0, 150.0)
+_LENGTHS = (0.2, 0.3, 0.4, 0.6, 0.8)
+_RIDGES = (0.01, 0.03, 0.1)
+
+_SPREADS_rad = np.radians(np.geomspace(0.2, 40.0, 60))
+_WITHIN_68, _WITHIN_95 = np.sqrt(-2.0 * np.log([0.32, 0.05]))
+"""Angles, in standard deviations per axis, within which 68 and 95 per cent of normals lie."""
+
+
+@dataclass(frozen=True)
+class MethodErrors:
+    """Angles between estimated and measured normals, for one method, on presses it was not trained on.
+
+    Attributes:
+        method: in words.
+        samples: presses for which it gave a normal.
+        median_deg, ninety_deg: of the angle; half and nine tenths of the presses lie below.
+        sigma_deg: the standard deviation per axis that the method states, in the median.
+        within_68, within_95: share of angles inside what that statement makes of 68 and 95 per cent.
+    """
+
+    method: str
+    samples: int
+    median_deg: float
+    ninety_deg: float
+    sigma_deg: float
+    within_68: float
+    within_95: float
+
+
+def angles_rad(estimated: Array, measured: Array) -> Array:
+    """Angle between unit vectors, row by row, radians."""
+    return np.asarray(np.arccos(np.clip((estimated * measured).sum(axis=1), -1.0, 1.0)))
+
+
+def rotation_between(source: Array, target: Array) -> Array:
+    """Rotation R (3, 3) that best turns unit vectors ``source`` into ``target`` (n, 3) (orthogonal Procrustes)."""
+    u, _, vt = np.linalg.svd(target.T @ source)
+    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
+
+
+def turned_to_sensor(presses: Presses, electrodes: ElectrodeCount, noise_counts: float) -> Array:
+    """Rotation reference_R_sensor of normals that were measured in another fixed frame than the BioTac's.
+
+    The frame's orientation is the one in which the normals agree best with those of equation 2.24.
+    """
+    found = contact_from_electrodes(presses.changes, electrode_layout(electrodes), noise_counts=noise_counts).normals
+    known = np.isfinite(found).all(axis=1)
+    return rotation_between(found[known], presses.normals[known])
+
+
+def train(
+    presses: Presses, electrodes: ElectrodeCount, *, noise_counts: float = 15.0, most: int = 800
+) -> LearnedNormals:
+    """Learn normals from presses in the order of time.
+
+    Args:
+        presses: at least :data:`FEWEST`.
+        electrodes: 19 or 24.
+        noise_counts: smaller changes are noise in equation 2.24.
+        most: examples kept, evenly spread over the recording.
+
+    Raises:
+        ConfigurationError: too few presses, or presses of another number of electrodes.
+    """
+    _check(presses, electrodes)
+    kept = presses.part(np.unique(np.linspace(0, len(presses) - 1, most).astype(int)))
+    usual = usual_normals(kept.changes, electrodes, noise_counts, kept.normals.mean(axis=0))
+    best: tuple[float, KernelSettings, Spread] | None = None
+    for saturation, length, ridge in product(_SATURATIONS_counts, _LENGTHS, _RIDGES):
+        kernel = KernelSettings(saturation_counts=saturation, length=length, ridge=ridge)
+        found, variance = _left_out(kept, usual, kernel)
+        errors = angles_rad(found, kept.normals)
+        if best is None or errors.mean() < best[0]:
+            best = float(errors.mean()), kernel, fitted_spread(errors, variance)
+    assert best is not None
+    return LearnedNormals(electrodes, kept, best[1], best[2], noise_counts)
+
+
+def _check(presses: Presses, electrodes: int) -> None:
+    if len(presses) < FEWEST:
+        what = f"{len(presses)} presses with a known normal, and {FEWEST} are needed"
+        raise ConfigurationError(what, where="BioTac normals", hint="Record more presses, all over the finger")
+    if presses.changes.shape[1] != electrodes:
+        what = f"the presses have {presses.changes.shape[1]} electrodes, not {electrodes}"
+        raise ConfigurationError(what, where="BioTac normals", hint="Name the right number of electrodes")
+
+
+def _left_out(presses: Presses, usual: Array, kernel: KernelSettings) -> tuple[Array, Array]:
+    """Normals of each stretch as the others tell them (n, 3), and the variances of the regression (n,).
+
+    In closed form from one inverse for all stretches (Rasmussen and Williams, Gaussian Processes, 5.4.2, by blocks).
+    """
+    known = patterns(presses.changes, kernel)
+    inverse = np.linalg.inv(kernel_values(known, known, kernel) + kernel.ridge * np.eye(len(known)))
+    weights = inverse @ (presses.normals - usual)
+    found, variance = np.empty_like(presses.normals), np.empty(len(presses))
+    for rows in np.array_split(np.arange(len(presses)), STRETCHES):
+        covariance = np.linalg.inv(inverse[np.ix_(rows, rows)])
+        found[rows] = presses.normals[rows] - covariance @ weights[rows]
+        variance[rows] = np.diag(covariance) - kernel.ridge
+    return found / np.linalg.norm(found, axis=1, keepdims=True), np.clip(variance, 0.0, 1.0)
+
+
+def fitted_spread(errors_rad: Array, variance: Array) -> Spread:
+    """The most likely spread for angles that are errors about two axes (Rayleigh distributed)."""
+    near, far = (grid.reshape(-1, 1) for grid in np.meshgrid(_SPREADS_rad, _SPREADS_rad))
+    squared = near**2 + far**2 * variance
+    misfit = (np.log(squared) + 0.5 * errors_rad**2 / squared).mean(axis=1)
+    chosen = int(misfit.argmin())
+    return Spread(near_rad=float(near[chosen, 0]), far_rad=float(far[chosen, 0]))
+
+
+# --- comparison ----------------------------------------------------------------------------------------------------
+
+
+def compare_methods(
+    presses: Presses,
+    electrodes: ElectrodeCount,
+    *,
+    noise_counts: float = 15.0,
+    in_sensor_frame: bool = False,
+    most: int = 800,
+) -> list[MethodErrors]:
+    """Every method trained on the first half in time and judged on the second.
+
+    Args:
+        presses: in the order of time.
+        electrodes: 19 or 24.
+        noise_counts: smaller changes are noise where squeezed electrodes count alone.
+        in_sensor_frame: normals are in the BioTac frame; otherwise each method's rotation to theirs is fitted on the
+            first half too.
+        most: examples the learned method keeps.
+
+    Raises:
+        ConfigurationError: too few presses.
+    """
+    _check(presses, electrodes)
+    half, layout = len(presses) // 2, electrode_layout(electrodes)
+    ways = {
+        "equation 2.24, all electrodes": _all_electrodes(presses.changes, electrodes, 1.0),
+        "equation 2.24, all electrodes, squared": _all_electrodes(presses.changes, electrodes, 2.0),
+        "equation 2.24, squeezed electrodes": contact_from_electrodes(
+            presses.changes, layout, noise_counts=noise_counts
+        ).normals,
+        "sum of squeezed normals": force_direction(presses.changes, layout, noise_counts=noise_counts),
+    }
+    rows = [_judged(name, normals, presses.normals, half, in_sensor_frame) for name, normals in ways.items()]
+    return [*rows, _judged_learning(presses, electrodes, noise_counts, half, in_sensor_frame, most)]
+
+
+def _all_electrodes(changes: Array, electrodes: ElectrodeCount, power: float) -> Array:
+    """Skin normals at the thesis's equation 2.24 as it stands: every change counts, of either sign."""
+    weights, layout = np.abs(changes) ** power, electrode_layout(electrodes)
+    with np.errstate(invalid="ignore"):
+        return layout.skin.project(weights @ layout.positions_m / weights.sum(axis=1, keepdims=True))[1]
+
+
+def _judged(name: str, found: Array, measured: Array, half: int, in_sensor_frame: bool) -> MethodErrors:
+    known = np.isfinite(found).all(axis=1)
+    first, second = np.flatnonzero(known[:half]), half + np.flatnonzero(known[half:])
+    turn = np.eye(3) if in_sensor_frame else rotation_between(found[first], measured[first])
+    trained = angles_rad(found[first] @ turn.T, measured[first])
+    sigma = np.full(len(second), np.sqrt(0.5 * np.mean(trained**2)))
+    return _errors(name, angles_rad(found[second] @ turn.T, measured[second]), sigma)
+
+
+def _judged_learning(
+    presses: Presses, electrodes: ElectrodeCount, noise_counts: float, half: int, in_sensor_frame: bool, most: int
+) -> MethodErrors:
+    first, second = presses.part(slice(0, half)), presses.part(slice(half, None))
+    turn = np.eye(3) if in_sensor_frame else turned_to_sensor(first, electrodes, noise_counts)
+    learned = train(Presses(first.changes, first.normals @ turn), electrodes, noise_counts=noise_counts, most=most)
+    found, sigma = learned.normals(second.changes)
+    return _errors("learned", angles_rad(found @ turn.T, second.normals), sigma)
+
+
+def _errors(name: str, angles: Array, sigma: Array) -> MethodErrors:
+    median, ninety = np.degrees(np.quantile(angles, (0.5, 0.9)))
+    return MethodErrors(
+        method=name,
+        samples=len(angles),
+        median_deg=float(median),
+        ninety_deg=float(ninety),
+        sigma_deg=float(np.degrees(np.median(sigma))),
+        within_68=float((angles < _WITHIN_68 * sigma).mean()),
+        within_95=float((angles < _WITHIN_95 * sigma).mean()),
+    )

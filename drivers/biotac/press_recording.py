@@ -1,0 +1,112 @@
+"""Recordings of presses on a plate whose normal is known, to train and to judge contact normals.
+
+Two forms are read. A CSV table with the columns ``e1`` ... ``e19`` (or ``e24``), ``nx``, ``ny``, ``nz``, in the order
+of time: counts and the skin's outward normal; in rows without a normal nothing was touched, and their mean is the tare
+of all. Or two text files of numbers, electrodes and normals, one column a sample, with the tare already taken.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+from drivers.biotac.electrodes import ElectrodeCount
+from drivers.biotac.learned_normal import Presses
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.geometry.contacts import Array
+
+_NORMAL = ("nx", "ny", "nz")
+_COUNTS: tuple[ElectrodeCount, ...] = get_args(ElectrodeCount)
+
+
+@dataclass(frozen=True, eq=False)
+class PressRecording:
+    """Presses and how many electrodes they have."""
+
+    presses: Presses
+    electrodes: ElectrodeCount
+
+
+def read_presses(path: Path, normals: Path | None = None) -> PressRecording:
+    """Read a recording.
+
+    Args:
+        path: the table, or the text file of electrodes when ``normals`` is given.
+        normals: the text file of normals, shape (3, n).
+
+    Raises:
+        ConfigurationError: a file can not be read or does not fit; says where.
+    """
+    changes, directions = _table(path) if normals is None else (_matrix(path), _matrix(normals))
+    where = str(path if normals is None else normals)
+    if directions.shape[1] != 3 or len(directions) != len(changes):
+        what = f"{len(changes)} samples of electrodes and normals of shape {directions.shape[::-1]}"
+        raise ConfigurationError(what, where=where, hint="One normal of three numbers belongs to each sample")
+    electrodes = next((count for count in _COUNTS if count == changes.shape[1]), None)
+    if electrodes is None:
+        hint = "A BioTac has 19, a BioTac SP 24"
+        raise ConfigurationError(f"{changes.shape[1]} electrodes", where=str(path), hint=hint)
+    return PressRecording(Presses(changes, _units(directions, where)), electrodes)
+
+
+def write_presses(path: Path, readings: Array, normals: Array) -> None:
+    """Write a table: counts (n, electrodes) and normals (n, 3), NaN where nothing was touched. Raises OSError."""
+    names = [f"e{number}" for number in range(1, readings.shape[1] + 1)]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow([*names, *_NORMAL])
+        for counts, normal in zip(readings.tolist(), normals.tolist(), strict=True):
+            table.writerow([*counts, *("" if value != value else value for value in normal)])
+
+
+def _units(directions: Array, where: str) -> Array:
+    length = np.linalg.norm(directions, axis=1)
+    if bad := np.flatnonzero(~(np.abs(length - 1.0) < 0.05)).tolist():
+        what = f"the normal of sample {bad[0] + 1} has the length {length[bad[0]]:.3g}, not 1"
+        raise ConfigurationError(what, where=where, hint="Write unit vectors")
+    return np.asarray(directions / length[:, None])
+
+
+def _matrix(path: Path) -> Array:
+    try:
+        values = np.loadtxt(path, ndmin=2)
+    except (OSError, ValueError) as error:
+        hint = "Give a text file of numbers, one column a sample"
+        raise ConfigurationError(f"can not be read ({error})", where=str(path), hint=hint) from error
+    if not np.isfinite(values).all():
+        raise ConfigurationError("holds values that are no numbers", where=str(path), hint="Leave those samples out")
+    return np.asarray(values.T)
+
+
+def _table(path: Path) -> tuple[Array, Array]:
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ConfigurationError(f"can not be read ({error})", where=str(path), hint="Give a CSV table") from error
+    electrodes = len(rows[0]) - len(_NORMAL) if rows else 0
+    names = [f"e{number}" for number in range(1, electrodes + 1)]
+    if not rows or [name.strip().lower() for name in rows[0]] != [*names, *_NORMAL]:
+        hint = "Its first line must be e1,e2,...,nx,ny,nz; two plain files of numbers are given with --normals"
+        raise ConfigurationError("is no table of presses", where=str(path), hint=hint)
+    values = np.array([_row(row, number, electrodes, path) for number, row in enumerate(rows[1:], 2)])
+    values = values.reshape(-1, electrodes + len(_NORMAL))
+    touched = np.isfinite(values[:, electrodes:]).all(axis=1)
+    tare = values[~touched, :electrodes].mean(axis=0) if not touched.all() else np.zeros(electrodes)
+    return values[touched, :electrodes] - tare, values[touched, electrodes:]
+
+
+def _row(cells: list[str], number: int, electrodes: int, path: Path) -> list[float]:
+    try:
+        counts = [float(cell) for cell in cells[:electrodes]]
+        normal = [float(cell) if cell.strip() else np.nan for cell in cells[electrodes:]]
+    except ValueError:
+        counts, normal = [], []
+    if len(counts) != electrodes or len(normal) != len(_NORMAL) or not np.isfinite(counts).all():
+        hint = "Each line holds the electrodes' counts and a normal, or three empty cells when nothing is touched"
+        raise ConfigurationError("is no sample", where=f"{path}, line {number}", hint=hint)
+    return counts + normal
