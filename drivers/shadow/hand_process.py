@@ -6,56 +6,76 @@ stamped bytes, for the recorder and for :class:`~drivers.shadow.hand_samples.Han
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import select
 import subprocess
 import sys
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from drivers.shadow.ethercat_link import EthercatSettings
+from drivers.links import Tap
+from drivers.shadow.first_move import MoveFinding
+from drivers.shadow.hand_orders import Order, OrderWriter
 from drivers.shadow.hand_records import Record, RecordKind, RecordReader
-from drivers.shadow.hand_settings import HandSettings
+from drivers.shadow.hand_setup import HandSetup
+from drivers.shadow.motors import DRIVEN_JOINTS
 from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock
 from tactile_lab.errors import DeviceError
 
-_START_s, _REPORT_s, _END_s = 30.0, 5.0, 10.0
+PATIENCE_s = 1.0
+"""So long the hand's process goes on without any order before it takes the demands away."""
+
+_START_s, _REPORT_s, _MOVES_s, _END_s = 30.0, 5.0, 120.0, 10.0
 _READ_BYTES = 1_048_576
+
+
+@dataclass(frozen=True)
+class HandReady:
+    """What the process says when the hand is connected.
+
+    Attributes:
+        scheduling: of the process, in words.
+        serial, palm: of the hand that was found; None where the master does not tell.
+        watchdog_s: time without commands after which the palm leaves operation, as read back; None when it never does.
+    """
+
+    scheduling: str
+    serial: int | None = None
+    palm: str | None = None
+    watchdog_s: float | None = None
+
+    def __str__(self) -> str:
+        """In words."""
+        watchdog = "no watchdog" if self.watchdog_s is None else f"watchdog reads back {1000 * self.watchdog_s:.1f} ms"
+        who = "hand in operation" if self.serial is None else f"hand {self.serial}, palm {self.palm}, in operation"
+        return f"{who}, {watchdog}, {self.scheduling}"
 
 
 class HandProcess:
     """A hand on EtherCAT, driven in another process.
 
     Args:
-        name: the device's name in the rig.
-        link: how the hand is reached.
-        hand: how it is driven; ``cycle_s`` is the period of its cycle.
-        joints, motors: calibration files.
+        setup: the hand.
+        tap: sees all traffic, in :meth:`exchange`; without one :meth:`receive` gives it.
         clock: for waiting on the process; it stamps with the monotonic clock.
+        patience_s: see :data:`PATIENCE_s`.
     """
 
     def __init__(
-        self,
-        name: str,
-        link: EthercatSettings,
-        hand: HandSettings,
-        joints: Path,
-        motors: Path,
-        clock: Clock | None = None,
+        self, setup: HandSetup, tap: Tap | None = None, clock: Clock | None = None, patience_s: float = PATIENCE_s
     ) -> None:
-        self.name, self._clock = name, clock or MonotonicClock()
-        self._start = {
-            "name": name,
-            "link": link.model_dump(mode="json"),
-            "hand": hand.model_dump(mode="json"),
-            "joints": str(joints),
-            "motors": str(motors),
-        }
+        self.name, self._clock, self._tap = setup.name, clock or MonotonicClock(), tap
+        self._start = {"setup": setup.model_dump(mode="json"), "patience_s": patience_s}
         self._process: subprocess.Popen[bytes] | None = None
+        self._orders: OrderWriter | None = None
+        self._targets_rad: dict[str, float] = {}
         self._reader, self._kept = RecordReader(), list[Record]()
-        self.scheduling = ""
+        self.ready = HandReady("")
+
+    # --- lifecycle ---------------------------------------------------------------------------------------------
 
     def connect(self) -> None:
         """Start the process and wait until the hand is connected. All or nothing, repeatable.
@@ -66,47 +86,18 @@ class HandProcess:
         if self._process is not None:
             return
         command = [sys.executable, "-m", "drivers.shadow.hand_worker"]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        self._reader, self._kept = RecordReader(), []
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0
+        )  # a group of its own: Ctrl+C is for the session, which may want to open the hand first
+        assert self._process.stdin is not None
+        self._orders = OrderWriter(self._process.stdin.fileno(), self.name)
+        self._reader, self._kept, self._targets_rad = RecordReader(), [], {}
         try:
             self._order(self._start)
-            self.scheduling = json.loads(self._wait_for(RecordKind.READY, _START_s).payload)["scheduling"]
+            self.ready = HandReady(**json.loads(self._wait_for(RecordKind.READY, _START_s).payload))
         except BaseException:
             self.close()
             raise
-
-    def set_targets(self, targets_rad: Mapping[str, float]) -> None:
-        """As :meth:`~drivers.shadow.hand.ShadowHand.set_targets`; a wrong name ends the process with an error."""
-        self._order({"targets": dict(targets_rad)})
-
-    def stop(self) -> None:
-        """Zero demands from the next cycle on, until :meth:`resume`."""
-        self._order({"stop": True})
-
-    def resume(self) -> None:
-        """Take back a stop or a fault; nothing moves before new targets are set."""
-        self._order({"resume": True})
-
-    def receive(self) -> list[Record]:
-        """Traffic and errors that have come since the last call, oldest first; does not wait.
-
-        Raises:
-            DeviceError: the process is gone.
-        """
-        records, self._kept = self._kept, []
-        while (more := self._read(0.0)) is not None:
-            records += more
-        return records
-
-    def report(self) -> dict[str, Any]:
-        """Punctuality, counts of the wire and of the hand, and what is wrong in words.
-
-        Raises:
-            DeviceError: the process is gone or does not answer.
-        """
-        self._order({"report": True})
-        answer: dict[str, Any] = json.loads(self._wait_for(RecordKind.REPORT, _REPORT_s).payload)
-        return answer
 
     def close(self) -> None:
         """End the process: the hand gets zero demands and is disconnected. Idempotent."""
@@ -119,26 +110,107 @@ class HandProcess:
             process.kill()
             process.communicate()
 
-    def _order(self, order: dict[str, Any]) -> None:
-        process = self._running()
-        assert process.stdin is not None
+    # --- motion ------------------------------------------------------------------------------------------------
+
+    def set_targets(self, targets_rad: Mapping[str, float]) -> None:
+        """As :meth:`~drivers.shadow.hand.ShadowHand.set_targets`, with the next :meth:`exchange`."""
+        self._targets_rad |= targets_rad
+
+    def stop(self) -> None:
+        """Zero demands from the process's next cycle on, until :meth:`resume`. Never raises."""
+        self._targets_rad = {}
+        with contextlib.suppress(DeviceError):  # a process that is gone has taken the demands with it
+            self._order({"stop": True})
+
+    def resume(self) -> None:
+        """Take back a stop or a fault; nothing moves before new targets are set."""
+        self._order({"resume": True})
+
+    def first_move(self, joints: Sequence[str] = DRIVEN_JOINTS) -> list[MoveFinding]:
+        """Nudge motor after motor, as :func:`drivers.shadow.first_move.check_motor_map`.
+
+        Raises:
+            DeviceError: the hand stopped itself, or its process is gone.
+        """
+        self._order({"first_move": list(joints)})
+        answer = json.loads(self._wait_for(RecordKind.MOVES, _MOVES_s).payload)
+        if "error" in answer:
+            raise DeviceError(answer["error"])
+        return [MoveFinding(**finding) for finding in answer["moved"]]
+
+    # --- traffic -----------------------------------------------------------------------------------------------
+
+    def exchange(self) -> None:
+        """Hand over the newest targets, or a sign of life, and show the tap what has come.
+
+        Raises:
+            DeviceError: the hand has stopped itself, in its own words, or its process is gone.
+        """
+        targets_rad, self._targets_rad = self._targets_rad, {}
+        self._order({"targets": targets_rad} if targets_rad else {"alive": True})
+        errors = [self._show(record) for record in self.receive()]
+        if told := [error for error in errors if error]:
+            raise DeviceError(told[0])
+
+    def receive(self) -> list[Record]:
+        """Traffic and errors that have come since the last call, oldest first; does not wait.
+
+        Raises:
+            DeviceError: the process is gone.
+        """
+        records, self._kept = self._kept, []
         try:
-            process.stdin.write(json.dumps(order).encode() + b"\n")
-            process.stdin.flush()
-        except BrokenPipeError:
-            raise self._gone() from None
+            while (more := self._read(0.0)) is not None:
+                records += more
+        except DeviceError:
+            if not records:  # its last words come first
+                raise
+        return records
+
+    def report(self) -> dict[str, Any]:
+        """Punctuality, counts of the wire and of the hand, and what is wrong in words.
+
+        Raises:
+            DeviceError: the process is gone or does not answer.
+        """
+        self._order({"report": True})
+        answer: dict[str, Any] = json.loads(self._wait_for(RecordKind.REPORT, _REPORT_s).payload)
+        return answer
+
+    def health(self) -> tuple[str, ...]:
+        """What is wrong with hand and wire, in words. Raises DeviceError when the process is gone."""
+        return tuple(self.report()["health"])
+
+    def _show(self, record: Record) -> str:
+        """Show the tap a message; an error's words."""
+        if record.kind is RecordKind.ERROR:
+            return record.payload.decode()
+        if self._tap is not None and record.kind is RecordKind.TRANSMITTED:
+            self._tap.transmitted(self.name, record.payload, record.stamp_ns)
+        if self._tap is not None and record.kind is RecordKind.RECEIVED:
+            self._tap.received(self.name, record.payload, record.stamp_ns)
+        return ""
+
+    def _order(self, order: Order) -> None:
+        self._running()
+        assert self._orders is not None
+        self._orders.give(order)
 
     def _wait_for(self, kind: RecordKind, patience_s: float) -> Record:
-        """The next record of a kind; the others are kept for :meth:`receive`. An error while waiting is raised."""
+        """The next record of a kind; the others are kept for :meth:`receive`. An error while starting is raised."""
         until_ns = self._clock.now_ns() + round(patience_s * NANOSECONDS)
-        while (left_ns := until_ns - self._clock.now_ns()) > 0:
+        wanted: Record | None = None
+        while wanted is None and (left_ns := until_ns - self._clock.now_ns()) > 0:
             for record in self._read(left_ns / NANOSECONDS) or []:
-                if record.kind is kind:
-                    return record
                 if record.kind is RecordKind.ERROR and kind is RecordKind.READY:
                     raise DeviceError(record.payload.decode())
-                self._kept.append(record)
-        raise DeviceError("its process does not answer", where=self.name, hint="Connect again")
+                if record.kind is kind and wanted is None:
+                    wanted = record
+                else:
+                    self._kept.append(record)
+        if wanted is None:
+            raise DeviceError("its process does not answer", where=self.name, hint="Connect again")
+        return wanted
 
     def _read(self, patience_s: float) -> list[Record] | None:
         """Records that arrive in this time; None when nothing does."""
@@ -147,13 +219,10 @@ class HandProcess:
         if not select.select([process.stdout], [], [], max(patience_s, 0.0))[0]:
             return None
         if not (data := os.read(process.stdout.fileno(), _READ_BYTES)):
-            raise self._gone()
+            raise DeviceError("its process has ended", where=self.name, hint="See its last error, and connect again")
         return self._reader.feed(data)
 
     def _running(self) -> subprocess.Popen[bytes]:
         if self._process is None:
             raise DeviceError("not connected", where=self.name, hint="Connect the hand first")
         return self._process
-
-    def _gone(self) -> DeviceError:
-        return DeviceError("its process has ended", where=self.name, hint="See its last error, and connect again")

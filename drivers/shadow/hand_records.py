@@ -27,6 +27,7 @@ class RecordKind(IntEnum):
     READY = 3
     REPORT = 4
     ERROR = 5
+    MOVES = 6
 
 
 @dataclass(frozen=True)
@@ -44,10 +45,15 @@ def encode_record(record: Record) -> bytes:
 
 
 class RecordReader:
-    """Cuts a stream of bytes into records, however it arrives."""
+    """Cuts a stream of bytes into records, however it arrives.
 
-    def __init__(self) -> None:
-        self._rest = b""
+    Args:
+        longest: payloads of more bytes are damage.
+        where: the process they come from, for errors.
+    """
+
+    def __init__(self, longest: int = _LONGEST, where: str = "hand process") -> None:
+        self._rest, self._longest, self._where = b"", longest, where
 
     def feed(self, data: bytes) -> list[Record]:
         """The records that are complete now.
@@ -59,8 +65,8 @@ class RecordReader:
         records, at = [], 0
         while len(self._rest) - at >= _HEAD.size:
             kind, length, stamp_ns = _HEAD.unpack_from(self._rest, at)
-            if kind not in set(RecordKind) or length > _LONGEST:
-                raise CodecError(f"a record of kind {kind}, {length} bytes", where="hand process")
+            if kind not in set(RecordKind) or length > self._longest:
+                raise CodecError(f"a record of kind {kind}, {length} bytes", where=self._where)
             if len(self._rest) - at < _HEAD.size + length:
                 break
             start = at + _HEAD.size

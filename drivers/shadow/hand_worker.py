@@ -1,8 +1,9 @@
 """The hand's cycle in a process of its own: ``python -m drivers.shadow.hand_worker``, started by ``HandProcess``.
 
-Takes lines of JSON on standard input, first what to drive and how, then orders. Gives records on standard output (see
-:mod:`~drivers.shadow.hand_records`), about twenty cycles at a time, without ever waiting for the reader. When its
-standard input ends, the program that started it is gone: the hand gets zero demands and the process ends.
+Takes orders on standard input (see :mod:`~drivers.shadow.hand_orders`), first what to drive and how. Gives records on
+standard output (see :mod:`~drivers.shadow.hand_records`), some cycles at a time, without ever waiting for the reader.
+When its standard input ends, the program that started it is gone: the hand gets zero demands and the process ends.
+When orders only stop coming, that program hangs: the demands are taken away as well.
 """
 
 from __future__ import annotations
@@ -10,24 +11,26 @@ from __future__ import annotations
 import dataclasses
 import gc
 import json
-import select
 import sys
-from pathlib import Path
-from typing import Any
 
 from drivers.links import TappedLink
 from drivers.shadow.cycle_statistics import CycleStatistics
-from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings
-from drivers.shadow.hand import ShadowHand
+from drivers.shadow.ethercat_link import EthercatLink
+from drivers.shadow.first_move import check_motor_map
+from drivers.shadow.hand import HandSample, ShadowHand
+from drivers.shadow.hand_orders import Order, OrderReader
 from drivers.shadow.hand_records import RecordKind, RecordPipe
-from drivers.shadow.hand_settings import HandSettings
-from drivers.shadow.joint_calibration import JointCalibration
+from drivers.shadow.hand_setup import HandSetup
 from drivers.shadow.motors import MotorMap
+from drivers.shadow.pysoem_link import PysoemLink
 from drivers.shadow.real_time import request_real_time
 from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock
 from tactile_lab.errors import DeviceError, TactileLabError
 
-CYCLES_PER_BLOCK = 20
+FLUSH_ns = 10_000_000
+"""Records are handed over this often: some cycles at a time."""
+
+HandLink = EthercatLink | PysoemLink
 
 
 class HandWorker:
@@ -36,78 +39,140 @@ class HandWorker:
     Args:
         hand: connected.
         link: the hand's, for its counts.
+        motors: the hand's motor map.
         pipe: where records go; also the tap of the hand's link.
+        orders: where orders come from.
         clock: the session's.
         cycle_ns: period.
+        patience_ns: without any order for so long the demands are taken away.
     """
 
-    def __init__(self, hand: ShadowHand, link: EthercatLink, pipe: RecordPipe, clock: Clock, cycle_ns: int) -> None:
-        self._hand, self._link, self._pipe, self._clock, self._cycle_ns = hand, link, pipe, clock, cycle_ns
+    def __init__(
+        self,
+        hand: ShadowHand,
+        link: HandLink,
+        motors: MotorMap,
+        pipe: RecordPipe,
+        orders: OrderReader,
+        clock: Clock,
+        cycle_ns: int,
+        patience_ns: int,
+    ) -> None:
+        self._hand, self._link, self._motors = hand, link, motors
+        self._pipe, self._orders, self._clock = pipe, orders, clock
+        self._cycle_ns, self._patience_ns = cycle_ns, patience_ns
         self._statistics = CycleStatistics()
-        self._failed = self._ended = False
+        self._told = self._moving_by_itself = self._ended = False
+        self._next_ns = self._heard_ns = self._flushed_ns = clock.now_ns()
 
     def run(self) -> None:
         """Cycle until the orders end."""
-        next_ns = self._clock.now_ns() + self._cycle_ns
         while not self._ended:
-            self._clock.sleep_until_ns(next_ns)
-            late_ns = self._clock.now_ns() - next_ns
-            left_out = late_ns // self._cycle_ns
-            self._statistics.add(late_ns, left_out)
-            self._exchange()
-            next_ns += self._cycle_ns * (1 + left_out)
-            if self._statistics.cycles % CYCLES_PER_BLOCK == 0:
-                self._pipe.flush()
-            if select.select([sys.stdin], [], [], 0)[0]:
-                self._obey(sys.stdin.readline())
+            self._turn()
 
-    def _exchange(self) -> None:
+    def _turn(self) -> HandSample | None:
+        """One cycle; its sample, None when the hand has stopped itself."""
+        self._next_ns += self._cycle_ns
+        self._clock.sleep_until_ns(self._next_ns)
+        late_ns = self._clock.now_ns() - self._next_ns
+        left_out = late_ns // self._cycle_ns
+        self._statistics.add(late_ns, left_out)
+        self._next_ns += self._cycle_ns * left_out
+        sample = self._exchange()
+        self._flush_when_due()
+        for order in self._orders.waiting():
+            self._obey(order)
+        self._watch_the_session()
+        return sample
+
+    def _exchange(self) -> HandSample | None:
         """A fault is told once; the cycle goes on with zero demands until someone resumes or ends it."""
         try:
-            self._hand.exchange()
+            return self._hand.exchange()
         except DeviceError as error:
-            if not self._failed:
-                self._failed = True
-                self._pipe.put(RecordKind.ERROR, self._clock.now_ns(), str(error).encode())
+            self._tell(str(error))
+            return None
 
-    def _obey(self, line: str) -> None:
-        order: dict[str, Any] = json.loads(line) if line else {"end": True}
+    def _flush_when_due(self) -> None:
+        if (now_ns := self._clock.now_ns()) - self._flushed_ns >= FLUSH_ns:
+            self._pipe.flush()
+            self._flushed_ns = now_ns
+
+    def _watch_the_session(self) -> None:
+        silent_ns = self._clock.now_ns() - self._heard_ns
+        if silent_ns > self._patience_ns and not self._moving_by_itself:
+            self._hand.stop()
+            self._tell(f"no order from the session for {silent_ns / NANOSECONDS:.1f} s: demands taken away")
+
+    def _tell(self, error: str) -> None:
+        if not self._told:
+            self._told = True
+            self._pipe.put(RecordKind.ERROR, self._clock.now_ns(), error.encode())
+
+    # --- orders ------------------------------------------------------------------------------------------------
+
+    def _obey(self, order: Order) -> None:
+        self._heard_ns = self._clock.now_ns()
         if "targets" in order:
             self._hand.set_targets(order["targets"])
         if order.get("stop"):
             self._hand.stop()
         if order.get("resume"):
             self._hand.resume()
-            self._failed = False
+            self._told = False
         if order.get("report"):
             self._report()
-        self._ended = bool(order.get("end"))
+        self._ended = self._ended or bool(order.get("end"))
+        if "first_move" in order:
+            self._check_motor_map(order["first_move"])
 
     def _report(self) -> None:
         report = {
             "punctuality": dataclasses.asdict(self._statistics.summary()),
-            "wire": dataclasses.asdict(self._link.counts),
+            "wire": dataclasses.asdict(self._link.counts) if isinstance(self._link, EthercatLink) else {},
             "hand": dataclasses.asdict(self._hand.counters),
             "dropped_blocks": self._pipe.dropped_blocks,
             "health": self._hand.health() + self._link.health(),
         }
-        self._pipe.put(RecordKind.REPORT, self._clock.now_ns(), json.dumps(report).encode())
+        self._answer(RecordKind.REPORT, report)
+
+    def _check_motor_map(self, joints: list[str]) -> None:
+        self._moving_by_itself = True
+        try:
+            findings = check_motor_map(self._hand, self._motors, self._sound_turn, joints)
+            self._answer(RecordKind.MOVES, {"moved": [dataclasses.asdict(finding) for finding in findings]})
+        except DeviceError as error:
+            self._answer(RecordKind.MOVES, {"error": str(error)})
+        finally:
+            self._moving_by_itself, self._heard_ns = False, self._clock.now_ns()
+
+    def _sound_turn(self) -> HandSample:
+        """A cycle of the motor check, which ends with the session or with the hand."""
+        if (sample := self._turn()) is None or self._ended:
+            raise DeviceError("stopped while its motors were being checked", where=self._link.name)
+        return sample
+
+    def _answer(self, kind: RecordKind, content: dict[str, object]) -> None:
+        self._pipe.put(kind, self._clock.now_ns(), json.dumps(content).encode())
         self._pipe.flush()
 
 
 def main() -> None:
-    """Connect what the first line names, drive it, close it."""
-    start = json.loads(sys.stdin.readline())
-    clock, pipe = MonotonicClock(), RecordPipe(sys.stdout.fileno())
+    """Connect what the first order names, drive it, close it."""
+    orders, clock, pipe = OrderReader(sys.stdin.fileno()), MonotonicClock(), RecordPipe(sys.stdout.fileno())
+    start = orders.first()
     try:
-        hand, link = _made(start, clock, pipe)
+        setup = HandSetup.model_validate(start["setup"])
+        link = setup.link(clock)
+        hand = setup.device(TappedLink(link, pipe, clock), clock)
         hand.connect()
-        scheduling = request_real_time()
+        ready = {"scheduling": request_real_time(), **_identity(link)}
         gc.freeze()
-        pipe.put(RecordKind.READY, clock.now_ns(), json.dumps({"scheduling": scheduling}).encode())
+        pipe.put(RecordKind.READY, clock.now_ns(), json.dumps(ready).encode())
         pipe.flush()
         try:
-            HandWorker(hand, link, pipe, clock, round(start["hand"]["cycle_s"] * NANOSECONDS)).run()
+            cycle_ns, patience_ns = (round(s * NANOSECONDS) for s in (setup.hand.cycle_s, start["patience_s"]))
+            HandWorker(hand, link, setup.motor_map(), pipe, orders, clock, cycle_ns, patience_ns).run()
         finally:
             hand.close()
     except TactileLabError as error:
@@ -117,11 +182,12 @@ def main() -> None:
         pipe.close()
 
 
-def _made(start: dict[str, Any], clock: Clock, pipe: RecordPipe) -> tuple[ShadowHand, EthercatLink]:
-    link = EthercatLink(start["name"], EthercatSettings.model_validate(start["link"]), clock)
-    joints, motors = JointCalibration.load(Path(start["joints"])), MotorMap.load(Path(start["motors"]))
-    settings = HandSettings.model_validate(start["hand"])
-    return ShadowHand(TappedLink(link, pipe, clock), clock, joints, settings, motors), link
+def _identity(link: HandLink) -> dict[str, object]:
+    """Who was found; SOEM's link does not tell."""
+    if isinstance(link, PysoemLink):
+        return {}
+    found = link.hand
+    return {"serial": found.serial, "palm": found.image.name, "watchdog_s": found.watchdog_s}
 
 
 if __name__ == "__main__":

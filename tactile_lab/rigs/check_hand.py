@@ -27,13 +27,13 @@ def check_hand(rig: HandRig, clock: Clock) -> list[Finding]:
     Raises:
         ConfigurationError: a file the rig names, or a master that is not installed.
     """
-    link = rig.link(clock)
-    hand = rig.hand(link, clock, set_up_boards=False)
+    setup = rig.setup
+    link = setup.link(clock)
+    hand = setup.device(link, clock, set_up_boards=False)
     try:
         hand.connect()
-        sample, statistics = _listen(hand, clock, round(rig.settings.cycle_s * NANOSECONDS))
-        motors = MotorMap.load(rig.folder / rig.description.calibration.motors)
-        return [_ring(link), _cycle(hand, link, statistics), _motors(hand, sample, motors), _joints(sample)]
+        sample, statistics = _listen(hand, clock, round(setup.hand.cycle_s * NANOSECONDS))
+        return [_ring(link), _cycle(hand, link, statistics), _motors(hand, sample, setup.motor_map()), _joints(sample)]
     except DeviceError as error:
         return [Finding("hand", False, str(error))]
     finally:

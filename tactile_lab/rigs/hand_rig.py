@@ -8,17 +8,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from drivers.links import Link
-from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings
-from drivers.shadow.hand import ShadowHand
+from drivers.shadow.ethercat_link import EthercatSettings
 from drivers.shadow.hand_settings import HandSettings
-from drivers.shadow.joint_calibration import JointCalibration
-from drivers.shadow.motor_configuration import load_configurations
-from drivers.shadow.motor_polling import load_rates
-from drivers.shadow.motors import MotorMap
-from drivers.shadow.pysoem_link import PysoemLink
-from tactile_lab.clock import Clock
-from tactile_lab.errors import ConfigurationError
+from drivers.shadow.hand_setup import HandSetup, Master
 from tactile_lab.strict_yaml import StrictModel, load, validate
 
 KIND = "hand"
@@ -57,7 +49,7 @@ class HandRigDescription(StrictModel):
     kind: Literal["hand"]
     calibration: HandFiles
     ethercat: EthercatSettings
-    master: Literal["own", "pysoem"] = "own"
+    master: Master = "own"
     hand: HandSettings = HandSettings(cycle_s=0.002)
     far_end: str | None = None
 
@@ -71,36 +63,17 @@ class HandRig:
     source: str
 
     @property
-    def settings(self) -> HandSettings:
-        """How the hand is driven, with the polling rates of the file that is named. Raises ConfigurationError."""
-        rates = self.description.calibration.rates
-        if rates is None:
-            return self.description.hand
-        return self.description.hand.model_copy(update={"polling": load_rates(self.folder / rates)})
-
-    def link(self, clock: Clock) -> Link:
-        """The hand's link, not open. Raises ConfigurationError when the master is not installed."""
-        wanted = self.description.hand.palm
-        settings = self.description.ethercat.model_copy(update={"palm": wanted})
-        return (EthercatLink if self.description.master == "own" else PysoemLink)("hand", settings, clock)
-
-    def hand(self, link: Link, clock: Clock, *, set_up_boards: bool) -> ShadowHand:
-        """The hand on a link, not connected. Raises ConfigurationError for a file that can not be used.
-
-        Args:
-            link: from :meth:`link`, or one around it.
-            clock: the session's.
-            set_up_boards: upload the motor boards' settings when connecting.
-        """
-        files = self.description.calibration
-        boards = load_configurations(self.folder / files.boards) if files.boards else None
-        return ShadowHand(
-            link,
-            clock,
-            JointCalibration.load(self.folder / files.joints),
-            self.settings,
-            MotorMap.load(self.folder / files.motors),
-            boards if set_up_boards else None,
+    def setup(self) -> HandSetup:
+        """The hand, with its files where they lie."""
+        description, files = self.description, self.description.calibration
+        return HandSetup(
+            ethercat=description.ethercat,
+            master=description.master,
+            hand=description.hand,
+            joints=self.folder / files.joints,
+            motors=self.folder / files.motors,
+            boards=self.folder / files.boards if files.boards else None,
+            rates=self.folder / files.rates if files.rates else None,
         )
 
 
@@ -114,10 +87,7 @@ def load_hand_rig(path: Path) -> HandRig:
     """Read a rig file of kind ``hand``.
 
     Raises:
-        ConfigurationError: it does not fit, or names a palm twice.
+        ConfigurationError: it does not fit.
     """
     description = validate(load(path), HandRigDescription, where=str(path))
-    if description.ethercat.palm not in (None, description.hand.palm):
-        hint = "Name the palm under hand alone"
-        raise ConfigurationError("hand.palm and ethercat.palm differ", where=str(path), hint=hint)
     return HandRig(description, path.parent, str(path))

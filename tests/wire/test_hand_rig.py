@@ -70,8 +70,8 @@ def test_files_that_do_not_fit_are_refused(tmp_path: Path) -> None:
         emulated_hand(load_hand_rig(rig_file(tmp_path, "lo"))),
     ):
         pass
-    with pytest.raises(ConfigurationError, match=r"hand.palm and ethercat.palm differ"):
-        load_hand_rig(rig_file(tmp_path, "lo", ethercat={"interface": "lo", "palm": "0230"}))
+    with pytest.raises(ConfigurationError, match=r"hand.palm and the cable's palm differ"):
+        check_rig(str(rig_file(tmp_path, "lo", ethercat={"interface": "lo", "palm": "0230"})))
     missing = {"joints": "none.yaml", "motors": "none.yaml"}
     with pytest.raises(ConfigurationError, match=r"none.yaml"):
         check_rig(str(rig_file(tmp_path, "lo", calibration=missing)))

@@ -1,0 +1,80 @@
+"""Everything that is needed to reach and drive one real hand, in a form that can be handed to another process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from drivers.links import Link
+from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings
+from drivers.shadow.hand import ShadowHand
+from drivers.shadow.hand_settings import HandSettings
+from drivers.shadow.joint_calibration import JointCalibration
+from drivers.shadow.motor_configuration import load_configurations
+from drivers.shadow.motor_polling import load_rates
+from drivers.shadow.motors import MotorMap
+from drivers.shadow.pysoem_link import PysoemLink
+from tactile_lab.clock import Clock
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.strict_yaml import StrictModel
+
+Master = Literal["own", "pysoem"]
+
+
+class HandSetup(StrictModel):
+    """A hand on its cable.
+
+    Attributes:
+        name: the device's name in the rig.
+        ethercat: how it is reached.
+        master: our own EtherCAT master, or ``pysoem`` (the ``[ethercat]`` extra).
+        hand: how it is driven; ``cycle_s`` is the period of its cycle.
+        joints, motors: calibration files of this very hand.
+        boards: settings to upload to the motor boards when connecting; they keep theirs when left out.
+        rates: how often motors are asked for what, in place of ``hand.polling``.
+    """
+
+    name: str = "hand"
+    ethercat: EthercatSettings
+    master: Master = "own"
+    hand: HandSettings
+    joints: Path
+    motors: Path
+    boards: Path | None = None
+    rates: Path | None = None
+
+    def settings(self) -> HandSettings:
+        """How the hand is driven, with the polling rates of the file. Raises ConfigurationError."""
+        return self.hand if self.rates is None else self.hand.model_copy(update={"polling": load_rates(self.rates)})
+
+    def link(self, clock: Clock) -> EthercatLink | PysoemLink:
+        """The hand's link, not open.
+
+        Raises:
+            ConfigurationError: the master is not installed, or two places name different palms.
+        """
+        if self.ethercat.palm not in (None, self.hand.palm):
+            raise ConfigurationError(
+                "hand.palm and the cable's palm differ", where=self.name, hint="Name the palm under hand alone"
+            )
+        settings = self.ethercat.model_copy(update={"palm": self.hand.palm})
+        return (EthercatLink if self.master == "own" else PysoemLink)(self.name, settings, clock)
+
+    def motor_map(self) -> MotorMap:
+        """Which motor pulls which joint. Raises ConfigurationError."""
+        return MotorMap.load(self.motors)
+
+    def device(self, link: Link, clock: Clock, *, set_up_boards: bool = True) -> ShadowHand:
+        """The hand, not connected.
+
+        Args:
+            link: from :meth:`link`, or one around it.
+            clock: the session's.
+            set_up_boards: upload the motor boards' settings when connecting.
+
+        Raises:
+            ConfigurationError: a file that can not be used.
+        """
+        boards = load_configurations(self.boards) if self.boards else None
+        joints = JointCalibration.load(self.joints)
+        return ShadowHand(link, clock, joints, self.settings(), self.motor_map(), boards if set_up_boards else None)
