@@ -227,6 +227,13 @@ class Gpis:
         single = self._factor.in_single_precision() if rough and fits else None
         return np.concatenate([self._variance(points_m[block], single) for block in self._blocks(len(points_m))])
 
+    def joint_covariance(self, points_m: Array) -> Array:
+        """Posterior covariance of the values at points of shape (q, d) with each other, shape (q, q), square metres."""
+        points_m = np.asarray(points_m, dtype=float)
+        rows = cross_covariance(self.kernel, points_m, self.observations.points_m, self._gradient_count)
+        prior = self.kernel.profile(cdist(points_m, points_m, "sqeuclidean")).value
+        return np.asarray(prior - self._factor.explained_jointly(rows))
+
     def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
         """The field at points of shape (q, d), in blocks, so that memory stays bounded for any q.
 

@@ -65,6 +65,11 @@ class RowFactor:
             found, _ = lapack.strtrs(single, columns.astype(np.float32), lower=1, overwrite_b=1)
         return np.asarray(np.einsum("nq,nq->q", found, found, dtype=float))
 
+    def explained_jointly(self, covariances: Array) -> Array:
+        """``k K^-1 k'`` between all rows k of covariances with all rows, shape (q, n); shape (q, q)."""
+        found, _ = lapack.dtrtrs(self.lower, self._ordered(covariances).T, lower=1)
+        return np.asarray(found.T @ found)
+
     def in_single_precision(self) -> Array:
         """The factor as single-precision numbers, half as dear to solve with."""
         return np.asarray(self.lower, dtype=np.float32, order="F")

@@ -1,0 +1,44 @@
+"""How well a Gaussian process knows the surface (thesis section 4.4.4)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactile_lab.exploration.policy import Surface
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.field_grid import Field
+from tactile_lab.shape.gpis import Gpis
+
+_JITTER = 1e-9
+
+
+def surface_variance(field: Field, surface: Surface) -> Array:
+    """Equation 4.7 on the extracted surface: the field's variance at every vertex, shape (n,), square metres."""
+    found = field.predict(surface.points_m, variance=True).variance_m2
+    return np.asarray(found)
+
+
+def log_determinant(covariance: Array) -> float:
+    """Of a covariance, shape (q, q); entries that rounding made singular count as very small, not as minus infinity."""
+    size = max(float(np.trace(covariance)) / max(len(covariance), 1), np.finfo(float).tiny)
+    return float(np.linalg.slogdet(covariance + _JITTER * size * np.eye(len(covariance)))[1])
+
+
+def differential_entropy(covariance: Array) -> float:
+    """Equation 4.8, ``log((2 pi e)^d det K) / 2``, of jointly Gaussian values with covariance (d, d), nats."""
+    count = len(covariance)
+    return 0.5 * (count * float(np.log(2 * np.pi * np.e)) + log_determinant(covariance))
+
+
+def contact_entropy(gpis: Gpis, points_m: Array, point_sigma_m: float = 0.001) -> float:
+    """Equations 4.9 and 4.10 for contacts that are expected at ``points_m``, shape (q, d), nats.
+
+    ``log det K*`` with the expected contacts bordering the present ones is ``log det K`` plus the logarithm of the
+    determinant of their posterior covariance. The first is the same for all candidates and left out, so that a grasp
+    without contacts has 0. The measurement's noise is part of the covariance: without it a second touch of the same
+    place would count as minus infinity. Normalised by the noise, so that the value is a pure number.
+    """
+    if len(points_m) == 0:
+        return 0.0
+    noise = point_sigma_m**2
+    return log_determinant(gpis.joint_covariance(points_m) / noise + np.eye(len(points_m)))
