@@ -23,7 +23,7 @@ from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.strict_yaml import StrictModel, load, validate
 
-Kind = Literal["forearm", "joints", "fingertips", "biotacs", "camera"]
+Kind = Literal["forearm", "joints", "fingertips", "biotacs", "normals", "camera"]
 Verdict = Literal["PASS", "FAIL"]
 
 VALID_DAYS = 90.0

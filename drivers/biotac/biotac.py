@@ -65,7 +65,7 @@ class BioTac:
             raise ConfigurationError(what, where=f"BioTac {finger}", hint=hint)
         self.finger = finger
         self.calibration = calibration
-        self._normals = normals
+        self.normals = normals
         self._settings = settings = settings or BioTacSettings()
         self._slot = FINGERS.index(finger)
         skin = calibration.skin.surface() if calibration.skin else None
@@ -167,8 +167,8 @@ class BioTac:
         if found.squeeze[0] == 0.0:
             return None
         normal, sigma_rad = found.normals[0], self.calibration.normal_sigma_rad
-        if self._normals is not None:
-            normals, sigmas = self._normals.normals(change[None])
+        if self.normals is not None:
+            normals, sigmas = self.normals.normals(change[None])
             normal, sigma_rad = normals[0], float(sigmas[0])
         return self._in_distal_frame(found.points_m[0], normal, sigma_rad, self._force_N(pdc_rise, change))
 

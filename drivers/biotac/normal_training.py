@@ -189,7 +189,7 @@ def _all_electrodes(changes: Array, electrodes: ElectrodeCount, power: float) ->
 
 
 def _judged(name: str, found: Array, measured: Array, half: int, in_sensor_frame: bool) -> MethodErrors:
-    known = np.isfinite(found).all(axis=1)
+    known = np.asarray(np.isfinite(found).all(axis=1))
     first, second = np.flatnonzero(known[:half]), half + np.flatnonzero(known[half:])
     turn = np.eye(3) if in_sensor_frame else rotation_between(found[first], measured[first])
     trained = angles_rad(found[first] @ turn.T, measured[first])

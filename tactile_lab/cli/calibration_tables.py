@@ -9,6 +9,7 @@ from calibration.store import CalibrationRecord
 from tactile_lab.cli.console import say, show_facts
 
 _LONGEST = 12
+_LONGEST_TEXT = 200
 
 
 def show_record(title: str, record: CalibrationRecord) -> None:
@@ -52,4 +53,8 @@ def _text(value: Any) -> str:
         if len(value) > _LONGEST or any(isinstance(part, list | tuple | Mapping) for part in value):
             return f"{len(value)} entries"
         return "  ".join(map(_text, value))
-    return str(value)
+    return _short(str(value))
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _LONGEST_TEXT else f"{len(text)} characters"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from calibration.forearm import load_forearm
 from drivers.ati.nano17 import Nano17
 from drivers.biotac.biotac import BioTac, BioTacCalibration, EllipsoidSkinSettings, load_biotacs
+from drivers.biotac.learned_normal import load_normals
 from drivers.camera.calibration import load_camera
 from drivers.camera.camera import Camera
 from drivers.camera.markers import MarkerSettings
@@ -121,7 +122,9 @@ def _biotacs(rig: Rig) -> dict[str, BioTac]:
     if rig.description.fingertips != "biotac":
         return {}
     calibrations = load_biotacs(rig.files["fingertips"])
-    return {finger: BioTac(finger, calibrations[finger]) for finger in FINGERS if finger in calibrations}
+    normals = load_normals(rig.files["normals"]) if "normals" in rig.files else {}
+    fitted = [finger for finger in FINGERS if finger in calibrations]
+    return {finger: BioTac(finger, calibrations[finger], normals=normals.get(finger)) for finger in fitted}
 
 
 def _tip_surfaces(rig: Rig) -> dict[str, TipSurface]:

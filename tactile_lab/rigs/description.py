@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from calibration.admission import Installation
 from drivers.ati.nano17 import Nano17Settings
+from drivers.ati.wiring import VoltsWiring
 from drivers.positioner import PositionerSettings
 from drivers.shadow.hand import HandSettings
 from drivers.simulation.settings import SimulationSettings
@@ -19,6 +20,7 @@ from sessions.conductor import ConductorSettings
 from sessions.perception import PerceptionSettings
 from sessions.session import Session
 from tactile_lab.errors import ConfigurationError
+from tactile_lab.rigs.wires import Wires
 from tactile_lab.strict_yaml import StrictModel, load, validate
 from tactile_lab.tracking.motion import MotionNoise
 
@@ -32,15 +34,21 @@ class CalibrationFiles(StrictModel):
     Attributes:
         joints: joint sensor tables of this hand (Shadow's calibration.yaml).
         motors: which motor pulls which joint.
+        boards: settings of the motor boards; on wires they are uploaded at every start, and kept when left out.
+        rates: how often motors are asked for what; in place of ``hand.polling``.
         fingertips: shape, mounting and weight of the fingertips.
         forearm: where the positioner stands in the world.
+        normals: learned contact normals of BioTacs; the skin's at equation 2.24's point without.
         camera, markers: lens, and the markers of the rig; left out for a rig without a camera.
     """
 
     joints: str
     motors: str
+    boards: str | None = None
+    rates: str | None = None
     fingertips: str
     forearm: str
+    normals: str | None = None
     camera: str | None = None
     markers: str | None = None
 
@@ -56,26 +64,30 @@ class RigDescription(StrictModel):
 
     Attributes:
         name, summary: for people.
-        kind: where the bytes come from. Only the simulated world is built so far.
+        kind: where the bytes come from: a simulated world in this program, or devices on wires.
         cycle_s: period of the common cycle, seconds.
         fingertips: the kind of fingertip on all fingers.
         calibration: files to use.
         station: the installation that the calibrations belong to, so that several rig files of one can share them;
             the rig's own name unless given.
         devices: serial numbers by device name (hand, base, camera, ft/FF ...); a calibration of another is refused.
+        wires: where the devices are, for kind ``wired``.
+        stand_ins: devices on wires are emulated by this program, in real time, over a simulated plant.
         hand, nano17, base, perception, conductor: settings of the parts.
         motion: how far a re-oriented object strays from the hand's motion on this rig, one standard deviation.
-        simulation: the simulated world (its fingertips follow ``fingertips``).
+        simulation: the simulated world (its fingertips follow ``fingertips``), of kind ``simulated`` or stand-ins.
     """
 
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
     summary: str
-    kind: Literal["simulated"]
+    kind: Literal["simulated", "wired"]
     cycle_s: float = Field(ge=0.001, le=0.02)
     fingertips: Literal["nano17", "biotac"]
     calibration: CalibrationFiles
     station: str = ""
     devices: dict[str, str] = Field(default_factory=dict)
+    wires: Wires | None = None
+    stand_ins: bool = False
     hand: HandSettings = HandSettings()
     nano17: Nano17Settings = Nano17Settings()
     base: PositionerSettings = PositionerSettings()
@@ -83,6 +95,16 @@ class RigDescription(StrictModel):
     conductor: ConductorSettings = ConductorSettings()
     motion: MotionNoise = MotionNoise()
     simulation: SimulationSettings = SimulationSettings()
+
+    @model_validator(mode="after")
+    def _wires_fit(self) -> RigDescription:
+        if (self.kind == "wired") != (self.wires is not None):
+            raise ValueError("wires belong to kind wired, and kind wired needs them")
+        if self.stand_ins and self.kind != "wired":
+            raise ValueError("stand_ins belong to kind wired: a simulated rig needs none")
+        if self.wires is not None and bool(self.wires.fingertips) != (self.fingertips == "nano17"):
+            raise ValueError("wires.fingertips belong to nano17 fingertips; BioTacs send through the palm")
+        return self
 
 
 @dataclass(frozen=True)
@@ -122,8 +144,19 @@ def load_rig(name_or_path: str) -> Rig:
         )
     description = validate(content, RigDescription, where=str(path))
     named = description.calibration.model_dump(exclude_none=True)
-    files = {role: path.parent / file for role, file in named.items()}
+    files = {role: path.parent / file for role, file in (named | gauge_files(description)).items()}
     return Rig(description, _present(files, str(path)), str(path))
+
+
+def gauge_files(description: RigDescription) -> dict[str, str]:
+    """The ``.cal`` files that the wires of force fingertips name, by role."""
+    wires = description.wires.fingertips if description.wires else {}
+    return {gauge_role(finger): wire.calibration for finger, wire in wires.items() if isinstance(wire, VoltsWiring)}
+
+
+def gauge_role(finger: str) -> str:
+    """Under which role a finger's ``.cal`` file is kept."""
+    return f"gauges-{finger}"
 
 
 def rig_of_session(session: Session) -> Rig:

@@ -190,7 +190,8 @@ def test_the_shipped_calibration_points_the_biotac_along_the_finger() -> None:
 
 
 def test_a_wrong_electrode_count_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "tips.yaml").write_text(TIPS.read_text().replace("electrodes: 19", "electrodes: 20"))
+    tips = {"biotacs": {"FF": {"electrodes": 20, "distal_T_sensor": {"translation_m": [0.0, 0.0, 0.0]}}}}
+    (tmp_path / "tips.yaml").write_text(json.dumps(tips))
     with pytest.raises(ConfigurationError, match="electrodes"):
         load_biotacs(tmp_path / "tips.yaml")
 
