@@ -17,6 +17,7 @@ from gtsam import Pose3
 from drivers.fingertip import FingertipCalibration, FingertipSensor
 from drivers.links import Link
 from drivers.shadow.kinematics import JOINTS
+from sessions.fingertip_samples import record_fingertips
 from sessions.instruments import (
     AskedInstrument,
     BaseInstrument,
@@ -176,6 +177,12 @@ class Bench:
         self.hand.stop()
         self.base.stop()
 
+    def restart_fingertip(self, finger: str) -> None:
+        """Close and start the sensor of a fingertip with a link of its own again. Raises DeviceError."""
+        if device := self.wrench_devices.get(finger):
+            device.close()
+            device.connect()
+
     def resume(self) -> None:
         """Motion is possible again after :meth:`stop`; nothing moves before new targets are set."""
         self.hand.resume()
@@ -245,6 +252,7 @@ class Bench:
         joints = dict(zip(JOINTS, seen.joints_rad.tolist(), strict=True))
         self.recorder.joints(now_ns, joints, dict(zip(BASE_JOINTS, seen.base_q.tolist(), strict=True)))
         self.recorder.loads(now_ns, seen.loads_N())
+        record_fingertips(self.recorder, now_ns, seen.fingertips)
         self.recorder.frames(now_ns, {"palm": seen.world_T_palm, **seen.world_T_distal})
         self._record_truth()
 

@@ -11,8 +11,9 @@ from typing import Any, Literal
 import yaml
 from pydantic import Field
 
+from sessions.formats import converted_manifest
 from tactile_lab.errors import ConfigurationError, SessionError
-from tactile_lab.strict_yaml import StrictModel, load_model
+from tactile_lab.strict_yaml import StrictModel, load, validate
 
 Status = Literal["open", "closed", "interrupted", "failed", "recovered"]
 
@@ -47,11 +48,12 @@ class Manifest(StrictModel):
         notes: the operator's.
         started_utc, ended_utc: ISO 8601.
         counts: messages by topic, grasps and the like.
+        streams: for each topic the messages recorded, gaps, late and dropped ones.
         data_loss: what was not recorded or dropped, by kind; empty when nothing was lost.
         problem: why it failed.
     """
 
-    format: Literal["tactile-session/1"] = "tactile-session/1"
+    format: Literal["tactile-session/2"] = "tactile-session/2"
     name: str
     status: Status
     rig: str
@@ -65,6 +67,7 @@ class Manifest(StrictModel):
     started_utc: str
     ended_utc: str | None = None
     counts: dict[str, int] = Field(default_factory=dict)
+    streams: dict[str, dict[str, int]] = Field(default_factory=dict)
     data_loss: dict[str, int] = Field(default_factory=dict)
     problem: str = ""
 
@@ -73,12 +76,13 @@ def read_manifest(folder: Path) -> Manifest:
     """Read ``session.yaml`` of a session folder.
 
     Raises:
-        SessionError: there is none, or it is not a strict document of this form.
+        SessionError: there is none, it is not a strict document of this form, or a newer version wrote it.
     """
     if not (folder / MANIFEST).is_file():
         raise SessionError("not a session folder (no session.yaml)", where=str(folder), hint="Check the path")
+    where = str(folder / MANIFEST)
     try:
-        return load_model(folder / MANIFEST, Manifest)
+        return validate(converted_manifest(load(folder / MANIFEST), where), Manifest, where=where)
     except ConfigurationError as error:
         raise SessionError(error.what, where=error.where, hint="The other files of the session are kept") from error
 

@@ -2,7 +2,7 @@
 
 Writes what the library's own writer would write, byte for byte, but puts a message into the chunk at hand in one go:
 hundreds come a second, and the library spends ten times as long on each. The records of which there are few are the
-library's.
+library's. A chunk can be taken from the writer and compressed and written later, by another thread.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
+    Attachment,
+    AttachmentIndex,
     Channel,
     Chunk,
     ChunkIndex,
@@ -56,19 +58,21 @@ class McapWriter:
 
     Args:
         output: where it goes; not closed here.
-        chunk_bytes: a chunk is closed when it has grown beyond this.
+        chunk_bytes: a chunk is written when it has grown beyond this; None where the caller takes the chunks.
         profile, library: for the header.
     """
 
-    def __init__(self, output: Output, chunk_bytes: int, profile: str, library: str) -> None:
+    def __init__(self, output: Output, chunk_bytes: int | None, profile: str, library: str) -> None:
         self._output, self._chunk_bytes = output, chunk_bytes
         self._compressor = zstandard.ZstdCompressor()
-        self._chunk = _Chunk()
+        self._chunk = PendingChunk()
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._chunk_indices: list[ChunkIndex] = []
         self._metadata_indices: list[MetadataIndex] = []
+        self._attachment_indices: list[AttachmentIndex] = []
         self._counts: Counter[int] = Counter()
+        self._closing: tuple[str, Mapping[str, str]] | None = None
         output.write(MCAP0_MAGIC + _encoded(Header(profile, library)))
 
     def add_metadata(self, name: str, content: Mapping[str, str]) -> None:
@@ -77,11 +81,27 @@ class McapWriter:
         self._output.write(record)
         self._metadata_indices.append(MetadataIndex(offset=offset, length=len(record), name=name))
 
+    def add_closing_metadata(self, name: str, content: Mapping[str, str]) -> None:
+        """Named texts that stand behind the last message: :meth:`finish` writes them."""
+        self._closing = (name, content)
+
+    def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
+        """Write a whole file into this one."""
+        record = _encoded(Attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data))
+        index = AttachmentIndex(self._output.tell(), len(record), 0, 0, len(data), name, media_type)
+        self._output.write(record)
+        self._attachment_indices.append(index)
+
+    @property
+    def pending_bytes(self) -> int:
+        """Size of the chunk at hand, uncompressed."""
+        return len(self._chunk.records)
+
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Describe a kind of message; gives its number."""
         schema = Schema(id=len(self._schemas) + 1, data=data, encoding=encoding, name=name)
         self._schemas.append(schema)
-        self._chunk.records += _encoded(schema)
+        self._chunk.define(_encoded(schema))
         return schema.id
 
     def add_channel(self, topic: str, message_encoding: str, schema: int = 0) -> int:
@@ -89,7 +109,7 @@ class McapWriter:
         number = len(self._channels) + 1
         channel = Channel(id=number, topic=topic, message_encoding=message_encoding, schema_id=schema, metadata={})
         self._channels.append(channel)
-        self._chunk.records += _encoded(channel)
+        self._chunk.define(_encoded(channel))
         return number
 
     def add_message(self, channel: int, log_ns: int, data: bytes, publish_ns: int, sequence: int) -> None:
@@ -104,18 +124,38 @@ class McapWriter:
         )
         chunk.records += data
         self._counts[channel] += 1
-        if len(chunk.records) > self._chunk_bytes:
+        if self._chunk_bytes is not None and len(chunk.records) > self._chunk_bytes:
             self.flush()
 
     def flush(self) -> None:
         """Write the chunk at hand, unless it has no message."""
-        if self._chunk.entries:
-            chunk, self._chunk = self._chunk, _Chunk()
-            self._write_chunk(chunk)
+        if (chunk := self.detach()) is not None:
+            self.write_chunk(chunk)
+
+    def detach(self) -> PendingChunk | None:
+        """Give away the chunk at hand, for :meth:`write_chunk` or :meth:`drop`; None when it has no message."""
+        if not self._chunk.entries:
+            return None
+        chunk, self._chunk = self._chunk, PendingChunk()
+        return chunk
+
+    def drop(self, chunk: PendingChunk) -> None:
+        """A chunk is not going to be written: what it described is described again in the chunk at hand.
+
+        The chunk at hand must have no message yet.
+        """
+        self._chunk.define(bytes(chunk.definitions))
+        self._counts.subtract(chunk.message_counts())
+
+    def discard(self) -> None:
+        """Forget the chunk at hand: writing a message into it was broken off."""
+        self._chunk = PendingChunk()
 
     def finish(self) -> None:
         """Write what is left, and the summary."""
         self.flush()
+        if self._closing is not None:
+            self.add_metadata(*self._closing)
         self._output.write(_encoded(DataEnd(0)))
         start = self._output.tell()
         summary, offsets = self._summary(start)
@@ -126,7 +166,8 @@ class McapWriter:
         footer = Footer(summary_start=start, summary_offset_start=offset_start, summary_crc=zlib.crc32(checked))
         self._output.write(_encoded(footer) + MCAP0_MAGIC)
 
-    def _write_chunk(self, chunk: _Chunk) -> None:
+    def write_chunk(self, chunk: PendingChunk) -> None:
+        """Compress a chunk that was taken, and write it. Chunks must come in the order in which they were taken."""
         start = self._output.tell()
         record = Chunk(
             compression="zstd",
@@ -160,7 +201,7 @@ class McapWriter:
             (Opcode.CHANNEL, self._channels),
             (Opcode.STATISTICS, [self._statistics()]),
             (Opcode.CHUNK_INDEX, self._chunk_indices),
-            (Opcode.ATTACHMENT_INDEX, []),
+            (Opcode.ATTACHMENT_INDEX, self._attachment_indices),
             (Opcode.METADATA_INDEX, self._metadata_indices),
         ]
         summary, offsets = bytearray(), []
@@ -172,7 +213,7 @@ class McapWriter:
 
     def _statistics(self) -> Statistics:
         return Statistics(
-            attachment_count=0,
+            attachment_count=len(self._attachment_indices),
             channel_count=len(self._channels),
             channel_message_counts=dict(self._counts),
             chunk_count=len(self._chunk_indices),
@@ -184,13 +225,23 @@ class McapWriter:
         )
 
 
-class _Chunk:
-    """The chunk at hand: its records, and by channel the index entries of its messages."""
+class PendingChunk:
+    """Messages on their way to the file: their records, and by channel the index entries."""
 
     def __init__(self) -> None:
         self.records = bytearray()
+        self.definitions = bytearray()
         self.entries: dict[int, bytearray] = {}
         self.first_ns = self.last_ns = 0
+
+    def define(self, records: bytes) -> None:
+        """Put in the description of schemas or channels."""
+        self.records += records
+        self.definitions += records
+
+    def message_counts(self) -> dict[int, int]:
+        """Number of messages by channel."""
+        return {channel: len(entries) // _INDEX_ENTRY.size for channel, entries in self.entries.items()}
 
     def index(self, start: int) -> tuple[dict[int, int], bytes]:
         """Where in the file each channel's index stands, and the indices, which begin at ``start``."""

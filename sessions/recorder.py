@@ -7,13 +7,13 @@ which only evaluation reads.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from enum import IntEnum
 from typing import Any, Protocol
 
 from gtsam import Pose3
 
-from sessions import schemas
+from sessions import foxglove, schemas
 from sessions.marks import Mark
 from tactile_lab.geometry.contacts import Array, Contact, Grasp
 
@@ -27,6 +27,21 @@ class Level(IntEnum):
     INFO = 2
     WARNING = 3
     ERROR = 4
+
+
+class WrenchReading(Protocol):
+    """One reading of a force sensor: force (N) then torque (N m), shape (6,), sensor frame."""
+
+    @property
+    def stamp_ns(self) -> int: ...
+    @property
+    def wrench(self) -> Array: ...
+    @property
+    def rdt_sequence(self) -> int: ...
+    @property
+    def ft_sequence(self) -> int: ...
+    @property
+    def status(self) -> int: ...
 
 
 class TrafficSink(Protocol):
@@ -54,7 +69,12 @@ class Recorder:
         self.broken = False
         """A message could not be kept, and its writer was told so: what follows is not recorded."""
         self._sink = sink
+        self._onlooker: TrafficSink = NullTraffic()
         self._next_state_ns: int | None = None
+
+    def watched_by(self, onlooker: TrafficSink) -> None:
+        """From here on what viewers show goes to ``onlooker`` too; its ``write`` must be quick and never raise."""
+        self._onlooker = onlooker
 
     # --- what a replay needs -----------------------------------------------------------------------------------
 
@@ -81,12 +101,11 @@ class Recorder:
 
     def joints(self, stamp_ns: int, joints_rad: Mapping[str, float], base: Mapping[str, float]) -> None:
         """Joint angles of the hand and joint positions of the positioner, by name."""
-        content = {"timestamp": schemas.time(stamp_ns), "joints_rad": dict(joints_rad), "base": dict(base)}
-        self._put_json(schemas.JOINTS_TOPIC, content, stamp_ns)
+        self._put_json(schemas.JOINTS_TOPIC, foxglove.joint_states(stamp_ns, {**joints_rad, **base}), stamp_ns)
 
     def loads(self, stamp_ns: int, loads_N: Mapping[str, float]) -> None:
         """Contact force on each fingertip."""
-        content = {"timestamp": schemas.time(stamp_ns), "load_N": dict(loads_N)}
+        content = {"timestamp": foxglove.time(stamp_ns), "load_N": dict(loads_N)}
         self._put_json(schemas.LOADS_TOPIC, content, stamp_ns)
 
     def frames(self, stamp_ns: int, world_T_frames: Mapping[str, Pose3]) -> None:
@@ -97,13 +116,38 @@ class Recorder:
     def grasp(self, stamp_ns: int, grasp: Grasp, dropped: Mapping[str, str]) -> None:
         """The contacts of a grasp, and the fingers without one."""
         content = {
-            "timestamp": schemas.time(grasp.stamp_ns),
+            "timestamp": foxglove.time(grasp.stamp_ns),
             "index": grasp.index,
             "contacts": schemas.contacts(grasp.contacts),
             "dropped": dict(dropped),
-            "hand_motion_world": schemas.pose(grasp.hand_motion_world),
+            "hand_motion_world": foxglove.pose(grasp.hand_motion_world),
         }
         self._put_json(schemas.CONTACTS_TOPIC, content, stamp_ns)
+        self._put_json(schemas.CLOUD_TOPIC, foxglove.contact_cloud(stamp_ns, grasp.contacts), stamp_ns)
+        self._put_json(schemas.SCENE_TOPIC, foxglove.contact_scene(stamp_ns, grasp.index, grasp.contacts), stamp_ns)
+
+    def wrench(self, stamp_ns: int, finger: str, reading: WrenchReading) -> None:
+        """What a fingertip's force sensor measures, in its own frame, as it came."""
+        content = {
+            "timestamp": foxglove.time(reading.stamp_ns),
+            "frame_id": f"{finger}/sensor",
+            "force_N": reading.wrench[:3],
+            "torque_Nm": reading.wrench[3:],
+            "device_counter": reading.rdt_sequence,
+            "device_clock": reading.ft_sequence,
+            "status": reading.status,
+        }
+        self._put_json(schemas.wrench_topic(finger), content, stamp_ns)
+
+    def biotac(self, stamp_ns: int, finger: str, counts: Mapping[str, int | None], pac: Sequence[int]) -> None:
+        """What a BioTac measures: counts by channel (PDC, TAC, TDC, E1 ...; None: not heard) and of the vibration."""
+        content = {"timestamp": foxglove.time(stamp_ns), "finger": finger, "counts": dict(counts), "pac": list(pac)}
+        self._put_json(schemas.biotac_topic(finger), content, stamp_ns)
+
+    def camera(self, stamp_ns: int, matrix: Array, distortion: Sequence[float], size_px: tuple[int, int]) -> None:
+        """The camera's calibration, for viewers: camera matrix (3, 3) in pixels, distortion in OpenCV's order."""
+        content = foxglove.camera_calibration(stamp_ns, matrix, distortion, size_px)
+        self._put_json(schemas.CAMERA_TOPIC, content, stamp_ns)
 
     def image(self, stamp_ns: int, encoded: bytes) -> None:
         """A camera picture as it came, JPEG or PNG."""
@@ -116,14 +160,26 @@ class Recorder:
         if world_T_object is not None:
             pose = schemas.pose_in_frame(stamp_ns, "world", world_T_object)
             self._put_json(schemas.SLAM_POSE_TOPIC, pose, stamp_ns)
-        content = {"timestamp": schemas.time(stamp_ns), **state}
+        content = {"timestamp": foxglove.time(stamp_ns), **state}
         if covariance is not None:
             content["covariance"] = covariance
         self._put_json(schemas.SLAM_STATE_TOPIC, content, stamp_ns)
 
+    def surface(self, stamp_ns: int, content: Mapping[str, Any]) -> None:
+        """The estimated surface, see :mod:`sessions.surface_message`."""
+        self._put_json(schemas.SLAM_SURFACE_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)
+
+    def plan(self, stamp_ns: int, content: Mapping[str, Any]) -> None:
+        """The grasp that comes next, plain data."""
+        self._put_json(schemas.PLAN_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)
+
+    def guide(self, stamp_ns: int, content: Mapping[str, Any]) -> None:
+        """What the person of a guided session is shown, plain data."""
+        self._put_json(schemas.GUIDE_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)
+
     def event(self, stamp_ns: int, level: Level, source: str, message: str) -> None:
         """Something a person should be able to read later."""
-        content = {"timestamp": schemas.time(stamp_ns), "level": int(level), "message": message, "name": source}
+        content = {"timestamp": foxglove.time(stamp_ns), "level": int(level), "message": message, "name": source}
         self._put_json(schemas.EVENTS_TOPIC, {**content, "file": "", "line": 0}, stamp_ns)
 
     # --- truth -------------------------------------------------------------------------------------------------
@@ -133,7 +189,7 @@ class Recorder:
         pose = schemas.pose_in_frame(stamp_ns, "world", world_T_object)
         self._put_json(schemas.TRUTH_POSE_TOPIC, pose, stamp_ns)
         if contacts is not None:
-            content = {"timestamp": schemas.time(stamp_ns), "contacts": schemas.contacts(contacts)}
+            content = {"timestamp": foxglove.time(stamp_ns), "contacts": schemas.contacts(contacts)}
             self._put_json(schemas.TRUTH_CONTACTS_TOPIC, content, stamp_ns)
 
     def _put(self, topic: str, data: bytes, stamp_ns: int) -> None:
@@ -143,8 +199,10 @@ class Recorder:
             self.broken = True
             raise
 
-    def _put_json(self, topic: str, content: schemas.Json, stamp_ns: int) -> None:
-        self._put(topic, schemas.encode(content), stamp_ns)
+    def _put_json(self, topic: str, content: foxglove.Json, stamp_ns: int) -> None:
+        data = schemas.encode(content)
+        self._put(topic, data, stamp_ns)
+        self._onlooker.write(topic, data, stamp_ns)
 
 
 class NullRecorder(Recorder):
@@ -156,5 +214,5 @@ class NullRecorder(Recorder):
     def state_due(self, now_ns: int) -> bool:
         return False
 
-    def _put_json(self, topic: str, content: schemas.Json, stamp_ns: int) -> None:
+    def _put_json(self, topic: str, content: foxglove.Json, stamp_ns: int) -> None:
         """Nothing to write."""

@@ -1,7 +1,9 @@
 """Topics of a traffic file, their JSON schemas, and how values are written in them.
 
 Schemas whose names begin with ``foxglove.`` follow Foxglove's published field names, so that standard viewers show
-images, poses, transforms and the log without a plug-in. Raw bytes and marks have none.
+images, poses, transforms, joints, point clouds, scenes and the log without a plug-in; the larger ones are in
+:mod:`sessions.foxglove`. Those that begin with ``tactile_lab.`` are our own, described in ``docs/sessions.md``. Bytes
+of links stand in the envelope of :mod:`sessions.raw_frames`.
 """
 
 from __future__ import annotations
@@ -15,10 +17,25 @@ from typing import Any
 import numpy as np
 from gtsam import Pose3
 
-from tactile_lab.clock import NANOSECONDS
-from tactile_lab.geometry.contacts import Array, Contact
-
-Json = dict[str, Any]
+from sessions import foxglove
+from sessions.foxglove import (
+    BYTES,
+    INTEGER,
+    NUMBER,
+    POSE,
+    QUATERNION,
+    TEXT,
+    TIME,
+    VECTOR,
+    Json,
+    fields,
+    list_of,
+    pose,
+    quaternion,
+    time,
+    vector,
+)
+from tactile_lab.geometry.contacts import Contact
 
 RAW_ENCODING = "application/octet-stream"
 MARKS_TOPIC = "/marks"
@@ -26,10 +43,17 @@ JOINTS_TOPIC = "/hand/joints"
 LOADS_TOPIC = "/hand/loads"
 TRANSFORMS_TOPIC = "/tf"
 CONTACTS_TOPIC = "/contacts"
+CLOUD_TOPIC = "/contacts/points"
+SCENE_TOPIC = "/contacts/scene"
+CAMERA_TOPIC = "/camera/calibration"
 EVENTS_TOPIC = "/events"
+STREAMS_TOPIC = "/recorder/streams"
 IMAGE_TOPIC = "/camera/image"
 SLAM_POSE_TOPIC = "/slam/pose"
 SLAM_STATE_TOPIC = "/slam/state"
+SLAM_SURFACE_TOPIC = "/slam/surface"
+PLAN_TOPIC = "/plan"
+GUIDE_TOPIC = "/guide"
 TRUTH_POSE_TOPIC = "/truth/object"
 TRUTH_CONTACTS_TOPIC = "/truth/contacts"
 
@@ -46,55 +70,87 @@ class Schema:
         return json.dumps({"title": self.name, **self.definition}).encode()
 
 
-def _fields(**properties: Json) -> Json:
-    return {"type": "object", "properties": properties}
-
-
-def _list_of(items: Json) -> Json:
-    return {"type": "array", "items": items}
-
-
-_NUMBER, _INTEGER, _TEXT = {"type": "number"}, {"type": "integer"}, {"type": "string"}
-_TIME = _fields(sec=_INTEGER, nsec=_INTEGER)
-_VECTOR = _fields(x=_NUMBER, y=_NUMBER, z=_NUMBER)
-_QUATERNION = _fields(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
-_POSE = _fields(position=_VECTOR, orientation=_QUATERNION)
-_TRANSFORM = _fields(
-    timestamp=_TIME, parent_frame_id=_TEXT, child_frame_id=_TEXT, translation=_VECTOR, rotation=_QUATERNION
-)
-_POSE_IN_FRAME = Schema("foxglove.PoseInFrame", _fields(timestamp=_TIME, frame_id=_TEXT, pose=_POSE))
-_CONTACT = _fields(
-    finger=_TEXT,
-    point_world_m=_list_of(_NUMBER),
-    normal_world=_list_of(_NUMBER),
-    point_covariance_m2=_list_of(_list_of(_NUMBER)),
-    normal_sigma_rad=_NUMBER,
-    force_N=_NUMBER,
+_TRANSFORM = fields(timestamp=TIME, parent_frame_id=TEXT, child_frame_id=TEXT, translation=VECTOR, rotation=QUATERNION)
+_POSE_IN_FRAME = Schema("foxglove.PoseInFrame", fields(timestamp=TIME, frame_id=TEXT, pose=POSE))
+_CONTACT = fields(
+    finger=TEXT,
+    point_world_m=list_of(NUMBER),
+    normal_world=list_of(NUMBER),
+    point_covariance_m2=list_of(list_of(NUMBER)),
+    normal_sigma_rad=NUMBER,
+    force_N=NUMBER,
 )
 _FREE = {"type": "object"}
+_LIST = list_of(NUMBER)
 
 SCHEMAS: Mapping[str, Schema] = {
-    JOINTS_TOPIC: Schema("tactile_lab.Joints", _fields(timestamp=_TIME, joints_rad=_FREE, base=_FREE)),
-    LOADS_TOPIC: Schema("tactile_lab.Loads", _fields(timestamp=_TIME, load_N=_FREE)),
-    TRANSFORMS_TOPIC: Schema("foxglove.FrameTransforms", _fields(transforms=_list_of(_TRANSFORM))),
+    JOINTS_TOPIC: Schema("foxglove.JointStates", foxglove.JOINT_STATES),
+    LOADS_TOPIC: Schema("tactile_lab.Loads", fields(timestamp=TIME, load_N=_FREE)),
+    TRANSFORMS_TOPIC: Schema("foxglove.FrameTransforms", fields(transforms=list_of(_TRANSFORM))),
     CONTACTS_TOPIC: Schema(
         "tactile_lab.Grasp",
-        _fields(timestamp=_TIME, index=_INTEGER, contacts=_list_of(_CONTACT), dropped=_FREE, hand_motion_world=_FREE),
+        fields(timestamp=TIME, index=INTEGER, contacts=list_of(_CONTACT), dropped=_FREE, hand_motion_world=_FREE),
     ),
+    CLOUD_TOPIC: Schema("foxglove.PointCloud", foxglove.POINT_CLOUD),
+    SCENE_TOPIC: Schema("foxglove.SceneUpdate", foxglove.SCENE_UPDATE),
+    CAMERA_TOPIC: Schema("foxglove.CameraCalibration", foxglove.CAMERA_CALIBRATION),
     EVENTS_TOPIC: Schema(
         "foxglove.Log",
-        _fields(timestamp=_TIME, level=_INTEGER, message=_TEXT, name=_TEXT, file=_TEXT, line=_INTEGER),
+        fields(timestamp=TIME, level=INTEGER, message=TEXT, name=TEXT, file=TEXT, line=INTEGER),
     ),
     IMAGE_TOPIC: Schema(
         "foxglove.CompressedImage",
-        _fields(timestamp=_TIME, frame_id=_TEXT, data={"type": "string", "contentEncoding": "base64"}, format=_TEXT),
+        fields(timestamp=TIME, frame_id=TEXT, data=BYTES, format=TEXT),
     ),
     SLAM_POSE_TOPIC: _POSE_IN_FRAME,
     SLAM_STATE_TOPIC: Schema("tactile_lab.SlamState", _FREE),
+    SLAM_SURFACE_TOPIC: Schema(
+        "tactile_lab.Surface",
+        fields(timestamp=TIME, vertices_m=list_of(list_of(NUMBER)), faces=list_of(list_of(INTEGER)), sigma_m=_LIST),
+    ),
+    PLAN_TOPIC: Schema("tactile_lab.Plan", _FREE),
+    GUIDE_TOPIC: Schema("tactile_lab.Guide", _FREE),
+    STREAMS_TOPIC: Schema("tactile_lab.Streams", fields(timestamp=TIME, streams=_FREE)),
     TRUTH_POSE_TOPIC: _POSE_IN_FRAME,
-    TRUTH_CONTACTS_TOPIC: Schema("tactile_lab.TruthContacts", _fields(timestamp=_TIME, contacts=_list_of(_FREE))),
+    TRUTH_CONTACTS_TOPIC: Schema("tactile_lab.TruthContacts", fields(timestamp=TIME, contacts=list_of(_FREE))),
 }
 """Schema of each topic that has one."""
+
+
+_WRENCH = Schema(
+    "tactile_lab.Wrench",
+    fields(
+        timestamp=TIME,
+        frame_id=TEXT,
+        force_N=list_of(NUMBER),
+        torque_Nm=list_of(NUMBER),
+        device_counter=INTEGER,
+        device_clock=INTEGER,
+        status=INTEGER,
+    ),
+)
+_BIOTAC = Schema("tactile_lab.BioTac", fields(timestamp=TIME, finger=TEXT, counts=_FREE, pac=list_of(INTEGER)))
+
+
+def wrench_topic(finger: str) -> str:
+    """Topic of a fingertip's wrenches."""
+    return f"/ft/{finger}/wrench"
+
+
+def biotac_topic(finger: str) -> str:
+    """Topic of a BioTac's readings."""
+    return f"/biotac/{finger}/readings"
+
+
+def schema_by_form(topic: str) -> Schema | None:
+    """Schema of the topics that there is one of for each finger."""
+    kind = {"wrench": _WRENCH, "readings": _BIOTAC}.get(topic.rpartition("/")[2])
+    return kind if topic.startswith(("/ft/", "/biotac/")) else None
+
+
+def is_raw(topic: str) -> bool:
+    """Whether a topic carries the bytes of a link."""
+    return topic.startswith("/link/")
 
 
 def received_topic(link: str) -> str:
@@ -112,16 +168,6 @@ def received_link(topic: str) -> str | None:
     return topic[len("/link/") : -len("/rx")] if topic.startswith("/link/") and topic.endswith("/rx") else None
 
 
-def time(stamp_ns: int) -> Json:
-    """Nanoseconds as Foxglove's seconds and nanoseconds."""
-    return {"sec": stamp_ns // NANOSECONDS, "nsec": stamp_ns % NANOSECONDS}
-
-
-def pose(target_T_source: Pose3) -> Json:
-    """A Foxglove pose."""
-    return {"position": _vector(target_T_source.translation()), "orientation": _quaternion(target_T_source)}
-
-
 def pose_in_frame(stamp_ns: int, frame: str, frame_T_object: Pose3) -> Json:
     """A ``foxglove.PoseInFrame``."""
     return {"timestamp": time(stamp_ns), "frame_id": frame, "pose": pose(frame_T_object)}
@@ -133,8 +179,8 @@ def transform(stamp_ns: int, parent: str, child: str, parent_T_child: Pose3) -> 
         "timestamp": time(stamp_ns),
         "parent_frame_id": parent,
         "child_frame_id": child,
-        "translation": _vector(parent_T_child.translation()),
-        "rotation": _quaternion(parent_T_child),
+        "translation": vector(parent_T_child.translation()),
+        "rotation": quaternion(parent_T_child),
     }
 
 
@@ -185,13 +231,3 @@ def _without_nan(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_without_nan(item) for item in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-def _vector(vector: Array) -> Json:
-    x, y, z = (float(value) for value in vector)
-    return {"x": x, "y": y, "z": z}
-
-
-def _quaternion(target_T_source: Pose3) -> Json:
-    rotation: Any = target_T_source.rotation().toQuaternion()
-    return {"x": rotation.x(), "y": rotation.y(), "z": rotation.z(), "w": rotation.w()}

@@ -5,7 +5,7 @@
     20261121-093000-sim-box/
         session.yaml        written first (status open), closed last
         calibration/        copies of the calibration files used
-        traffic.mcap        bytes, marks, samples, truth
+        traffic.mcap        bytes, marks, samples, truth; a long one goes on in traffic-2.mcap
         truth/object.ply    the object's true mesh, for evaluation only
         results/            what was made of it
 """
@@ -30,8 +30,11 @@ from sessions.manifest import (
     write_manifest,
     write_whole,
 )
+from sessions.raw_frames import Stamper
 from sessions.recorder import Recorder
-from sessions.traffic import TrafficWriter
+from sessions.session_ids import LONGEST_ID, slug
+from sessions.traffic import Attached, TrafficSettings, TrafficWriter
+from sessions.traffic_disk import being_written
 from sessions.traffic_reader import TrafficReader
 from tactile_lab.errors import SessionError
 
@@ -84,6 +87,21 @@ class Session:
             raise SessionError("changed since it was recorded", where=str(path), hint="Restore the recorded file")
         return path
 
+    def calibration_changes(self) -> list[str]:
+        """Roles whose calibration copy is missing or not the recorded one any more."""
+        changed = []
+        for role in self.manifest.calibration:
+            try:
+                self.calibration_file(role)
+            except SessionError:
+                changed.append(role)
+        return changed
+
+    @property
+    def being_recorded(self) -> bool:
+        """Whether a living program is recording into it."""
+        return self.manifest.status == "open" and being_written(self.folder / TRAFFIC)
+
     def traffic(self) -> TrafficReader:
         """The recorded traffic. Raises SessionError."""
         return TrafficReader(self.folder / TRAFFIC)
@@ -96,10 +114,26 @@ class RunningSession(Session):
     ``failed``.
     """
 
-    def __init__(self, folder: Path, manifest: Manifest) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        manifest: Manifest,
+        stampers: Mapping[str, Stamper] | None = None,
+        traffic_settings: TrafficSettings | None = None,
+    ) -> None:
         super().__init__(folder, manifest)
-        self._traffic = TrafficWriter(folder / TRAFFIC, {"session": manifest.name, "rig": manifest.rig})
+        self._traffic = TrafficWriter(
+            folder / TRAFFIC,
+            {"session": manifest.name, "rig": manifest.rig},
+            attachments=_attachments(folder, manifest),
+            stampers=stampers,
+            settings=traffic_settings,
+        )
         self.recorder = Recorder(self._traffic)
+
+    def settle(self) -> None:
+        """Wait until everything that was handed over to the disk is written, or can not be."""
+        self._traffic.settle()
 
     def close(
         self,
@@ -114,23 +148,27 @@ class RunningSession(Session):
 
         Args:
             counts: figures beside those of the messages (grasps, cycles, overruns).
-            data_loss: dropped messages and the like; zeros are left out.
+            data_loss: undecodable messages and the like; zeros are left out. What the recorder itself knows to be
+                lost (gaps, late and dropped messages) is added.
 
         Raises:
             SessionError: the folder can not be written.
         """
         if self.manifest.status != "open":
             return
+        known = {kind: str(number) for kind, number in {**(counts or {}), **(data_loss or {})}.items()}
         try:
-            self._traffic.close()
+            self._traffic.close({"status": status, "problem": problem, **known})
         except SessionError as error:
             status, problem = "failed", problem or str(error)
-        lost = {**(data_loss or {}), "traffic_cut_short": int(not self._traffic.complete)}
+        streams = self._traffic.streams
+        lost = {**(data_loss or {}), **streams.losses(), "traffic_cut_short": int(not self._traffic.complete)}
         self.manifest = self.manifest.model_copy(
             update={
                 "status": status,
                 "ended_utc": _iso(now or datetime.now(UTC)),
-                "counts": {**dict(sorted(self._traffic.counts.items())), **(counts or {})},
+                "counts": {**dict(sorted(streams.messages.items())), **(counts or {})},
+                "streams": streams.plain(),
                 "data_loss": {kind: number for kind, number in lost.items() if number},
                 "problem": problem,
             }
@@ -163,6 +201,8 @@ def create_session(
     notes: str = "",
     truth_mesh_ply: bytes | None = None,
     started: datetime | None = None,
+    stampers: Mapping[str, Stamper] | None = None,
+    traffic_settings: TrafficSettings | None = None,
 ) -> RunningSession:
     """Make a new session folder under ``root`` and begin recording.
 
@@ -171,12 +211,14 @@ def create_session(
         calibration_files: role to file; copied with their hashes.
         truth_mesh_ply: the true mesh as PLY bytes, where the rig knows it.
         started: time of the start, UTC; now when not given.
+        stampers: by link, what reads the device's own counter and clock out of its messages.
+        traffic_settings: how the recording is kept; the usual ones suit a rig whose time waits for the disk.
 
     Raises:
         SessionError: the folder can not be made or a calibration file can not be read.
     """
     started = started or datetime.now(UTC)
-    folder = _new_folder(root, f"{started:%Y%m%d-%H%M%S}-{_slug(rig)}-{_slug(object_name)}")
+    folder = _new_folder(root, f"{started:%Y%m%d-%H%M%S}-{slug(rig)}-{slug(object_name)}")
     manifest = Manifest(
         name=folder.name,
         status="open",
@@ -195,14 +237,21 @@ def create_session(
     if truth_mesh_ply is not None:
         (folder / TRUTH_MESH).parent.mkdir()
         write_whole(folder / TRUTH_MESH, truth_mesh_ply)
-    return RunningSession(folder, manifest)
+    return RunningSession(folder, manifest, stampers, traffic_settings)
+
+
+def _attachments(folder: Path, manifest: Manifest) -> tuple[Attached, ...]:
+    """What the recording itself keeps, so that it can be understood without the folder."""
+    names = [CALIBRATION + "/" + copy.file for copy in manifest.calibration.values()]
+    return tuple(Attached(name, "application/yaml", _read(folder / name)) for name in (MANIFEST, *names))
 
 
 def _new_folder(root: Path, name: str) -> Path:
     try:
         root.mkdir(parents=True, exist_ok=True)
         for attempt in range(1, 1000):
-            folder = root / (name if attempt == 1 else f"{name}-{attempt}")
+            end = "" if attempt == 1 else f"-{attempt}"
+            folder = root / (name[: LONGEST_ID - len(end)].rstrip("-_") + end)
             try:
                 folder.mkdir()
             except FileExistsError:
@@ -231,12 +280,6 @@ def _read(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise SessionError(f"can not be read ({error.strerror})", where=str(path)) from error
-
-
-def _slug(text: str) -> str:
-    """A name that is safe in a folder's name; of a path (``mesh:some/part.stl``) its last part without suffix."""
-    last = re.split(r"[/\\:]", text.strip())[-1]
-    return re.sub(r"[^a-z0-9]+", "-", re.sub(r"\.[a-z0-9]+$", "", last.lower())).strip("-") or "unnamed"
 
 
 def _sha256(content: bytes) -> str:

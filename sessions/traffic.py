@@ -2,63 +2,125 @@
 
 Messages stand in the file in the exact order in which they happened and are numbered across all topics, so that a
 gap shows. ``publish_time`` is a message's own stamp; ``log_time`` never decreases, so that readers that sort by it
-keep the order. A chunk is closed after 64 KiB or 100 ms of session time, which bounds what a killed process loses;
-once a second of real time the file is forced to the disk, off the control thread, for the case of a power cut.
+keep the order. A chunk is closed after 64 KiB, after 80 ms of session time or after 80 ms of real time, whichever
+comes first, which bounds what a killed process loses to a tenth of a second; once a second the file is forced to the
+disk for the case of a power cut. Both happen in threads of their own (see :mod:`sessions.traffic_disk`).
+
+A recording that has grown beyond its limit goes on in ``traffic-2.mcap`` and so on; each of these files can be
+opened by itself. The last one ends with a record that says what was lost.
 """
 
 from __future__ import annotations
 
 import errno
-import os
+import json
 import threading
 from collections import Counter
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Literal
 
-from sessions import schemas
-from sessions.mcap_writer import McapWriter
+from sessions import foxglove, raw_frames, schemas
+from sessions.mcap_writer import McapWriter, PendingChunk
+from sessions.raw_frames import UNSTAMPED, Stamper
+from sessions.stream_counts import StreamCounts
+from sessions.traffic_disk import CutBackFile, DiskThread, Segment, Syncer
+from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import SessionError
 
 PROFILE = "tactile-lab"
-FORMAT = "tactile-traffic/1"
+FORMAT = "tactile-traffic/2"
+END_RECORD = "tactile-lab/end"
 CHUNK_BYTES = 64 * 1024
-FLUSH_PERIOD_ns = 100_000_000
-SYNC_PERIOD_s = 1.0
+FLUSH_PERIOD_ns = 80_000_000
+STREAMS_PERIOD_ns = NANOSECONDS
+CLOSE_TIMEOUT_s = 10.0
 
 _SEQUENCE_MASK = 0xFFFFFFFF
 
 
+@dataclass(frozen=True)
+class TrafficSettings:
+    """How a recording is kept.
+
+    Attributes:
+        segment_bytes: size at which the next file is begun.
+        queue_bytes: uncompressed bytes that may wait for the disk; at 2 MB/s half a minute.
+        when_full: "wait" delays the recording thread, for a rig whose time waits with it; "drop" leaves out whole
+            chunks and counts their messages, for real time.
+        patience_s: how long "wait" waits before the recording ends with an error.
+    """
+
+    segment_bytes: int = 1 << 30
+    queue_bytes: int = 64 << 20
+    when_full: Literal["wait", "drop"] = "wait"
+    patience_s: float = CLOSE_TIMEOUT_s
+
+
+@dataclass(frozen=True)
+class Attached:
+    """A file to be kept inside the recording."""
+
+    name: str
+    media_type: str
+    content: bytes
+
+
 class TrafficWriter:
-    """A new traffic file.
+    """A new recording. Every method may be called from any thread.
 
     Args:
-        path: must not exist.
-        info: facts about the session, kept in the file beside the format's name.
+        path: of its first file; must not exist.
+        info: facts about the session, kept in each file beside the format's name.
+        attachments: files kept in each file.
+        stampers: by link, what reads the device's own stamp out of its messages.
+        settings: see there.
 
     Raises:
         SessionError: the file exists or can not be made.
     """
 
-    def __init__(self, path: Path, info: Mapping[str, str] | None = None) -> None:
-        self.path = path
-        self.counts: Counter[str] = Counter()
-        """Messages by topic."""
+    def __init__(
+        self,
+        path: Path,
+        info: Mapping[str, str] | None = None,
+        *,
+        attachments: tuple[Attached, ...] = (),
+        stampers: Mapping[str, Stamper] | None = None,
+        settings: TrafficSettings | None = None,
+    ) -> None:
+        self.path, self.streams = path, StreamCounts()
         self.complete = False
-        """The file was finished with everything in it."""
+        """The recording was finished with everything in it."""
+        self._settings = settings or TrafficSettings()
+        self._stampers = {schemas.received_topic(link): stamper for link, stamper in (stampers or {}).items()}
+        self._info, self._attachments = dict(info or {}), attachments
+        self._files: list[Segment] = []
         self._failure: SessionError | None = None
         self._channels: dict[str, int] = {}
+        self._names: dict[tuple[Path, int], str] = {}
         self._log_ns = self._sequence = 0
-        self._flushed_ns: int | None = None
-        self._file = _CutBackFile(path)
-        self._guard = _Guard(self)
-        self._syncer: _Syncer | None = None
-        with self._guard:
-            self._writer = McapWriter(self._file, CHUNK_BYTES, PROFILE, f"tactile-lab {version('tactile-lab')}")
-            self._writer.add_metadata(PROFILE, {**(info or {}), "format": FORMAT})
-        self._syncer = _Syncer(self._file)
+        self._handed_ns: int | None = None
+        self._told_ns: int | None = None
+        self._lock = threading.Lock()
+        self._closed = False
+        self._segment = self._make_segment()
+        self._disk = DiskThread(
+            self._segment,
+            self._make_segment,
+            segment_bytes=self._settings.segment_bytes,
+            queue_bytes=self._settings.queue_bytes,
+            idle=self._flush_in_time,
+            idle_s=FLUSH_PERIOD_ns / NANOSECONDS,
+        )
+        self._syncer = Syncer(self._disk.sync)
+        self._disk.start()
         self._syncer.start()
+
+    # --- recording ---------------------------------------------------------------------------------------------
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
         """Append one message.
@@ -66,158 +128,198 @@ class TrafficWriter:
         Raises:
             SessionError: the disk is full or failed; what was recorded before is kept and readable.
         """
-        with self._guard:
-            self._log_ns = max(self._log_ns, stamp_ns)
-            self._writer.add_message(self._channel(topic), self._log_ns, data, stamp_ns, self._sequence)
-            self._sequence = (self._sequence + 1) & _SEQUENCE_MASK
-            self.counts[topic] += 1
-            self._flush_when_due()
+        with self._lock:
+            self._check()
+            try:
+                self._append(topic, data, stamp_ns)
+                self._tell_streams()
+                self._hand_over_when_due()
+            except BaseException:
+                self._abandon()
+                raise
 
     def flush(self) -> None:
-        """Hand everything so far to the operating system. Raises SessionError as :meth:`write`."""
-        with self._guard:
-            self._writer.flush()
-            self._flushed_ns = self._log_ns
+        """Hand everything so far to the operating system, and wait for that. Raises SessionError as :meth:`write`."""
+        with self._lock:
+            self._check()
+            self._hand_over()
+        self.settle()
+        with self._lock:
+            self._check()
 
-    def close(self) -> None:
+    def settle(self) -> None:
+        """Wait until everything that was handed over is written, or can not be."""
+        self._disk.settle(CLOSE_TIMEOUT_s)
+
+    def close(self, end: Mapping[str, str] | None = None) -> None:
         """Finish the file; idempotent. After a failed write the file stays as it was then.
 
-        Raises:
-            SessionError: the last part could not be written.
-        """
-        if self._syncer is None:
-            return
-        self._syncer.stop()
-        self._syncer = None
-        try:
-            if self._failure is None:
-                with self._guard:
-                    self._writer.finish()
-                    self._file.sync()
-                self.complete = True
-        finally:
-            self._file.close()
+        Args:
+            end: facts for the record at the end, beside what was lost on each stream.
 
-    def _channel(self, topic: str) -> int:
-        channel = self._channels.get(topic)
-        if channel is None:
-            channel = self._channels[topic] = self._register(topic)
-        return channel
+        Raises:
+            SessionError: the last part could not be written, or the disk does not answer.
+        """
+        with self._lock:
+            if self._closed:
+                return
+            self._closed, known = True, self._failure
+            with suppress(SessionError):  # told below
+                self._finish(end or {})
+        answered = self._disk.end(CLOSE_TIMEOUT_s)
+        if not (self._syncer.stop(CLOSE_TIMEOUT_s if answered else 0.0) and answered):
+            # the threads are left behind: they wait inside the operating system
+            raise self._end(f"the disk has not answered for {CLOSE_TIMEOUT_s:g} s", "check the disk")
+        self._close_files()
+        if known is None:
+            self._check()
+            self.complete = True
+
+    # --- one message -------------------------------------------------------------------------------------------
+
+    def _append(self, topic: str, data: bytes, stamp_ns: int) -> None:
+        stamper = self._stampers.get(topic)
+        device = UNSTAMPED if stamper is None else stamper(data)
+        self.streams.take(topic, self._log_ns - stamp_ns, device)
+        content = raw_frames.encode(data, stamp_ns, device) if schemas.is_raw(topic) else data
+        self._log_ns = max(self._log_ns, stamp_ns)
+        channel = self._channels.get(topic) or self._register(topic)
+        self._segment.writer.add_message(channel, self._log_ns, content, stamp_ns, self._sequence)
+        self._sequence = (self._sequence + 1) & _SEQUENCE_MASK
 
     def _register(self, topic: str) -> int:
-        schema = schemas.SCHEMAS.get(topic)
-        if schema is None:
-            encoding = "json" if topic == schemas.MARKS_TOPIC else schemas.RAW_ENCODING
-            return self._writer.add_channel(topic, encoding)
-        number = self._writer.add_schema(schema.name, "jsonschema", schema.to_bytes())
-        return self._writer.add_channel(topic, "json", number)
+        writer, schema = self._segment.writer, schemas.SCHEMAS.get(topic) or schemas.schema_by_form(topic)
+        if schema is not None:
+            number = writer.add_schema(schema.name, "jsonschema", schema.to_bytes())
+            channel = writer.add_channel(topic, "json", number)
+        elif schemas.is_raw(topic):
+            number = writer.add_schema(
+                raw_frames.SCHEMA_NAME, raw_frames.SCHEMA_ENCODING, raw_frames.DEFINITION.encode()
+            )
+            channel = writer.add_channel(topic, raw_frames.MESSAGE_ENCODING, number)
+        else:
+            channel = writer.add_channel(topic, "json" if topic == schemas.MARKS_TOPIC else schemas.RAW_ENCODING)
+        self._channels[topic] = channel
+        self._names[self._segment.path, channel] = topic
+        return channel
 
-    def _flush_when_due(self) -> None:
-        if self._flushed_ns is None:
-            self._flushed_ns = self._log_ns
-        if self._log_ns - self._flushed_ns >= FLUSH_PERIOD_ns:
-            self._writer.flush()
-            self._flushed_ns = self._log_ns
+    def _tell_streams(self) -> None:
+        """What was lost so far, once a second, so that a crash does not take it along."""
+        if self._told_ns is None:
+            self._told_ns = self._log_ns
+        if self._log_ns - self._told_ns >= STREAMS_PERIOD_ns:
+            self._told_ns = self._log_ns
+            content = {"timestamp": foxglove.time(self._log_ns), "streams": self.streams.plain()}
+            self._append(schemas.STREAMS_TOPIC, schemas.encode(content), self._log_ns)
 
-    def keep(self) -> None:
-        """What the file holds now is complete."""
-        self._file.keep()
+    # --- chunks ------------------------------------------------------------------------------------------------
 
-    def check(self) -> None:
+    def _hand_over_when_due(self) -> None:
+        if self._handed_ns is None:
+            self._handed_ns = self._log_ns
+        due = self._log_ns - self._handed_ns >= FLUSH_PERIOD_ns
+        if due or self._segment.writer.pending_bytes > CHUNK_BYTES:
+            self._hand_over()
+
+    def _hand_over(self) -> None:
+        self._handed_ns = self._log_ns
+        if (chunk := self._segment.writer.detach()) is None:
+            return
+        patience_s = self._settings.patience_s if self._settings.when_full == "wait" else 0.0
+        if not self._disk.put(self._segment, chunk, patience_s):
+            self._do_without(chunk)
+        elif (following := self._disk.take_prepared()) is not None:
+            self._disk.end_segment(self._segment)
+            self._segment = following
+            self._channels.clear()
+
+    def _do_without(self, chunk: PendingChunk) -> None:
+        self._segment.writer.drop(chunk)
+        self._count(self.streams.dropped, self._segment, chunk)
+        if self._settings.when_full == "wait":
+            raise self._end(f"the disk has taken nothing for {self._settings.patience_s:g} s", "check the disk")
+
+    def _flush_in_time(self) -> None:
+        """Nothing was handed over for a while: do it now, unless the recording thread is just at it."""
+        if self._lock.acquire(blocking=False):
+            try:
+                if self._failure is None and not self._closed:
+                    self._hand_over()
+            finally:
+                self._lock.release()
+
+    def _count(self, counter: Counter[str], segment: Segment, chunk: PendingChunk) -> None:
+        for channel, number in chunk.message_counts().items():
+            counter[self._names[segment.path, channel]] += number
+
+    # --- files -------------------------------------------------------------------------------------------------
+
+    def _make_segment(self) -> Segment:
+        number = len(self._files) + 1
+        path = segment_path(self.path, number)
+        file = CutBackFile(path)
+        try:
+            writer = McapWriter(file, None, PROFILE, f"tactile-lab {version('tactile-lab')}")
+            writer.add_metadata(PROFILE, {**self._info, "segment": str(number), "format": FORMAT})
+            for attached in self._attachments:
+                writer.add_attachment(attached.name, attached.media_type, attached.content)
+        except OSError as error:
+            file.close()
+            raise _failed(path, error, 0) from error
+        file.keep()
+        self._files.append(Segment(path, file, writer))
+        return self._files[-1]
+
+    def _finish(self, end: Mapping[str, str]) -> None:
+        self._check()
+        self._hand_over()
+        facts = {"streams": json.dumps(self.streams.plain()), "lost": json.dumps(self.streams.losses())}
+        self._segment.writer.add_closing_metadata(END_RECORD, {**end, **facts})
+        self._disk.end_segment(self._segment)
+
+    def _close_files(self) -> None:
+        for segment, chunk in self._disk.unwritten:
+            self._count(self.streams.unwritten, segment, chunk)
+        for segment in self._files:
+            segment.file.close()
+        if (spare := self._disk.take_prepared()) is not None:  # begun for messages that did not come
+            spare.path.unlink(missing_ok=True)
+
+    # --- failures ----------------------------------------------------------------------------------------------
+
+    def _check(self) -> None:
         """Raise the failure that ended the recording, if one did."""
         if self._failure is not None:
             raise self._failure
-        if self._syncer is not None and self._syncer.error is not None:
-            raise self.fail(self._syncer.error)
+        self._check_disk()
 
-    def fail(self, error: OSError) -> SessionError:
-        """The disk failed: keep what is complete, and remember why the recording ended."""
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-        what = "the disk is full" if full else f"can not be written ({error.strerror or error})"
-        return self._end(what, "free some space and start a new session" if full else "check the disk")
+    def _check_disk(self) -> None:
+        error = self._disk.failure or self._syncer.error
+        if error is not None:
+            self._failure = _failed(self._disk.failed_segment.path, error, self._disk.failed_segment.file.kept)
+            raise self._failure
 
-    def abandon(self) -> None:
+    def _abandon(self) -> None:
         """Something (a second Ctrl+C) broke into a write: the chunk at hand may be torn and is not to be written."""
-        self._end("writing was broken off", "start a new session")
+        self._segment.writer.discard()
+        if self._failure is None:
+            self._end("writing was broken off", "start a new session")
 
     def _end(self, what: str, advice: str) -> SessionError:
-        with suppress(OSError):  # a file that can not be shortened reads as truncated, which is told on reading
-            self._file.cut_back()
-        hint = f"The {self._file.kept} bytes recorded so far are kept; {advice}"
-        self._failure = SessionError(what, where=str(self.path), hint=hint)
+        hint = f"The {self._segment.file.kept} bytes recorded so far are kept; {advice}"
+        self._failure = SessionError(what, where=str(self._segment.path), hint=hint)
         return self._failure
 
 
-class _Guard:
-    """Turns a disk's failure into the writer's SessionError; refuses work after one."""
-
-    def __init__(self, writer: TrafficWriter) -> None:
-        self._writer = writer
-
-    def __enter__(self) -> None:
-        self._writer.check()
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if error is None:
-            self._writer.keep()
-        elif isinstance(error, OSError):
-            raise self._writer.fail(error) from error
-        else:
-            self._writer.abandon()
+def segment_path(path: Path, number: int) -> Path:
+    """The file of a segment: the path itself, then ``traffic-2.mcap`` and so on."""
+    return path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
 
 
-class _CutBackFile:
-    """An unbuffered new file that can go back to the last point declared complete."""
-
-    def __init__(self, path: Path) -> None:
-        try:
-            self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
-        except FileExistsError as error:
-            raise SessionError("exists already", where=str(path), hint="Sessions are never overwritten") from error
-        except OSError as error:
-            raise SessionError(f"can not be made ({error.strerror})", where=str(path)) from error
-        self._position = self.kept = 0
-
-    def write(self, data: bytes) -> int:
-        rest = memoryview(data)
-        while rest:
-            written = os.write(self._descriptor, rest)
-            self._position += written
-            rest = rest[written:]
-        return len(data)
-
-    def tell(self) -> int:
-        return self._position
-
-    def keep(self) -> None:
-        self.kept = self._position
-
-    def cut_back(self) -> None:
-        os.ftruncate(self._descriptor, self.kept)
-
-    def sync(self) -> None:
-        os.fdatasync(self._descriptor)
-
-    def close(self) -> None:
-        os.close(self._descriptor)
-
-
-class _Syncer(threading.Thread):
-    """Forces the file to the disk once a second; an error waits in ``error`` for the next write."""
-
-    def __init__(self, file: _CutBackFile) -> None:
-        super().__init__(name="traffic sync", daemon=True)
-        self.error: OSError | None = None
-        self._file, self._ended = file, threading.Event()
-
-    def run(self) -> None:
-        while not self._ended.wait(SYNC_PERIOD_s):
-            try:
-                self._file.sync()
-            except OSError as error:
-                self.error = error
-                return
-
-    def stop(self) -> None:
-        self._ended.set()
-        self.join()
+def _failed(path: Path, error: OSError | SessionError, kept: int) -> SessionError:
+    if isinstance(error, SessionError):
+        return error
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    what = "the disk is full" if full else f"can not be written ({error.strerror or error})"
+    advice = "free some space and start a new session" if full else "check the disk"
+    return SessionError(what, where=str(path), hint=f"The {kept} bytes recorded so far are kept; {advice}")

@@ -2,14 +2,18 @@
 
 A file that was cut off (killed process, full disk, power cut) has no summary, and its last record may be torn. Every
 complete chunk is read, and :attr:`TrafficReader.loss` says what was not. A chunk that was damaged on the disk is left
-out and counted; the chunks after it are read.
+out and counted; the chunks after it are read. A recording in several files is read as one. Recordings of older
+versions are converted while they are read (see :mod:`sessions.formats`).
 """
 
 from __future__ import annotations
 
+import json
+import re
 import struct
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
@@ -18,26 +22,28 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Header, McapRecord, Message, Metadata
+from mcap.records import Attachment, Channel, Chunk, Header, McapRecord, Message, MessageIndex, Metadata
 from mcap.stream_reader import breakup_chunk
-from mcap.writer import MCAP0_MAGIC
 
-from sessions.traffic import FORMAT, PROFILE
+from sessions import formats, raw_frames, schemas
+from sessions.mcap_frames import Frames
+from sessions.raw_frames import UNSTAMPED, DeviceStamp
+from sessions.traffic import END_RECORD, PROFILE, segment_path
 from tactile_lab.errors import SessionError
 
-_FRAME = struct.Struct("<BQ")
 _UNREADABLE = (McapError, zstandard.ZstdError, struct.error, ValueError, OverflowError, MemoryError)
 """What the mcap package raises on damaged content."""
 
 
 @dataclass(frozen=True)
 class TrafficMessage:
-    """One message: topic, bytes, its own stamp (session clock) and its number in the file."""
+    """One message: topic, bytes, its own stamp (session clock), its number in the file, the device's own stamp."""
 
     topic: str
     data: bytes
     stamp_ns: int
     sequence: int
+    device: DeviceStamp = UNSTAMPED
 
 
 @dataclass
@@ -45,16 +51,18 @@ class Loss:
     """What could not be read.
 
     Attributes:
-        truncated: the file ends too early; up to 100 ms of traffic before the end was never written.
+        truncated: the file ends too early; the last tenth of a second was never written.
         unreadable_bytes: bytes after the last complete record.
         damaged_chunks: chunks left out.
         missing_messages: gaps in the numbering of what was read.
+        by_topic: messages of damaged chunks whose index could be read, by topic; part of ``missing_messages``.
     """
 
     truncated: bool = False
     unreadable_bytes: int = 0
     damaged_chunks: int = 0
     missing_messages: int = 0
+    by_topic: dict[str, int] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
         return self.truncated or self.damaged_chunks > 0 or self.missing_messages > 0
@@ -73,79 +81,98 @@ class Loss:
 
     def counts(self) -> dict[str, int]:
         """The loss as numbers by kind, for a session's record; empty when nothing was lost."""
-        return {kind: int(number) for kind, number in asdict(self).items() if number}
+        kinds = {
+            "truncated": int(self.truncated),
+            "unreadable_bytes": self.unreadable_bytes,
+            "damaged_chunks": self.damaged_chunks,
+            "missing_messages": self.missing_messages,
+        }
+        return {kind: number for kind, number in kinds.items() if number}
 
 
 class TrafficReader:
-    """Streams the messages of a traffic file in the order in which they happened.
+    """Streams the messages of a recording in the order in which they happened.
+
+    Args:
+        path: of its first file; those that follow it stand beside it.
 
     Raises:
-        SessionError: the file is missing, no MCAP file, or not one of a session.
+        SessionError: the file is missing, no MCAP file, not one of a session, or of a version that is not known.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.info: dict[str, str] = {}
         """What the writer noted about the session."""
+        self.end: dict[str, str] = {}
+        """What the writer noted at the end; complete once :meth:`messages` has been read to the end."""
         self.loss = Loss()
         """Complete once :meth:`messages` has been read to the end."""
-        with self._open() as file:
-            self._read_preamble(_Frames(file))
+        self._convert = self._read_preamble(path)
 
     def messages(self) -> Iterator[TrafficMessage]:
         """All messages that can be read, from the beginning."""
-        self.loss = Loss()
-        channels: dict[int, str] = {}
-        expected = 0
-        with self._open() as file:
-            frames = _Frames(file)
-            for record in self._records(frames):
-                if isinstance(record, Channel):
-                    channels[record.id] = record.topic
-                elif isinstance(record, Message):
-                    self.loss.missing_messages += (record.sequence - expected) & 0xFFFFFFFF
-                    expected = record.sequence + 1
-                    if record.channel_id not in channels:  # its description was in a damaged chunk
-                        self.loss.missing_messages += 1
-                        continue
-                    topic = channels[record.channel_id]
-                    yield TrafficMessage(topic, record.data, record.publish_time, record.sequence)
-            self.loss.truncated, self.loss.unreadable_bytes = not frames.complete, frames.unreadable_bytes
+        self.loss, self.end, expected = Loss(), {}, 0
+        for path in segment_paths(self.path):
+            segment = _SegmentMessages(path, self.loss)
+            for topic, message in segment:
+                self.loss.missing_messages += (message.sequence - expected) & 0xFFFFFFFF
+                expected = message.sequence + 1
+                if topic is None:  # its description was in a damaged chunk
+                    self.loss.missing_messages += 1
+                    continue
+                yield self._as_now(topic, message)
+            self.end = segment.end
+        self.loss.truncated |= not self.end and self.info.get("format") != formats.TRAFFIC_FORMATS[0]
 
-    def _records(self, frames: _Frames) -> Iterator[McapRecord]:
-        for opcode, content in frames:
-            if opcode != Opcode.CHUNK:
-                continue
-            try:
-                records = breakup_chunk(Chunk.read(ReadDataStream(BytesIO(content))), validate_crc=True)
-            except _UNREADABLE:
-                self.loss.damaged_chunks += 1
-            else:
-                yield from records
-
-    def _open(self) -> BinaryIO:
+    def streams(self) -> dict[str, dict[str, int]]:
+        """What the writer counted on each stream, by its record at the end; empty when there is none."""
         try:
-            return self.path.open("rb")
-        except OSError as error:
-            raise SessionError(
-                f"can not be opened ({error.strerror})", where=str(self.path), hint="Check the session folder"
-            ) from error
+            found = json.loads(self.end.get("streams", "{}"))
+        except ValueError:
+            return {}
+        return found if isinstance(found, dict) else {}
 
-    def _read_preamble(self, frames: _Frames) -> None:
-        if not frames.is_mcap:
-            raise SessionError("not an MCAP file", where=str(self.path), hint="Restore it from a copy of the session")
-        try:
-            for opcode, content in frames:
-                stream = ReadDataStream(BytesIO(content))
-                if opcode == Opcode.HEADER:
-                    self._check_profile(Header.read(stream).profile)
-                elif opcode == Opcode.METADATA:
-                    self._check_format(Metadata.read(stream).metadata)
+    def attachments(self) -> Iterator[Attachment]:
+        """The files kept inside the recording. Raises SessionError."""
+        with _opened(self.path) as file:
+            for opcode, content in Frames(file):
+                if opcode == Opcode.CHUNK:
                     return
-                else:
-                    self._check_format({})
-        except _UNREADABLE as error:
-            raise SessionError(f"its beginning is damaged ({error})", where=str(self.path)) from error
+                if opcode == Opcode.ATTACHMENT:
+                    try:
+                        yield Attachment.read(ReadDataStream(BytesIO(content)))
+                    except _UNREADABLE as error:
+                        raise SessionError(f"an attachment is damaged ({error})", where=str(self.path)) from error
+
+    def _as_now(self, topic: str, message: Message) -> TrafficMessage:
+        """A message in the present form, taken out of its envelope."""
+        topic, data, stamp_ns = self._convert((topic, message.data, message.publish_time))
+        if not schemas.is_raw(topic):
+            return TrafficMessage(topic, data, stamp_ns, message.sequence)
+        try:
+            payload, device = raw_frames.decode(data)
+        except ValueError as error:
+            raise SessionError(f"a message of {topic} can not be read ({error})", where=str(self.path)) from error
+        return TrafficMessage(topic, payload, stamp_ns, message.sequence, device)
+
+    def _read_preamble(self, path: Path) -> Callable[[formats.Message], formats.Message]:
+        with _opened(path) as file:
+            frames = Frames(file)
+            if not frames.is_mcap:
+                raise SessionError("not an MCAP file", where=str(path), hint="Restore it from a copy of the session")
+            try:
+                for opcode, content in frames:
+                    if opcode == Opcode.HEADER:
+                        self._check_profile(Header.read(ReadDataStream(BytesIO(content))).profile)
+                    elif opcode == Opcode.METADATA:
+                        self.info = Metadata.read(ReadDataStream(BytesIO(content))).metadata
+                        return formats.traffic_converter(self.info.get("format"), str(path))
+                    else:
+                        return formats.traffic_converter(None, str(path))
+            except _UNREADABLE as error:
+                raise SessionError(f"its beginning is damaged ({error})", where=str(path)) from error
+        return formats.traffic_converter(formats.TRAFFIC_FORMATS[-1], str(path))  # torn before it says anything
 
     def _check_profile(self, profile: str) -> None:
         if profile != PROFILE:
@@ -155,47 +182,64 @@ class TrafficReader:
                 hint="Restore the session's own traffic.mcap",
             )
 
-    def _check_format(self, metadata: dict[str, str]) -> None:
-        self.info = metadata
-        if metadata.get("format") != FORMAT:
-            raise SessionError(
-                f"written in the form {metadata.get('format')!r}; this version reads {FORMAT!r}",
-                where=str(self.path),
-                hint="Use the version that recorded it",
-            )
+
+def segment_paths(path: Path) -> list[Path]:
+    """The files of a recording, in their order; a hole in their numbers shows as missing messages."""
+    numbered = re.compile(rf"{re.escape(path.stem)}-([1-9][0-9]{{0,8}}){re.escape(path.suffix)}")
+    numbers = [int(found[1]) for item in path.parent.glob("*") if (found := numbered.fullmatch(item.name))]
+    return [path, *(segment_path(path, number) for number in sorted(numbers) if number > 1)]
 
 
-class _Frames:
-    """Iterates over the records of an MCAP file, torn or not, as opcode and content."""
+class _SegmentMessages:
+    """The messages of one file with their topics (None where that is not known)."""
 
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-        self._size = file.seek(0, 2)
-        file.seek(0)
-        magic = file.read(len(MCAP0_MAGIC))
-        self.is_mcap = MCAP0_MAGIC.startswith(magic)
-        self.complete = False
-        """The closing magic was reached."""
-        self.unreadable_bytes = 0
+    def __init__(self, path: Path, loss: Loss) -> None:
+        self.end: dict[str, str] = {}
+        self._path, self._loss = path, loss
+        self._topics: dict[int, str] = {}
+        self._lost: Counter[int] = Counter()
+        self._after_damage = False
 
-    def __iter__(self) -> Iterator[tuple[int, bytes]]:
-        while not self.complete:
-            start = self._file.tell()
-            opcode, content = self._next()
-            if content is None:
-                self.unreadable_bytes = self._size - start
-                return
-            yield opcode, content
-            if opcode == Opcode.FOOTER:
-                self.complete = self._file.read() == MCAP0_MAGIC
-                self.unreadable_bytes = 0 if self.complete else self._size - start - _FRAME.size - len(content)
-                return
+    def __iter__(self) -> Iterator[tuple[str | None, Message]]:
+        with _opened(self._path) as file:
+            frames = Frames(file)
+            for opcode, content in frames:
+                for record in self._records(opcode, content):
+                    if isinstance(record, Channel):
+                        self._topics[record.id] = record.topic
+                    elif isinstance(record, Message):
+                        yield self._topics.get(record.channel_id), record
+            self._loss.truncated |= not frames.complete
+            self._loss.unreadable_bytes += frames.unreadable_bytes
+            for channel, number in self._lost.items():
+                topic = self._topics.get(channel, f"channel {channel}")
+                self._loss.by_topic[topic] = self._loss.by_topic.get(topic, 0) + number
 
-    def _next(self) -> tuple[int, bytes | None]:
-        head = self._file.read(_FRAME.size)
-        if len(head) < _FRAME.size:
-            return 0, None
-        opcode, length = _FRAME.unpack(head)
-        if length > self._size - self._file.tell():
-            return opcode, None
-        return opcode, self._file.read(length)
+    def _records(self, opcode: int, content: bytes) -> list[McapRecord]:
+        try:
+            if opcode == Opcode.CHUNK:
+                self._after_damage = True  # until it is read
+                records = breakup_chunk(Chunk.read(ReadDataStream(BytesIO(content))), validate_crc=True)
+                self._after_damage = False
+                return records
+            if opcode == Opcode.MESSAGE_INDEX and self._after_damage:
+                index = MessageIndex.read(ReadDataStream(BytesIO(content)))
+                self._lost[index.channel_id] += len(index.records)
+            elif opcode == Opcode.METADATA:
+                found = Metadata.read(ReadDataStream(BytesIO(content)))
+                self.end = found.metadata if found.name == END_RECORD else self.end
+            elif opcode == Opcode.CHANNEL:  # of the summary: names what damaged chunks described
+                channel = Channel.read(ReadDataStream(BytesIO(content)))
+                self._topics.setdefault(channel.id, channel.topic)
+        except _UNREADABLE:
+            self._loss.damaged_chunks += opcode == Opcode.CHUNK
+        return []
+
+
+def _opened(path: Path) -> BinaryIO:
+    try:
+        return path.open("rb")
+    except OSError as error:
+        raise SessionError(
+            f"can not be opened ({error.strerror})", where=str(path), hint="Check the session folder"
+        ) from error

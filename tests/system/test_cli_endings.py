@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from sessions import traffic
+from sessions import traffic_disk
 from tests.support.interruptible import interruptible
 
 COMMAND = [sys.executable, "-m", "tactile_lab.cli.main", "run"]
@@ -130,7 +130,7 @@ def test_a_full_disk_ends_the_session_and_the_recorded_part_replays(tmp_path, in
         return write(descriptor, data)
 
     with monkeypatch.context() as patched:
-        patched.setattr(traffic.os, "write", write_while_there_is_room)
+        patched.setattr(traffic_disk.os, "write", write_while_there_is_room)
         answer = inside("run", "--grasps", 4, "--seed", 1, "--out", tmp_path)
     assert answer.code == 1
     assert "the disk is full" in answer.err

@@ -184,8 +184,9 @@ def test_a_session_leaves_samples_marks_contacts_and_truth():
     assert topics["/marks"] == 1 + 3 * (2 + 1 + 4)
     assert topics["/truth/object"] >= topics["/hand/joints"]
     joints = json.loads(next(data for topic, data, _ in memory.messages if topic == "/hand/joints"))
-    assert set(joints["base"]) == {"x_m", "y_m", "z_m", "yaw_rad", "pitch_rad", "roll_rad"}
-    assert len(joints["joints_rad"]) == 24
+    names = [joint["name"] for joint in joints["joints"]]
+    assert set(names[24:]) == {"x_m", "y_m", "z_m", "yaw_rad", "pitch_rad", "roll_rad"}
+    assert len(names) == 30
 
 
 def test_a_refused_tare_is_reported_and_recorded():

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sessions import traffic
+from sessions import traffic_disk
 from sessions.listing import find_session, list_sessions, summarize
 from sessions.manifest import Manifest, read_manifest, write_manifest
 from sessions.session import Session, create_session
@@ -150,7 +150,8 @@ def test_values_that_yaml_can_not_hold_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("format: tactile-session/2\n", "format"),
+        ("format: tactile-session/3\n", "a newer version of the program"),
+        ("format: shopping-list/1\n", "does not know"),
         ("name: [\n", "not valid YAML"),
         ("", "must be keys with values"),
         ("surprise: 1\n", "surprise"),
@@ -213,9 +214,12 @@ def test_a_recording_that_was_broken_off_is_told_as_data_loss(tmp_path, monkeypa
     def run():
         with create(tmp_path) as session:
             session.recorder.received("hand", b"kept", 0)
-            session.recorder.received("hand", b"not kept", 10**9)
-            monkeypatch.setattr(traffic.os, "write", fill)
+            session.recorder.received("hand", b"kept", 10**9)
+            session.settle()
+            monkeypatch.setattr(traffic_disk.os, "write", fill)
             session.recorder.received("hand", b"not kept", 2 * 10**9)
+            session.settle()
+            session.recorder.received("hand", b"not kept", 3 * 10**9)
 
     with pytest.raises(SessionError, match="the disk is full"):
         run()
@@ -223,6 +227,10 @@ def test_a_recording_that_was_broken_off_is_told_as_data_loss(tmp_path, monkeypa
     manifest = read_manifest(summary.folder)
     assert manifest.status == "failed"
     assert "the disk is full" in manifest.problem
-    assert manifest.data_loss == {"traffic_cut_short": 1}
+    assert manifest.data_loss == {
+        "unwritten /link/hand/rx": 1,
+        "unwritten /recorder/streams": 1,
+        "traffic_cut_short": 1,
+    }
     assert summary.data_loss
     assert next(Session.open(summary.folder).traffic().messages()).data == b"kept"
