@@ -123,13 +123,15 @@ class ContactMap:
         """Number of contacts that are kept aside."""
         return sum(len(grasp.left_out) for grasp in self.placed)
 
-    def without_contact(self, position: int) -> ContactMap:
-        """The map without one of :attr:`contacts`."""
-        index = int(self.grasp_indices[position])
-        grasp = self.placed[index]
-        within = position - int(np.searchsorted(self.grasp_indices, index))
-        emptier = replace(grasp, left_out=grasp.left_out | {int(grasp.kept[within])})
-        return replace(self, placed=(*self.placed[:index], emptier, *self.placed[index + 1 :]))
+    @property
+    def origins(self) -> list[tuple[int, int]]:
+        """The grasp that each of :attr:`contacts` comes from, and its index among that grasp's contacts."""
+        return [(index, int(each)) for index, grasp in enumerate(self.placed) for each in grasp.kept]
+
+    def without_contact(self, grasp: int, contact: int) -> ContactMap:
+        """The map with one contact left out."""
+        emptier = replace(self.placed[grasp], left_out=self.placed[grasp].left_out | {contact})
+        return replace(self, placed=(*self.placed[:grasp], emptier, *self.placed[grasp + 1 :]))
 
     def with_contact(self, grasp: int, contact: int) -> ContactMap:
         """The map with one contact that was left out made part of the shape again."""

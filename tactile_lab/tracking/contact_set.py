@@ -126,7 +126,7 @@ def _free_places(
 def _comes_down(line: ClosingLine) -> bool:
     """A way from above tells nothing about the contour: the object may be under it."""
     way = line.end_world_m - line.start_world_m
-    return abs(way[2]) > LARGEST_SLOPE * float(np.linalg.norm(way))
+    return bool(abs(way[2]) > LARGEST_SLOPE * np.linalg.norm(way))
 
 
 def _contact_at_end(line: ClosingLine, counted: Sequence[Contact]) -> int:

@@ -98,7 +98,7 @@ class Judge:
             value, costs = evidence.value_and_leave_one_out_costs(contact_map.rows, asked)
             if len(asked) == 0 or costs.max() <= self._unexplained_cost or len(contact_map.grasp_indices) == 1:
                 return contact_map, value
-            contact_map = contact_map.without_contact(int(asked[costs.argmax()]))
+            contact_map = contact_map.without_contact(*contact_map.origins[asked[costs.argmax()]])
 
     def with_covariances(self, contact_map: ContactMap) -> ContactMap:
         """The map with the covariance that all contacts and motions leave to each pose."""

@@ -18,7 +18,7 @@ from tactile_lab.shape.surface import extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.facet_smoothing import FlatFaces, smoothed_with_faces
 from tactile_lab.tracking.free_space import free_space_costs
-from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost
+from tactile_lab.tracking.hypotheses import Hypothesis, Judge
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.pose_rows import PLANAR
@@ -81,12 +81,11 @@ class SharpJudge:
 
     def _reconsidered(self, sharp: Hypothesis) -> Hypothesis:
         """Contacts left out that a sharp shape explains by themselves only, and those back that it explains better."""
-        for _ in range(_MOST_DOUBTS):
-            thinner = [self._sharp(sharp.map.without_contact(position)) for position in _doubtful(sharp.map)]
-            best = min((one for one in thinner if one is not None), key=cost, default=sharp)
-            if best.cost >= sharp.cost:
-                break
-            sharp = best
+        asked: set[tuple[int, int]] = set()
+        while doubts := [each for each in _doubtful(sharp.map) if each not in asked]:
+            for each in doubts:
+                sharp = _likelier(sharp, self._sharp(sharp.map.without_contact(*each)))
+            asked.update(doubts)
         return self._restored(sharp)
 
     def _restored(self, sharp: Hypothesis) -> Hypothesis:
@@ -123,8 +122,8 @@ def _prism_evidence(fitted: Gpis) -> float:
         return -np.inf
 
 
-def _doubtful(contact_map: ContactMap) -> list[int]:
-    """Contacts on faces of one or two, and those that do not fit their face, the worst first."""
+def _doubtful(contact_map: ContactMap) -> list[tuple[int, int]]:
+    """Origins of contacts on faces of one or two, and those that do not fit their face, the worst first."""
     seen, fitted = contact_map.contacts, contact_map.fit()
     try:
         faces = _faces(contact_map, fitted)
@@ -136,7 +135,9 @@ def _doubtful(contact_map: ContactMap) -> list[int]:
     misfit += np.sum((seen.normals - outward) ** 2, axis=1) / seen.normal_sigma_rad**2
     lonely = np.bincount(faces.labels, minlength=faces.count)[faces.labels] <= _SMALL_FACE
     doubts = np.flatnonzero(lonely | (misfit > _DOUBTFUL_CHI_SQUARE))
-    return [int(i) for i in doubts[np.argsort(-misfit[doubts], kind="stable")]][:_MOST_DOUBTS]
+    worst_first = doubts[np.argsort(-misfit[doubts], kind="stable")][:_MOST_DOUBTS]
+    origins = contact_map.origins
+    return [origins[i] for i in worst_first]
 
 
 def _faces(contact_map: ContactMap, fitted: Gpis) -> FlatFaces:

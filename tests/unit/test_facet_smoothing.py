@@ -115,7 +115,7 @@ def test_wrong_contacts_are_left_out_and_hardly_any_right_one(shape: str) -> Non
 
 def test_contacts_left_out_by_mistake_come_back() -> None:
     contact_map = true_map("rectangle", count=14)
-    thinner = contact_map.without_contact(7).without_contact(20)
+    thinner = contact_map.without_contact(1, 2).without_contact(4, 1)
     assert thinner.left_out_count == 2
     assert sharp_judge(thinner).better(thinner).map.left_out_count == 0
 

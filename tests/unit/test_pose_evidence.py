@@ -136,8 +136,8 @@ def test_leaving_one_contact_out_changes_the_evidence_by_its_cost() -> None:
     )
     assert costs.shape == (len(contact_map.contacts),)
     assert value == pytest.approx(PoseEvidence(contact_map, NOISE).value(contact_map.rows))
-    for position, cost in enumerate(costs):
-        without = PoseEvidence(contact_map.without_contact(position), NOISE).value(contact_map.rows)
+    for origin, cost in zip(contact_map.origins, costs, strict=True):
+        without = PoseEvidence(contact_map.without_contact(*origin), NOISE).value(contact_map.rows)
         assert cost == pytest.approx(value - without, abs=1e-6)
 
 
@@ -153,7 +153,7 @@ def test_a_torn_contact_costs_most() -> None:
     )
     worst = int(costs.argmax())
     assert spoiled.grasp_indices[worst] == 3
-    cleaned = spoiled.without_contact(worst)
+    cleaned = spoiled.without_contact(*spoiled.origins[worst])
     assert cleaned.placed[3].left_out == frozenset({2})
     assert cleaned.left_out_count == 1
     assert len(cleaned.contacts) == len(spoiled.contacts) - 1
