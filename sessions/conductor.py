@@ -31,6 +31,7 @@ from sessions.decisions import (
 )
 from sessions.explorer import ExplorationSettings
 from sessions.grasp_cycle import GraspCycle, GraspPlan
+from sessions.guided.settings import GuidedSettings
 from sessions.motion import Motion
 from sessions.next_grasp import FixedRule, PlanSettings
 from sessions.planner import Planner, Reorientation
@@ -55,7 +56,7 @@ class ConductorSettings(StrictModel):
         grasps: how many.
         fixed_grasps: how many of them follow the fixed rule before the estimate chooses.
         missed_approaches: this many approaches in a row without a way down to the table end the session.
-        plan, cycle, exploration, safety: see there.
+        plan, cycle, exploration, safety, guided: see there.
     """
 
     grasps: int = Field(default=16, ge=1)
@@ -65,6 +66,7 @@ class ConductorSettings(StrictModel):
     cycle: CycleSettings = CycleSettings()
     exploration: ExplorationSettings = ExplorationSettings()
     safety: SafetySettings = SafetySettings()
+    guided: GuidedSettings = GuidedSettings()
 
 
 class Ending(StrEnum):
@@ -295,7 +297,7 @@ class Conductor:
 
     def _carry(self, grasp: Grasp, wanted: Reorientation) -> None:
         """Squeeze, and re-orient the object, unless too few fingers hold it or no grasp will follow."""
-        cycle, touching = self._cycle, frozenset(contact.finger for contact in grasp.contacts)
+        cycle, touching = self._cycle, grasp.touching
         self._supervisor.count_contacts(len(touching))
         hand_motion = Pose3()
         last = len(self._grasps) >= self._settings.grasps or self._guard.requested
@@ -343,7 +345,7 @@ class Conductor:
             planned=self._settings.grasps,
             closing=plan.closing,
             reason=plan.reason,
-            forces_N={contact.finger: contact.force_N for contact in grasp.contacts},
+            forces_N={contact.finger: contact.force_N for contact in grasp.contacts if not contact.probed},
             missing=missing,
             landings=len(self._cycle.landings_world_m),
             position_sigma_m=None if covariance is None else float(np.sqrt(np.trace(covariance[:2, :2]) / 2)),

@@ -7,6 +7,34 @@ from pydantic import Field
 from tactile_lab.strict_yaml import StrictModel
 
 
+class TouchSettings(StrictModel):
+    """How the hand touches without grasping.
+
+    Attributes:
+        tap_m_s: speed of the hand coming down on the top.
+        met_N: force on a fingertip that ends the approach.
+        force_N: force that every fingertip is then brought to.
+        most_N: force on any fingertip at which the hand itself moves on no more.
+        reach_m: how far a fingertip moves on for that; what is farther away is not met.
+        gain: speed of that per force error, m/s per N.
+        sink_m: how far the hand itself moves on.
+        press_s: time for both.
+        capture_s: length of the capture.
+        lowest_m: height of the fingertips over the table where a tap has missed the object.
+    """
+
+    tap_m_s: float = Field(default=0.06, gt=0.0)
+    met_N: float = Field(default=0.20, gt=0.0)
+    force_N: float = Field(default=0.35, gt=0.0)
+    most_N: float = Field(default=0.8, gt=0.0)
+    reach_m: float = Field(default=0.008, ge=0.0)
+    gain: float = Field(default=0.04, gt=0.0)
+    sink_m: float = Field(default=0.004, ge=0.0)
+    press_s: float = Field(default=0.6, ge=0.0)
+    capture_s: float = Field(default=0.2, gt=0.0)
+    lowest_m: float = Field(default=0.012, ge=0.0)
+
+
 class CycleSettings(StrictModel):
     """Speeds, forces and times of the grasp cycle.
 
@@ -29,6 +57,7 @@ class CycleSettings(StrictModel):
         squeeze_gain: fingertip speed per force error, m/s per N.
         carry_turn_rad_s, carry_m_s: speeds while the object is held.
         finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind leave the path.
+        touch: taps on the top and probes from the side.
         finger_gap_m: the thumb stops this far from another tip's centre: they would touch each other.
     """
 
@@ -52,4 +81,5 @@ class CycleSettings(StrictModel):
     carry_turn_rad_s: float = Field(default=0.6, gt=0.0)
     carry_m_s: float = Field(default=0.06, gt=0.0)
     finger_rad_s: float = Field(default=1.8, gt=0.0)
+    touch: TouchSettings = TouchSettings()
     finger_gap_m: float = Field(default=0.021, ge=0.0)

@@ -11,6 +11,7 @@ from drivers.shadow.closing import Closing, closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.cycle_settings import CycleSettings
 from sessions.motion import GraspFrame, Motion
+from sessions.touching import Toucher
 from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
 
 
@@ -22,6 +23,7 @@ class GraspPlan:
         frame: the grasp frame in the world.
         closing: a key of :data:`drivers.shadow.closing.PRESHAPES`.
         height_m: height of the fingertip centres above the table.
+        tap: lay the fingertips on the top first.
         reason: why this one, for people.
     """
 
@@ -29,6 +31,7 @@ class GraspPlan:
     closing: str
     height_m: float
     reason: str = ""
+    tap: bool = False
 
 
 class GraspCycle:
@@ -49,6 +52,7 @@ class GraspCycle:
         yaw_window_rad: tuple[float, float] = (-np.pi, np.pi),
     ) -> None:
         self._motion, self.settings = motion, settings
+        self._toucher = Toucher(motion, settings, tip or TipEllipsoid())
         self._tip, self._yaw_window_rad = tip or TipEllipsoid(), yaw_window_rad
         self._plan: GraspPlan | None = None
         self._progress = dict.fromkeys(FINGERS, 0.0)
@@ -65,7 +69,7 @@ class GraspCycle:
     # --- down --------------------------------------------------------------------------------------------------
 
     def descend(self, plan: GraspPlan) -> bool:
-        """Move above, tare, and come down with care.
+        """Move above, tap on the top if the plan says so, tare, and come down with care.
 
         A fingertip that meets something on the way down stands on the object: lift, shift the grasp toward that
         finger and try again. When thumb and fingers have both landed, the object is too long that way: turn.
@@ -75,6 +79,8 @@ class GraspCycle:
         """
         self._plan, self.landings_world_m = plan, []
         landed: set[str] = set()
+        if plan.tap:
+            self._toucher.tap(plan.frame)
         for _ in range(self.settings.landing_tries):
             self._move_above()
             hit = self._come_down()

@@ -143,6 +143,12 @@ class Motion:
                 return False
         return True
 
+    def line(self, q: Array, speed_m_s: float) -> Iterator[Array]:
+        """Targets on the even way from where the positioner was sent last to ``q``, one a cycle."""
+        start = self._base_q
+        for share in self.shares(self._base_time_s(q, speed_m_s, np.inf)):
+            yield start + share * (q - start)
+
     def _base_time_s(self, q: Array, speed_m_s: float, turn_rad_s: float) -> float:
         travel_s = float(np.linalg.norm(q[:3] - self._base_q[:3])) / speed_m_s
         return max(travel_s, float(np.max(np.abs(q[3:] - self._base_q[3:]))) / turn_rad_s)
@@ -156,11 +162,21 @@ class Motion:
 
     # --- the fingers -------------------------------------------------------------------------------------------
 
-    def set_fingers(self, closing: Closing, progress: Mapping[str, float]) -> None:
-        """Targets of the fingers at their progress on the closing's lines; the wrist stays straight."""
+    def set_fingers(
+        self, closing: Closing, progress: Mapping[str, float], aside_rad: Mapping[str, float] | None = None
+    ) -> None:
+        """Targets of the fingers at their progress on the closing's lines; the wrist stays straight.
+
+        Args:
+            closing: whose lines.
+            progress: of each finger.
+            aside_rad: what single motors turn beyond that.
+        """
         targets = dict(_HOLD_WRIST)
         for finger in FINGERS:
             targets.update(closing.joints(finger, progress[finger]))
+        for motor, angle in (aside_rad or {}).items():
+            targets[motor] += angle
         self._targets_rad = targets
         self.bench.hand.set_targets(targets)
 

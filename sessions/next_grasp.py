@@ -32,6 +32,7 @@ class PlanSettings(StrictModel):
         start_m: where the object is expected before the first grasp, world x, y.
         turn_rad: smallest and largest re-orientation.
         return_m: largest step back toward ``start_m`` while the object is carried.
+        tap_every: every so many grasps begins with a tap on the top when the whole surface is wanted; 0 never.
     """
 
     closings: tuple[str, ...] = Field(default=("radial", "pinch"), min_length=1)
@@ -41,6 +42,7 @@ class PlanSettings(StrictModel):
     start_m: tuple[float, float] = (0.0, 0.0)
     turn_rad: tuple[float, float] = (0.23, 0.79)
     return_m: float = Field(default=0.03, ge=0.0)
+    tap_every: int = Field(default=2, ge=0)
 
     @model_validator(mode="after")
     def _sensible(self) -> PlanSettings:
@@ -106,6 +108,7 @@ class FixedRule:
 
     def __init__(self, settings: PlanSettings, rng: np.random.Generator, dimension: int = 2) -> None:
         self.settings, self._rng = settings, rng
+        self._wants_top = dimension == 3
         self._heights_m = settings.contour_heights_m if dimension == 2 else settings.surface_heights_m
         self.centre_m: Array = np.array(settings.start_m)
         """Where the object is thought to be, world x, y."""
@@ -130,6 +133,10 @@ class FixedRule:
     def closing(self, index: int) -> str:
         """The closing whose turn it is: each twice, so that it meets both sides of the window."""
         return self.settings.closings[(index // 2) % len(self.settings.closings)]
+
+    def taps(self, index: int) -> bool:
+        """Whether the grasp begins with a tap on the top."""
+        return self._wants_top and self.settings.tap_every > 0 and index % self.settings.tap_every == 0
 
     def height_m(self, index: int) -> float:
         """The contact height whose turn it is."""

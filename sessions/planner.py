@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from gtsam import Pose2, Pose3
@@ -79,7 +79,7 @@ class Planner:
         trusted = index >= self._fixed_grasps and not self._doubted
         chosen = self._best_by_estimate(index) if trusted else None
         self._by_estimate = chosen is not None
-        return chosen or self._rule.plan(index, self._has_room)
+        return replace(chosen or self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
 
     def landed(self, points_world_m: list[Array]) -> None:
         """Take note of where fingertips stood on the object; it counts until the object has been moved."""

@@ -172,6 +172,9 @@ class DiscWorld:
     def outward(self, finger: str) -> Array:
         """Out of the disc toward a tip, world frame, shape (3,)."""
         assert self.disc is not None
+        aside_m, above_m = self._depths_m(finger)
+        if above_m < aside_m:
+            return np.array([0.0, 0.0, 1.0])
         away = self._tip_m(finger)[:2] - self.disc.centre_m
         return np.array([*(away / np.linalg.norm(away)), 0.0])
 
@@ -179,10 +182,14 @@ class DiscWorld:
         """Contact force of a tip."""
         if self.disc is None:
             return 0.0
+        return STIFFNESS_N_m * max(0.0, min(self._depths_m(finger)))
+
+    def _depths_m(self, finger: str) -> tuple[float, float]:
+        """How deep a tip is in the disc: from its side, and from its top."""
+        assert self.disc is not None
         tip_m = self._tip_m(finger)
         aside_m = self.disc.radius_m + TIP_RADIUS_m - float(np.linalg.norm(tip_m[:2] - self.disc.centre_m))
-        below_m = self.disc.height_m + TIP_RADIUS_m - tip_m[2]
-        return STIFFNESS_N_m * max(0.0, min(aside_m, below_m))
+        return aside_m, self.disc.height_m + TIP_RADIUS_m - float(tip_m[2])
 
     # --- marks -------------------------------------------------------------------------------------------------
 
@@ -205,6 +212,9 @@ class DiscWorld:
         grasp = self._mark(MarkKind.CAPTURE_END)
         assert isinstance(grasp, Grasp)
         return grasp
+
+    def end_touch(self) -> None:
+        self._mark(MarkKind.TOUCH_END)
 
     def begin_hold(self) -> None:
         self._mark(MarkKind.HOLD_BEGIN)
