@@ -1,0 +1,202 @@
+"""A grasp led by keys: for a hand that can not be moved by hand, and for the simulated one.
+
+The hand moves only on request: a step at a time, or a whole step of the grasp by itself. Whatever moves, it stops
+where a fingertip meets something.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from gtsam import Pose3
+
+from drivers.shadow.posture import TipEllipsoid
+from sessions.cycle_settings import CycleSettings
+from sessions.grasp_cycle import GraspCycle, GraspPlan
+from sessions.guided.desk import Desk
+from sessions.guided.motion import GuidedMotion
+from sessions.guided.operator import Ask, Request, Stage
+from sessions.recorder import Level
+from tactile_lab.geometry.contacts import Array, Grasp
+
+AROUND_m = 0.001
+"""The hand is around the object when it is no higher than this over the height of its grasp."""
+
+
+class GraspByKeys(GraspCycle):
+    """The verbs of a grasp, each done on request.
+
+    Args:
+        motion: supervised motion that listens to the person.
+        settings: speeds, forces, times.
+        desk: where the person sits.
+        tip: shape of the fingertips.
+        yaw_window_rad: yaws the arm can take up.
+    """
+
+    def __init__(
+        self,
+        motion: GuidedMotion,
+        settings: CycleSettings,
+        desk: Desk,
+        tip: TipEllipsoid,
+        yaw_window_rad: tuple[float, float],
+    ) -> None:
+        super().__init__(motion, settings, tip, yaw_window_rad)
+        self._guided, self._desk = motion, desk
+        self._above_m: float | None = None
+        """Height over the grasp's own; None where the hand has not been sent to this grasp."""
+
+    # --- down --------------------------------------------------------------------------------------------------
+
+    def descend(self, plan: GraspPlan) -> bool:
+        self._free_the_hand()
+        prompt = "Guide the hand around the object. g: go as suggested; arrows, r, f, comma, full stop: steps"
+        self._desk.enter(Stage.GUIDE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.GIVE_UP)
+        self._plan, self.landings_world_m, self._above_m = plan, [], None
+        for request in self._guided.requests():
+            if request.ask is Ask.GO:
+                arrived = super().descend(self.plan)
+                self._above_m = 0.0 if arrived else self.settings.lift_m
+                return arrived
+            if request.ask is Ask.MOVE:
+                self._move_step(request)
+            elif request.ask in (Ask.NEXT, Ask.CAPTURE) and self._is_around():
+                self._motion.supervisor.approached()
+                return True
+        return False
+
+    def _is_around(self) -> bool:
+        if self._above_m is not None and self._above_m <= AROUND_m:
+            return True
+        height = "not over the object yet" if self._above_m is None else f"{1e3 * self._above_m:.0f} mm too high"
+        self._desk.tell(f"the hand is {height}: lower it with f, or g goes by itself")
+        return False
+
+    def _move_step(self, request: Request) -> None:
+        """One step of the hand; the first one takes it over the suggested place."""
+        if self._above_m is None:
+            self._move_above()
+            self._above_m = self.settings.lift_m
+            return
+        jog = self._desk.settings
+        frame = self.plan.frame.moved(jog.jog_m * request.x, jog.jog_m * request.y, jog.jog_rad * request.turn)
+        above_m = max(0.0, self._above_m + jog.jog_m * request.z)
+        start = self._motion.base_joints(self.plan.frame, self._table(), self._above_m)
+        if self._go_with_care(start, self._motion.base_joints(frame, self._table(), above_m)):
+            self._plan, self._above_m = replace(self.plan, frame=frame), above_m
+            self._desk.tell(f"tips {1e3 * above_m:.0f} mm over their grasp")
+
+    def _go_with_care(self, start: Array, end: Array) -> bool:
+        """Straight to ``end``; back to ``start`` where a fingertip meets something."""
+        jog = self._desk.settings
+        way_m, turn_rad = float(np.linalg.norm((end - start)[:3])), float(np.abs((end - start)[3:]).max())
+        for share in self._motion.shares(max(way_m / jog.jog_m_s, turn_rad / jog.jog_rad_s)):
+            self._motion.set_base(start + share * (end - start))
+            self._motion.tick()
+            if met := self._met(self.settings.landing_force_N):
+                self._motion.set_base(start)
+                self._motion.wait(self.settings.rest_s)
+                self._desk.tell(f"{', '.join(met)} met something: back by one step", Level.WARNING)
+                return False
+        return True
+
+    def _met(self, force_N: float) -> list[str]:
+        return [finger for finger, load_N in self._motion.loads_N().items() if load_N > force_N]
+
+    def _free_the_hand(self) -> None:
+        """After a failure the hand may still be around the object: open and up before anything else."""
+        self._guided.begin_anew()
+        if self._above_m is not None:
+            super().release()
+            self.lift()
+
+    # --- close and measure -------------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        prompt = "Close the fingers. g: all by themselves; 1-5 close, 6-0 open one finger; c, o all; SPACE: done"
+        self._desk.enter(Stage.CLOSE, prompt, Ask.GO, Ask.FINGERS, Ask.NEXT, Ask.GIVE_UP)
+        self._progress, begun = self._opened(), False
+        for request in self._guided.requests():
+            if request.ask is Ask.GO:
+                super().close()
+                return
+            if request.ask is Ask.FINGERS:
+                if not begun:
+                    self._motion.bench.begin_closing()
+                    begun = True
+                self._step_fingers(request)
+            elif request.ask in (Ask.NEXT, Ask.CAPTURE):
+                self._touching = frozenset(self._met(self.settings.touch_force_N))
+                return
+
+    def _step_fingers(self, request: Request) -> None:
+        """Close or open fingers by steps along their lines; each stops at its touch."""
+        table = self._table()
+        way_m = self._desk.settings.finger_step_m * request.steps
+        moving = set(request.fingers)
+        cycles = self._motion.cycles(abs(way_m) / (self.settings.closing_m_s * self._motion.supervisor.speed_scale))
+        for _ in range(cycles):
+            if way_m > 0.0:
+                moving -= set(self._met(self.settings.touch_force_N))
+                moving = {finger for finger in moving if self._may_close(finger)}
+            for finger in moving:
+                step = way_m / cycles / table.path(finger).length_m
+                self._progress[finger] = float(np.clip(self._progress[finger] + step, *table.path(finger).valid))
+            self._motion.set_fingers(table, self._progress)
+            self._motion.tick()
+        stopped = [finger for finger in request.fingers if finger not in moving]
+        if stopped and way_m > 0.0:
+            self._desk.tell(f"{', '.join(stopped)} stopped")
+
+    def settle(self) -> None:
+        self._desk.enter(Stage.HOLD, "Hold still. SPACE: capture; x: give up", Ask.CAPTURE, Ask.FINGERS, Ask.GIVE_UP)
+        super().settle()
+        self._desk.take()
+        hold_N = self._balanced_forces_N(self._touching, self.settings.contact_force_N)
+        while not self._desk.wants_capture():
+            self._servo_forces(hold_N)
+            self._motion.tick()
+
+    def capture(self) -> Grasp:
+        self._desk.enter(Stage.CAPTURE, "Capturing: hold still")
+        return super().capture()
+
+    # --- carry and away ----------------------------------------------------------------------------------------
+
+    def squeeze(self, touching: frozenset[str]) -> None:
+        self._desk.enter(Stage.ROTATE, "Building up the squeeze")
+        super().squeeze(touching)
+
+    def reorient(self, turn_rad: float, shift_world_m: Array, touching: frozenset[str]) -> Pose3:
+        wanted = f"{np.degrees(turn_rad):+.0f}°"
+        prompt = f"Turn the object. g: {wanted} as suggested; comma, full stop, arrows: steps; SPACE: done"
+        self._desk.enter(Stage.ROTATE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.UNDO)
+        hold_N = self._balanced_forces_N(touching, self.settings.squeeze_force_N)
+        motion, jog = Pose3(), self._desk.settings
+        for request in self._guided.requests(lambda: self._servo_forces(hold_N)):
+            if request.ask is Ask.GO:
+                return super().reorient(turn_rad, shift_world_m, touching) * motion
+            if request.ask is Ask.MOVE:
+                shift_m = jog.jog_m * np.array([request.x, request.y], dtype=float)
+                motion = super().reorient(jog.jog_rad * request.turn, shift_m, touching) * motion
+            elif request.ask in (Ask.NEXT, Ask.CAPTURE):
+                break
+        return motion
+
+    def release(self) -> None:
+        self._desk.enter(Stage.RELEASE, "Releasing the object")
+        if self._above_m is not None:
+            super().release()
+
+    def lift(self) -> None:
+        if self._above_m is not None:
+            super().lift()
+            self._above_m = None
+
+    def idle(self) -> None:
+        if self._desk.paused:
+            self._guided.rest()
+        else:
+            super().idle()

@@ -1,0 +1,93 @@
+"""A person decides; the planner suggests."""
+
+from __future__ import annotations
+
+from gtsam import Pose3
+
+from sessions.decisions import AutonomousDecisions, Decision, End, Pause, UndoGrasp, Veto, Wait
+from sessions.grasp_cycle import GraspPlan
+from sessions.guided.desk import Desk
+from sessions.guided.operator import Ask, Stage
+from sessions.guided.words import plan_in_words, unknown_in_words
+from sessions.planner import Planner, Reorientation
+from tactile_lab.errors import DeviceError, SafetyError, TactileLabError
+from tactile_lab.geometry.contacts import Grasp
+from tactile_lab.geometry.poses import planar
+from tactile_lab.slam_result import SlamStep
+from tactile_lab.tracking.observability import planar_observability
+
+GOOD_OBSERVABILITY = 0.15
+"""Smallest eigenvalue of (3.18) from which a grasp tells the whole pose on the table."""
+
+
+class GuidedDecisions(AutonomousDecisions):
+    """What the person asks for at the desk.
+
+    Args:
+        planner: suggests.
+        desk: where the person sits.
+    """
+
+    def __init__(self, planner: Planner, desk: Desk) -> None:
+        super().__init__(planner)
+        self._desk = desk
+        self._entered: int | None = None
+
+    def think(self, index: int) -> None:
+        super().think(index)
+        assert self._plan is not None
+        self._desk.suggestion = plan_in_words(self._plan)
+        self._entered = None
+
+    def decide(self, index: int) -> Decision:
+        desk = self._desk
+        if desk.end_wanted:
+            return End(f"ended by the operator after {index} grasps")
+        if desk.undo_wanted:
+            desk.undo_wanted = False
+            return self._again(UndoGrasp("by the operator"))
+        if desk.paused:
+            return Pause(desk.paused)
+        if self._entered != index:
+            self._enter(index)
+        for request in desk.take():
+            if request.ask is Ask.UNDO:
+                return self._again(UndoGrasp("by the operator"))
+            if request.ask in (Ask.NEXT, Ask.GO):
+                return self._again(super().decide(index))
+        return Wait()
+
+    def _again(self, decision: Decision) -> Decision:
+        self._entered = None
+        return decision
+
+    def _enter(self, index: int) -> None:
+        self._entered, self._desk.grasp = index, index + 1
+        first = "Place the object on the table." if index == 0 else "Ready for the next grasp."
+        undo = "" if index == 0 else "; u: take the last grasp back"
+        self._desk.enter(Stage.PLACE, f"{first} SPACE: go on{undo}; e: end", Ask.NEXT, Ask.UNDO, Ask.END)
+
+    def captured(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
+        self._desk.tell(_in_words(grasp))
+        return super().captured(grasp, plan)
+
+    def estimated(self, step: SlamStep) -> None:
+        super().estimated(step)
+        self._tell_unknown(step.world_T_object)
+        self._desk.tell(f"grasp {step.index + 1} {step.verdict}: {step.reason}")
+
+    def _tell_unknown(self, world_T_object: Pose3 | None) -> None:
+        pose = None if world_T_object is None else planar(world_T_object)
+        self._desk.unknown = unknown_in_words(self.known_shape(), pose)
+
+    def failed(self, error: TactileLabError) -> bool:
+        return isinstance(error, (SafetyError, DeviceError)) and self._desk.fail(str(error))
+
+
+def _in_words(grasp: Grasp) -> str:
+    """What was captured, and whether it tells the pose."""
+    if not grasp.contacts:
+        return "captured, but no finger has a contact"
+    value = planar_observability(grasp.points_world_m, grasp.normals_world).smallest
+    worth = "tells the whole pose" if value >= GOOD_OBSERVABILITY else "leaves a motion of the object open"
+    return f"captured {len(grasp.contacts)} contacts: observability {value:.2f}, {worth}"

@@ -1,0 +1,80 @@
+"""An operator without a person: does what the prompts ask for, and what a script puts in between."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from sessions.guided.operator import Ask, Panel, Request, Stage
+
+_ANSWERS = {
+    Stage.PLACE: Ask.NEXT,
+    Stage.GUIDE: Ask.GO,
+    Stage.CLOSE: Ask.GO,
+    Stage.HOLD: Ask.CAPTURE,
+    Stage.ROTATE: Ask.GO,
+    Stage.RELEASE: Ask.NEXT,
+}
+
+
+@dataclass(frozen=True)
+class Cue:
+    """What a script does, once, as soon as it fits.
+
+    Attributes:
+        fits: whether it is time, by what is shown.
+        requests: what is asked for then.
+        act: done then, before the requests.
+    """
+
+    fits: Callable[[Panel], bool]
+    requests: tuple[Request, ...] = ()
+    act: Callable[[], None] = lambda: None
+
+
+class SimulatedOperator:
+    """Answers every prompt by letting the rig do the step, and captures when the grasp is steady.
+
+    Args:
+        script: cues in their order; while the next one fits, it is played instead of an answer.
+        attended: plays a person who mends what has failed and then goes on.
+    """
+
+    def __init__(self, script: Iterable[Cue] = (), *, attended: bool = False) -> None:
+        self.attended = attended
+        self.panels: list[Panel] = []
+        self._script = deque(script)
+        self._waiting: deque[Request] = deque()
+        self._answered: tuple[Stage, int, str] | None = None
+
+    def requests(self) -> Sequence[Request]:
+        requests = list(self._waiting)
+        self._waiting.clear()
+        return requests
+
+    def show(self, panel: Panel) -> None:
+        self.panels.append(panel)
+        if self._script and self._script[0].fits(panel):
+            cue = self._script.popleft()
+            cue.act()
+            self._waiting.extend(cue.requests)
+        elif panel.paused:
+            self._go_on(panel)
+        elif (panel.stage, panel.grasp, panel.prompt) != self._answered or panel.stage is Stage.PLACE:
+            self._answer(panel)
+
+    def _go_on(self, panel: Panel) -> None:
+        if not panel.sight.silent:
+            self._answered = None
+            self._waiting.append(Request(Ask.PAUSE))
+
+    def _answer(self, panel: Panel) -> None:
+        """One answer to each prompt; in the hold only once the grasp is steady, or after it can not become so."""
+        answer = _ANSWERS.get(panel.stage)
+        if answer is None or not panel.prompt:
+            return
+        if panel.stage is Stage.HOLD and not (panel.sight.is_steady or panel.sight.steady_s > 1.0):
+            return
+        self._answered = (panel.stage, panel.grasp, panel.prompt)
+        self._waiting.append(Request(answer))

@@ -1,0 +1,66 @@
+"""Plans and shapes in words, as a person at the table says them.
+
+Directions are those of someone who stands behind the arm: "far" is along the world's x axis, "left" along its y axis.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from gtsam import Pose2
+
+from sessions.explorer import KnownShape
+from sessions.grasp_cycle import GraspPlan
+from tactile_lab.errors import ShapeError
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.surface import extract_contour, extract_mesh
+
+SECTORS = ("far", "far left", "left", "near left", "near", "near right", "right", "far right")
+KNOWN_WELL = 0.9
+"""Share of the surface from which nothing is called unknown."""
+
+
+def direction(x: float, y: float) -> str:
+    """The direction of a vector on the table."""
+    turns = math.atan2(y, x) / (2.0 * math.pi)
+    return SECTORS[round(turns * len(SECTORS)) % len(SECTORS)]
+
+
+def plan_in_words(plan: GraspPlan) -> str:
+    """A grasp as a person would do it."""
+    frame = plan.frame
+    place = f"{1e3 * frame.x_m:+.0f}, {1e3 * frame.y_m:+.0f} mm"
+    turn = math.degrees(frame.yaw_rad)
+    text = f"{plan.closing} at {place}, turned {turn:+.0f}°, tips {1e3 * plan.height_m:.0f} mm high"
+    return f"{text} ({plan.reason})" if plan.reason else text
+
+
+def unknown_in_words(known: KnownShape | None, world_T_object: Pose2 | None) -> str:
+    """Which part of the object is least known, as seen from its middle."""
+    if known is None or world_T_object is None:
+        return "the whole object is unknown"
+    if known.explored >= KNOWN_WELL:
+        return f"{known.explored:.0%} of the surface is known"
+    try:
+        points_m, sigma_m = _surface_points(known)
+    except ShapeError:
+        return "the contacts enclose nothing yet"
+    worst = _worst_sector(points_m - known.centre_m, sigma_m, world_T_object)
+    return f"{known.explored:.0%} of the surface is known; least the {SECTORS[worst]} side"
+
+
+def _surface_points(known: KnownShape) -> tuple[Array, Array]:
+    if known.dimension == 2:
+        contour = extract_contour(known.field, resolution_m=0.004)
+        return contour.points_m, contour.sigma_m
+    mesh = extract_mesh(known.field, resolution_m=0.008)
+    return mesh.vertices[:, :2], mesh.sigma_m
+
+
+def _worst_sector(offsets_m: Array, sigma_m: Array, world_T_object: Pose2) -> int:
+    """The sector, seen from the middle, whose points are known worst on average; object frame in."""
+    turns = (np.arctan2(offsets_m[:, 1], offsets_m[:, 0]) + world_T_object.theta()) / (2.0 * np.pi)
+    sectors = np.round(turns * len(SECTORS)).astype(int) % len(SECTORS)
+    means = [float(sigma_m[sectors == i].mean()) if np.any(sectors == i) else 0.0 for i in range(len(SECTORS))]
+    return int(np.argmax(means))
