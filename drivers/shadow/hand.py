@@ -9,31 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.links import Datagram, Link
+from drivers.shadow.hand_motion import LARGEST_NUDGE, NO_DEMAND, HandMotion
 from drivers.shadow.hand_samples import HandDecoder, HandSample
 from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.joint_calibration import JointCalibration
-from drivers.shadow.motor_configuration import MotorConfiguration, configure_motors
+from drivers.shadow.motor_configuration import MotorConfiguration, configure_motors, reset_motors
 from drivers.shadow.motor_data import ToMotor
 from drivers.shadow.motor_polling import MotorPolling, MotorReadings
 from drivers.shadow.motor_watch import Fault, MotorWatch
 from drivers.shadow.motors import MotorMap
-from drivers.shadow.palm_codec import MOTORS, EdcCommand, PalmCommand
+from drivers.shadow.palm_codec import EdcCommand, PalmCommand
 from drivers.shadow.palm_images import PALMS
-from drivers.shadow.position_control import PositionControl
 from drivers.shadow.tactile_requests import TactileRotation
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import CodecError, DeviceError
-from tactile_lab.geometry.contacts import Array
 
-__all__ = ["HandCounters", "HandDecoder", "HandSample", "HandSettings", "ShadowHand"]
+__all__ = ["LARGEST_NUDGE", "HandCounters", "HandDecoder", "HandSample", "HandSettings", "ShadowHand"]
 
 MOTOR_PATIENCE_ns = 20_000_000
 """A motor halts itself when it has seen no demand for 20 ms."""
-
-LARGEST_NUDGE = 250
-"""Largest duty cycle of a nudge, counts: a quarter of full duty can not hurt a joint in a moment."""
-
-_NO_DEMAND = np.zeros(MOTORS, dtype=np.int16)
 
 
 @dataclass
@@ -80,11 +74,11 @@ class ShadowHand:
         self._link, self._clock = link, clock
         self._settings = settings or HandSettings()
         self._motors, self._boards = motors or MotorMap.load(), boards
-        self._control = PositionControl(self._motors, self._settings.gains)
+        self._motion = HandMotion(self._motors, self._settings.gains, self._settings.soft_start_s, link.name)
+        self._kind = ToMotor.DEMAND_TORQUE if self._settings.demand == "torque" else ToMotor.DEMAND_PWM
         self._watch = MotorWatch(self._motors, self._settings.heat, link.name)
         self._image = PALMS[self._settings.palm]
         self._decoder = HandDecoder(calibration, self._image)
-        self._nudge: NDArray[np.int16] | None = None
         self._connected = False
         self._reset()
 
@@ -115,6 +109,8 @@ class ShadowHand:
         try:
             self._reset()
             self._wake_palm()
+            if self._settings.reset_motors:
+                reset_motors(self._setup_cycle, round(self._settings.reset_wait_s / self._settings.cycle_s))
             if self._boards is not None:
                 configure_motors(self._setup_cycle, self._motors, self._boards, self._link.name)
         except BaseException:
@@ -133,7 +129,7 @@ class ShadowHand:
         self._connected = False
         try:
             for _ in range(self._settings.close_cycles):
-                self._cycle(_NO_DEMAND)
+                self._cycle(NO_DEMAND)
                 self._pause()
         finally:
             self._link.close()
@@ -160,7 +156,7 @@ class ShadowHand:
         self._take(self._link.receive())
         for _ in range(self._settings.connect_tries):
             self._pause()
-            if (sample := self._cycle(_NO_DEMAND)) is not None:
+            if (sample := self._cycle(NO_DEMAND)) is not None:
                 self._last = sample
                 return
         raise DeviceError(
@@ -180,8 +176,19 @@ class ShadowHand:
         Raises:
             DeviceError: a name is not a driven joint, or a target is not a finite number. Nothing is changed then.
         """
-        self._control.set_targets(targets_rad)
-        self._nudge = None
+        self._motion.set_targets(targets_rad)
+
+    def set_demands(self, counts: Mapping[str, float]) -> None:
+        """Drive joints directly, in place of their position control, until they are given a target again.
+
+        Args:
+            counts: by driven joint, towards larger angles: duty cycle of 1023, or torque (strain gauge difference)
+                where the settings say so. Sent within the joint's largest demand, the heat limit and the soft start.
+
+        Raises:
+            DeviceError: a name is not a driven joint, or a demand is not a finite number. Nothing is changed then.
+        """
+        self._motion.set_demands(counts)
 
     def nudge(self, joint: str, pwm: float) -> None:
         """Drive one motor alone with a small duty cycle from now on, in place of all position control.
@@ -193,19 +200,12 @@ class ShadowHand:
         Raises:
             DeviceError: not a driven joint, or too large.
         """
-        if joint not in self._motors.numbers or not abs(pwm) <= LARGEST_NUDGE:
-            what = f"can not nudge {joint} with {pwm} counts"
-            raise DeviceError(what, where=self._link.name, hint=f"At most {LARGEST_NUDGE} for a driven joint")
-        self._control.clear()
-        motor = self._motors.numbers[joint]
-        self._nudge = np.zeros(MOTORS, dtype=np.int16) if pwm else None
-        if self._nudge is not None:
-            self._nudge[motor] = round(pwm) * self._motors.sign[motor]
+        self._motion.nudge(joint, pwm)
 
     @property
     def targets_rad(self) -> dict[str, float]:
         """The targets that are set, by driven joint, radians."""
-        return self._control.targets_rad
+        return self._motion.targets_rad
 
     def stop(self) -> None:
         """Zero demands in every exchange from now on, until :meth:`resume`. Never raises.
@@ -219,9 +219,7 @@ class ShadowHand:
         self._stopped = False
         self._fault: Fault | None = None
         self._counters.lost_in_a_row = 0
-        self._motion_since_ns: int | None = None
-        self._nudge = None
-        self._control.clear()
+        self._motion.clear()
 
     # --- the cycle ---------------------------------------------------------------------------------------------
 
@@ -261,10 +259,11 @@ class ShadowHand:
         self._last = sample or self._last
         return None if sample is None else sample.motor
 
-    def _cycle(self, words: NDArray[np.int16], to_motor: ToMotor = ToMotor.DEMAND_PWM) -> HandSample | None:
+    def _cycle(self, words: NDArray[np.int16], to_motor: ToMotor | None = None) -> HandSample | None:
+        to_motor = self._kind if to_motor is None else to_motor
         now_ns = self._clock.now_ns()
         silent = self._sent_ns is None or now_ns - self._sent_ns > MOTOR_PATIENCE_ns
-        if silent or to_motor != ToMotor.DEMAND_PWM:
+        if silent or to_motor not in (ToMotor.DEMAND_PWM, ToMotor.DEMAND_TORQUE):
             self._demands_since_ns = now_ns
         which_motors, kind = self._polling.next(now_ns)
         command = PalmCommand(
@@ -303,22 +302,10 @@ class ShadowHand:
 
     def _demand(self, last: HandSample) -> NDArray[np.int16]:
         if self._stopped or self._fault is not None or self._counters.lost_in_a_row >= self._settings.blind_after:
-            self._motion_since_ns = None
-            return _NO_DEMAND
-        if self._nudge is not None:
-            return self._nudge
-        return self._control.demand(last.joints_rad, self._limit_share(last))
-
-    def _limit_share(self, last: HandSample) -> Array:
-        if self._motion_since_ns is None and self._control.active:
-            self._motion_since_ns = self._clock.now_ns()
-        return np.minimum(self._soft_start_share(), self._watch.pwm_share(last.motor.temperature_C))
-
-    def _soft_start_share(self) -> float:
-        rise_ns = self._settings.soft_start_s * NANOSECONDS
-        if self._motion_since_ns is None or not rise_ns:
-            return 1.0
-        return min((self._clock.now_ns() - self._motion_since_ns) / rise_ns, 1.0)
+            self._motion.pause()
+            return NO_DEMAND
+        share = self._watch.pwm_share(last.motor.temperature_C)
+        return self._motion.words(last.joints_rad, share, self._clock.now_ns())
 
     # --- what can go wrong -------------------------------------------------------------------------------------
 

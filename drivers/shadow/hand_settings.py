@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from typing import Literal
 
+from pydantic import Field, model_validator
+
+from drivers.shadow.gains import GainTable
+from drivers.shadow.motor_data import MAX_PWM
 from drivers.shadow.motor_polling import PollingRates
 from drivers.shadow.motor_watch import HeatLimits
-from drivers.shadow.motors import GainTable
+from drivers.shadow.motors import DRIVEN_JOINTS
 from drivers.shadow.palm_images import PalmName
 from drivers.shadow.tactile_requests import TactileKind
 from tactile_lab.strict_yaml import StrictModel
@@ -18,7 +22,8 @@ class HandSettings(StrictModel):
     Attributes:
         palm: which palm the hand has.
         cycle_s: period of the exchanges while connecting and closing, seconds.
-        gains: position control.
+        demand: what the motors are told: a duty cycle, or a torque that they keep by themselves at 5 kHz.
+        gains: position control, in counts of that demand.
         polling: how often the motors are asked for what.
         tactile: kind of fingertip asked for data through the palm.
         lost_limit: so many cycles in a row without a valid status stop the hand.
@@ -28,10 +33,12 @@ class HandSettings(StrictModel):
         heat: temperature limits of the motors.
         connect_tries: exchanges until the palm must have answered.
         close_cycles: exchanges with zero demands before the link is closed.
+        reset_motors: reset the motor boards when connecting; they then need ``reset_wait_s`` to come back.
     """
 
     palm: PalmName = "0220"
     cycle_s: float = Field(default=0.01, gt=0.0)
+    demand: Literal["pwm", "torque"] = "pwm"
     gains: GainTable = GainTable()
     polling: PollingRates = PollingRates()
     tactile: TactileKind = "none"
@@ -42,3 +49,12 @@ class HandSettings(StrictModel):
     heat: HeatLimits = HeatLimits()
     connect_tries: int = Field(default=20, ge=1)
     close_cycles: int = Field(default=5, ge=1)
+    reset_motors: bool = False
+    reset_wait_s: float = Field(default=3.2, ge=0.0, le=30.0)
+
+    @model_validator(mode="after")
+    def _duty_cycles_exist(self) -> HandSettings:
+        largest = max(self.gains.of(joint).max_pwm for joint in DRIVEN_JOINTS)
+        if self.demand == "pwm" and largest > MAX_PWM:
+            raise ValueError(f"a duty cycle of {largest:g} counts is more than the full one, {MAX_PWM}")
+        return self

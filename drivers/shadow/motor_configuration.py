@@ -24,6 +24,9 @@ from tactile_lab.strict_yaml import StrictModel
 UPLOAD_TRIES = 3
 _LOST_IN_A_ROW = 20
 _CYCLES_FOR_FLAGS = 400
+RESET_WORD, MOTORS_A_BUS = 0x5200, 10
+"""A reset names the motor by its number on its bus."""
+
 _BACKLASH_ON, _BACKLASH_OFF = 0x0001, 0x0002
 _REFUSED = int(MotorFlag.CONFIG_CRC_MISMATCH | MotorFlag.CONFIG_OUT_OF_RANGE)
 
@@ -119,6 +122,13 @@ def configure_motors(
     words = ", ".join(describe_flags(int(flags[motors.numbers[joint]]) & _REFUSED))
     hint = "Check the motor's entry in motor_board_effort_controllers.yaml"
     raise DeviceError(words, where=f"{where}, {joint} (motor {motors.numbers[joint]})", hint=hint)
+
+
+def reset_motors(exchange: Exchange, cycles: int) -> None:
+    """Reset every motor board, then wait with empty control words while they start (Shadow's small driver does so)."""
+    exchange(ToMotor.RESET, np.array([RESET_WORD | motor % MOTORS_A_BUS for motor in range(MOTORS)], dtype=np.int16))
+    for _ in range(cycles):
+        exchange(ToMotor.SYSTEM_CONTROLS, np.zeros(MOTORS, dtype=np.int16))
 
 
 def _alone(motor: int, word: int) -> NDArray[np.int16]:

@@ -19,6 +19,9 @@ from tactile_lab.geometry.contacts import Array
 MAX_PWM = 0x3FF
 """Full duty cycle of a motor's bridge, counts."""
 
+MAX_TORQUE = 0x7FFF
+"""Largest torque demand, counts of strain gauge difference."""
+
 
 class FromMotor(IntEnum):
     """What a motor can be asked for."""

@@ -1,4 +1,4 @@
-"""The 20 motors: which joint each one pulls, and how the host drives it to an angle."""
+"""The 20 motors: which joint each one pulls."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from drivers.shadow.kinematics import JOINT_INDEX, JOINTS, JOINT_LIMITS_rad
-from drivers.shadow.motor_data import MAX_PWM
 from drivers.shadow.palm_codec import MOTORS
 from tactile_lab import strict_yaml
 from tactile_lab.errors import ConfigurationError
@@ -98,6 +97,10 @@ class MotorMap:
         own = strict_yaml.validate(content, _MotorFile, where=str(path))
         return cls(own.motors, own.reversed, str(path))
 
+    def turned(self, backwards: tuple[str, ...]) -> MotorMap:
+        """The same map with other joints turning backwards, as a file of gains tells by their signs."""
+        return MotorMap(self.numbers, backwards, "motor map")
+
     def _matrix(self) -> Array:
         matrix = np.zeros((MOTORS, len(JOINTS)))
         for motor, name in enumerate(self.names):
@@ -113,49 +116,3 @@ def _check_one_to_one(numbers: Mapping[str, int], backwards: tuple[str, ...], wh
         raise ConfigurationError(f"no driven joint called {', '.join(unknown)}", where=where, hint=hint)
     if sorted(numbers.values()) != list(range(MOTORS)):
         raise ConfigurationError(f"motor numbers are not 0 to {MOTORS - 1}, each once", where=where, hint=hint)
-
-
-class JointGains(StrictModel):
-    """Host position control of one joint.
-
-    Attributes:
-        pwm_per_rad: duty cycle counts per radian of error.
-        deadband_rad: errors within it give no demand; larger ones count from its edge.
-        max_pwm: largest duty cycle, counts of 1023.
-    """
-
-    pwm_per_rad: float = Field(gt=0.0)
-    deadband_rad: float = Field(ge=0.0, default=0.003)
-    max_pwm: float = Field(gt=0.0, le=MAX_PWM, default=600.0)
-
-
-class GainTable(StrictModel):
-    """Gains by class of joint, with exceptions by name.
-
-    The defaults are the magnitudes that Shadow delivers with hand 378 for control of the duty cycle.
-
-    Attributes:
-        coupled: J0 of the fingers.
-        flexion: J3 of the fingers.
-        spread: J4 of the fingers and LFJ5.
-        thumb: THJ1 to THJ5.
-        wrist: WRJ1 and WRJ2.
-        exceptions: gains of single driven joints.
-    """
-
-    coupled: JointGains = JointGains(pwm_per_rad=4500.0)
-    flexion: JointGains = JointGains(pwm_per_rad=6000.0)
-    spread: JointGains = JointGains(pwm_per_rad=7100.0, deadband_rad=0.004, max_pwm=500.0)
-    thumb: JointGains = JointGains(pwm_per_rad=5500.0, max_pwm=500.0)
-    wrist: JointGains = JointGains(pwm_per_rad=9000.0, deadband_rad=0.004)
-    exceptions: dict[str, JointGains] = Field(default_factory=dict)
-
-    def of(self, name: str) -> JointGains:
-        """Gains of one driven joint."""
-        if name in self.exceptions:
-            return self.exceptions[name]
-        if name.startswith("TH"):
-            return self.thumb
-        if name.startswith("WR"):
-            return self.wrist
-        return {"J0": self.coupled, "J3": self.flexion}.get(name[2:], self.spread)

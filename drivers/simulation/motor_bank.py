@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.shadow.motor_data import CONFIG_TYPES, MAX_PWM, FromMotor, MotorFlag, ToMotor, config_crc
+from drivers.shadow.motor_data import CONFIG_TYPES, MAX_PWM, MAX_TORQUE, FromMotor, MotorFlag, ToMotor, config_crc
 from drivers.shadow.motors import DRIVEN_JOINTS, MotorMap
 from drivers.shadow.palm_codec import MOTORS, PalmCommand
 from drivers.simulation.geared_motors import motor_class
@@ -30,8 +30,8 @@ _SLOW_WORDS = (0, 1200, 1200, 0, 4711, 0, 131, 2020, 0x0A1F, 300, 4500, 0, 0, 0,
 class MotorBank:
     """All motor boards together, vectors by motor number.
 
-    PWM demands, configurations, backlash controls and resets are served; torque demands are not, so that such motors
-    halt after 20 ms.
+    PWM and torque demands, configurations, backlash controls and resets are served. The torque loop runs with the
+    commands, not at 5 kHz: the duty cycle that gives the torque at a standstill, and as much again per torque missing.
 
     Args:
         plant: whose motors turn.
@@ -55,6 +55,7 @@ class MotorBank:
         self._celsius = np.full(MOTORS, _AMBIENT_C)
         self._config = np.zeros((MOTORS, len(CONFIG_TYPES)), int)
         self._max_pwm = np.full(MOTORS, MAX_PWM)
+        self._max_torque = np.full(MOTORS, MAX_TORQUE)
         self.backlash_compensated = np.zeros(MOTORS, bool)
         self._frames = np.zeros(MOTORS, int)
         self._halts_at_ns: int | None = None
@@ -80,6 +81,8 @@ class MotorBank:
         self._warm()
         if kind == ToMotor.DEMAND_PWM:
             self._demand(words)
+        elif kind == ToMotor.DEMAND_TORQUE:
+            self._demand(self._torque_loop(words))
         elif kind == ToMotor.RESET:
             self._reset(words)
         elif kind in CONFIG_TYPES:
@@ -138,6 +141,12 @@ class MotorBank:
         self._halts_at_ns = self._plant.stamp_ns + DEMAND_TIMEOUT_ns
         self._turn(np.minimum(np.maximum(words, -self._max_pwm), self._max_pwm))
 
+    def _torque_loop(self, torques: NDArray[np.int_]) -> NDArray[np.int_]:
+        """Duty cycles for torque demands in counts of the gauges, within the boards' torque limits."""
+        wanted = np.minimum(np.maximum(torques, -self._max_torque), self._max_torque)
+        missing = wanted - self._torque_Nm * GAUGE_COUNTS_PER_Nm
+        return np.rint((wanted + missing) / (GAUGE_COUNTS_PER_Nm * self._stall_Nm) * MAX_PWM).astype(int)
+
     def _turn(self, pwm: Array | NDArray[np.int_]) -> None:
         self._pwm = np.where(self._flags & int(MotorFlag.OVER_TEMPERATURE), 0.0, pwm)
         self._plant.drive((self._sign * self._pwm)[self._motor_of_row] / MAX_PWM)
@@ -146,7 +155,7 @@ class MotorBank:
         """A reset addresses a motor by its number on its bus; it comes back halted and with its stored settings."""
         reset = words & 0xFFFF == 0x5200 | np.arange(MOTORS) % 10
         self._flags[reset] = int(MotorFlag.NO_DEMAND)
-        self._max_pwm[reset] = MAX_PWM
+        self._max_pwm[reset], self._max_torque[reset] = MAX_PWM, MAX_TORQUE
         self._turn(np.where(reset, 0.0, self._pwm))
 
     def _activate(self, checksums: NDArray[np.int_]) -> None:
@@ -160,6 +169,7 @@ class MotorBank:
                 self._flags[motor] |= int(MotorFlag.CONFIG_OUT_OF_RANGE)
             else:
                 self._max_pwm[motor] = max_pwm
+                self._max_torque[motor] = self._config[motor, CONFIG_TYPES.index(ToMotor.TORQUE_LIMIT)]
 
     def _warm(self) -> None:
         """Windings approach the temperature of their present load; too hot, they halt for good."""

@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 
 from drivers.links import Datagram, MemoryLink, ReplayLink
 from drivers.shadow import palm_codec
+from drivers.shadow.gains import GainTable, JointGains
 from drivers.shadow.hand import HandDecoder, HandSample, HandSettings, ShadowHand
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.kinematics import JOINT_INDEX, joint_vector
 from drivers.shadow.motor_data import FromMotor, MotorFlag, ToMotor
 from drivers.shadow.motor_polling import MotorMemory, MotorPolling
-from drivers.shadow.motors import GainTable, JointGains, MotorMap
+from drivers.shadow.motors import MotorMap
 from drivers.shadow.palm_codec import PalmCommand, PalmStatus
 from drivers.shadow.tactile_requests import BIOTAC_ROTATION, TactileRotation
 from tactile_lab import rigs

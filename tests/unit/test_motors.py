@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drivers.shadow.gains import GainTable, JointGains
 from drivers.shadow.kinematics import JOINT_INDEX, JOINTS, JOINT_LIMITS_rad
-from drivers.shadow.motors import DRIVEN_JOINTS, GainTable, JointGains, MotorMap
+from drivers.shadow.motors import DRIVEN_JOINTS, MotorMap
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
 
