@@ -6,7 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sessions.manifest import MANIFEST
+from sessions.mcap_frames import ends_well
 from sessions.session import TRAFFIC, Session
+from sessions.session_ids import recovered_id
+from sessions.traffic_reader import segment_paths
 from tactile_lab.errors import SessionError
 
 
@@ -15,11 +18,14 @@ class SessionSummary:
     """One line of a list of sessions.
 
     Attributes:
-        status: that of the manifest, or ``unreadable``.
+        status: that of the manifest, where ``open`` means that it is being recorded; or ``damaged``: left open by a
+            crash, torn, or not readable.
         grasps: number of grasps, when the session was closed.
         traffic_bytes: size of the traffic file, 0 when there is none.
         data_loss: something was lost, by the manifest.
-        problem: why it can not be read or why it failed; else empty.
+        problem: why it can not be read, why it failed, or what to do about the damage; else empty.
+        readable: its manifest can be read.
+        left_open: a crash ended it.
     """
 
     name: str
@@ -32,28 +38,55 @@ class SessionSummary:
     traffic_bytes: int = 0
     data_loss: bool = False
     problem: str = ""
+    readable: bool = True
+    left_open: bool = False
 
 
 def summarize(folder: Path) -> SessionSummary:
     """What a session folder holds; a manifest that can not be read is told, not raised."""
     traffic = folder / TRAFFIC
-    size = traffic.stat().st_size if traffic.is_file() else 0
+    size = sum(path.stat().st_size for path in segment_paths(traffic) if path.is_file())
     try:
-        manifest = Session.open(folder).manifest
+        session = Session.open(folder)
     except SessionError as error:
-        return SessionSummary(folder.name, folder, "unreadable", traffic_bytes=size, problem=str(error))
+        return SessionSummary(folder.name, folder, "damaged", traffic_bytes=size, problem=str(error), readable=False)
+    manifest, damage = session.manifest, _damage(session)
     return SessionSummary(
         name=manifest.name,
         folder=folder,
-        status=manifest.status,
+        status="damaged" if damage else manifest.status,
         rig=manifest.rig,
         object_name=manifest.object_name,
         started_utc=manifest.started_utc,
         grasps=manifest.counts.get("grasps"),
         traffic_bytes=size,
         data_loss=bool(manifest.data_loss),
-        problem=manifest.problem,
+        problem=damage or manifest.problem,
+        left_open=manifest.status == "open" and not session.being_recorded,
     )
+
+
+def _damage(session: Session) -> str:
+    """What is wrong with a recording, as far as a glance at its end shows; empty when nothing is."""
+    advice = f"tactile-lab session recover {session.folder}"
+    if session.manifest.status == "open":
+        return "" if session.being_recorded else f"left open by a crash. Recover it: {advice}"
+    if session.manifest.status == "failed":  # told by its own problem
+        return ""
+    last = segment_paths(session.folder / TRAFFIC)[-1]
+    if not last.is_file():
+        return f"{last.name} is missing"
+    return "" if ends_well(last) else f"{last.name} is cut off. Recover what there is: {advice}"
+
+
+def left_open(root: Path) -> list[SessionSummary]:
+    """The sessions under ``root`` that a crash left open, without those that were recovered already."""
+    try:
+        found = list_sessions(root)
+    except SessionError:
+        return []  # whoever wants to write there is told why that is not possible
+    names = {item.folder.name for item in found}
+    return [item for item in found if item.left_open and recovered_id(item.folder.name) not in names]
 
 
 def list_sessions(root: Path) -> list[SessionSummary]:
@@ -79,12 +112,17 @@ def find_session(root: Path, name: str) -> Session:
     Raises:
         SessionError: there is none, or its manifest can not be read.
     """
+    return Session.open(session_folder(root, name))
+
+
+def session_folder(root: Path, name: str) -> Path:
+    """The folder of a session, which need not be whole; named as for :func:`find_session`. Raises SessionError."""
     if name == "last":
-        readable = [item for item in list_sessions(root) if item.status != "unreadable"]
+        readable = [item for item in list_sessions(root) if item.readable]
         if not readable:
             raise SessionError("no session yet", where=str(root), hint="Record one first: tactile-lab run")
-        return Session.open(readable[-1].folder)
+        return readable[-1].folder
     folder = root / name if (root / name).is_dir() else Path(name)
     if not folder.is_dir():
         raise SessionError("no such session", where=name, hint=f"See: tactile-lab session list --root {root}")
-    return Session.open(folder)
+    return folder

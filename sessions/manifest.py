@@ -13,7 +13,7 @@ from pydantic import Field
 
 from sessions.formats import converted_manifest
 from tactile_lab.errors import ConfigurationError, SessionError
-from tactile_lab.strict_yaml import StrictModel, load, validate
+from tactile_lab.strict_yaml import StrictModel, load, loads, validate
 
 Status = Literal["open", "closed", "interrupted", "failed", "recovered"]
 
@@ -82,9 +82,21 @@ def read_manifest(folder: Path) -> Manifest:
         raise SessionError("not a session folder (no session.yaml)", where=str(folder), hint="Check the path")
     where = str(folder / MANIFEST)
     try:
-        return validate(converted_manifest(load(folder / MANIFEST), where), Manifest, where=where)
+        return _validated(load(folder / MANIFEST), where)
     except ConfigurationError as error:
         raise SessionError(error.what, where=error.where, hint="The other files of the session are kept") from error
+
+
+def manifest_from(content: bytes, where: str) -> Manifest:
+    """A ``session.yaml`` that is no file of its own. Raises SessionError as :func:`read_manifest`."""
+    try:
+        return _validated(loads(content, where), where)
+    except ConfigurationError as error:
+        raise SessionError(error.what, where=error.where) from error
+
+
+def _validated(content: Any, where: str) -> Manifest:
+    return validate(converted_manifest(content, where), Manifest, where=where)
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:

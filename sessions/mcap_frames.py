@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from pathlib import Path
 from typing import BinaryIO
 
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 _FRAME = struct.Struct("<BQ")
+
+
+def ends_well(path: Path) -> bool:
+    """Whether a file ends as a finished MCAP file does; nothing else of it is looked at."""
+    with path.open("rb") as file:
+        size = file.seek(0, 2)
+        file.seek(max(0, size - len(MCAP0_MAGIC)))
+        return file.read() == MCAP0_MAGIC
 
 
 class Frames:

@@ -218,7 +218,7 @@ def create_session(
         SessionError: the folder can not be made or a calibration file can not be read.
     """
     started = started or datetime.now(UTC)
-    folder = _new_folder(root, f"{started:%Y%m%d-%H%M%S}-{slug(rig)}-{slug(object_name)}")
+    folder = new_folder(root, f"{started:%Y%m%d-%H%M%S}-{slug(rig)}-{slug(object_name)}")
     manifest = Manifest(
         name=folder.name,
         status="open",
@@ -246,7 +246,8 @@ def _attachments(folder: Path, manifest: Manifest) -> tuple[Attached, ...]:
     return tuple(Attached(name, "application/yaml", _read(folder / name)) for name in (MANIFEST, *names))
 
 
-def _new_folder(root: Path, name: str) -> Path:
+def new_folder(root: Path, name: str) -> Path:
+    """A folder of that name, or of that name with a number behind it, that was not there. Raises SessionError."""
     try:
         root.mkdir(parents=True, exist_ok=True)
         for attempt in range(1, 1000):

@@ -29,3 +29,9 @@ def slug(text: str) -> str:
     """A part of an id; of a path (``mesh:some/part.stl``) its last part without suffix."""
     last = re.split(r"[/\\:]", text.strip())[-1]
     return re.sub(r"[^a-z0-9]+", "-", re.sub(r"\.[a-z0-9]+$", "", last.lower())).strip("-") or "unnamed"
+
+
+def recovered_id(name: str) -> str:
+    """The id of what is recovered from a session."""
+    end = "-recovered"
+    return name[: LONGEST_ID - len(end)] + end

@@ -25,7 +25,7 @@ from typing import Literal
 
 from sessions import foxglove, raw_frames, schemas
 from sessions.mcap_writer import McapWriter, PendingChunk
-from sessions.raw_frames import UNSTAMPED, Stamper
+from sessions.raw_frames import UNSTAMPED, DeviceStamp, Stamper
 from sessions.stream_counts import StreamCounts
 from sessions.traffic_disk import CutBackFile, DiskThread, Segment, Syncer
 from tactile_lab.clock import NANOSECONDS
@@ -52,12 +52,14 @@ class TrafficSettings:
         when_full: "wait" delays the recording thread, for a rig whose time waits with it; "drop" leaves out whole
             chunks and counts their messages, for real time.
         patience_s: how long "wait" waits before the recording ends with an error.
+        tell_streams: whether to write once a second what was lost so far; not for a copy of a recording.
     """
 
     segment_bytes: int = 1 << 30
     queue_bytes: int = 64 << 20
     when_full: Literal["wait", "drop"] = "wait"
     patience_s: float = CLOSE_TIMEOUT_s
+    tell_streams: bool = True
 
 
 @dataclass(frozen=True)
@@ -122,8 +124,11 @@ class TrafficWriter:
 
     # --- recording ---------------------------------------------------------------------------------------------
 
-    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
+    def write(self, topic: str, data: bytes, stamp_ns: int, device: DeviceStamp | None = None) -> None:
         """Append one message.
+
+        Args:
+            device: the device's own stamp; read out of the message where it is not given.
 
         Raises:
             SessionError: the disk is full or failed; what was recorded before is kept and readable.
@@ -131,7 +136,7 @@ class TrafficWriter:
         with self._lock:
             self._check()
             try:
-                self._append(topic, data, stamp_ns)
+                self._append(topic, data, stamp_ns, device)
                 self._tell_streams()
                 self._hand_over_when_due()
             except BaseException:
@@ -177,9 +182,10 @@ class TrafficWriter:
 
     # --- one message -------------------------------------------------------------------------------------------
 
-    def _append(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        stamper = self._stampers.get(topic)
-        device = UNSTAMPED if stamper is None else stamper(data)
+    def _append(self, topic: str, data: bytes, stamp_ns: int, device: DeviceStamp | None = None) -> None:
+        if device is None:
+            stamper = self._stampers.get(topic)
+            device = UNSTAMPED if stamper is None else stamper(data)
         self.streams.take(topic, self._log_ns - stamp_ns, device)
         content = raw_frames.encode(data, stamp_ns, device) if schemas.is_raw(topic) else data
         self._log_ns = max(self._log_ns, stamp_ns)
@@ -207,7 +213,7 @@ class TrafficWriter:
         """What was lost so far, once a second, so that a crash does not take it along."""
         if self._told_ns is None:
             self._told_ns = self._log_ns
-        if self._log_ns - self._told_ns >= STREAMS_PERIOD_ns:
+        if self._settings.tell_streams and self._log_ns - self._told_ns >= STREAMS_PERIOD_ns:
             self._told_ns = self._log_ns
             content = {"timestamp": foxglove.time(self._log_ns), "streams": self.streams.plain()}
             self._append(schemas.STREAMS_TOPIC, schemas.encode(content), self._log_ns)

@@ -77,17 +77,28 @@ def load(path: Path) -> Any:
         ConfigurationError: the file is missing, unreadable or not strict YAML.
     """
     try:
-        return yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+        content = path.read_bytes()
     except FileNotFoundError as error:
         raise ConfigurationError("file not found", where=str(path), hint="Check the path") from error
-    except UnicodeDecodeError as error:
-        raise ConfigurationError("is not a text file", where=str(path), hint="Name a YAML file in UTF-8") from error
     except OSError as error:
         raise ConfigurationError(
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
         ) from error
+    return loads(content, str(path))
+
+
+def loads(content: bytes, where: str) -> Any:
+    """Read one YAML document that is not a file of its own.
+
+    Raises:
+        ConfigurationError: it is not strict YAML in UTF-8.
+    """
+    try:
+        return yaml.load(content.decode("utf-8"), Loader=_Loader)
+    except UnicodeDecodeError as error:
+        raise ConfigurationError("is not a text file", where=where, hint="Name a YAML file in UTF-8") from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date or number out of its range
-        raise ConfigurationError(f"is not valid YAML: {_yaml_problem(error)}", where=str(path), hint=_RETRY) from error
+        raise ConfigurationError(f"is not valid YAML: {_yaml_problem(error)}", where=where, hint=_RETRY) from error
 
 
 def load_model(path: Path, model: type[Model]) -> Model:

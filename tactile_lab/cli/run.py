@@ -35,9 +35,11 @@ def run(
     with interruptions_held():
         from tactile_lab.cli.progress import LiveProgress
         from tactile_lab.cli.results import conclude
+        from tactile_lab.cli.session_tables import tell_left_open
         from tactile_lab.workflow.running import SessionRequest, run_session
 
     del no_input  # an autonomous session asks nothing; the option is there so that scripts can always give it
+    tell_left_open(out)
     request = SessionRequest(rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated)
     with LiveProgress(f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}") as progress:
         finished = run_session(request, progress)

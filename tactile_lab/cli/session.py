@@ -108,6 +108,31 @@ def export(
         say(f"{len(log.grasps)} grasps with {touched} contacts: {contacts}")
 
 
+@app.command("recover")
+def recover(
+    session: SessionName,
+    root: Root = Path("runs"),
+    as_json: Json = False,
+    no_input: NoInput = False,
+) -> None:
+    """Make a whole session of one that a crash left open, or whose recording is torn; the torn one is kept.
+
+    Ends with exit code 3 when anything is lost, and says of which topic.
+    """
+    from sessions.listing import session_folder
+    from sessions.recovery import recover
+    from tactile_lab.cli.console import emit_json
+    from tactile_lab.cli.session_tables import recovery_document, show_recovery
+
+    del no_input
+    recovery = recover(session_folder(root, session))
+    if as_json:
+        emit_json(recovery_document(recovery))
+    show_recovery(recovery)
+    if recovery.lossy:
+        raise typer.Exit(3)
+
+
 def _tell_identity(recorded: Session, out: Path) -> bool:
     """Whether a replay gave the session's own results; tells people."""
     from sessions.manifest import installed_versions

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
-from sessions.listing import SessionSummary
+from sessions.listing import SessionSummary, left_open
 from sessions.manifest import Manifest
+from sessions.recovery import Recovery
 from sessions.session import TRAFFIC, Session
-from tactile_lab.cli.console import say, show_facts, show_table
+from tactile_lab.cli.console import say, show_facts, show_table, warn
 
 NEVER_CLOSED = "open: still running, or killed before it was closed"
 
@@ -32,6 +35,47 @@ def show_sessions(root: Path, summaries: Sequence[SessionSummary]) -> None:
     for summary in summaries:
         if summary.problem:
             say(f"{summary.folder.name}: {summary.problem}", "yellow")
+
+
+def tell_left_open(root: Path) -> None:
+    """Say which sessions a crash left open, so that nobody forgets them."""
+    for summary in left_open(root):
+        warn(f"{summary.folder.name}: {summary.problem}")
+
+
+def show_recovery(recovery: Recovery) -> None:
+    """What was brought back of each topic and what was not."""
+    if recovery.folder is None:
+        say(f"{recovery.source} is closed and whole: nothing to recover")
+        return
+    rows = [
+        (
+            topic,
+            str(item.read),
+            str(item.lost),
+            f"{item.at_most_more}" if item.at_most_more else "",
+            f"{item.last_s:.3f}",
+        )
+        for topic, item in recovery.topics.items()
+    ]
+    titles = ["topic", "recovered", "lost", "at most lost at the end", "last stamp, s"]
+    show_table(f"Recovered from {recovery.source}", titles, rows, right=(1, 2, 3, 4))
+    say(f"session  {recovery.folder}")
+    if recovery.lossy:
+        warn(f"lost: {recovery.loss.describe()}")
+    else:
+        say("nothing was lost", "green")
+
+
+def recovery_document(recovery: Recovery) -> dict[str, Any]:
+    """A recovery as plain data."""
+    return {
+        "source": str(recovery.source),
+        "session": None if recovery.folder is None else str(recovery.folder),
+        "lossy": recovery.lossy,
+        "loss": recovery.loss.describe(),
+        "topics": {topic: asdict(item) for topic, item in recovery.topics.items()},
+    }
 
 
 def show_session(session: Session) -> None:

@@ -102,7 +102,7 @@ def test_a_description_that_can_not_be_read(inside, session_copy, change, words)
         refused(inside(*command.split(), session_copy), "session.yaml", words)
     listed = inside("session", "list", "--root", session_copy.parent)
     assert listed.code == 0
-    assert "unreadable" in listed.err
+    assert "damaged" in listed.err
     assert words in listed.err
 
 

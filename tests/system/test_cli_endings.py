@@ -91,7 +91,7 @@ def test_a_killed_session_is_open_and_replays_up_to_the_end(tmp_path, inside):
     process.communicate()
     folder = only_session(tmp_path)
     (listed,) = json.loads(inside("session", "list", "--root", tmp_path, "--json").out)
-    assert listed["status"] == "open"
+    assert listed["status"] == "damaged"
     answer = inside("session", "replay", folder)
     assert answer.code in (0, 3)
     assert answer.code == 0 or "the file ends too early" in answer.err

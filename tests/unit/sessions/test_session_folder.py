@@ -166,7 +166,7 @@ def test_a_bad_manifest_is_explained_and_does_not_hide_the_others(tmp_path, text
     with pytest.raises(SessionError, match=message):
         Session.open(folder)
     by_name = {summary.name: summary for summary in list_sessions(tmp_path)}
-    assert by_name[folder.name].status == "unreadable"
+    assert by_name[folder.name].status == "damaged"
     assert by_name["20261121-093000-sim-sphere"].status == "closed"
     assert find_session(tmp_path, "last").folder.name == "20261121-093000-sim-sphere"
 
