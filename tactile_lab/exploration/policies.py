@@ -2,53 +2,68 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-import numpy as np
-
 from tactile_lab.errors import ConfigurationError
-from tactile_lab.exploration.candidates import Candidate, predict_contacts
-from tactile_lab.exploration.policy import Belief, Decision, Policy, best_of, nothing_to_choose
-from tactile_lab.exploration.rewards import variance_reward
+from tactile_lab.exploration.information.igef import IgefSettings
+from tactile_lab.exploration.information_policy import InformationPolicy, InformationSettings
+from tactile_lab.exploration.policy import Policy
+from tactile_lab.exploration.pose_policies import PoseSwitchPolicy, determinant_gain, information_gain, kl_gain
+from tactile_lab.exploration.regions import RegionSettings
+from tactile_lab.exploration.surface_policies import (
+    ClustersPolicy,
+    ContactsPolicy,
+    RandomPolicy,
+    entropy_at,
+    igef_rating,
+    variance_at,
+)
+
+DEFAULT_POLICY = "information"
+_LOOK_AHEAD = 3
 
 
-@dataclass(frozen=True)
-class RandomPolicy:
-    """Any candidate, all alike."""
-
-    name: str = "random"
-
-    def choose(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Decision:
-        if settled := nothing_to_choose(self.name, candidates, belief):
-            return settled
-        chosen = int(rng.integers(len(candidates)))
-        return Decision(self.name, "grasp", chosen, (0.0,) * len(candidates), "chosen by chance, as asked")
+def _variance() -> Policy:
+    return ContactsPolicy("variance", variance_at, "its fingers are expected where the surface is known least (4.20)")
 
 
-@dataclass(frozen=True)
-class VariancePolicy:
-    """Equation 4.20: the sum of the field's variances where the fingers are expected to touch."""
-
-    name: str = "variance"
-
-    def choose(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Decision:
-        if settled := nothing_to_choose(self.name, candidates, belief):
-            return settled
-        expected = [predict_contacts(candidate, belief.modelled) for candidate in candidates]
-        scores = np.array([variance_reward(one) if one.fingers else -np.inf for one in expected])
-        return best_of(self.name, scores, "its fingers are expected where the surface is known least", rng)
+def _entropy() -> Policy:
+    return ContactsPolicy("entropy", entropy_at, "its contacts have the largest joint entropy (4.10)")
 
 
-POLICIES: Mapping[str, Callable[[], Policy]] = MappingProxyType({"random": RandomPolicy, "variance": VariancePolicy})
+def _igef() -> Policy:
+    rating = igef_rating(lambda metrics: metrics.product, IgefSettings())
+    return ContactsPolicy("igef", rating, "its contacts are new, near and easy to turn to (4.15)")
+
+
+def _igef_shape() -> Policy:
+    rating = igef_rating(lambda metrics: metrics.shape_only, IgefSettings())
+    return ContactsPolicy("igef-shape", rating, "its contacts are new and beside what is known (4.11, 4.13)")
+
+
+POLICIES: Mapping[str, Callable[[], Policy]] = MappingProxyType(
+    {
+        "random": RandomPolicy,
+        "variance": _variance,
+        "clusters": ClustersPolicy,
+        "clusters-appendix": lambda: ClustersPolicy(RegionSettings(weighting="appendix"), "clusters-appendix"),
+        "entropy": _entropy,
+        "igef": _igef,
+        "igef-shape": _igef_shape,
+        "det": lambda: PoseSwitchPolicy("det", determinant_gain, _variance()),
+        "kl": lambda: PoseSwitchPolicy("kl", kl_gain, _variance()),
+        "mutual-information": lambda: PoseSwitchPolicy("mutual-information", information_gain, _variance()),
+        "information": InformationPolicy,
+        "look-ahead": lambda: InformationPolicy(InformationSettings(look_ahead=_LOOK_AHEAD), "look-ahead"),
+    }
+)
 """How each policy is made, by its name."""
 
 
 def make_policy(name: str) -> Policy:
     """The policy called ``name``. Raises ConfigurationError if there is none."""
     if name not in POLICIES:
-        raise ConfigurationError(
-            f"no policy is called {name!r}", where="policy", hint=f"Policies are {', '.join(POLICIES)}"
-        )
+        hint = f"Policies are {', '.join(POLICIES)}"
+        raise ConfigurationError(f"no policy is called {name!r}", where="policy", hint=hint)
     return POLICIES[name]()

@@ -77,8 +77,9 @@ class Belief:
         contacts_m, normals: all contacts so far with their outward normals, shape (n, d).
         grasp_indices: which grasp each contact belongs to, shape (n,); the largest is the latest.
         world_T_object: where the object is thought to be on the table.
-        pose_covariance: of (x m, y m, yaw rad) in the world, shape (3, 3).
-        particles: poses that may be the true one, rows (x, y, yaw) in the world, shape (p, 3); empty if there are none.
+        pose_covariance: of the present estimate (x m, y m, yaw rad) in the world, shape (3, 3).
+        particles: where the object may be when the next grasp closes, rows (x, y, yaw) in the world, shape (p, 3):
+            the present particles, moved as it may move until then. Empty if there are none: then the Gaussian counts.
         weights: of the particles, summing to one, shape (p,).
         displacements_m: sampled surfaces: how far each vertex of ``surface`` moves along its normal, shape (s, n).
         missed_m: where contacts were expected and fingers met nothing, shape (k, d).

@@ -11,10 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from gtsam import Pose2
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tactile_lab.exploration.candidates import Candidate
+from tactile_lab.exploration.candidates import Candidate, ClosingRays
 from tactile_lab.exploration.first_hits import first_hits
 from tactile_lab.exploration.policy import Belief, Surface
 from tactile_lab.geometry.contacts import Array
@@ -123,20 +124,37 @@ def _sampled_poses(belief: Belief, count: int, rng: np.random.Generator) -> Arra
     return np.asarray(pose_row(belief.world_T_object) + spread)
 
 
+def most_fingers(candidates: Sequence[Candidate]) -> int:
+    """Largest number of fingers that a candidate closes."""
+    return max(len(candidate.rays.fingers) for candidate in candidates)
+
+
 def expected_touches(candidates: Sequence[Candidate], belief: Belief, worlds: PossibleWorlds) -> ExpectedTouches:
-    """Cast the fingers' ways of all candidates in all worlds; candidates have as many fingers as the worlds."""
-    rays = [_rays(candidate, belief, worlds) for candidate in candidates]
+    """Cast the fingers' ways of all candidates in all worlds; candidates with fewer fingers touch with fewer."""
+    fingers = worlds.finger_errors_m.shape[1]
+    padded = [_padded(candidate.rays, fingers) for candidate in candidates]
+    rays = [
+        _in_worlds(candidate.world_T_grasp, *way[:2], belief, worlds)
+        for candidate, way in zip(candidates, padded, strict=True)
+    ]
     starts, ways = (np.concatenate(parts, axis=1) for parts in zip(*rays, strict=True))
-    longest = np.concatenate([candidate.rays.lengths_m for candidate in candidates])
+    longest = np.concatenate([lengths for _, _, lengths in padded])
     distances = first_hits(worlds.corners_m, worlds.surface.cells, starts, ways, longest)
-    points = starts + np.where(np.isfinite(distances), distances, np.nan)[..., None] * ways
-    shape = (len(distances), len(candidates), -1)
     touching = np.isfinite(distances)
+    points = starts + np.where(touching, distances, np.nan)[..., None] * ways
     vertices = np.full(distances.shape, -1, dtype=np.int64)
     vertices[touching] = _nearest(worlds, points, touching)
+    shape = (len(distances), len(candidates), fingers)
     return ExpectedTouches(
         vertices.reshape(shape).transpose(1, 0, 2), points.reshape(*shape, belief.dimension).transpose(1, 0, 2, 3)
     )
+
+
+def _padded(rays: ClosingRays, fingers: int) -> tuple[Array, Array, Array]:
+    """Starts, directions and lengths for so many fingers; those that are not there have no way to go."""
+    absent = fingers - len(rays.fingers)
+    ways = np.vstack([rays.directions, np.tile([1.0, 0.0, 0.0], (absent, 1))])
+    return np.pad(rays.starts_m, ((0, absent), (0, 0))), ways, np.pad(rays.lengths_m, (0, absent))
 
 
 def _nearest(worlds: PossibleWorlds, points: Array, touching: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -148,14 +166,14 @@ def _nearest(worlds: PossibleWorlds, points: Array, touching: NDArray[np.bool_])
     return np.concatenate(found).astype(np.int64)
 
 
-def _rays(candidate: Candidate, belief: Belief, worlds: PossibleWorlds) -> tuple[Array, Array]:
+def _in_worlds(
+    world_T_grasp: Pose2, starts_m: Array, directions: Array, belief: Belief, worlds: PossibleWorlds
+) -> tuple[Array, Array]:
     """Starts and unit directions in the object frame of every world, each of shape (s, fingers, d)."""
-    grasp = pose_row(candidate.world_T_grasp)
-    rows = compose(compose(inverse(worlds.world_T_object), grasp), worlds.palm_errors)
+    rows = compose(compose(inverse(worlds.world_T_object), pose_row(world_T_grasp)), worlds.palm_errors)
     cosine, sine = np.cos(rows[:, 2]), np.sin(rows[:, 2])
     turn = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
-    starts = np.repeat(candidate.rays.starts_m[None], len(rows), axis=0)
-    ways = np.repeat(candidate.rays.directions[None], len(rows), axis=0)
+    starts, ways = (np.repeat(rays[None], len(rows), axis=0) for rays in (starts_m, directions))
     starts[..., :2] = np.einsum("sij,sfj->sfi", turn, starts[..., :2] + worlds.finger_errors_m) + rows[:, None, :2]
     ways[..., :2] = np.einsum("sij,sfj->sfi", turn, ways[..., :2])
     starts[..., 2] -= belief.origin_height_m

@@ -1,0 +1,262 @@
+"""Ours: the expected information about shape and pose together, per second (beyond thesis section 4.5.2).
+
+What a grasp z tells about the pose x and the shape f is, by the chain rule, ``I(x, f; z) = I(x; z) + I(f; z | x)``.
+
+- The first term is that of the linearised contacts: ``log det(1 + P J' J / r) / 2`` with the covariance P of the
+  particles at the time of the grasp, and r the variance of a contact *on an uncertain surface*: where the surface is
+  not known, a contact says nothing about the pose.
+- The second is summed over the surface: every patch of the size that one contact tells about (``reach_m``) hides a
+  deviation of its own, beside what the field is uncertain about, until a contact has been there. A contact reveals it
+  up to the sensor's noise and the pose's remaining uncertainty.
+
+Both are averages over sampled worlds (:mod:`tactile_lab.exploration.prediction`): surfaces, poses and errors of
+execution are drawn, and the candidates' fingers closed on each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy.spatial import cKDTree
+
+from tactile_lab.exploration.candidates import Candidate
+from tactile_lab.exploration.policy import Belief, Decision, Surface, best_of, nothing_to_choose
+from tactile_lab.exploration.prediction import (
+    ExecutionNoise,
+    ExpectedTouches,
+    PossibleWorlds,
+    expected_touches,
+    most_fingers,
+    possible_worlds,
+)
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.strict_yaml import StrictModel
+from tactile_lab.tracking.motion import compose, inverse
+
+Mask: TypeAlias = NDArray[np.bool_]
+
+_SMALLEST_VARIANCE = 1e-12
+
+
+class InformationSettings(StrictModel):
+    """Parameters.
+
+    Attributes:
+        worlds: how many are sampled for a decision.
+        execution: how well the hand does what is planned.
+        reach_m: so far along the surface a contact tells about it.
+        detail_m: standard deviation of what the field does not foresee between contacts (edges, corners).
+        point_sigma_m, normal_sigma_rad: of a contact's measurement.
+        pose_weight: of the pose's information against the shape's; 1 is the chain rule, 0 asks for the shape alone.
+        look_ahead: how many grasps are planned together; 1 is greedy.
+        least_gain: stop when no grasp promises so many nats; 0 never does.
+        known_sigma_m: stop when the surface is explored to ``enough`` and known so well everywhere; None never does.
+        enough: share of the surface near contacts at which that question is asked.
+    """
+
+    worlds: int = Field(default=48, ge=1)
+    execution: ExecutionNoise = ExecutionNoise()
+    reach_m: float = Field(default=0.0045, gt=0)
+    detail_m: float = Field(default=0.003, ge=0)
+    point_sigma_m: float = Field(default=0.001, gt=0)
+    normal_sigma_rad: float = Field(default=float(np.deg2rad(5.0)), gt=0)
+    pose_weight: float = Field(default=1.0, ge=0)
+    look_ahead: int = Field(default=1, ge=1)
+    least_gain: float = Field(default=0.0, ge=0)
+    known_sigma_m: float | None = Field(default=None, gt=0)
+    enough: float = Field(default=0.9, gt=0, le=1)
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What every candidate is expected to tell.
+
+    Attributes:
+        pose: nats about the pose, shape (c,).
+        shape: nats about the shape, shape (c,).
+        touching: expected number of contacts, shape (c,).
+        chance: probability that a candidate explores each vertex, shape (c, n).
+        worth: nats that exploring each vertex brings, 0 for explored ones, shape (c, n).
+        new_share: expected share of the whole surface that is newly explored, shape (c,).
+    """
+
+    pose: Array
+    shape: Array
+    touching: Array
+    chance: Array
+    worth: Array
+    new_share: Array
+
+
+@dataclass(frozen=True)
+class InformationPolicy:
+    """Expected information per second; see the module's text."""
+
+    settings: InformationSettings = field(default_factory=InformationSettings)
+    name: str = "information"
+
+    def choose(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Decision:
+        if settled := nothing_to_choose(self.name, candidates, belief):
+            return settled
+        if belief.surface is None:
+            scores = np.zeros(len(candidates))
+            return best_of(self.name, scores, "the contacts enclose nothing yet, so nothing can be foreseen", rng)
+        promise = promised(candidates, belief, belief.surface, self.settings, rng)
+        return self._decided(candidates, belief.surface, belief, promise, rng)
+
+    def _decided(
+        self,
+        candidates: Sequence[Candidate],
+        surface: Surface,
+        belief: Belief,
+        promise: Promise,
+        rng: np.random.Generator,
+    ) -> Decision:
+        times = np.array([candidate.time_s for candidate in candidates])
+        nats = self.settings.pose_weight * promise.pose + promise.shape
+        rates = planned_rates(nats, promise, times, self.settings.look_ahead)
+        rates = np.where(promise.touching > 0, rates, -np.inf)
+        decision = best_of(self.name, rates, "", rng)
+        if decision.chosen is None:
+            return decision
+        if why := self._stops(surface, belief, nats):
+            return Decision(self.name, "stop", None, decision.scores, why)
+        best = decision.chosen
+        reason = _reason(promise, best) + decision.reason
+        return Decision(self.name, "grasp", best, decision.scores, reason, float(promise.new_share[best]))
+
+    def _stops(self, surface: Surface, belief: Belief, nats: Array) -> str:
+        """Why to end here, or ""."""
+        if nats.max() < self.settings.least_gain:
+            return (
+                f"no grasp promises more than {nats.max():.2g} nats, less than the {self.settings.least_gain:g} asked"
+            )
+        limit = self.settings.known_sigma_m
+        if limit is None or float(np.quantile(surface.sigma_m, self.settings.enough)) > limit:
+            return ""
+        share = float(surface.sizes[~unexplored(surface, belief, self.settings.reach_m)].sum() / surface.sizes.sum())
+        if share < self.settings.enough:
+            return ""
+        return f"{100 * share:.0f} % of the surface has been touched and it is known to {1e3 * limit:.3g} mm"
+
+
+def _reason(promise: Promise, best: int) -> str:
+    pose = f" and {promise.pose[best]:.1f} nats about the pose" if promise.pose[best] > 0.05 else ""
+    return (
+        f"{promise.touching[best]:.1f} contacts are expected to tell {promise.shape[best]:.1f} nats about the shape"
+        f"{pose}, {100 * promise.new_share[best]:.1f} % of the surface new"
+    )
+
+
+def promised(
+    candidates: Sequence[Candidate],
+    belief: Belief,
+    surface: Surface,
+    settings: InformationSettings,
+    rng: np.random.Generator,
+) -> Promise:
+    """What each candidate is expected to tell, over sampled worlds."""
+    worlds = possible_worlds(belief, surface, most_fingers(candidates), settings.worlds, settings.execution, rng)
+    touches = expected_touches(candidates, belief, worlds)
+    pose, placed = _pose_information(touches, belief, worlds, settings)
+    fresh, patches = unexplored(surface, belief, settings.reach_m), _patches(surface, settings.reach_m)
+    chance = covered_chance(touches, surface, settings.reach_m)
+    hidden = surface.sigma_m**2 + settings.detail_m**2
+    worth = 0.5 * np.log1p(hidden / (settings.point_sigma_m**2 + placed[:, None])) * fresh * patches
+    worth = worth * _hope(surface, belief, settings.reach_m)
+    new_share = chance @ (fresh * surface.sizes) / surface.sizes.sum()
+    touching = touches.touching.sum(axis=2).mean(axis=1)
+    return Promise(pose, np.sum(chance * worth, axis=1), touching, chance, worth, new_share)
+
+
+def unexplored(surface: Surface, belief: Belief, reach_m: float) -> Mask:
+    """Which vertices have no contact within reach, shape (n,)."""
+    return np.asarray(cKDTree(belief.contacts_m).query(surface.points_m)[0] > reach_m)
+
+
+def covered_chance(touches: ExpectedTouches, surface: Surface, reach_m: float) -> Array:
+    """Probability that a candidate's contacts come within reach of each vertex, shape (c, n)."""
+    count = len(surface.points_m)
+    near = np.zeros((count + 1, count), dtype=bool)  # the last row stands for a finger that meets nothing
+    pairs = cKDTree(surface.points_m).query_pairs(reach_m, output_type="ndarray")
+    near[pairs[:, 0], pairs[:, 1]] = near[pairs[:, 1], pairs[:, 0]] = True
+    np.fill_diagonal(near[:count], True)
+    chance = np.empty((len(touches.vertices), count))
+    for index, met in enumerate(touches.vertices):
+        reached = near[met[:, 0]]
+        for finger in range(1, met.shape[1]):
+            reached = reached | near[met[:, finger]]
+        chance[index] = reached.mean(axis=0)
+    return chance
+
+
+def planned_rates(nats: Array, promise: Promise, times: Array, depth: int) -> Array:
+    """Nats per second of each candidate followed by the best ``depth - 1`` grasps after it, shape (c,).
+
+    The following grasps count with what the first is expected to leave, and tell the pose as the first one does.
+    """
+    gained, spent = nats.copy(), times.copy()
+    left = 1.0 - promise.chance
+    for _ in range(depth - 1):
+        following = np.einsum("an,bn,bn->ab", left, promise.chance, promise.worth)
+        best = (following / times).argmax(axis=1)
+        gained += following[np.arange(len(nats)), best]
+        spent += times[best]
+        left = left * (1.0 - promise.chance[best])
+    return np.asarray(gained / spent)
+
+
+def _patches(surface: Surface, reach_m: float) -> Array:
+    """Share of a contact's patch that belongs to each vertex: lengths over 2 r, areas over pi r^2, shape (n,)."""
+    whole = 2 * reach_m if surface.points_m.shape[1] == 2 else np.pi * reach_m**2
+    return np.asarray(surface.sizes / whole)
+
+
+def _hope(surface: Surface, belief: Belief, reach_m: float) -> Array:
+    """Halved at every vertex for each finger that met nothing where a contact had been expected, shape (n,)."""
+    if len(belief.missed_m) == 0:
+        return np.ones(len(surface.points_m))
+    near = cKDTree(belief.missed_m).query_ball_point(surface.points_m, 2 * reach_m, return_length=True)
+    return np.asarray(0.5 ** np.asarray(near, dtype=float))
+
+
+def _pose_information(
+    touches: ExpectedTouches, belief: Belief, worlds: PossibleWorlds, settings: InformationSettings
+) -> tuple[Array, Array]:
+    """Nats about the pose, and the variance with which a contact can be placed afterwards (m^2), each of shape (c,)."""
+    prior = _covariance(worlds)
+    if np.trace(prior) <= _SMALLEST_VARIANCE or settings.pose_weight == 0:
+        return np.zeros(len(touches.vertices)), np.zeros(len(touches.vertices))
+    surface, met = worlds.surface, touches.touching
+    normals = np.where(met[..., None], surface.normals[touches.vertices], 0.0)
+    points = np.nan_to_num(touches.points_m)
+    turn = points[..., 0] * normals[..., 1] - points[..., 1] * normals[..., 0]
+    rows = np.stack([normals[..., 0], normals[..., 1], turn], axis=-1)
+    variance = settings.point_sigma_m**2 + surface.sigma_m[touches.vertices] ** 2 + settings.detail_m**2
+    told = np.einsum("csfi,csf,csfj->csij", rows, met / variance, rows)
+    told[..., 2, 2] += _told_by_normals(surface, touches, met, settings)
+    nats = 0.5 * np.linalg.slogdet(np.eye(3) + prior @ told)[1]
+    after = np.linalg.inv(np.linalg.inv(prior + _SMALLEST_VARIANCE * np.eye(3)) + told)
+    moved = np.einsum("csfi,csij,csfj->csf", rows, after, rows)
+    placed = np.sum(moved * met, axis=(1, 2)) / np.maximum(met.sum(axis=(1, 2)), 1)
+    return nats.mean(axis=1), placed
+
+
+def _told_by_normals(surface: Surface, touches: ExpectedTouches, met: Mask, settings: InformationSettings) -> Array:
+    """Precision that measured normals add to the heading, shape (c, s), 1/rad^2; slopes are uncertain too."""
+    slope_rad = np.minimum(surface.sigma_m[touches.vertices] / (2 * settings.reach_m), 1.0)
+    level = np.linalg.norm(surface.normals[touches.vertices][..., :2], axis=-1)
+    return np.asarray(np.sum(met * level**2 / (settings.normal_sigma_rad**2 + slope_rad**2), axis=2))
+
+
+def _covariance(worlds: PossibleWorlds) -> Array:
+    """Of the sampled poses, with places in the object's own axes, shape (3, 3)."""
+    middle = worlds.world_T_object.mean(axis=0)
+    middle[2] = np.arctan2(np.sin(worlds.world_T_object[:, 2]).mean(), np.cos(worlds.world_T_object[:, 2]).mean())
+    local = compose(inverse(middle), worlds.world_T_object)
+    return np.asarray(local.T @ local / max(len(local) - 1, 1))
