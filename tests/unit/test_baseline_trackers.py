@@ -16,6 +16,7 @@ from tactile_lab.experiments.sensing import SimulatedGrasps
 from tactile_lab.geometry.poses import planar, spatial
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.slam_result import SlamResult
+from tests.support.simulated_contacts import registration_mm
 
 
 def run(data: SimulatedGrasps, method: str, known=None, **changes: object) -> SlamResult:
@@ -25,13 +26,6 @@ def run(data: SimulatedGrasps, method: str, known=None, **changes: object) -> Sl
     for grasp in data.grasps:
         slam.step(grasp)
     return slam.finish()
-
-
-def registration_mm(data: SimulatedGrasps, result: SlamResult) -> float:
-    points = [grasp.points_world_m for grasp in data.grasps]
-    error = registration_rms_mm(points, result.world_T_object, data.world_T_body, result.dimension)
-    assert error is not None
-    return error
 
 
 DATA = simulate("rectangle", 3, count=8)

@@ -7,37 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tactile_lab.experiments import planar_data, spatial_data
+from tactile_lab.experiments import planar_data
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.choice import polygon_of
 from tactile_lab.shape.polyhedron_planes import segment_planes
 from tactile_lab.shape.sampling import distances_to_polygon
-from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.shape.surface import extract_contour
 from tactile_lab.slam import SlamSettings, TactileSlam
-from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
-from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.facet_smoothing import FacetSmoother, FlatFaces, smoothed_with_faces
 from tactile_lab.tracking.hypotheses import Judge
-from tactile_lab.tracking.motion import MotionNoise, planar_motion
+from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.pose_evidence import PoseEvidence
 from tactile_lab.tracking.sharp_judge import SharpJudge
+from tests.support.simulated_contacts import true_map
 
 NOISE = MotionNoise()
-
-
-def true_map(shape: str, count: int = 12, seed: int = 0, dimension: int = 2) -> ContactMap:
-    data = (planar_data if dimension == 2 else spatial_data).simulate(shape, seed, count=count)
-    placed = tuple(
-        PlacedGrasp(
-            ContactSet.of_grasp(grasp, dimension, 0.0),
-            planar_motion(pose),
-            np.eye(3) * 1e-6,
-            planar_motion(grasp.hand_motion_world),
-        )
-        for grasp, pose in zip(data.grasps, data.world_T_body, strict=True)
-    )
-    return ContactMap(placed, GpisSettings())
 
 
 def shaken(contact_map: ContactMap, scale: float) -> Array:

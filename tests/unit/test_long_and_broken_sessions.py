@@ -8,19 +8,10 @@ import numpy as np
 import pytest
 from gtsam import Pose3, Rot3
 
-from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.experiments import planar_data, spatial_data
-from tactile_lab.experiments.sensing import SimulatedGrasps
 from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.slam import SlamSettings, TactileSlam
-from tactile_lab.slam_result import SlamResult
-
-
-def registration_mm(data: SimulatedGrasps, result: SlamResult) -> float:
-    points = [grasp.points_world_m for grasp in data.grasps]
-    error = registration_rms_mm(points, result.world_T_object, data.world_T_body, result.dimension)
-    assert error is not None
-    return error
+from tests.support.simulated_contacts import registration_mm
 
 
 def moved(grasp: Grasp, jump: Pose3) -> Grasp:

@@ -9,34 +9,19 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from tactile_lab.evaluation.registration import registration_rms_mm
-from tactile_lab.experiments import planar_data, spatial_data
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import FieldGrid
 from tactile_lab.shape.kernels import Kernel, Matern52, SquaredExponential, ThinPlate, covariance
 from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
-from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.evidence_kernels import assemble, pull
-from tactile_lab.tracking.motion import MotionNoise, compose, deviation, planar_motion, row_pose_in_space
+from tactile_lab.tracking.motion import MotionNoise, compose, deviation, row_pose_in_space
 from tactile_lab.tracking.motion_cost import estimated_noise
 from tactile_lab.tracking.pose_evidence import PoseEvidence, third_derivative
 from tactile_lab.tracking.proposals import GraspMatch, ProposalSettings, propose, quasi_normal
+from tests.support.simulated_contacts import true_map
 
 NOISE = MotionNoise()
-
-
-def true_map(shape: str, count: int, dimension: int = 2, kernel: str = "matern52") -> ContactMap:
-    data = (planar_data if dimension == 2 else spatial_data).simulate(shape, 0, count=count)
-    placed = [
-        PlacedGrasp(
-            ContactSet.of_grasp(grasp, dimension, 0.0),
-            planar_motion(pose),
-            np.eye(3) * 1e-6,
-            planar_motion(grasp.hand_motion_world),
-        )
-        for grasp, pose in zip(data.grasps, data.world_T_body, strict=True)
-    ]
-    return ContactMap(tuple(placed), GpisSettings.model_validate({"kernel": kernel}))
 
 
 def disturbed(contact_map: ContactMap, scale: float, seed: int = 0) -> Array:
@@ -55,7 +40,9 @@ def disturbed(contact_map: ContactMap, scale: float, seed: int = 0) -> Array:
     ],
 )
 def test_the_gradient_is_the_derivative_of_the_value(shape: str, dimension: int, kernel: str) -> None:
-    contact_map = true_map(shape, 4, dimension, kernel)
+    contact_map = true_map(
+        shape, count=4, dimension=dimension, settings=GpisSettings.model_validate({"kernel": kernel})
+    )
     evidence, rows = PoseEvidence(contact_map, NOISE), disturbed(contact_map, 1.0)
     value, gradient = evidence.value_and_gradient(rows)
     assert value == pytest.approx(evidence.value(rows))
@@ -113,7 +100,7 @@ def spread_m(contact_map: ContactMap, rows: Array) -> float:
 
 
 def test_true_poses_are_likelier_than_disturbed_ones() -> None:
-    contact_map = true_map("rectangle", 8)
+    contact_map = true_map("rectangle", count=8)
     evidence = PoseEvidence(contact_map, NOISE)
     assert all(
         evidence.value(contact_map.rows) < evidence.value(disturbed(contact_map, 1.0, seed)) for seed in range(5)
@@ -121,7 +108,7 @@ def test_true_poses_are_likelier_than_disturbed_ones() -> None:
 
 
 def test_smoothing_finds_the_poses_again() -> None:
-    contact_map = true_map("ellipse", 10)
+    contact_map = true_map("ellipse", count=10)
     start = disturbed(contact_map, 1.0)
     found, cost = PoseEvidence(contact_map, NOISE).maximised(start, 60)
     assert spread_m(contact_map, found) < 0.6 * spread_m(contact_map, start)
@@ -129,7 +116,7 @@ def test_smoothing_finds_the_poses_again() -> None:
 
 
 def test_leaving_one_contact_out_changes_the_evidence_by_its_cost() -> None:
-    contact_map = true_map("hexagon", 3)
+    contact_map = true_map("hexagon", count=3)
     contact_map = replace(contact_map, settings=contact_map.settings.model_copy(update={"prior_mean": "zero"}))
     value, costs = PoseEvidence(contact_map, NOISE).value_and_leave_one_out_costs(
         contact_map.rows, np.arange(len(contact_map.contacts))
@@ -142,7 +129,7 @@ def test_leaving_one_contact_out_changes_the_evidence_by_its_cost() -> None:
 
 
 def test_a_torn_contact_costs_most() -> None:
-    contact_map = true_map("ellipse", 6)
+    contact_map = true_map("ellipse", count=6)
     grasp = contact_map.placed[3]
     normals = grasp.contacts_world.normals.copy()
     normals[2] *= -1.0
@@ -161,13 +148,13 @@ def test_a_torn_contact_costs_most() -> None:
 
 
 def test_the_first_pose_is_given() -> None:
-    contact_map = true_map("rectangle", 3)
+    contact_map = true_map("rectangle", count=3)
     found, _ = PoseEvidence(contact_map, NOISE).maximised(disturbed(contact_map, 1.0), 10)
     assert np.array_equal(found[0], contact_map.rows[0])
 
 
 def test_a_grasp_without_contacts_follows_the_motion_model() -> None:
-    contact_map = true_map("rectangle", 4)
+    contact_map = true_map("rectangle", count=4)
     last = contact_map.placed[-1]
     empty = PlacedGrasp(
         last.contacts_world.selected(np.zeros(len(last.contacts_world), dtype=bool)),
@@ -186,7 +173,7 @@ def contact_map_of(contact_map: ContactMap, last: PlacedGrasp) -> ContactMap:
 
 
 def test_proposals_contain_the_true_pose() -> None:
-    contact_map = true_map("rectangle", 8)
+    contact_map = true_map("rectangle", count=8)
     known = ContactMap(contact_map.placed[:7], contact_map.settings)
     last = contact_map.placed[7]
     predicted = compose(last.motion, contact_map.rows[6])
@@ -198,7 +185,7 @@ def test_proposals_contain_the_true_pose() -> None:
 
 
 def test_proposals_differ_from_each_other() -> None:
-    contact_map = true_map("ellipse", 5)
+    contact_map = true_map("ellipse", count=5)
     settings = ProposalSettings(kept=5)
     last = contact_map.placed[-1]
     rows, _ = propose(last.row, last.contacts_world, contact_map.fit(), NOISE, settings)
@@ -211,7 +198,7 @@ def test_proposals_differ_from_each_other() -> None:
 
 
 def test_the_information_is_a_second_derivative_near_a_good_fit() -> None:
-    contact_map = true_map("rectangle", 8)
+    contact_map = true_map("rectangle", count=8)
     last = contact_map.placed[-1]
     match = GraspMatch(last.row, last.contacts_world, contact_map.fit(), NOISE, ProposalSettings())
     fit = match.fit(last.row[None], match.variance(last.row[None]))
@@ -230,7 +217,7 @@ def test_quasi_random_samples_are_normal_and_always_the_same() -> None:
 
 @pytest.mark.parametrize("scale", [0.3, 3.0])
 def test_the_noise_of_the_motion_is_learnt_from_the_slips(scale: float) -> None:
-    contact_map = true_map("rectangle", 16)
+    contact_map = true_map("rectangle", count=16)
     configured = MotionNoise(translation_m=0.010 * scale, rotation_rad=float(np.deg2rad(20.0)) * scale)
     learnt = estimated_noise(contact_map, configured)
     assert abs(np.log(learnt.translation_m / 0.010)) < 0.7 * abs(np.log(scale))

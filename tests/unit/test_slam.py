@@ -11,7 +11,6 @@ from pydantic import ValidationError
 from threadpoolctl import threadpool_limits
 
 from tactile_lab.errors import TrackingError
-from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.experiments import spatial_data
 from tactile_lab.experiments.planar_data import simulate
 from tactile_lab.experiments.sensing import SimulatedGrasps
@@ -21,6 +20,7 @@ from tactile_lab.shape.metrics import contour_errors
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.slam_result import SlamResult
 from tactile_lab.tracking.trackers import palm_heading
+from tests.support.simulated_contacts import registration_mm
 
 
 def settings(**changes: object) -> SlamSettings:
@@ -32,13 +32,6 @@ def run(data: SimulatedGrasps, seed: int = 0, **changes: object) -> SlamResult:
     for grasp in data.grasps:
         slam.step(grasp)
     return slam.finish()
-
-
-def registration_mm(data: SimulatedGrasps, result: SlamResult) -> float:
-    points = [grasp.points_world_m for grasp in data.grasps]
-    error = registration_rms_mm(points, result.world_T_object, data.world_T_body, result.dimension)
-    assert error is not None
-    return error
 
 
 def with_contacts(grasp: Grasp, keep: int) -> Grasp:

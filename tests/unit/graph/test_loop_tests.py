@@ -10,42 +10,24 @@ from gtsam import Pose3
 
 from tactile_lab.evaluation.loops import wrong_loops
 from tactile_lab.evaluation.plain import plain
-from tactile_lab.experiments.planar_data import simulate
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import spatial
 from tactile_lab.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.graph.placement import PlacementSettings, judge_placements
 from tactile_lab.graph.pose_graph import LoopReport
 from tactile_lab.graph.relocation import relocation_candidates
-from tactile_lab.shape.settings import GpisSettings
-from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
-from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.motion import MotionNoise, deviation, planar_motion, row_pose
+from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.motion import MotionNoise, deviation, row_pose
+from tests.support.simulated_contacts import true_map
 
 MISPLACED = 9
 
 
 @cache
-def true_map(shape: str = "triangle", seed: int = 0) -> ContactMap:
-    data = simulate(shape, seed)
-    return ContactMap(
-        tuple(
-            PlacedGrasp(
-                ContactSet.of_grasp(grasp, 2, 0.0),
-                planar_motion(pose),
-                np.eye(3) * 1e-6,
-                planar_motion(grasp.hand_motion_world),
-            )
-            for grasp, pose in zip(data.grasps, data.world_T_body, strict=True)
-        ),
-        GpisSettings(),
-    )
-
-
 @cache
 def misplaced_map() -> ContactMap:
     """One grasp lies where it fits the shape as well, turned to another corner of the triangle."""
-    truth = true_map()
+    truth = true_map("triangle", count=16)
     others = ContactMap(truth.placed[:MISPLACED] + truth.placed[MISPLACED + 1 :], truth.settings)
     found = relocation_candidates(others, truth.placed[MISPLACED].contacts_world)
     turned = np.abs(deviation(found.rows, truth.rows[MISPLACED])[:, 2]) > np.deg2rad(60.0)
@@ -61,7 +43,7 @@ def judged(contact_map: ContactMap, *, as_printed: bool) -> tuple[LoopReport, ..
 
 
 def true_poses() -> list[Pose3]:
-    return [spatial(row_pose(row)) for row in true_map().rows]
+    return [spatial(row_pose(row)) for row in true_map("triangle", count=16).rows]
 
 
 def wrong_of(reports: tuple[LoopReport, ...], poses: list[Pose3]) -> int | None:
@@ -69,7 +51,7 @@ def wrong_of(reports: tuple[LoopReport, ...], poses: list[Pose3]) -> int | None:
 
 
 def test_on_true_poses_many_loops_are_accepted_and_none_is_wrong() -> None:
-    reports = judged(true_map(), as_printed=False)
+    reports = judged(true_map("triangle", count=16), as_printed=False)
     assert sum(report.accepted for report in reports) >= 10
     assert wrong_of(reports, true_poses()) == 0
 
@@ -87,13 +69,13 @@ def test_a_misplaced_grasp_is_told_where_it_fits_better() -> None:
     assert not placement.sure
     assert "fits better" in placement.reason
     assert placement.other is not None
-    gap = np.abs(deviation(placement.other, true_map().rows[MISPLACED]))
+    gap = np.abs(deviation(placement.other, true_map("triangle", count=16).rows[MISPLACED]))
     assert np.hypot(gap[0], gap[1]) < 0.01
     assert gap[2] < 0.2
 
 
 def test_grasps_kept_aside_have_no_sure_place() -> None:
-    truth = true_map()
+    truth = true_map("triangle", count=16)
     aside = replace(truth, placed=(*truth.placed[:-1], truth.placed[-1].put_aside()))
     last = judge_placements(aside, MotionNoise(), PlacementSettings())[-1]
     assert not last.sure
@@ -114,7 +96,7 @@ def test_the_thesis_s_variant_tests_each_loop_alone() -> None:
 
 def test_displacements_hold_whatever_the_object_frame_s_heading_is() -> None:
     """Turning the object frame by 20 degrees changes no measurement, and so no verdict about right and wrong."""
-    truth = true_map()
+    truth = true_map("triangle", count=16)
     turn = np.array([0.004, -0.002, 0.35])
     rows: Array = np.array([compose_right(row, turn) for row in truth.rows])
     reports = judged(truth.with_rows(rows), as_printed=True)

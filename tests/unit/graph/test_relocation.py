@@ -7,29 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tactile_lab.experiments.planar_data import simulate
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.graph.relocation import RelocationSettings, relocation_candidates
-from tactile_lab.shape.settings import GpisSettings
-from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.motion import deviation, planar_motion
-
-
-def true_map(shape: str, seed: int, count: int = 14) -> ContactMap:
-    data = simulate(shape, seed, count=count)
-    return ContactMap(
-        tuple(
-            PlacedGrasp(
-                ContactSet.of_grasp(grasp, 2, 0.0),
-                planar_motion(pose),
-                np.eye(3) * 1e-6,
-                planar_motion(grasp.hand_motion_world),
-            )
-            for grasp, pose in zip(data.grasps, data.world_T_body, strict=True)
-        ),
-        GpisSettings(),
-    )
+from tactile_lab.tracking.motion import deviation
+from tests.support.simulated_contacts import true_map
 
 
 def before(contact_map: ContactMap, index: int) -> ContactMap:
@@ -43,7 +26,7 @@ def near(rows: Array, true: Array) -> Array:
 
 @pytest.mark.parametrize("shape", ["rectangle", "triangle", "L", "hexagon"])
 def test_the_true_pose_is_among_the_proposals_wherever_the_hand_was_believed_to_be(shape: str) -> None:
-    contact_map = true_map(shape, seed=1)
+    contact_map = true_map(shape, seed=1, count=14)
     found = [
         near(relocation_candidates(before(contact_map, k), contact_map.placed[k].contacts_world).rows, placed.row).any()
         for k, placed in enumerate(contact_map.placed)
@@ -53,7 +36,7 @@ def test_the_true_pose_is_among_the_proposals_wherever_the_hand_was_believed_to_
 
 
 def test_a_shape_without_symmetry_has_the_true_pose_first() -> None:
-    contact_map = true_map("hexagon", seed=2)
+    contact_map = true_map("hexagon", seed=2, count=14)
     first = [
         near(relocation_candidates(before(contact_map, k), contact_map.placed[k].contacts_world).rows[:1], placed.row)
         for k, placed in enumerate(contact_map.placed)
@@ -63,14 +46,14 @@ def test_a_shape_without_symmetry_has_the_true_pose_first() -> None:
 
 
 def test_a_rectangle_s_half_turn_is_proposed_as_well() -> None:
-    contact_map = true_map("rectangle", seed=1)
+    contact_map = true_map("rectangle", seed=1, count=14)
     found = relocation_candidates(before(contact_map, 13), contact_map.placed[13].contacts_world)
     turns = np.abs(deviation(found.rows, contact_map.placed[13].row)[:, 2])
     assert np.any(turns > np.deg2rad(170.0))
 
 
 def test_proposals_are_ranked_differ_and_have_covariances() -> None:
-    contact_map = true_map("L", seed=3)
+    contact_map = true_map("L", seed=3, count=14)
     settings = RelocationSettings(kept=8)
     found = relocation_candidates(before(contact_map, 12), contact_map.placed[12].contacts_world, settings)
     assert 1 < len(found.rows) <= 8
@@ -83,7 +66,7 @@ def test_proposals_are_ranked_differ_and_have_covariances() -> None:
 def test_covariances_tell_the_true_errors() -> None:
     values = []
     for seed in range(3):
-        contact_map = true_map("hexagon", seed)
+        contact_map = true_map("hexagon", seed, count=14)
         for k in range(8, 14):
             found = relocation_candidates(before(contact_map, k), contact_map.placed[k].contacts_world)
             hits = np.flatnonzero(near(found.rows, contact_map.placed[k].row))
@@ -95,7 +78,7 @@ def test_covariances_tell_the_true_errors() -> None:
 
 
 def test_contacts_on_parallel_sides_propose_nothing() -> None:
-    contact_map = true_map("rectangle", seed=1)
+    contact_map = true_map("rectangle", seed=1, count=14)
     parallel = ContactSet(
         np.array([[0.0, 0.03], [0.01, 0.03], [0.0, -0.03]]),
         np.array([[0.0, 1.0], [0.0, 1.0], [0.0, -1.0]]),
@@ -113,7 +96,7 @@ def test_no_contacts_propose_nothing() -> None:
 
 def test_in_space_heights_must_fit() -> None:
     """The same outline over another stretch of height: contacts of the lower part do not fit the upper one."""
-    flat = true_map("L", seed=3)
+    flat = true_map("L", seed=3, count=14)
 
     def lifted(contacts: ContactSet, height_m: float) -> ContactSet:
         ones = np.full((len(contacts), 1), 1.0)

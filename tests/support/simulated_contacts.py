@@ -1,0 +1,39 @@
+"""Simulated grasps as tests of the estimation need them: placed by their true poses, and judged against them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.experiments import planar_data, spatial_data
+from tactile_lab.experiments.sensing import SimulatedGrasps
+from tactile_lab.shape.settings import GpisSettings
+from tactile_lab.slam_result import SlamResult
+from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.motion import planar_motion
+
+
+def true_map(
+    shape: str, seed: int = 0, count: int = 12, *, dimension: int = 2, settings: GpisSettings | None = None
+) -> ContactMap:
+    """Grasps at their true poses, the object frame being the body's."""
+    data = (planar_data if dimension == 2 else spatial_data).simulate(shape, seed, count=count)
+    placed = [
+        PlacedGrasp(
+            ContactSet.of_grasp(grasp, dimension, 0.0),
+            planar_motion(pose),
+            np.eye(3) * 1e-6,
+            planar_motion(grasp.hand_motion_world),
+        )
+        for grasp, pose in zip(data.grasps, data.world_T_body, strict=True)
+    ]
+    return ContactMap(tuple(placed), settings or GpisSettings())
+
+
+def registration_mm(data: SimulatedGrasps, result: SlamResult) -> float:
+    """Registration error of a result; a result without poses fails the test."""
+    points = [grasp.points_world_m for grasp in data.grasps]
+    error = registration_rms_mm(points, result.world_T_object, data.world_T_body, result.dimension)
+    assert error is not None
+    return error
