@@ -20,15 +20,15 @@ class JointGains(StrictModel):
     Attributes:
         pwm_per_rad: counts per radian of error.
         deadband_rad: errors within it give no demand; larger ones count from its edge.
-        max_pwm: largest demand, counts.
+        max_pwm: largest demand, counts; 0 for a joint that is not to be driven.
         damping: counts per radian per second of the joint's speed, against it.
         integral: counts per radian and second of error.
         integral_max: largest demand that the integral makes up, counts.
     """
 
-    pwm_per_rad: float = Field(gt=0.0)
+    pwm_per_rad: float = Field(ge=0.0)
     deadband_rad: float = Field(ge=0.0, default=0.003)
-    max_pwm: float = Field(gt=0.0, le=MAX_TORQUE, default=600.0)
+    max_pwm: float = Field(ge=0.0, le=MAX_TORQUE, default=600.0)
     damping: float = Field(default=0.0, ge=0.0)
     integral: float = Field(default=0.0, ge=0.0)
     integral_max: float = Field(default=0.0, ge=0.0)
@@ -86,7 +86,7 @@ class _Pid(StrictModel):
     i: float
     d: float
     i_clamp: float = Field(ge=0.0)
-    max_force: float = Field(gt=0.0)
+    max_force: float = Field(ge=0.0)
     position_deadband: float = Field(ge=0.0)
     deadband: float = 0.0
     friction_deadband: float = 0.0
@@ -123,7 +123,7 @@ def load_gains(path: Path) -> PublishedGains:
 
 def _gains(pid: _Pid, joint: str, path: Path) -> JointGains:
     sign = -1.0 if pid.p < 0.0 else 1.0
-    if pid.p == 0.0 or sign * pid.i < 0.0 or sign * pid.d < 0.0:
+    if (pid.p == 0.0 and pid.max_force) or sign * pid.i < 0.0 or sign * pid.d < 0.0:
         what = f"gains p {pid.p:g}, i {pid.i:g}, d {pid.d:g} of {joint} do not push the same way"
         raise ConfigurationError(what, where=str(path), hint="All three have one sign, and p is not zero")
     content = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,36 +15,15 @@ from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motor_configuration import MotorConfiguration, configure_motors, reset_motors
 from drivers.shadow.motor_data import ToMotor
-from drivers.shadow.motor_polling import MotorPolling, MotorReadings
+from drivers.shadow.motor_polling import MotorReadings
 from drivers.shadow.motor_watch import Fault, MotorWatch
 from drivers.shadow.motors import MotorMap
-from drivers.shadow.palm_codec import EdcCommand, PalmCommand
+from drivers.shadow.palm_dialogue import HandCounters, PalmDialogue
 from drivers.shadow.palm_images import PALMS
-from drivers.shadow.tactile_requests import TactileRotation
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import CodecError, DeviceError
 
 __all__ = ["LARGEST_NUDGE", "HandCounters", "HandDecoder", "HandSample", "HandSettings", "ShadowHand"]
-
-MOTOR_PATIENCE_ns = 20_000_000
-"""A motor halts itself when it has seen no demand for 20 ms."""
-
-
-@dataclass
-class HandCounters:
-    """Cycles since connecting.
-
-    Attributes:
-        cycles: exchanges.
-        lost: exchanges without a valid status.
-        lost_in_a_row: the present run of them.
-        malformed: messages that were no status of this palm.
-    """
-
-    cycles: int = 0
-    lost: int = 0
-    lost_in_a_row: int = 0
-    malformed: int = 0
 
 
 class ShadowHand:
@@ -75,22 +54,18 @@ class ShadowHand:
         self._settings = settings or HandSettings()
         self._motors, self._boards = motors or MotorMap.load(), boards
         self._motion = HandMotion(self._motors, self._settings.gains, self._settings.soft_start_s, link.name)
-        self._kind = ToMotor.DEMAND_TORQUE if self._settings.demand == "torque" else ToMotor.DEMAND_PWM
         self._watch = MotorWatch(self._motors, self._settings.heat, link.name)
-        self._image = PALMS[self._settings.palm]
-        self._decoder = HandDecoder(calibration, self._image)
+        self._decoder = HandDecoder(calibration, PALMS[self._settings.palm])
         self._connected = False
         self._reset()
 
     def _reset(self) -> None:
         """As new: nothing received, nothing sent, no target."""
         self._decoder.restart()
-        self._polling = MotorPolling(self._settings.polling)
-        self._tactile = TactileRotation(self._settings.tactile)
+        self._dialogue = PalmDialogue(self._settings, self._clock)
         self._counters = HandCounters()
         self._last: HandSample | None = None
-        self._sent_ns: int | None = None
-        self._connected_ns = self._demands_since_ns = self._clock.now_ns()
+        self._connected_ns = self._clock.now_ns()
         self.resume()
 
     # --- lifecycle ---------------------------------------------------------------------------------------------
@@ -139,11 +114,8 @@ class ShadowHand:
 
         Nothing moves afterwards until :meth:`set_targets`.
 
-        Returns:
-            How long it took, nanoseconds.
-
-        Raises:
-            DeviceError: the hand does not come back; it is disconnected then.
+        Returns how long it took, nanoseconds. Raises DeviceError when the hand does not come back; it is disconnected
+        then.
         """
         started_ns = self._clock.now_ns()
         self._connected = False
@@ -152,7 +124,7 @@ class ShadowHand:
         return self._clock.now_ns() - started_ns
 
     def _wake_palm(self) -> None:
-        self._link.send(self._image.encode_command(PalmCommand()))
+        self._link.send(self._dialogue.first())
         self._take(self._link.receive())
         for _ in range(self._settings.connect_tries):
             self._pause()
@@ -208,10 +180,7 @@ class ShadowHand:
         return self._motion.targets_rad
 
     def stop(self) -> None:
-        """Zero demands in every exchange from now on, until :meth:`resume`. Never raises.
-
-        Without further exchanges the motors halt themselves within 20 ms.
-        """
+        """Zero demands from now on, until :meth:`resume`. Never raises; without exchanges motors halt after 20 ms."""
         self._stopped = True
 
     def resume(self) -> None:
@@ -260,23 +229,8 @@ class ShadowHand:
         return None if sample is None else sample.motor
 
     def _cycle(self, words: NDArray[np.int16], to_motor: ToMotor | None = None) -> HandSample | None:
-        to_motor = self._kind if to_motor is None else to_motor
-        now_ns = self._clock.now_ns()
-        silent = self._sent_ns is None or now_ns - self._sent_ns > MOTOR_PATIENCE_ns
-        if silent or to_motor not in (ToMotor.DEMAND_PWM, ToMotor.DEMAND_TORQUE):
-            self._demands_since_ns = now_ns
-        which_motors, kind = self._polling.next(now_ns)
-        command = PalmCommand(
-            edc_command=EdcCommand.SENSOR_DATA,
-            from_motor_data_type=kind,
-            which_motors=which_motors,
-            to_motor_data_type=to_motor,
-            motor_data=words,
-            tactile_data_type=self._tactile.next(),
-        )
-        self._sent_ns = now_ns
         self._counters.cycles += 1
-        return self._take(self._transfer(self._image.encode_command(command)))
+        return self._take(self._transfer(self._dialogue.next(words, to_motor)))
 
     def _transfer(self, payload: bytes) -> list[Datagram]:
         """Out and back; a link that fails stops the hand as a fault of its own would."""
@@ -297,7 +251,7 @@ class ShadowHand:
                 continue
             if sample is not None:
                 newest = sample
-                self._fault = self._fault or self._watch.fault(sample.status, settling=self._settling)
+                self._fault = self._fault or self._watch.fault(sample.status, settling=self._dialogue.settling)
         return newest
 
     def _demand(self, last: HandSample) -> NDArray[np.int16]:
@@ -309,16 +263,11 @@ class ShadowHand:
 
     # --- what can go wrong -------------------------------------------------------------------------------------
 
-    @property
-    def _settling(self) -> bool:
-        flowing_ns = self._clock.now_ns() - self._demands_since_ns
-        return flowing_ns < self._settings.demand_grace_s * NANOSECONDS
-
     def _count_loss(self) -> None:
         counters = self._counters
         counters.lost += 1
         counters.lost_in_a_row += 1
-        self._demands_since_ns = self._clock.now_ns()
+        self._dialogue.interrupted()
         if counters.lost_in_a_row >= self._settings.lost_limit and self._fault is None:
             self._fault = Fault(
                 f"stopped after {counters.lost_in_a_row} cycles in a row without a valid status",

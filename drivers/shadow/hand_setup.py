@@ -7,6 +7,7 @@ from typing import Literal
 
 from drivers.links import Link
 from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings
+from drivers.shadow.gains import load_gains
 from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.joint_calibration import JointCalibration
@@ -32,6 +33,8 @@ class HandSetup(StrictModel):
         joints, motors: calibration files of this very hand.
         boards: settings to upload to the motor boards when connecting; they keep theirs when left out.
         rates: how often motors are asked for what, in place of ``hand.polling``.
+        gains: position control as Shadow delivers it (``sr_edc_joint_position_controllers_PWM.yaml``), in place of
+            ``hand.gains``; its signs tell which motors turn backwards.
     """
 
     name: str = "hand"
@@ -42,10 +45,14 @@ class HandSetup(StrictModel):
     motors: Path
     boards: Path | None = None
     rates: Path | None = None
+    gains: Path | None = None
 
     def settings(self) -> HandSettings:
-        """How the hand is driven, with the polling rates of the file. Raises ConfigurationError."""
-        return self.hand if self.rates is None else self.hand.model_copy(update={"polling": load_rates(self.rates)})
+        """How the hand is driven, with the polling rates and gains of the files. Raises ConfigurationError."""
+        changes: dict[str, object] = {} if self.rates is None else {"polling": load_rates(self.rates)}
+        if self.gains is not None:
+            changes["gains"] = load_gains(self.gains).table
+        return self.hand.model_copy(update=changes)
 
     def link(self, clock: Clock) -> EthercatLink | PysoemLink:
         """The hand's link, not open.
@@ -60,9 +67,18 @@ class HandSetup(StrictModel):
         settings = self.ethercat.model_copy(update={"palm": self.hand.palm})
         return (EthercatLink if self.master == "own" else PysoemLink)(self.name, settings, clock)
 
+    def check_files(self) -> None:
+        """Read every file that is named. Raises ConfigurationError."""
+        self.settings()
+        self.motor_map()
+        JointCalibration.load(self.joints)
+        if self.boards is not None:
+            load_configurations(self.boards)
+
     def motor_map(self) -> MotorMap:
         """Which motor pulls which joint. Raises ConfigurationError."""
-        return MotorMap.load(self.motors)
+        motors = MotorMap.load(self.motors)
+        return motors if self.gains is None else motors.turned(load_gains(self.gains).backwards)
 
     def device(self, link: Link, clock: Clock, *, set_up_boards: bool = True) -> ShadowHand:
         """The hand, not connected.

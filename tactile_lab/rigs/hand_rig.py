@@ -24,12 +24,14 @@ class HandFiles(StrictModel):
         motors: which motor pulls which joint; a wrong one can damage the hand.
         boards: settings of the motor boards (``motor_board_effort_controllers.yaml``); they keep theirs when left out.
         rates: how often motors are asked for what (``motor_data_polling.yaml``); in place of ``hand.polling``.
+        gains: position control (``sr_edc_joint_position_controllers_PWM.yaml``); in place of ``hand.gains``.
     """
 
     joints: str
     motors: str
     boards: str | None = None
     rates: str | None = None
+    gains: str | None = None
 
 
 class HandRigDescription(StrictModel):
@@ -74,6 +76,7 @@ class HandRig:
             motors=self.folder / files.motors,
             boards=self.folder / files.boards if files.boards else None,
             rates=self.folder / files.rates if files.rates else None,
+            gains=self.folder / files.gains if files.gains else None,
         )
 
 

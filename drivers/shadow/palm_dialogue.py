@@ -1,0 +1,88 @@
+"""The hand's side of the talk with its palm: which command is next, and for how long the motors have had demands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.shadow.hand_settings import HandSettings
+from drivers.shadow.motor_data import ToMotor
+from drivers.shadow.motor_polling import MotorPolling
+from drivers.shadow.palm_codec import EdcCommand, PalmCommand
+from drivers.shadow.palm_images import PALMS
+from drivers.shadow.tactile_requests import TactileRotation
+from tactile_lab.clock import NANOSECONDS, Clock
+
+MOTOR_PATIENCE_ns = 20_000_000
+"""A motor halts itself when it has seen no demand for 20 ms."""
+
+_DEMANDS = (ToMotor.DEMAND_PWM, ToMotor.DEMAND_TORQUE)
+
+
+@dataclass
+class HandCounters:
+    """Cycles since connecting.
+
+    Attributes:
+        cycles: exchanges.
+        lost: exchanges without a valid status.
+        lost_in_a_row: the present run of them.
+        malformed: messages that were no status of this palm.
+    """
+
+    cycles: int = 0
+    lost: int = 0
+    lost_in_a_row: int = 0
+    malformed: int = 0
+
+
+class PalmDialogue:
+    """Commands of one connection, in the order in which the palm gets them.
+
+    Args:
+        settings: of the hand.
+        clock: the session's.
+    """
+
+    def __init__(self, settings: HandSettings, clock: Clock) -> None:
+        self._clock = clock
+        self._image = PALMS[settings.palm]
+        self._usual = ToMotor.DEMAND_TORQUE if settings.demand == "torque" else ToMotor.DEMAND_PWM
+        self._grace_ns = settings.demand_grace_s * NANOSECONDS
+        self._polling, self._tactile = MotorPolling(settings.polling), TactileRotation(settings.tactile)
+        self._sent_ns: int | None = None
+        self._demands_since_ns = clock.now_ns()
+
+    def first(self) -> bytes:
+        """The all-zero image, which moves nothing."""
+        return self._image.encode_command(PalmCommand())
+
+    def next(self, words: NDArray[np.int16], to_motor: ToMotor | None = None) -> bytes:
+        """The next command, with these words for the motors: demands unless another type is named."""
+        to_motor = self._usual if to_motor is None else to_motor
+        now_ns = self._clock.now_ns()
+        silent = self._sent_ns is None or now_ns - self._sent_ns > MOTOR_PATIENCE_ns
+        if silent or to_motor not in _DEMANDS:
+            self._demands_since_ns = now_ns
+        which_motors, kind = self._polling.next(now_ns)
+        self._sent_ns = now_ns
+        command = PalmCommand(
+            edc_command=EdcCommand.SENSOR_DATA,
+            from_motor_data_type=kind,
+            which_motors=which_motors,
+            to_motor_data_type=to_motor,
+            motor_data=words,
+            tactile_data_type=self._tactile.next(),
+        )
+        return self._image.encode_command(command)
+
+    def interrupted(self) -> None:
+        """A cycle was lost: the motors may have missed their demand."""
+        self._demands_since_ns = self._clock.now_ns()
+
+    @property
+    def settling(self) -> bool:
+        """Whether demands have only just begun to flow, so that motors may report that they had halted."""
+        return self._clock.now_ns() - self._demands_since_ns < self._grace_ns
