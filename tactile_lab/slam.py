@@ -25,6 +25,7 @@ from dataclasses import replace
 
 import numpy as np
 from gtsam import Pose3
+from numpy.typing import NDArray
 from pydantic import Field
 
 from tactile_lab.errors import ConfigurationError, ShapeError, TrackingError
@@ -177,6 +178,11 @@ class TactileSlam:
         return self._trajectory()[-1] if self._steps else None
 
     @property
+    def trajectory(self) -> tuple[Pose3 | None, ...]:
+        """The pose at every grasp so far, as the present knowledge has it; None where it is not known."""
+        return self._trajectory()
+
+    @property
     def pose_covariance(self) -> Array | None:
         """Covariance of the present (x m, y m, yaw rad) in the world, shape (3, 3)."""
         return self._covariances()[-1] if self._steps else None
@@ -196,6 +202,11 @@ class TactileSlam:
         if self._surface is None or self._surface[0] is not contact_map:
             self._surface = (contact_map, contact_map.fit())
         return self._surface[1]
+
+    @property
+    def surface_grasps(self) -> NDArray[np.intp]:
+        """Which grasp each contact of :attr:`surface` comes from, counted from the object frame's birth, shape (n,)."""
+        return np.empty(0, dtype=np.intp) if self._tracker is None else self._tracker.map.grasp_indices
 
     @property
     def is_lost(self) -> bool:
