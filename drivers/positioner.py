@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from drivers.links import Datagram, Link
 from drivers.positioner_codec import (
@@ -16,91 +15,20 @@ from drivers.positioner_codec import (
     encode_command,
 )
 from drivers.positioner_kinematics import mount_joints, mount_T_forearm
+from drivers.positioner_settings import AXES, PositionerCounters, PositionerSample, PositionerSettings
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import CodecError, DeviceError
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.strict_yaml import StrictModel
 
 __all__ = ["Positioner", "PositionerSample", "PositionerSettings", "mount_T_forearm", "mount_joints"]
-
-AXES = ("x", "y", "z", "yaw", "pitch", "roll")
 
 _LONGEST_STEP_s = 0.05
 """After a pause of the host a step is no longer than after this time."""
 
 _SHORTEST_STEP_s = 1e-6
 
-Range = tuple[float, float]
-
-
-class PositionerSettings(StrictModel):
-    """Limits of the positioner.
-
-    Attributes:
-        speed_m_s: largest speed of each linear axis.
-        speed_rad_s: largest speed of each rotation.
-        ranges: lower and upper end of each axis, metres and radians; targets are clamped to them.
-        lost_limit: so many cycles in a row without a status stop the positioner.
-        following_m: a linear axis this far from where it was sent stops the positioner: something is in its way.
-        following_rad: the same for the rotations.
-        cycle_s: period of the questions while connecting.
-        connect_tries: questions until the positioner must have answered.
-    """
-
-    speed_m_s: float = Field(default=0.5, gt=0.0)
-    speed_rad_s: float = Field(default=2.5, gt=0.0)
-    ranges: tuple[Range, Range, Range, Range, Range, Range] = (
-        (-1.0, 1.0),
-        (-1.0, 1.0),
-        (-0.3, 1.3),
-        (-12.5, 12.5),
-        (-1.0, 1.9),
-        (-2.2, 2.2),
-    )
-    lost_limit: int = Field(default=10, ge=1)
-    following_m: float = Field(default=0.1, gt=0.0)
-    following_rad: float = Field(default=0.5, gt=0.0)
-    cycle_s: float = Field(default=0.01, gt=0.0)
-    connect_tries: int = Field(default=20, ge=1)
-
-    @model_validator(mode="after")
-    def _ranges_are_not_empty(self) -> PositionerSettings:
-        for axis, (lower, upper) in zip(AXES, self.ranges, strict=True):
-            if lower >= upper:
-                raise ValueError(f"the range of {axis} is empty")
-        return self
-
-
-@dataclass(frozen=True, eq=False)
-class PositionerSample:
-    """Where the positioner stands.
-
-    Attributes:
-        stamp_ns: arrival, session clock.
-        q: measured axes, shape (6,), metres and radians.
-        fresh: False for the last sample repeated after a lost cycle.
-    """
-
-    stamp_ns: int
-    q: Array
-    fresh: bool = True
-
-
-@dataclass
-class PositionerCounters:
-    """Cycles since connecting.
-
-    Attributes:
-        cycles: exchanges.
-        lost: exchanges without a new status.
-        lost_in_a_row: the present run of them.
-        malformed: messages that were no status.
-    """
-
-    cycles: int = 0
-    lost: int = 0
-    lost_in_a_row: int = 0
-    malformed: int = 0
+_BEGINS_ANEW = 1000
+"""A status that answers a command so long ago is none that came late: the count began anew."""
 
 
 class Positioner:
@@ -228,7 +156,7 @@ class Positioner:
         return self._last
 
     def receive(self, datagram: Datagram) -> PositionerSample | None:
-        """Decode one status; None when it repeats the one before.
+        """Decode one status; None when it repeats the newest one or answers an older command than that.
 
         Raises:
             CodecError: not a status, or its positions are not numbers.
@@ -236,8 +164,12 @@ class Positioner:
         status = decode_status(datagram.payload)
         if not np.isfinite(status.q).all():
             raise CodecError("a status without finite positions", where=self._link.name)
-        repeated, self._heard = status.sequence == self._heard, status.sequence
-        return None if repeated else PositionerSample(datagram.stamp_ns, status.q)
+        behind = _BEGINS_ANEW if self._heard is None else (self._heard - status.sequence) % (LARGEST_SEQUENCE + 1)
+        if behind == 0 or (behind < _BEGINS_ANEW and self._heard != QUESTION):
+            self._counters.late += behind > 0
+            return None
+        self._heard = status.sequence
+        return PositionerSample(datagram.stamp_ns, status.q)
 
     def _send_step(self) -> None:
         now_ns = self._clock.now_ns()
@@ -294,4 +226,6 @@ class Positioner:
             problems.append(f"{self._counters.lost} of {self._counters.cycles} cycles lost")
         if self._counters.malformed:
             problems.append(f"{self._counters.malformed} messages were no status of a positioner")
+        if self._counters.late:
+            problems.append(f"{self._counters.late} statuses came behind newer ones")
         return tuple(problems)

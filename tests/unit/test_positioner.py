@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from drivers.links import Datagram, MemoryLink
+from drivers.links import Datagram, MemoryLink, ReplayLink
 from drivers.positioner import Positioner, PositionerSample, PositionerSettings, mount_joints, mount_T_forearm
 from drivers.positioner_codec import (
+    LARGEST_SEQUENCE,
     PositionerCommand,
     PositionerStatus,
     decode_command,
@@ -302,3 +303,19 @@ def test_an_empty_range_is_refused() -> None:
     ranges = (*PositionerSettings().ranges[:2], (1.0, 0.0), *PositionerSettings().ranges[3:])
     with pytest.raises(ValidationError, match="range of z is empty"):
         PositionerSettings(ranges=ranges)
+
+
+def test_a_status_that_comes_behind_a_newer_one_is_not_taken_for_the_newest() -> None:
+    device = Positioner(ReplayLink("base", ()), VirtualClock())
+    told = [encode_status(PositionerStatus(sequence, np.full(6, sequence / 100.0))) for sequence in (7, 9, 8, 9, 10)]
+    samples = [device.receive(Datagram(payload, 0)) for payload in told]
+    assert [None if sample is None else round(100 * sample.q[0]) for sample in samples] == [7, 9, None, None, 10]
+    assert device.counters.late == 1
+    assert "1 statuses came behind newer ones" in device.health()
+
+
+def test_sequences_go_on_after_their_largest() -> None:
+    device = Positioner(ReplayLink("base", ()), VirtualClock())
+    for sequence in (LARGEST_SEQUENCE - 1, LARGEST_SEQUENCE, 1, 2):
+        assert device.receive(Datagram(encode_status(PositionerStatus(sequence, np.zeros(6))), 0)) is not None
+    assert device.counters.late == 0
