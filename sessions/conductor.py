@@ -19,7 +19,6 @@ from drivers.shadow.posture import TipEllipsoid
 from sessions.bench import Bench
 from sessions.cycle_settings import CycleSettings
 from sessions.decisions import (
-    AutonomousDecisions,
     Crew,
     DoGrasp,
     End,
@@ -35,10 +34,12 @@ from sessions.guided.settings import GuidedSettings
 from sessions.motion import Motion
 from sessions.next_grasp import FixedRule, PlanSettings
 from sessions.planner import Planner, Reorientation
+from sessions.policy_decisions import Approve, PolicyDecisions, chooser_for, everything_approved, recorded_by
 from sessions.progress import GraspReport, NullProgress, Progress
 from sessions.recorder import Level
 from sessions.safety import InterruptGuard, SafetySettings, SafetySupervisor
 from sessions.slam_memory import SlamMemory
+from sessions.view_messages import plan_message, surface_message
 from tactile_lab.clock import VirtualClock
 from tactile_lab.errors import TactileLabError
 from tactile_lab.geometry.contacts import Grasp
@@ -100,15 +101,35 @@ class SessionOutcome:
 
 
 def autonomous_crew(
-    bench: Bench, slam: TactileSlam, settings: ConductorSettings, *, seed: int = 0, dimension: int = 2
+    bench: Bench,
+    slam: TactileSlam,
+    settings: ConductorSettings,
+    *,
+    seed: int = 0,
+    dimension: int = 2,
+    approve: Approve = everything_approved,
 ) -> Crew:
-    """The crew of a session without a person: the hand moves by itself, the planner decides."""
+    """The crew of a session without a person: the hand moves by itself, the planner decides.
+
+    Args:
+        bench, slam, settings: of the session.
+        seed: of what is left to chance.
+        dimension: of the estimation.
+        approve: asked before every grasp; refuses what a person does not want.
+
+    Raises:
+        ConfigurationError: there is no policy of the name in the settings.
+    """
     supervisor = SafetySupervisor(bench, settings.safety, bench.cycle_ns)
     tip, window = tip_shape(bench), settings.plan.yaw_window_rad
     cycle = GraspCycle(Motion(bench, supervisor), settings.cycle, tip, window)
     rule = FixedRule(settings.plan, np.random.default_rng(seed), dimension)
-    planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension)
-    return Crew(supervisor, cycle, AutonomousDecisions(planner))
+    chooser = None
+    if policy := settings.exploration.policy:
+        limits = settings.plan, settings.exploration, settings.cycle, settings.safety
+        chooser = chooser_for(policy, limits, tip, dimension, slam.settings.motion, seed)
+    planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension, chooser, settings.grasps)
+    return Crew(supervisor, cycle, PolicyDecisions(planner, recorded_by(bench), approve))
 
 
 class Conductor:
@@ -191,6 +212,8 @@ class Conductor:
         if self._thought_of != index:
             self._think(lambda: self._decisions.think(index))
             self._thought_of = index
+            if plan := self._decisions.suggested:
+                self._bench.recorder.plan(self._bench.clock.now_ns(), plan_message(index, plan))
 
     def _pause(self, wanted: Pause | None) -> None:
         if wanted is not None and not self._paused:
@@ -323,6 +346,8 @@ class Conductor:
         self._think(lambda: self._decisions.estimated(step))
         state = {"index": step.index, "verdict": step.verdict, "reason": step.reason, "seconds": step.seconds}
         self._bench.recorder.slam(self._bench.clock.now_ns(), step.world_T_object, state, step.covariance)
+        surface = self._think(lambda: surface_message(self._decisions.known_shape()))
+        self._bench.recorder.surface(self._bench.clock.now_ns(), surface)
         return step
 
     def _think(self, question: Callable[[], Answer]) -> Answer:

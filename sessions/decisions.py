@@ -74,6 +74,10 @@ class DecisionMaker(Protocol):
     def centre_m(self) -> Array:
         """Where the middle of the object is thought to be, world x, y."""
 
+    @property
+    def suggested(self) -> GraspPlan | None:
+        """The grasp that comes next, as far as it has been thought of."""
+
     def think(self, index: int) -> None:
         """Prepare the decision about grasp ``index``; may take its time, in another thread."""
 
@@ -149,6 +153,10 @@ class AutonomousDecisions:
     @property
     def centre_m(self) -> Array:
         return self.planner.centre_m
+
+    @property
+    def suggested(self) -> GraspPlan | None:
+        return self._plan
 
     def think(self, index: int) -> None:
         self._plan = self.planner.plan(index)

@@ -27,6 +27,7 @@ class GuidedSettings(StrictModel):
         jog_m_s, jog_rad_s: its speeds.
         silent_s: a fingertip that sends nothing for so long counts as unplugged.
         attention_s: without any sign of the person for so long the session is closed in order.
+        session_limit_s: the longest session, in place of the one of an autonomous session.
         panel_s: how often the panel is renewed.
     """
 
@@ -44,4 +45,5 @@ class GuidedSettings(StrictModel):
     jog_rad_s: float = Field(default=0.5, gt=0.0)
     silent_s: float = Field(default=0.5, gt=0.0)
     attention_s: float = Field(default=3600.0, gt=0.0)
+    session_limit_s: float = Field(default=12 * 3600.0, gt=0.0)
     panel_s: float = Field(default=0.2, gt=0.0)

@@ -24,11 +24,16 @@ class LiveProgress:
 
     A grasp is one line that stays, in a terminal and in a file alike; the step in hand is a line that a terminal
     shows below them and that leaves no trace.
+
+    Args:
+        title: of the session.
+        live: show the step in hand; a guided session shows it itself.
     """
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, title: str, *, live: bool = True) -> None:
         self._title, self._begun, self._listed = title, False, False
-        self._live = Live(console=people, refresh_per_second=8, transient=True) if people.is_terminal else None
+        live = live and people.is_terminal
+        self._live = Live(console=people, refresh_per_second=8, transient=True) if live else None
 
     def __enter__(self) -> Self:
         return self

@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from tactile_lab.cli.loading import interruptions_held
 from tactile_lab.cli.options import METHOD_HELP, AllowUncalibrated, Json, Method, NoInput, RigName
+
+
+class Mode(StrEnum):
+    """Who decides in a session."""
+
+    AUTONOMOUS = "autonomous"
+    GUIDED = "guided"
+
+
+class LedBy(StrEnum):
+    """How the hand is moved in a guided session."""
+
+    KEYS = "keys"
+    HAND = "hand"
 
 
 def run(
@@ -24,23 +39,47 @@ def run(
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder in which the session's folder is made.")] = Path("runs"),
     notes: Annotated[str, typer.Option(help="The operator's notes, kept with the session.")] = "",
+    mode: Annotated[Mode, typer.Option(help="autonomous: the program decides; guided: a person.")] = Mode.AUTONOMOUS,
+    led_by: Annotated[
+        LedBy | None,
+        typer.Option(help="Guided: the hand is moved by keys, or by hands.", show_default="the rig's, keys on sim"),
+    ] = None,
+    automatic_capture: Annotated[
+        bool, typer.Option("--automatic-capture", help="Guided: capture as soon as the contacts are steady.")
+    ] = False,
+    pedal: Annotated[str, typer.Option(help="Guided: a further key that captures, as a foot pedal sends it.")] = "",
+    pace: Annotated[
+        float, typer.Option(min=0.0, help="Guided, simulated rig: its seconds for a real one; 0: as fast as it goes.")
+    ] = 1.0,
     allow_uncalibrated: AllowUncalibrated = False,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Run an autonomous session: grasp, estimate, choose the next grasp, and judge the result.
+    """Run a session: grasp, estimate, choose the next grasp, and judge the result.
+
+    A guided session (docs/guided-sessions.md) says what to do, shows what the sensors see, and captures on a key; with
+    --no-input a simulated operator does what it says.
 
     Ctrl+C once finishes the step in hand and closes the session; twice ends at once. Both leave a readable session.
     """
     with interruptions_held():
+        from tactile_lab.cli.attending import GuidedWay, attendance
         from tactile_lab.cli.progress import LiveProgress
         from tactile_lab.cli.results import conclude
         from tactile_lab.cli.session_tables import tell_left_open
         from tactile_lab.workflow.running import SessionRequest, run_session
 
-    del no_input  # an autonomous session asks nothing; the option is there so that scripts can always give it
+    guided = mode is Mode.GUIDED
+    way = GuidedWay(_led_by(led_by), automatic_capture or None, pedal, pace, no_input)
     tell_left_open(out)
     request = SessionRequest(rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated)
-    with LiveProgress(f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}") as progress:
-        finished = run_session(request, progress)
+    title = f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}"
+    with LiveProgress(title, live=not guided) as progress, attendance(way if guided else None) as present:
+        finished = run_session(request, progress, present)
     conclude(finished, as_json)
+
+
+def _led_by(chosen: LedBy | None) -> Literal["keys", "hand"] | None:
+    if chosen is None:
+        return None
+    return "keys" if chosen is LedBy.KEYS else "hand"

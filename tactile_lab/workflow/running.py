@@ -1,4 +1,4 @@
-"""The main job: an autonomous session on a rig, recorded and judged."""
+"""The main job: a session on a rig, autonomous or guided, recorded and judged."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from calibration.admission import UNCALIBRATED, admit
 from drivers.simulation.world import SimulatedWorld
-from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome, autonomous_crew
+from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome
 from sessions.manifest import Status
 from sessions.progress import Progress
 from sessions.session import RunningSession, create_session
@@ -18,7 +18,10 @@ from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.strict_yaml import validate
 from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.workflow.attending import Attendance, crew_for, settings_for
 from tactile_lab.workflow.judging import FinishedSession, estimate_rest, judge
+
+ALONE = Attendance()
 
 
 @dataclass(frozen=True)
@@ -60,8 +63,13 @@ def refuse_known_pose(method: str) -> None:
         raise ConfigurationError("a running session does not know the true poses", where="known-pose", hint=hint)
 
 
-def run_session(request: SessionRequest, progress: Progress) -> FinishedSession:
-    """Run an autonomous session on a rig, and judge it.
+def run_session(request: SessionRequest, progress: Progress, attendance: Attendance = ALONE) -> FinishedSession:
+    """Run a session on a rig, and judge it.
+
+    Args:
+        request: what is to be done.
+        progress: is told what happens.
+        attendance: who guides it, or watches.
 
     Raises:
         ConfigurationError, ShapeError: the request can not be met; nothing was recorded.
@@ -77,7 +85,7 @@ def run_session(request: SessionRequest, progress: Progress) -> FinishedSession:
     slam = TactileSlam(slam_settings(request.method, request.dimension, rig.description.motion), request.seed)
     session = _new_session(rig, world, slam, request, overlooked)
     try:
-        outcome = _record(session, rig, world, slam, request, progress)
+        outcome = _record(session, rig, world, slam, request, progress, attendance)
         progress.phase(len(outcome.grasps), "model and evaluation")
         estimate_rest(slam, outcome.grasps)
         finished = judge(session, rig, slam, outcome.grasps, session.results)
@@ -94,15 +102,19 @@ def _record(
     slam: TactileSlam,
     request: SessionRequest,
     progress: Progress,
+    attendance: Attendance,
 ) -> SessionOutcome:
     """Connect, grasp until done, disconnect; the session is closed in any case."""
     with session:
         progress.phase(0, "connect")
+        if attendance.onlooker is not None:
+            session.recorder.watched_by(attendance.onlooker)
         bench = build_bench(rig, world, session.recorder)
         bench.connect()
-        settings, dimension = _conductor_settings(rig, request), request.dimension
+        settings = settings_for(_conductor_settings(rig, request), attendance)
+        seed, dimension = request.seed, request.dimension
         try:
-            crew = autonomous_crew(bench, slam, settings, seed=request.seed, dimension=dimension)
+            crew = crew_for(attendance, bench, slam, settings, session.folder, seed=seed, dimension=dimension)
             outcome = Conductor(bench, slam, settings, crew, progress).run()
         finally:
             bench.close()

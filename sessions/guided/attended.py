@@ -1,0 +1,37 @@
+"""An autonomous session with someone at the page: between grasps he may pause it, take a grasp back, or end it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from sessions.decisions import AutonomousDecisions, Decision, End, Pause, UndoGrasp
+from sessions.guided.operator import Ask, Operator
+from sessions.planner import Planner
+
+
+class AttendedDecisions(AutonomousDecisions):
+    """The planner's decisions, unless the person asks for something else.
+
+    Args:
+        planner: it.
+        operator: the person; is heard between grasps.
+        wait: called in every cycle of a pause; makes a simulated rig wait for the person.
+    """
+
+    def __init__(self, planner: Planner, operator: Operator, wait: Callable[[], None] = lambda: None) -> None:
+        super().__init__(planner)
+        self._operator, self._wait = operator, wait
+        self._paused = False
+
+    def decide(self, index: int) -> Decision:
+        for request in self._operator.requests():
+            if request.ask is Ask.PAUSE:
+                self._paused = not self._paused
+            elif request.ask is Ask.UNDO:
+                return UndoGrasp("by the person at the page")
+            elif request.ask is Ask.END:
+                return End(f"ended by the person at the page after {index} grasps")
+        if not self._paused:
+            return super().decide(index)
+        self._wait()
+        return Pause("by the person at the page")

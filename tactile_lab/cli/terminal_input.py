@@ -1,0 +1,95 @@
+"""Reading a person at the terminal without ever waiting for him: single keys, or whole lines."""
+
+from __future__ import annotations
+
+import atexit
+import codecs
+import os
+import select
+import sys
+import termios
+from types import TracebackType
+from typing import Any, Self
+
+_LFLAG, _IFLAG, _CC = 3, 0, 6
+
+
+class KeyInput:
+    """Single keys from a terminal, not echoed; a context that puts the terminal back on every way out.
+
+    Ctrl+C still interrupts. Ctrl+Z and Ctrl+S do nothing while the context is open: a program that moves a hand must
+    not be put to sleep by a key.
+
+    Args:
+        descriptor: of the terminal; standard input unless given.
+    """
+
+    def __init__(self, descriptor: int | None = None) -> None:
+        self._descriptor = sys.stdin.fileno() if descriptor is None else descriptor
+        self._before: list[Any] | None = None
+        self._decoder = codecs.getincrementaldecoder("utf-8")("replace")
+        self.closed = False
+        """The terminal is gone."""
+
+    def __enter__(self) -> Self:
+        self._before = termios.tcgetattr(self._descriptor)
+        changed = termios.tcgetattr(self._descriptor)
+        changed[_LFLAG] &= ~(termios.ICANON | termios.ECHO)
+        changed[_IFLAG] &= ~termios.IXON
+        changed[_CC][termios.VSUSP] = b"\x00"
+        changed[_CC][termios.VMIN], changed[_CC][termios.VTIME] = b"\x00", b"\x00"
+        atexit.register(self.restore)
+        termios.tcsetattr(self._descriptor, termios.TCSADRAIN, changed)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.restore()
+        atexit.unregister(self.restore)
+
+    def restore(self) -> None:
+        """The terminal as it was; repeatable."""
+        before, self._before = self._before, None
+        if before is not None and not self.closed:
+            termios.tcsetattr(self._descriptor, termios.TCSADRAIN, before)
+
+    def read(self) -> str:
+        """What was typed since the last call."""
+        data = _waiting_bytes(self._descriptor)
+        self.closed = self.closed or data is None
+        return self._decoder.decode(data or b"")
+
+
+class LineInput:
+    """Whole lines from standard input: a terminal without abilities, or a pipe.
+
+    Args:
+        descriptor: where to read; standard input unless given.
+    """
+
+    def __init__(self, descriptor: int | None = None) -> None:
+        self._descriptor = sys.stdin.fileno() if descriptor is None else descriptor
+        self._decoder = codecs.getincrementaldecoder("utf-8")("replace")
+        self._rest = ""
+        self.closed = False
+        """The end of the input was reached."""
+
+    def lines(self) -> list[str]:
+        """Complete lines that were typed since the last call."""
+        if self.closed:
+            return []
+        data = _waiting_bytes(self._descriptor)
+        self.closed = data is None
+        *lines, self._rest = (self._rest + self._decoder.decode(data or b"")).split("\n")
+        return lines
+
+
+def _waiting_bytes(descriptor: int) -> bytes | None:
+    """What can be read at once, b"" for nothing; None at the end of the input."""
+    try:
+        if not select.select([descriptor], [], [], 0)[0]:
+            return b""
+        return os.read(descriptor, 4096) or None
+    except OSError:  # a terminal that was closed reads as an input/output error
+        return None
