@@ -20,6 +20,7 @@ from sessions.grasp_cycle import GraspPlan
 from sessions.motion import GraspFrame
 from tactile_lab.errors import ShapeError
 from tactile_lab.exploration.candidates import Candidate, ClosingRays, ModelledObject, ring_of_candidates
+from tactile_lab.exploration.policy import Surface
 from tactile_lab.exploration.rewards import RatedCandidate, explored_share, rate
 from tactile_lab.geometry.contacts import FINGERS, Array
 from tactile_lab.shape.gpis import Gpis
@@ -37,6 +38,10 @@ class ExplorationSettings(StrictModel):
         least_contacts: candidates that promise fewer lose against all that promise as many.
         least_observability: smallest eigenvalue of (3.18) that the predicted contacts should have; where no candidate
             reaches it (a round object can not tell its turn) it does not count.
+        policy: name of the policy that chooses among everything the hand can do (:mod:`tactile_lab.exploration`);
+            None for the reward of equation 4.20 alone, as above.
+        caution: standard deviations of the estimated surface that the open fingertips keep clear of besides, of at
+            most the clearance each; for policies.
         clearance_m: distance from the estimated surface that the open fingertips' centres must keep.
         contour_resolution_m, mesh_resolution_m: of the surface that the explored share is measured on.
     """
@@ -45,6 +50,8 @@ class ExplorationSettings(StrictModel):
     shifts_m: tuple[float, ...] = Field(default=(-0.015, 0.0, 0.015), min_length=1)
     least_contacts: int = Field(default=4, ge=0)
     least_observability: float = Field(default=0.15, ge=0.0)
+    policy: str | None = None
+    caution: float = Field(default=0.5, ge=0.0)
     clearance_m: float = Field(default=0.012, ge=0.0)
     contour_resolution_m: float = Field(default=0.002, gt=0.0)
     mesh_resolution_m: float = Field(default=0.006, gt=0.0)
@@ -60,6 +67,8 @@ class KnownShape:
         origin_height_m: height of the object frame's origin over the table.
         centre_m: middle of the shape's extent, x, y.
         explored: share of the surface that is known, 0..1.
+        surface: what was measured; None where the contacts enclose nothing yet.
+        top_height_m: highest place of it over the table; None where it is not known.
     """
 
     field: Gpis
@@ -67,6 +76,8 @@ class KnownShape:
     origin_height_m: float
     centre_m: Array
     explored: float
+    surface: Surface | None = None
+    top_height_m: float | None = None
 
 
 def known_shape(field: Gpis, dimension: int, origin_height_m: float, settings: ExplorationSettings) -> KnownShape:
@@ -75,12 +86,13 @@ def known_shape(field: Gpis, dimension: int, origin_height_m: float, settings: E
     Where the contacts enclose nothing yet, the object frame's origin stands in for the middle and nothing is explored.
     """
     try:
-        surface = _surface(field, dimension, settings)
+        extracted = _surface(field, dimension, settings)
     except ShapeError:
         return KnownShape(field, dimension, origin_height_m, np.zeros(2), 0.0)
-    points_m = surface.points_m if isinstance(surface, Contour) else surface.vertices
-    centre_m = (points_m[:, :2].min(axis=0) + points_m[:, :2].max(axis=0)) / 2
-    return KnownShape(field, dimension, origin_height_m, centre_m, explored_share(surface))
+    surface = Surface.of(extracted)
+    centre_m = (surface.points_m[:, :2].min(axis=0) + surface.points_m[:, :2].max(axis=0)) / 2
+    top_m = None if dimension == 2 else float(surface.points_m[:, 2].max()) + origin_height_m
+    return KnownShape(field, dimension, origin_height_m, centre_m, explored_share(extracted), surface, top_m)
 
 
 def _surface(field: Gpis, dimension: int, settings: ExplorationSettings) -> Contour | SurfaceMesh:

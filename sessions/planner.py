@@ -11,7 +11,9 @@ from drivers.shadow.closing import Closing, closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.explorer import ExplorationSettings, KnownShape, choose_grasp, known_shape
 from sessions.grasp_cycle import GraspPlan
+from sessions.motion import GraspFrame
 from sessions.next_grasp import FixedRule, PlanSettings, contact_centre
+from sessions.policy_choice import Choice, Knowledge, PolicyChooser
 from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
 from tactile_lab.geometry.poses import planar
 from tactile_lab.shape.gpis import Gpis
@@ -19,6 +21,9 @@ from tactile_lab.slam import TactileSlam
 
 _LANDING_m = 0.020
 """An open fingertip's centre must stay this far from where one has landed on the object."""
+
+_LEAST_BY_POLICY = 2
+"""A policy may be after few contacts; with fewer than that the object is not where it was expected."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,8 @@ class Planner:
         fixed_grasps: so many grasps follow the rule in any case.
         tip: shape of the fingertips.
         dimension: the estimation's, 2 or 3.
+        chooser: the policy that chooses where there is an estimate; None for the reward of equation 4.20 alone.
+        grasps: how many the session may make, for the policy.
     """
 
     def __init__(
@@ -49,6 +56,8 @@ class Planner:
         fixed_grasps: int,
         tip: TipEllipsoid,
         dimension: int,
+        chooser: PolicyChooser | None = None,
+        grasps: int | None = None,
     ) -> None:
         self._slam, self._rule, self._exploration = slam, rule, exploration
         self._fixed_grasps, self._tip, self._dimension = fixed_grasps, tip, dimension
@@ -57,6 +66,11 @@ class Planner:
         self._landings_m: list[Array] = []
         self._by_estimate = False
         self._doubted = False
+        self._chooser, self._grasps = chooser, grasps
+        self._here: GraspFrame | None = None
+        self._carried = False
+        self.choice: Choice | None = None
+        """The policy's decision about the grasp that comes next; None where the policy was not asked."""
 
     @property
     def centre_m(self) -> Array:
@@ -76,10 +90,46 @@ class Planner:
         After a grasp that the estimate had chosen and that missed the object with some fingers, the contacts' own
         word counts for one grasp.
         """
-        trusted = index >= self._fixed_grasps and not self._doubted
+        trusted, self.choice = index >= self._fixed_grasps and not self._doubted, None
+        if trusted and self._chooser is not None:
+            return self._by_policy(index, self._chooser)
         chosen = self._best_by_estimate(index) if trusted else None
         self._by_estimate = chosen is not None
         return replace(chosen or self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
+
+    def vetoed(self, index: int) -> GraspPlan:
+        """Another plan for the same grasp, after a person has refused the last one."""
+        if self.choice is None or self.choice.decision.chosen is None:
+            plan = replace(self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
+            return replace(plan, reason=f"{plan.reason}, as the last was vetoed")
+        self.choice = self.choice.without_chosen()
+        return self._plan_of(self.choice, index)
+
+    def _by_policy(self, index: int, chooser: PolicyChooser) -> GraspPlan:
+        """The policy's choice; the fixed rule where it has none, and where there is nothing to choose by."""
+        knowledge = self._knowledge(index)
+        if knowledge is None:
+            self._by_estimate = False
+            return replace(self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
+        self.choice = chooser.choose(index + 1, knowledge, self._has_room)
+        return self._plan_of(self.choice, index)
+
+    def _plan_of(self, choice: Choice, index: int) -> GraspPlan:
+        plan, self._by_estimate = choice.plan, choice.plan is not None
+        knowledge = self._knowledge(index)
+        if plan is not None and self._chooser is not None and knowledge is not None:
+            self._chooser.decided(choice, knowledge)
+            return plan
+        rule = self._rule.plan(index, self._has_room)
+        return replace(rule, tap=self._rule.taps(index), reason=f"{rule.reason}, as {choice.decision.reason}")
+
+    def _knowledge(self, index: int) -> Knowledge | None:
+        known, expected, covariance = self.known_shape(), self._expected_pose(), self._slam.pose_covariance
+        if known is None or expected is None or covariance is None or self._chooser is None:
+            return None
+        left = None if self._grasps is None else self._grasps - index
+        spread = self._chooser.spread(covariance, self._carried)
+        return Knowledge(known, expected, spread, self._slam.surface_grasps, left, self._here)
 
     def landed(self, points_world_m: list[Array]) -> None:
         """Take note of where fingertips stood on the object; it counts until the object has been moved."""
@@ -115,15 +165,31 @@ class Planner:
 
     def grasped(self, grasp: Grasp, plan: GraspPlan) -> Reorientation:
         """Take note of a captured grasp; how the object should be carried from there."""
-        self._doubted = self._by_estimate and len(grasp.contacts) < self._exploration.least_contacts
-        if grasp.contacts and (self._doubted or not self._by_estimate):
+        least = self._exploration.least_contacts if self._chooser is None else _LEAST_BY_POLICY
+        self._doubted = self._by_estimate and len(grasp.touching) < least
+        if grasp.touching and (self._doubted or not self._by_estimate):
             self._rule.centre_m = contact_centre(grasp, plan)
-        self._hand_motion = Pose3()
-        return Reorientation(self._rule.turn(plan.frame.yaw_rad), self._rule.step_back(self.centre_m))
+        turn_rad = self._turn(grasp, plan)
+        self._hand_motion, self._here = Pose3(), plan.frame
+        return Reorientation(turn_rad, self._rule.step_back(self.centre_m))
+
+    def _turn(self, grasp: Grasp, plan: GraspPlan) -> float:
+        """How far to turn the object: as the policy would have it, where there is one and something to choose by."""
+        turn_rad = self._rule.turn(plan.frame.yaw_rad)
+        if self._chooser is None:
+            return turn_rad
+        self._chooser.grasped(grasp)
+        knowledge = self._knowledge(grasp.index) if grasp.index >= self._fixed_grasps else None
+        return turn_rad if knowledge is None else self._chooser.turn(plan.frame, knowledge, turn_rad)
 
     def carried(self, hand_motion_world: Pose3) -> None:
         """Take note that the hand carried the object since the last grasp."""
         self._hand_motion, self._landings_m = hand_motion_world, []
+        motion = planar(hand_motion_world)
+        self._carried = not hand_motion_world.equals(Pose3(), 1e-9)
+        if self._here is not None:
+            pose = motion * Pose2(self._here.x_m, self._here.y_m, self._here.yaw_rad)
+            self._here = GraspFrame(float(pose.x()), float(pose.y()), float(pose.theta()))
         self._rule.centre_m = np.asarray(planar(hand_motion_world).transformFrom(self.centre_m))
 
     def undone(self, hand_motion_world: Pose3) -> None:

@@ -173,6 +173,10 @@ class Recorder:
         """The grasp that comes next, plain data."""
         self._put_json(schemas.PLAN_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)
 
+    def decision(self, stamp_ns: int, content: Mapping[str, Any]) -> None:
+        """A policy's decision with its candidates and scores, plain data."""
+        self._put_json(schemas.DECISION_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)
+
     def guide(self, stamp_ns: int, content: Mapping[str, Any]) -> None:
         """What the person of a guided session is shown, plain data."""
         self._put_json(schemas.GUIDE_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)

@@ -54,6 +54,7 @@ SLAM_STATE_TOPIC = "/slam/state"
 SLAM_SURFACE_TOPIC = "/slam/surface"
 PLAN_TOPIC = "/plan"
 GUIDE_TOPIC = "/guide"
+DECISION_TOPIC = "/decision"
 TRUTH_POSE_TOPIC = "/truth/object"
 TRUTH_CONTACTS_TOPIC = "/truth/contacts"
 
@@ -110,6 +111,7 @@ SCHEMAS: Mapping[str, Schema] = {
     ),
     PLAN_TOPIC: Schema("tactile_lab.Plan", _FREE),
     GUIDE_TOPIC: Schema("tactile_lab.Guide", _FREE),
+    DECISION_TOPIC: Schema("tactile_lab.Decision", _FREE),
     STREAMS_TOPIC: Schema("tactile_lab.Streams", fields(timestamp=TIME, streams=_FREE)),
     TRUTH_POSE_TOPIC: _POSE_IN_FRAME,
     TRUTH_CONTACTS_TOPIC: Schema("tactile_lab.TruthContacts", fields(timestamp=TIME, contacts=list_of(_FREE))),
