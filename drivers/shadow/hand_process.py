@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from drivers.links import Tap
-from drivers.shadow.first_move import MoveFinding
+from drivers.shadow.first_move import MoveFinding, require_motor_map
 from drivers.shadow.hand_orders import Order, OrderWriter
 from drivers.shadow.hand_records import Record, RecordKind, RecordReader
 from drivers.shadow.hand_setup import HandSetup
@@ -62,12 +62,20 @@ class HandProcess:
         tap: sees all traffic, in :meth:`exchange`; without one :meth:`receive` gives it.
         clock: for waiting on the process; it stamps with the monotonic clock.
         patience_s: see :data:`PATIENCE_s`.
+        check_map: when connecting, nudge each motor to see that it moves the joint its map says.
     """
 
     def __init__(
-        self, setup: HandSetup, tap: Tap | None = None, clock: Clock | None = None, patience_s: float = PATIENCE_s
+        self,
+        setup: HandSetup,
+        tap: Tap | None = None,
+        clock: Clock | None = None,
+        *,
+        patience_s: float = PATIENCE_s,
+        check_map: bool = False,
     ) -> None:
         self.name, self._clock, self._tap = setup.name, clock or MonotonicClock(), tap
+        self._check_map = check_map
         self._start = {"setup": setup.model_dump(mode="json"), "patience_s": patience_s}
         self._process: subprocess.Popen[bytes] | None = None
         self._orders: OrderWriter | None = None
@@ -81,7 +89,7 @@ class HandProcess:
         """Start the process and wait until the hand is connected. All or nothing, repeatable.
 
         Raises:
-            DeviceError: the hand does not connect, in the driver's own words.
+            DeviceError: the hand does not connect, in the driver's own words, or its motor map is wrong.
         """
         if self._process is not None:
             return
@@ -95,6 +103,8 @@ class HandProcess:
         try:
             self._order(self._start)
             self.ready = HandReady(**json.loads(self._wait_for(RecordKind.READY, _START_s).payload))
+            if self._check_map:
+                require_motor_map(self.first_move(), self.name)
         except BaseException:
             self.close()
             raise

@@ -62,7 +62,8 @@ class HandWorker:
         self._pipe, self._orders, self._clock = pipe, orders, clock
         self._cycle_ns, self._patience_ns = cycle_ns, patience_ns
         self._statistics = CycleStatistics()
-        self._told = self._moving_by_itself = self._ended = False
+        self._trouble = ""
+        self._moving_by_itself = self._ended = False
         self._next_ns = self._heard_ns = self._flushed_ns = clock.now_ns()
 
     def run(self) -> None:
@@ -99,14 +100,15 @@ class HandWorker:
             self._flushed_ns = now_ns
 
     def _watch_the_session(self) -> None:
+        """A session that has not moved anything yet may be busy with its other devices."""
         silent_ns = self._clock.now_ns() - self._heard_ns
-        if silent_ns > self._patience_ns and not self._moving_by_itself:
+        if silent_ns > self._patience_ns and self._hand.targets_rad and not self._moving_by_itself:
             self._hand.stop()
             self._tell(f"no order from the session for {silent_ns / NANOSECONDS:.1f} s: demands taken away")
 
     def _tell(self, error: str) -> None:
-        if not self._told:
-            self._told = True
+        if not self._trouble:
+            self._trouble = error
             self._pipe.put(RecordKind.ERROR, self._clock.now_ns(), error.encode())
 
     # --- orders ------------------------------------------------------------------------------------------------
@@ -119,7 +121,7 @@ class HandWorker:
             self._hand.stop()
         if order.get("resume"):
             self._hand.resume()
-            self._told = False
+            self._trouble = ""
         if order.get("report"):
             self._report()
         self._ended = self._ended or bool(order.get("end"))
@@ -149,7 +151,7 @@ class HandWorker:
     def _sound_turn(self) -> HandSample:
         """A cycle of the motor check, which ends with the session or with the hand."""
         if (sample := self._turn()) is None or self._ended:
-            raise DeviceError("stopped while its motors were being checked", where=self._link.name)
+            raise DeviceError(self._trouble or f"{self._link.name}: the check of its motors was broken off")
         return sample
 
     def _answer(self, kind: RecordKind, content: dict[str, object]) -> None:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 PRIORITY = 80
+SESSION_PRIORITY = 20
 
 
 def request_real_time(priority: int = PRIORITY) -> str:
@@ -14,3 +17,21 @@ def request_real_time(priority: int = PRIORITY) -> str:
     except PermissionError:
         return "usual scheduling: no right to SCHED_FIFO (grant it with an rtprio line in limits.conf)"
     return f"SCHED_FIFO, priority {priority}"
+
+
+@contextmanager
+def preferred(priority: int = SESSION_PRIORITY) -> Iterator[str]:
+    """Let the calling thread come before usual programs while the context lasts; gives what came of it, in words.
+
+    For the thread that cycles devices from a program that also computes: threads and processes that it starts
+    meanwhile are scheduled as usual.
+    """
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+    except PermissionError:
+        yield "usual scheduling of the session's cycle"
+        return
+    try:
+        yield f"the session's cycle at SCHED_RR, priority {priority}"
+    finally:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

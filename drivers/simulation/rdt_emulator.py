@@ -13,48 +13,15 @@ from numpy.typing import NDArray
 from drivers.ati import rdt_codec
 from drivers.ati.rdt_codec import RECORD, Command
 from drivers.links import Datagram
-from drivers.simulation.hand_plant import LoadedPlant
+from drivers.simulation.nano_sensors import SHAPE, NanoSensors, six
 from drivers.simulation.plant import Plant
 from drivers.simulation.settings import ForceSensorSettings
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.geometry.contacts import FINGERS, Array
 
-RANGE = np.array([12.0, 12.0, 17.0, 0.12, 0.12, 0.12])
-"""Measuring range of a Nano17 SI-12-0.12, newtons and newton metres."""
-
-RESOLUTION = np.array([1 / 320] * 3 + [1e-3 / 64] * 3)
-"""Its resolution, newtons and newton metres."""
-
 INTERNAL_RATE_Hz = 7000
 _SATURATED = rdt_codec.SATURATION | 1 << 31
 _SOCKET_DATAGRAMS = 5000  # what a receive buffer holds before datagrams are lost
-_SHAPE = (len(FINGERS), 6)
-
-
-class NanoSensors:
-    """The five force sensors: true loads to readings with offset, drift, noise and the sensor's resolution.
-
-    Args:
-        plant: the physics behind the sensors.
-        settings: how large the errors are.
-        rng: where they come from.
-    """
-
-    def __init__(self, plant: LoadedPlant, settings: ForceSensorSettings, rng: np.random.Generator) -> None:
-        self._plant, self._rng = plant, rng
-        self._offset = _six(settings.offset_N, settings.offset_Nm) * rng.standard_normal(_SHAPE)
-        self._keep = float(np.exp(-1 / (settings.rate_hz * settings.drift_time_s)))
-        self._wander = np.sqrt(1 - self._keep**2) * _six(settings.drift_N, settings.drift_Nm)
-        self._drift = _six(settings.drift_N, settings.drift_Nm) * rng.standard_normal(_SHAPE)
-        self._noise = settings.noise_lsb * RESOLUTION
-
-    def read(self) -> tuple[Array, NDArray[np.bool_]]:
-        """One reading: wrenches, shape (5, 6), sensor frames, and which sensors are saturated, shape (5,)."""
-        fresh = self._rng.standard_normal((2, *_SHAPE))
-        self._drift = self._keep * self._drift + self._wander * fresh[0]
-        measured = self._plant.wrenches + self._offset + self._drift + self._noise * fresh[1]
-        inside = np.minimum(np.maximum(measured, -RANGE), RANGE)
-        return np.rint(inside / RESOLUTION) * RESOLUTION, (inside != measured).any(axis=1)
 
 
 class RdtBox:
@@ -113,8 +80,8 @@ class RdtBank:
         self._plant, self._sensors = plant, NanoSensors(plant, settings, rng)
         self._period_ns = NANOSECONDS // settings.rate_hz
         self._next_ns = plant.stamp_ns + self._period_ns
-        self._software_bias = np.zeros(_SHAPE)
-        self._scale = _six(settings.counts_per_N, settings.counts_per_Nm)
+        self._software_bias = np.zeros(SHAPE)
+        self._scale = six(settings.counts_per_N, settings.counts_per_Nm)
 
     @property
     def next_event_ns(self) -> int | None:
@@ -146,7 +113,3 @@ class RdtBank:
         for row, box in enumerate(self.boxes.values()):
             if box.streaming:
                 box.push(records[row * RECORD.itemsize : (row + 1) * RECORD.itemsize], self._plant.stamp_ns)
-
-
-def _six(force: float, moment: float) -> Array:
-    return np.array([force] * 3 + [moment] * 3)

@@ -144,11 +144,7 @@ class SimulatedWorld:
     @property
     def marker_settings(self) -> MarkerSettings:
         """The markers of this rig with this object: a small foot carries a smaller marker, some carry it off-centre."""
-        marker = self.object_model.marker
-        glued = RigidTransform(translation_m=marker.centre_object_m, rpy_rad=(np.pi, 0.0, 0.0))
-        return self.calibration.markers.model_copy(
-            update={"object_side_m": marker.side_m, "object_T_objectmarker": glued}
-        )
+        return marker_settings(self.object_model, self.calibration.markers)
 
     def advance_to(self, deadline_ns: int) -> None:
         """Move the world on to a time of the clock, device by device as their times come."""
@@ -237,3 +233,9 @@ class SimulatedWorld:
             (glued, markers.object_T_objectmarker.pose()),
             self.settings.camera.jpeg_quality,
         )
+
+
+def marker_settings(target: ObjectModel, markers: MarkerSettings) -> MarkerSettings:
+    """A rig's markers with the one that a simulated object carries."""
+    glued = RigidTransform(translation_m=target.marker.centre_object_m, rpy_rad=(np.pi, 0.0, 0.0))
+    return markers.model_copy(update={"object_side_m": target.marker.side_m, "object_T_objectmarker": glued})

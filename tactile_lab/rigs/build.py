@@ -25,8 +25,10 @@ from sessions.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, Interpreter,
 from sessions.perception import Perception
 from sessions.recorder import Recorder
 from tactile_lab.clock import NANOSECONDS, Clock, VirtualClock
+from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import FINGERS
 from tactile_lab.rigs.description import Rig
+from tactile_lab.rigs.wired import force_wire, hand_setup
 from tactile_lab.strict_yaml import load_model
 
 
@@ -38,6 +40,8 @@ def check_calibration(rig: Rig) -> None:
     """
     build_interpreter(rig)
     MotorMap.load(rig.files["motors"])
+    if rig.description.wires is not None:
+        hand_setup(rig).check_files()
     if "camera" in rig.files:
         load_camera(rig.files["camera"])
         load_model(rig.files["markers"], MarkerSettings)
@@ -73,9 +77,9 @@ def build_bench(rig: Rig, world: SimulatedWorld, recorder: Recorder) -> Bench:
         hand=_hand(rig, tapped(HAND_LINK), world.clock),
         base=Positioner(tapped(BASE_LINK), world.clock, description.base),
         observer=observer,
-        wrench_devices={finger: stream(finger, calibration) for finger, calibration in _force_tips(rig).items()},
+        wrench_devices={finger: stream(finger, calibration) for finger, calibration in force_tips(rig).items()},
         camera=Camera(tapped(CAMERA_LINK), world.clock) if "camera" in rig.files else None,
-        fingertip_calibrations=_force_tips(rig),
+        fingertip_calibrations=force_tips(rig),
         truth=world.truth,
     )
 
@@ -83,10 +87,7 @@ def build_bench(rig: Rig, world: SimulatedWorld, recorder: Recorder) -> Bench:
 def build_interpreter(rig: Rig) -> Interpreter:
     """Decoders and a fresh perception: what understands a rig's bytes, live and in replay alike."""
     clock, description = VirtualClock(), rig.description
-    tips = {
-        finger: Nano17(finger, _silent(fingertip_link(finger)), clock, calibration, description.nano17)
-        for finger, calibration in _force_tips(rig).items()
-    }
+    tips = {finger: _decoder(rig, finger, tip, clock) for finger, tip in force_tips(rig).items()}
     forearm = load_forearm(rig.files["forearm"])
     perception = Perception(
         wrench_fingertips=tips,
@@ -114,8 +115,28 @@ def _hand(rig: Rig, link: Link, clock: Clock) -> ShadowHand:
     return ShadowHand(link, clock, joints, settings, motors)
 
 
-def _force_tips(rig: Rig) -> dict[str, FingertipCalibration]:
-    return load_fingertips(rig.files["fingertips"]) if rig.description.fingertips == "nano17" else {}
+def force_tips(rig: Rig) -> dict[str, FingertipCalibration]:
+    """Calibrations of the force fingertips that a rig has, by finger; of those with a wire where it has wires.
+
+    Raises:
+        ConfigurationError: a finger with a wire but without a calibration.
+    """
+    if rig.description.fingertips != "nano17":
+        return {}
+    calibrations = load_fingertips(rig.files["fingertips"])
+    fitted = calibrations if rig.description.wires is None else rig.description.wires.fingertips
+    if missing := sorted(set(fitted) - set(calibrations)):
+        what = f"the fingertip calibration does not name {', '.join(missing)}"
+        raise ConfigurationError(
+            what, where=rig.source, hint="Calibrate the finger, or take it out of wires.fingertips"
+        )
+    return {finger: calibrations[finger] for finger in FINGERS if finger in fitted}
+
+
+def _decoder(rig: Rig, finger: str, calibration: FingertipCalibration, clock: Clock) -> Nano17:
+    """What understands a finger's bytes."""
+    wire = None if rig.description.wires is None else force_wire(rig, finger)
+    return Nano17(finger, _silent(fingertip_link(finger)), clock, calibration, rig.description.nano17, wire)
 
 
 def _biotacs(rig: Rig) -> dict[str, BioTac]:
@@ -130,7 +151,7 @@ def _biotacs(rig: Rig) -> dict[str, BioTac]:
 def _tip_surfaces(rig: Rig) -> dict[str, TipSurface]:
     """What each finger touches with; the usual tip where a BioTac's calibration names no ellipsoid."""
     if rig.description.fingertips == "nano17":
-        tips = _force_tips(rig)
+        tips = force_tips(rig)
         return {finger: TipSurface.upright(tip.semi_axes_m, tip.centre_distal_m) for finger, tip in tips.items()}
     return {finger: _skin(tip) for finger, tip in load_biotacs(rig.files["fingertips"]).items()}
 

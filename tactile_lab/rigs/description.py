@@ -120,6 +120,11 @@ class Rig:
         """What a calibration has to belong to."""
         return Installation(self.description.station or self.description.name, self.description.devices)
 
+    @property
+    def own_calibrations(self) -> dict[str, Path]:
+        """The files that are ours to judge: all but the maker's ``.cal`` files."""
+        return {role: file for role, file in self.files.items() if file.suffix != ".cal"}
+
     def plain(self) -> dict[str, Any]:
         """The description as plain data, the form kept in ``session.yaml``."""
         return self.description.model_dump(mode="json")

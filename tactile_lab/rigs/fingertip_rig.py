@@ -35,7 +35,8 @@ def place_of(wiring: Wiring) -> str:
             return f"local port {wiring.local_port}"
 
 
-def _one_place_each(wires: dict[str, Wiring]) -> dict[str, Wiring]:
+def one_place_each(wires: dict[str, Wiring]) -> dict[str, Wiring]:
+    """Wires of known fingers that all end in places of their own. Raises ValueError."""
     if unknown := sorted(set(wires) - set(FINGERS)):
         raise ValueError(f"unknown finger {', '.join(unknown)}; the fingers are {', '.join(FINGERS)}")
     taken: dict[str, str] = {}
@@ -61,7 +62,7 @@ class FingertipRigDescription(StrictModel):
     kind: Literal["fingertips"]
     calibration: str = Field(min_length=1)
     nano17: Nano17Settings = Nano17Settings()
-    wires: Annotated[dict[str, Wiring], Field(min_length=1), AfterValidator(_one_place_each)]
+    wires: Annotated[dict[str, Wiring], Field(min_length=1), AfterValidator(one_place_each)]
 
 
 @dataclass(frozen=True)

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from calibration.admission import UNCALIBRATED, admit
-from drivers.simulation.world import SimulatedWorld
+from drivers.simulation.objects import ObjectModel
 from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome
 from sessions.manifest import Status
 from sessions.progress import Progress
 from sessions.session import RunningSession, create_session
 from tactile_lab.errors import ConfigurationError, InterruptionError
-from tactile_lab.rigs.build import build_bench, check_calibration, simulated_world
+from tactile_lab.exploration.policies import make_policy
+from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
+from tactile_lab.rigs.laboratory import Laboratory, open_laboratory
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.strict_yaml import validate
 from tactile_lab.tracking.motion import MotionNoise
@@ -30,12 +34,13 @@ class SessionRequest:
 
     Attributes:
         rig: name of a shipped rig, or a rig file.
-        object_name: of the simulated rig's catalogue, or ``mesh:FILE``.
+        object_name: of the simulated rig's catalogue, or ``mesh:FILE``; any name in a real laboratory.
         root: folder in which the session's folder is made.
         method, dimension: of the estimation; how far objects stray is the rig's affair.
         seed: of everything that is left to chance.
         grasps: how many; the rig's own number when None.
         notes: the operator's.
+        policy: name of the exploration policy; the rig's own way of choosing when None.
         allow_uncalibrated: begin though a calibration is missing, expired, failed or foreign; the session records it.
     """
 
@@ -48,6 +53,7 @@ class SessionRequest:
     grasps: int | None = None
     notes: str = ""
     allow_uncalibrated: bool = False
+    policy: str | None = None
 
 
 def slam_settings(method: str, dimension: int, motion: MotionNoise) -> SlamSettings:
@@ -78,27 +84,38 @@ def run_session(request: SessionRequest, progress: Progress, attendance: Attenda
         InterruptionError: a person ended it at once; the session folder is kept and readable.
     """
     refuse_known_pose(request.method)
+    if request.policy is not None:
+        make_policy(request.policy)
     rig = load_rig(request.rig)
     check_calibration(rig)
-    overlooked = admit(rig.files, rig.installation, allow_uncalibrated=request.allow_uncalibrated)
-    world = simulated_world(rig, request.seed, request.object_name)
+    overlooked = admit(rig.own_calibrations, rig.installation, allow_uncalibrated=request.allow_uncalibrated)
     slam = TactileSlam(slam_settings(request.method, request.dimension, rig.description.motion), request.seed)
-    session = _new_session(rig, world, slam, request, overlooked)
-    try:
-        outcome = _record(session, rig, world, slam, request, progress, attendance)
+    progress.phase(0, "connect")
+    with open_laboratory(rig, request.seed, request.object_name) as laboratory:
+        session = _new_session(rig, laboratory, slam, request, overlooked)
+        with _kept_when_interrupted(session):
+            outcome = _record(session, rig, laboratory, slam, request, progress, attendance)
+    with _kept_when_interrupted(session):
         progress.phase(len(outcome.grasps), "model and evaluation")
         estimate_rest(slam, outcome.grasps)
         finished = judge(session, rig, slam, outcome.grasps, session.results)
+    return replace(finished, outcome=outcome, data_loss=session.manifest.data_loss, overlooked=overlooked)
+
+
+@contextmanager
+def _kept_when_interrupted(session: RunningSession) -> Iterator[None]:
+    """Whoever interrupts is told where the recording is. Raises InterruptionError."""
+    try:
+        yield
     except KeyboardInterrupt:
         hint = f"What was recorded is kept: tactile-lab session replay {session.folder}"
         raise InterruptionError("interrupted before it was done", where=str(session.folder), hint=hint) from None
-    return replace(finished, outcome=outcome, data_loss=session.manifest.data_loss, overlooked=overlooked)
 
 
 def _record(
     session: RunningSession,
     rig: Rig,
-    world: SimulatedWorld,
+    laboratory: Laboratory,
     slam: TactileSlam,
     request: SessionRequest,
     progress: Progress,
@@ -106,10 +123,9 @@ def _record(
 ) -> SessionOutcome:
     """Connect, grasp until done, disconnect; the session is closed in any case."""
     with session:
-        progress.phase(0, "connect")
         if attendance.onlooker is not None:
             session.recorder.watched_by(attendance.onlooker)
-        bench = build_bench(rig, world, session.recorder)
+        bench = laboratory.bench(session.recorder)
         bench.connect()
         settings = settings_for(_conductor_settings(rig, request), attendance)
         seed, dimension = request.seed, request.dimension
@@ -123,7 +139,7 @@ def _record(
 
 
 def _new_session(
-    rig: Rig, world: SimulatedWorld, slam: TactileSlam, request: SessionRequest, overlooked: tuple[str, ...]
+    rig: Rig, laboratory: Laboratory, slam: TactileSlam, request: SessionRequest, overlooked: tuple[str, ...]
 ) -> RunningSession:
     return create_session(
         request.root,
@@ -135,23 +151,33 @@ def _new_session(
         settings={
             "slam": slam.settings.model_dump(mode="json"),
             "grasps": _conductor_settings(rig, request).grasps,
-            "markers": world.marker_settings.model_dump(mode="json"),
+            **_policy(rig, request),
+            "markers": laboratory.markers.model_dump(mode="json"),
             **({UNCALIBRATED: list(overlooked)} if overlooked else {}),
         },
         notes=request.notes,
-        truth_mesh_ply=_ply(world),
+        truth_mesh_ply=None if laboratory.target is None else _ply(laboratory.target),
     )
 
 
-def _ply(world: SimulatedWorld) -> bytes:
-    text = world.object_model.mesh.export(file_type="ply")
+def _policy(rig: Rig, request: SessionRequest) -> dict[str, str]:
+    """The policy by name, for the session's record."""
+    policy = _conductor_settings(rig, request).exploration.policy
+    return {} if policy is None else {"policy": policy}
+
+
+def _ply(target: ObjectModel) -> bytes:
+    text = target.mesh.export(file_type="ply")
     assert isinstance(text, bytes)
     return text
 
 
 def _conductor_settings(rig: Rig, request: SessionRequest) -> ConductorSettings:
-    changes = {} if request.grasps is None else {"grasps": request.grasps}
-    return rig.description.conductor.model_copy(update=changes)
+    settings = rig.description.conductor
+    changes: dict[str, Any] = {} if request.grasps is None else {"grasps": request.grasps}
+    if request.policy is not None:
+        changes["exploration"] = settings.exploration.model_copy(update={"policy": request.policy})
+    return settings.model_copy(update=changes)
 
 
 def _close(session: RunningSession, outcome: SessionOutcome, overruns: int, undecodable: Mapping[str, int]) -> None:

@@ -14,7 +14,7 @@ from drivers.emulators.ati_sensor import EmulatedSensor, emulated_calibration
 from drivers.emulators.net_box_server import NetBoxServer
 from drivers.emulators.net_box_unit import NetBoxUnit
 from drivers.emulators.wired.plant_mirror import PlantMirror
-from drivers.simulation.rdt_emulator import NanoSensors
+from drivers.simulation.nano_sensors import NanoSensors
 from drivers.simulation.settings import ForceSensorSettings
 from tactile_lab.clock import Clock
 from tactile_lab.errors import DeviceError

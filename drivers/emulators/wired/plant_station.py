@@ -8,10 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from drivers.emulators.wired.plant_mirror import PlantMirror
+from drivers.shadow.real_time import request_real_time
 from drivers.simulation.plant import Plant, STEP_ns
 from drivers.simulation.settings import SimulationSettings
 from drivers.simulation.world import SimulatedWorld
 from tactile_lab.clock import Clock
+
+PRIORITY = 70
+"""Where permitted the physics comes before whatever else the machine does, but after the hand's frames."""
 
 _LONGEST_ns = 100_000_000
 """A delay that the physics makes up for; of a longer one the rest is left out, and counted."""
@@ -34,6 +38,7 @@ class PlantStation:
 
     def serve(self) -> None:
         """Step until standard input ends."""
+        request_real_time(PRIORITY)
         behind_ns, turns = self._clock.now_ns() - self._plant.stamp_ns, 0
         while turns % _LOOK_EVERY or not select.select([sys.stdin], [], [], 0)[0]:
             behind_ns += self._catch_up(self._clock.now_ns() - behind_ns)

@@ -11,10 +11,13 @@ import json
 import sys
 from typing import Any, Protocol
 
+from drivers.shadow.real_time import request_real_time
 from tactile_lab.clock import MonotonicClock
 from tactile_lab.errors import TactileLabError
 
 ROLES = ("plant", "hand", "box", "base", "camera")
+PRIORITY = 60
+"""Where permitted, devices come before whatever else the machine does: real ones are never late."""
 
 
 class Station(Protocol):
@@ -35,6 +38,7 @@ def main() -> None:
     start: dict[str, Any] = json.loads(sys.stdin.readline())
     try:
         station = _made(start.pop("role"), start)
+        request_real_time(PRIORITY)
         say({"ready": True})
         station.serve()
     except TactileLabError as error:

@@ -1,0 +1,104 @@
+"""Where a session happens: a simulated world in this program, devices on wires, or stand-ins for those."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Protocol
+
+from drivers.camera.markers import MarkerSettings
+from drivers.emulators.wired.stand_ins import StandIns
+from drivers.shadow.real_time import preferred
+from drivers.simulation.mesh_object import MESH_PREFIX
+from drivers.simulation.objects import CATALOGUE, ObjectModel, object_model
+from drivers.simulation.world import SimulatedWorld, marker_settings
+from sessions.bench import Bench
+from sessions.recorder import Recorder
+from tactile_lab.clock import Clock, MonotonicClock
+from tactile_lab.rigs.build import build_bench, simulated_world
+from tactile_lab.rigs.description import Rig
+from tactile_lab.rigs.wired import stand_in_plan
+from tactile_lab.rigs.wired_bench import build_wired_bench
+from tactile_lab.strict_yaml import load_model
+
+
+class Laboratory(Protocol):
+    """A place with devices.
+
+    Attributes:
+        markers: of the rig with this object, for the truth.
+        target: the object, where its shape is known.
+    """
+
+    @property
+    def markers(self) -> MarkerSettings: ...
+    @property
+    def target(self) -> ObjectModel | None: ...
+
+    def bench(self, recorder: Recorder) -> Bench:
+        """Its devices, not yet connected."""
+
+
+@dataclass(frozen=True)
+class SimulatedLaboratory:
+    """A world in this program, in time of its own."""
+
+    rig: Rig
+    world: SimulatedWorld
+
+    @property
+    def markers(self) -> MarkerSettings:
+        return self.world.marker_settings
+
+    @property
+    def target(self) -> ObjectModel:
+        return self.world.object_model
+
+    def bench(self, recorder: Recorder) -> Bench:
+        """See :class:`Laboratory`."""
+        return build_bench(self.rig, self.world, recorder)
+
+
+@dataclass(frozen=True)
+class WiredLaboratory:
+    """Devices on wires, or their stand-ins, in real time."""
+
+    rig: Rig
+    clock: Clock
+    markers: MarkerSettings
+    target: ObjectModel | None = None
+    stand_ins: StandIns | None = None
+
+    def bench(self, recorder: Recorder) -> Bench:
+        """See :class:`Laboratory`."""
+        truth = None if self.stand_ins is None else self.stand_ins.truth
+        return build_wired_bench(self.rig, recorder, self.clock, truth=truth)
+
+
+@contextmanager
+def open_laboratory(rig: Rig, seed: int, object_name: str) -> Iterator[SimulatedLaboratory | WiredLaboratory]:
+    """The laboratory of a rig with an object on its table; stand-ins run while the context lasts.
+
+    A real laboratory takes any name for its object. That of the catalogue, or of a mesh, tells its true shape.
+
+    Raises:
+        ConfigurationError: no such object in a simulation, or stand-ins that this program does not have.
+        ShapeError: the object's mesh can not be used.
+        DeviceError: a stand-in can not be started.
+    """
+    if rig.description.kind == "simulated":
+        yield SimulatedLaboratory(rig, simulated_world(rig, seed, object_name))
+    elif rig.description.stand_ins:
+        target, clock = object_model(object_name), MonotonicClock()
+        with StandIns(stand_in_plan(rig, seed, object_name), clock) as stand_ins, preferred():
+            yield WiredLaboratory(rig, clock, marker_settings(target, _markers(rig)), target, stand_ins)
+    else:
+        known = object_name in CATALOGUE or object_name.startswith(MESH_PREFIX)
+        target_or_none = object_model(object_name) if known else None
+        with preferred():
+            yield WiredLaboratory(rig, MonotonicClock(), _markers(rig), target_or_none)
+
+
+def _markers(rig: Rig) -> MarkerSettings:
+    return load_model(rig.files["markers"], MarkerSettings) if "markers" in rig.files else MarkerSettings()

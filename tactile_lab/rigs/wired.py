@@ -1,0 +1,96 @@
+"""Devices on wires: how they are reached and decoded, in a real laboratory or in one that this program emulates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from drivers.ati.wire import ForceWire
+from drivers.ati.wiring import NetBoxWiring, VoltsWiring, Wiring, make_wire
+from drivers.emulators.wired.stand_ins import SERIAL, HandPlace, StandInPlan
+from drivers.shadow.hand_setup import HandSetup
+from sessions.interpreter import HAND_LINK
+from tactile_lab.errors import CodecError, ConfigurationError
+from tactile_lab.rigs.description import Rig, gauge_role
+from tactile_lab.rigs.wires import Wires
+
+
+def wires_of(rig: Rig) -> Wires:
+    """A wired rig's wires."""
+    assert rig.description.wires is not None
+    return rig.description.wires
+
+
+def hand_setup(rig: Rig) -> HandSetup:
+    """The hand of a rig on wires."""
+    description, files, wiring = rig.description, rig.files, wires_of(rig).hand
+    tactile = "biotac" if description.fingertips == "biotac" else "none"
+    return HandSetup(
+        name=HAND_LINK,
+        ethercat=wiring.ethercat,
+        master=wiring.master,
+        hand=description.hand.model_copy(update={"tactile": tactile}),
+        joints=files["joints"].resolve(),
+        motors=files["motors"].resolve(),
+        boards=_whole(files.get("boards")),
+        rates=_whole(files.get("rates")),
+    )
+
+
+def force_wire(rig: Rig, finger: str) -> ForceWire:
+    """How a finger's readings are decoded, live and in a replay.
+
+    Raises:
+        ConfigurationError: a calibration file that the wire names can not be used.
+    """
+    wiring: Wiring = wires_of(rig).fingertips[finger]
+    if isinstance(wiring, VoltsWiring):
+        wiring = wiring.model_copy(update={"calibration": str(rig.files[gauge_role(finger)].resolve())})
+    try:
+        return make_wire(wiring, Path())
+    except CodecError as error:
+        where = f"{rig.source}: wires.fingertips.{finger}"
+        raise ConfigurationError(error.what, where=where, hint=error.hint) from error
+
+
+def stand_in_plan(rig: Rig, seed: int, object_name: str) -> StandInPlan:
+    """What has to be emulated for a rig with stand-ins.
+
+    Raises:
+        ConfigurationError: a wire on which the simulated plant has no emulator.
+    """
+    wires, description = wires_of(rig), rig.description
+    changes = {"object": object_name, "fingertips": description.fingertips}
+    return StandInPlan(
+        simulation=description.simulation.model_copy(update=changes),
+        seed=seed,
+        hand=_hand_place(rig),
+        base=(wires.base.host, wires.base.port),
+        boxes={finger: _box(rig, finger, wiring) for finger, wiring in wires.fingertips.items()},
+        camera=None if wires.camera is None else (wires.camera.host, wires.camera.port),
+    )
+
+
+def _hand_place(rig: Rig) -> HandPlace:
+    wiring = wires_of(rig).hand
+    if rig.description.fingertips != "nano17" or wiring.far_end is None:
+        what = "stand-ins need nano17 fingertips and wires.hand.far_end"
+        raise ConfigurationError(what, where=rig.source, hint="See the shipped sim-wire rig")
+    return HandPlace(
+        near=wiring.ethercat.interface,
+        far=wiring.far_end,
+        joints=rig.files["joints"].resolve(),
+        motors=rig.files["motors"].resolve(),
+        palm=rig.description.hand.palm,
+        serial=SERIAL if wiring.ethercat.serial is None else wiring.ethercat.serial,
+    )
+
+
+def _box(rig: Rig, finger: str, wiring: Wiring) -> NetBoxWiring:
+    if not isinstance(wiring, NetBoxWiring):
+        where = f"{rig.source}: wires.fingertips.{finger}"
+        raise ConfigurationError("the simulated plant feeds net-ft wires alone", where=where, hint="Use wire: net-ft")
+    return wiring
+
+
+def _whole(path: Path | None) -> Path | None:
+    return None if path is None else path.resolve()

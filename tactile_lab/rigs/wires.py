@@ -1,0 +1,64 @@
+"""How a rig file says where each device of a laboratory is plugged in."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from drivers.ati.wiring import Port, Wiring
+from drivers.shadow.ethercat_link import EthercatSettings
+from drivers.shadow.hand_setup import Master
+from tactile_lab.rigs.fingertip_rig import one_place_each
+from tactile_lab.strict_yaml import StrictModel
+
+FingertipWires = Annotated[dict[str, Wiring], AfterValidator(one_place_each)]
+
+
+class HandWiring(StrictModel):
+    """The hand on its EtherCAT cable.
+
+    Attributes:
+        ethercat: how it is reached.
+        master: our own EtherCAT master, or ``pysoem`` (the ``[ethercat]`` extra).
+        far_end: for stand-ins: the network interface at the other end of a virtual cable.
+        first_move: before a session nudge each motor, to see that it moves the joint its map says.
+        patience_s: without a sign of life from the session for so long the hand's process takes the demands away.
+    """
+
+    ethercat: EthercatSettings
+    master: Master = "own"
+    far_end: str | None = None
+    first_move: bool = True
+    patience_s: float = Field(default=2.0, gt=0.0, le=10.0)
+
+
+class BaseWiring(StrictModel):
+    """The program that moves the positioner, spoken to in datagrams of 52 bytes (docs/real-laboratory.md)."""
+
+    wire: Literal["udp"]
+    host: str = Field(min_length=1)
+    port: Port
+
+
+class CameraWiring(StrictModel):
+    """The program that takes the pictures: messages behind their length on a TCP connection."""
+
+    wire: Literal["tcp"]
+    host: str = Field(min_length=1)
+    port: Port
+
+
+class Wires(StrictModel):
+    """All wires of a laboratory.
+
+    Attributes:
+        hand, base: always there.
+        fingertips: of force fingertips, finger to wire; none where the palm carries the fingertips' data.
+        camera: left out for a rig without one.
+    """
+
+    hand: HandWiring
+    base: BaseWiring
+    fingertips: FingertipWires = Field(default_factory=dict)
+    camera: CameraWiring | None = None
