@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
+import ipaddress
 import socket
-import struct
-import sys
 import time
 
+import numpy as np
+
+from drivers.hardware.batches import SO_RXQ_OVFL, SO_TIMESTAMPNS, Batch, BatchReceiver, can_batch
 from drivers.links import Datagram
 from tactile_lab.clock import Clock
 from tactile_lab.errors import DeviceError
 
-SO_TIMESTAMPNS = 35
-"""Linux: the kernel's stamp of each datagram, two 64-bit words (seconds and nanoseconds of the wall clock)."""
-
-SO_RXQ_OVFL = 40
-"""Linux: with each datagram the number of datagrams this socket has dropped so far, 32 bits."""
-
-_STAMP, _DROPS = struct.Struct("@qq"), struct.Struct("@I")
 _LARGEST = 65536
-_ANCILLARY = socket.CMSG_SPACE(_STAMP.size) + socket.CMSG_SPACE(_DROPS.size)
-_AT_ONCE = 20_000  # a flood must not hold the caller
+_BATCHES = 160  # a flood must not hold the caller
 
 
 class UdpLink:
@@ -56,6 +50,7 @@ class UdpLink:
         self._host, self._port, self._clock = host, port, clock
         self._local, self._buffer = local, receive_buffer
         self._socket: socket.socket | None = None
+        self._batches: BatchReceiver | None = None
         self._address: tuple[str, int] = (host, port)
         self._newest_ns = 0
 
@@ -73,8 +68,8 @@ class UdpLink:
             made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             made.setblocking(False)
             made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, self._buffer)
-            self.kernel_stamps = sys.platform == "linux" and _enabled(made, SO_TIMESTAMPNS)
-            if sys.platform == "linux":
+            self.kernel_stamps = can_batch() and _enabled(made, SO_TIMESTAMPNS)
+            if can_batch():
                 _enabled(made, SO_RXQ_OVFL)
             made.bind(self._local)
         except OSError as error:
@@ -82,13 +77,14 @@ class UdpLink:
                 made.close()
             raise self._failure(f"no UDP socket to {self._host}:{self._port} ({error.strerror or error})") from error
         self._socket, self._newest_ns = made, self._clock.now_ns()
+        self._batches = BatchReceiver(made) if can_batch() else None
         self.foreign = self.dropped = 0
 
     def close(self) -> None:
         """Close the socket; idempotent."""
         if self._socket is not None:
             self._socket.close()
-            self._socket = None
+            self._socket = self._batches = None
 
     def send(self, payload: bytes) -> None:
         """Send one datagram. Raises DeviceError when the network refuses it."""
@@ -99,20 +95,16 @@ class UdpLink:
 
     def receive(self) -> list[Datagram]:
         """All datagrams of the device that wait, oldest first, never blocking. Raises DeviceError."""
-        wire, taken = self._open_socket(), []
+        wire, taken = self._open_socket(), list[Datagram]()
         behind_ns = _wall_offset_ns(self._clock)
-        for _ in range(_AT_ONCE):
+        for _ in range(_BATCHES):
             try:
-                payload, ancillary, _, source = wire.recvmsg(_LARGEST, _ANCILLARY)
-            except BlockingIOError:
-                break
+                batch = self._batches.receive() if self._batches else _singly(wire)
             except OSError as error:
                 raise self._failure(f"lost {self._host}:{self._port} ({error.strerror})") from error
-            stamp_ns = self._stamp(ancillary, behind_ns)
-            if source[0] == self._address[0] and source[1] == (self._address[1] or source[1]):
-                taken.append(Datagram(payload, stamp_ns))
-            else:
-                self.foreign += 1
+            if not batch.payloads:
+                break
+            taken += self._taken(batch, behind_ns)
         return taken
 
     def health(self) -> tuple[str, ...]:
@@ -124,20 +116,24 @@ class UdpLink:
             found.append(f"{self.dropped} datagrams dropped by the kernel: the program reads too slowly")
         return tuple(found)
 
-    def _stamp(self, ancillary: list[tuple[int, int, bytes]], behind_ns: int) -> int:
-        """Arrival on the session's clock: never in the future, never before the one before it.
+    def _taken(self, batch: Batch, behind_ns: int) -> list[Datagram]:
+        """The device's own of a batch, stamped on the session's clock: never in the future, never going back.
 
         The bounds hold the error of a wall clock that was set between arrival and reading.
         """
-        stamp_ns = now_ns = self._clock.now_ns()
-        for _, kind, data in ancillary:
-            if kind == SO_TIMESTAMPNS:
-                seconds, nanoseconds = _STAMP.unpack(data)
-                stamp_ns = seconds * 1_000_000_000 + nanoseconds - behind_ns
-            elif kind == SO_RXQ_OVFL:
-                (self.dropped,) = _DROPS.unpack(data)
-        self._newest_ns = max(self._newest_ns, min(stamp_ns, now_ns))
-        return self._newest_ns
+        self.dropped = self.dropped if batch.drops is None else batch.drops
+        now_ns = self._clock.now_ns()
+        stamps_ns = np.where(batch.walls_ns > 0, np.minimum(batch.walls_ns - behind_ns, now_ns), now_ns)
+        stamps_ns = np.maximum(np.maximum.accumulate(stamps_ns), self._newest_ns)
+        self._newest_ns = int(stamps_ns[-1])
+        host, port = int(ipaddress.IPv4Address(self._address[0])), self._address[1]
+        ours = batch.hosts == host
+        if port:
+            ours &= batch.ports == port
+        if ours.all():
+            return list(map(Datagram, batch.payloads, stamps_ns.tolist()))
+        self.foreign += int((~ours).sum())
+        return [Datagram(batch.payloads[row], int(stamps_ns[row])) for row in np.flatnonzero(ours)]
 
     def _open_socket(self) -> socket.socket:
         if self._socket is None:
@@ -146,6 +142,18 @@ class UdpLink:
 
     def _failure(self, what: str) -> DeviceError:
         return DeviceError(what, where=self.name, hint="Check address, cable and the network card's settings")
+
+
+def _singly(wire: socket.socket) -> Batch:
+    """The next datagram alone, without a stamp of the kernel; for systems without batches. Raises OSError."""
+    try:
+        payload, (host, port) = wire.recvfrom(_LARGEST)
+    except BlockingIOError:
+        payload, host, port = b"", "0.0.0.0", -1
+    payloads = [] if port < 0 else [payload]
+    rows = len(payloads)
+    hosts = np.full(rows, int(ipaddress.IPv4Address(host)), np.uint32)
+    return Batch(payloads, np.zeros(rows, np.int64), hosts, np.full(rows, max(port, 0), np.uint16), None)
 
 
 def _enabled(made: socket.socket, option: int) -> bool:
