@@ -131,6 +131,11 @@ class RunningSession(Session):
         )
         self.recorder = Recorder(self._traffic)
 
+    @property
+    def traffic_sink(self) -> TrafficWriter:
+        """Where its recorder writes."""
+        return self._traffic
+
     def settle(self) -> None:
         """Wait until everything that was handed over to the disk is written, or can not be."""
         self._traffic.settle()

@@ -16,7 +16,7 @@ import errno
 import json
 import threading
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -53,6 +53,7 @@ class TrafficSettings:
             chunks and counts their messages, for real time.
         patience_s: how long "wait" waits before the recording ends with an error.
         tell_streams: whether to write once a second what was lost so far; not for a copy of a recording.
+        open_file: makes the files; another one than usual tries out what a bad disk does.
     """
 
     segment_bytes: int = 1 << 30
@@ -60,6 +61,7 @@ class TrafficSettings:
     when_full: Literal["wait", "drop"] = "wait"
     patience_s: float = CLOSE_TIMEOUT_s
     tell_streams: bool = True
+    open_file: Callable[[Path], CutBackFile] = CutBackFile
 
 
 @dataclass(frozen=True)
@@ -263,7 +265,7 @@ class TrafficWriter:
     def _make_segment(self) -> Segment:
         number = len(self._files) + 1
         path = segment_path(self.path, number)
-        file = CutBackFile(path)
+        file = self._settings.open_file(path)
         try:
             writer = McapWriter(file, None, PROFILE, f"tactile-lab {version('tactile-lab')}")
             writer.add_metadata(PROFILE, {**self._info, "segment": str(number), "format": FORMAT})

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from tactile_lab.errors import ConfigurationError
-from tactile_lab.experiments import graph_runs, shape_runs, tracking_runs
+from tactile_lab.experiments import crash_runs, exploration_runs, graph_runs, shape_runs, tracking_runs
 from tactile_lab.experiments.cells import Cell, Row, Setting, Value, Work, grid, planned_cells
 from tactile_lab.experiments.graph_stress import stock_solvers
 from tactile_lab.experiments.plots import CurvePanel, RangePanel, curve_of, curves_svg, ranges_svg
@@ -42,6 +42,15 @@ AGAINST_KNOWN = Column("Hausdorff, mm", "hausdorff_mm", 2, versus=True)
 TRACKING_COLUMNS = (AGAINST_KNOWN, MEAN_DISTANCE, REGISTRATION, COVERED, STEP, FINISH)
 SHAPE_COLUMNS = (HAUSDORFF, Column("mean Hausdorff, mm", "hausdorff_mm", 1, kind="mean"), MEAN_DISTANCE, COVERED)
 
+EXPLORATION_COLUMNS = (
+    Column("actions by B", "actions_B", 1, kind="estimate"),
+    Column("actions by A", "actions_A", 1, kind="estimate"),
+    Column("by B: median / p90 / max", "actions_B", 0),
+    Column("by A: median / p90 / max", "actions_A", 0),
+    Column("decision, ms: median / p95", "decision_ms", 0, kind="pooled"),
+    Column("correlation of promised and realised share", "promises", 2, kind="correlation"),
+)
+_ACTIONS_LABEL = "actions until 90 % of the contour is explored (definition B)"
 _HAUSDORFF_LABEL = "Hausdorff at best fit, mm"
 
 Plot: TypeAlias = Callable[[str, Sequence[Row]], str]
@@ -334,6 +343,22 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             grasps=PLANAR_GRASPS,
         ),
         Experiment(
+            "table-4.2",
+            "Thesis, table 4.2: actions until 90 % of a fixed rectangle's contour is explored, policies and bounds.",
+            exploration_runs.fixed_settings,
+            exploration_runs.explore_fixed,
+            EXPLORATION_COLUMNS,
+            _ranges("policy", _ACTIONS_LABEL, "actions_B", lambda cell: f"{cell['candidates']} candidates", columns=1),
+        ),
+        Experiment(
+            "table-4.3",
+            "Thesis, table 4.3: the same of a rectangle that every grasp pushes aside, at full motion noise.",
+            exploration_runs.moving_settings,
+            exploration_runs.explore_moving,
+            (*EXPLORATION_COLUMNS, REGISTRATION),
+            _ranges("policy", _ACTIONS_LABEL, "actions_B", lambda cell: f"followed by {cell['tracking']}", columns=1),
+        ),
+        Experiment(
             "graph-stress",
             "Pose graphs of 50 grasps with 20 % wrong loops: gtsam's solvers, ours, and one told which are right.",
             lambda grasps: grid(solver=[*stock_solvers(), graph_runs.OUR_SOLVER]),
@@ -347,6 +372,24 @@ EXPERIMENTS: Mapping[str, Experiment] = {
                 Column("right ones refused", "right_refused", 0, kind="sum"),
             ),
             _ranges("solver", "position error, mm", "error_mm", lambda cell: "50 grasps, 20 % wrong loops", columns=1),
+        ),
+        Experiment(
+            "crash-recovery",
+            "Accidents of a recording at full load, at a random instant: what is lost of it.",
+            lambda grasps: grid(fault=crash_runs.faults_here()),
+            crash_runs.crash_and_recover,
+            (
+                Column("messages recovered", "recovered", 0),
+                Column("messages lost", "lost", 0),
+                Column("lost before the end, ms", "lost_ms", 0),
+                Column("of the hand, ms", "hand_ms", 0),
+                Column("of force sensors, ms", "ft_ms", 0),
+                Column("of pictures, ms", "camera_ms", 0),
+                Column("longest write, ms", "write_ms", 1),
+                Column("late messages", "late", 0, kind="median"),
+            ),
+            _ranges("fault", "lost at the end, ms", "lost_ms", lambda cell: "full load", columns=1),
+            left_out=crash_runs.needs_root,
         ),
     )
 }

@@ -1,0 +1,30 @@
+"""Reading a device's own counter and clock out of its messages, without decoding the rest."""
+
+from __future__ import annotations
+
+import struct
+
+from sessions.raw_frames import UNSTAMPED, DeviceStamp
+
+RDT_RECORD_BYTES = 36
+RDT_CLOCK_ns = 1_000_000_000 // 7000
+"""A Net F/T box counts its measurements at 7 kHz (protocols C.1)."""
+
+_RDT_HEAD = struct.Struct(">II")
+_POSITIONER_HEAD = struct.Struct("<I")
+POSITIONER_STATUS_BYTES = 52
+
+
+def rdt_stamp(payload: bytes) -> DeviceStamp:
+    """RDT records of a Net F/T box: number of the first one sent, and the box's count of measurements as time."""
+    if not payload or len(payload) % RDT_RECORD_BYTES:
+        return UNSTAMPED
+    sent, measured = _RDT_HEAD.unpack_from(payload)
+    return DeviceStamp(sent, measured * RDT_CLOCK_ns, len(payload) // RDT_RECORD_BYTES)
+
+
+def positioner_stamp(payload: bytes) -> DeviceStamp:
+    """A status of the positioner: the number of the command it answers."""
+    if len(payload) != POSITIONER_STATUS_BYTES:
+        return UNSTAMPED
+    return DeviceStamp(_POSITIONER_HEAD.unpack_from(payload)[0])
