@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from drivers.camera.packet import picture_of
 from drivers.links import Datagram
 from sessions.instruments import BaseReading, Decoder, FrameReading, HandReading
 from sessions.marks import Mark
@@ -114,8 +115,8 @@ class Observer:
         """A device sent."""
         if not self.recorder.broken:
             self.recorder.received(link, payload, stamp_ns)
-            if link == CAMERA_LINK:
-                self.recorder.image(stamp_ns, payload)
+            if link == CAMERA_LINK and (picture := picture_of(payload)):
+                self.recorder.image(stamp_ns, picture)
         self.interpreter.received(link, payload, stamp_ns)
 
     def mark(self, mark: Mark) -> Outcome | None:

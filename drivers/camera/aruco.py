@@ -2,9 +2,10 @@
 
 The world marker, which does not move, is averaged over frames and gives the camera's pose. The object's marker lies on
 the table, so that only its place and its turn are free: the rays through its corners are cut with the plane in which
-the marker lies, and the square is laid into the four points. Unlike the pose of a single square (both IPPE solutions
-are given for comparison) this can not flip. The sideways shift of rays in the table's glass is taken into account for
-both markers.
+the marker lies, and the square is laid into the four points; from there all corners are fitted together. Unlike the
+pose of a single square (both IPPE solutions are given beside it) this can not flip. The sideways shift of rays in the
+table's glass is taken into account for both markers. What a picture can not tell for certain it does not tell: the
+reason is given instead of a pose.
 """
 
 from __future__ import annotations
@@ -15,22 +16,24 @@ import numpy as np
 from gtsam import Pose3, Rot3
 
 from drivers.camera.calibration import CameraCalibration
-from drivers.camera.frames import Frame
-from drivers.camera.glass import Glass
+from drivers.camera.frames import Detection, Frame
+from drivers.camera.joint_pose import Corners, JointPose, solve_jointly
 from drivers.camera.markers import (
     MarkerPose,
     MarkerSettings,
-    detect,
-    marker_corners,
+    detection,
     marker_poses,
     points_reprojection_px,
     refine_pose,
 )
+from drivers.camera.world_marker import WorldMarker, table_glass
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import rotate, transform_points
 
 FACE_DOWN = Pose3(Rot3(np.diag([1.0, -1.0, -1.0])), np.zeros(3))
 """A marker seen from below: its z points down."""
+_MEAN_FLOOR_px = 0.02
+"""What averaging does not remove from the world marker's corners."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,83 +42,36 @@ class ObjectSighting:
 
     Attributes:
         stamp_ns: arrival of the frame.
-        world_T_object: its pose, constrained to the table.
-        position_sigma_m, yaw_sigma_rad: standard deviations, per axis in the plane and about the vertical.
+        world_T_object: its pose, constrained to the table unless the settings set it free.
+        covariance: of x, y (m) and yaw (rad), shape (3, 3), world axes; of a free object shape (6, 6), rotation first.
+        position_sigma_m, yaw_sigma_rad: standard deviations, the larger one in the plane and about the vertical.
         fit_rms_m: how badly the square fits the four points on the table; large when the object is tilted or lifted.
         ambiguous: whether the marker on its own would allow two poses.
         unconstrained: the one or two poses of the object from its marker alone, better first.
+        reprojection_px: error of each of these.
         object_corners_px, world_corners_px: corners used, shape (4, 2); the world's are means over frames.
     """
 
     stamp_ns: int
     world_T_object: Pose3
+    covariance: Array
     position_sigma_m: float
     yaw_sigma_rad: float
     fit_rms_m: float
     ambiguous: bool
     unconstrained: tuple[Pose3, ...]
+    reprojection_px: tuple[float, ...]
     object_corners_px: Array
     world_corners_px: Array
 
 
-class WorldMarker:
-    """The camera's pose from the world marker, its corners averaged for as long as it does not move."""
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What came of one frame: a sighting, or the reason why there is none."""
 
-    def __init__(self, camera: CameraCalibration, settings: MarkerSettings) -> None:
-        self._camera, self._settings = camera, settings
-        self._corners_px: Array | None = None
-        self._count = 0
-
-    @property
-    def frames(self) -> int:
-        """Frames in the mean."""
-        return self._count
-
-    @property
-    def corners_px(self) -> Array | None:
-        """Mean corners, shape (4, 2); None before the first sight."""
-        return self._corners_px
-
-    def add(self, corners_px: Array) -> None:
-        """Take the marker's corners in one more frame; a jump begins a new mean."""
-        mean = self._corners_px
-        if mean is None or np.abs(corners_px - mean).max() > self._settings.moved_px:
-            self._corners_px, self._count = np.array(corners_px), 1
-            return
-        self._count += 1
-        self._corners_px = mean + (corners_px - mean) / self._count
-
-    def camera_T_world(self) -> Pose3 | None:
-        """The world in the camera's frame; None before the first sight.
-
-        Of the two poses a square allows the better one is taken, then refined twice: once to know from where the
-        camera looks through the glass, once with the corners where they seem to be.
-        """
-        if self._corners_px is None:
-            return None
-        guess = marker_poses(self._corners_px, self._settings.world_side_m, self._camera)[0].camera_T_marker
-        pose = guess * self._settings.world_T_worldmarker.pose().inverse()
-        for _ in range(2):
-            pose = refine_pose(pose, self._apparent_corners_m(pose), self._corners_px, self._camera)
-        return pose
-
-    def reprojection_px(self) -> float:
-        """Root mean square reprojection error of the mean corners, pixels; NaN before the first sight."""
-        pose = self.camera_T_world()
-        if pose is None or self._corners_px is None:
-            return float("nan")
-        return points_reprojection_px(pose, self._apparent_corners_m(pose), self._corners_px, self._camera)
-
-    def _apparent_corners_m(self, camera_T_world: Pose3) -> Array:
-        corners = transform_points(
-            self._settings.world_T_worldmarker.pose(), marker_corners(self._settings.world_side_m)
-        )
-        return table_glass(self._settings).apparent(corners, np.array(camera_T_world.inverse().translation()))
-
-
-def table_glass(settings: MarkerSettings) -> Glass:
-    """The plate the settings describe."""
-    return Glass(settings.glass_thickness_m, settings.glass_index)
+    stamp_ns: int
+    sighting: ObjectSighting | None
+    problem: str = ""
 
 
 class ObjectTracker:
@@ -127,12 +83,33 @@ class ObjectTracker:
         self._object_T_marker = settings.object_T_objectmarker.pose()
 
     def object_pose(self, frame: Frame) -> ObjectSighting | None:
-        """Where the object is in this frame; None when its marker is not seen, or the world marker never was."""
-        seen = detect(frame.image, self._settings.dictionary)
-        if self._settings.world_id in seen:
-            self.world.add(seen[self._settings.world_id])
-        corners_px = seen.get(self._settings.object_id)
-        return None if corners_px is None else self.sighting(frame.stamp_ns, corners_px)
+        """Where the object is in this frame; None where that can not be told, see :meth:`observe`."""
+        return self.observe(frame).sighting
+
+    def observe(self, frame: Frame) -> Observation:
+        """Take one frame: the world marker joins its mean, and the object is found, or the reason is told."""
+        found = found_in(frame, self._settings.dictionary)
+        return self.locate(frame.stamp_ns, found, self.take_world(found))
+
+    def take_world(self, found: Detection) -> str:
+        """Let the world marker of one frame join the mean; why the frame can not be used, or ""."""
+        if problem := self._picture_problem(found):
+            return problem
+        world = found.markers.get(self._settings.world_id)
+        if world is None:
+            return self.world.moved
+        return self._blur_problem(self._settings.world_id, world.blur_px) or self.world.add(world.corners_px)
+
+    def locate(self, stamp_ns: int, found: Detection, problem: str = "") -> Observation:
+        """The object in a frame whose world marker has been taken; ``problem`` is what came of that."""
+        marker = found.markers.get(self._settings.object_id)
+        if not problem and marker is None:
+            problem = f"the object's marker {self._settings.object_id} is not to be seen"
+        if problem or marker is None:
+            return Observation(stamp_ns, None, problem)
+        if problem := self._blur_problem(self._settings.object_id, marker.blur_px):
+            return Observation(stamp_ns, None, problem)
+        return self._judged(self.sighting(stamp_ns, marker.corners_px), stamp_ns)
 
     def sighting(self, stamp_ns: int, corners_px: Array) -> ObjectSighting | None:
         """The object from the corners of its marker, shape (4, 2), which lies on the table, z = 0 of the world.
@@ -145,6 +122,37 @@ class ObjectTracker:
         on_table = self._on_table(camera_T_world.inverse(), corners_px)
         return None if on_table is None else self._sighting(stamp_ns, camera_T_world, corners_px, on_table)
 
+    def _picture_problem(self, found: Detection) -> str:
+        if found.dictionary != self._settings.dictionary:
+            return f"markers of {found.dictionary} were looked for, not of {self._settings.dictionary}"
+        if self._camera.size_px is not None and found.size_px != self._camera.size_px:
+            made, seen = (" x ".join(map(str, size)) for size in (self._camera.size_px, found.size_px))
+            return f"the picture has {seen} pixels, the lens was calibrated with {made}"
+        return ""
+
+    def _blur_problem(self, number: int, blur_px: float) -> str:
+        largest = self._settings.largest_blur_px
+        if blur_px <= largest:
+            return ""
+        return f"blurred: the edges of marker {number} are {blur_px:.1f} px wide, at most {largest:g} px are trusted"
+
+    def _judged(self, sighting: ObjectSighting | None, stamp_ns: int) -> Observation:
+        if sighting is None:
+            seen = self.world.frames > 0
+            problem = "the marker's corners can not lie on the table" if seen else "the world marker was not seen yet"
+        elif self._settings.freedom == "spatial":
+            problem = _ambiguity(sighting) if sighting.ambiguous else ""
+        else:
+            problem = self._misfit(sighting.fit_rms_m)
+        return Observation(stamp_ns, None if problem else sighting, problem)
+
+    def _misfit(self, fit_rms_m: float) -> str:
+        if fit_rms_m <= self._settings.largest_misfit_m:
+            return ""
+        return (
+            f"the marker does not lie flat on the table (misfit {1e3 * fit_rms_m:.1f} mm): lifted, tilted or in motion"
+        )
+
     def _on_table(self, world_T_camera: Pose3, corners_px: Array) -> Array | None:
         """The corners on the table, shape (4, 2), world; None when a ray never comes up to it."""
         rays = rotate(world_T_camera, self._camera.rays(corners_px))
@@ -155,34 +163,70 @@ class ObjectTracker:
         return np.asarray(origin[:2] - origin[2] * slope - table_glass(self._settings).shift(slope))
 
     def _sighting(self, stamp_ns: int, camera_T_world: Pose3, corners_px: Array, on_table: Array) -> ObjectSighting:
-        model = marker_corners(self._settings.object_side_m) @ FACE_DOWN.rotation().matrix().T
+        model = self._settings.object_corners_m @ FACE_DOWN.rotation().matrix().T
         place, yaw, rms = fit_in_plane(model[:, :2], on_table)
-        world_T_marker = Pose3(Rot3.Yaw(yaw), np.array([*place, 0.0])) * FACE_DOWN
-        alone = marker_poses(corners_px, self._settings.object_side_m, self._camera)
         marker_T_object = self._object_T_marker.inverse()
-        position, turn = self._sigmas(camera_T_world)
+        on_plane = Pose3(Rot3.Yaw(yaw), np.array([*place, 0.0])) * FACE_DOWN * marker_T_object
+        alone = self._alone(camera_T_world, corners_px)
+        free = tuple(camera_T_world.inverse() * each.camera_T_marker * marker_T_object for each in alone)
+        found = self._jointly(camera_T_world, on_plane if self._settings.freedom == "planar" else free[0], corners_px)
+        position_sigma_m, yaw_sigma_rad = _sigmas(found.covariance)
         return ObjectSighting(
             stamp_ns=stamp_ns,
-            world_T_object=world_T_marker * marker_T_object,
-            position_sigma_m=position,
-            yaw_sigma_rad=turn,
+            world_T_object=found.world_T_object,
+            covariance=found.covariance,
+            position_sigma_m=position_sigma_m,
+            yaw_sigma_rad=yaw_sigma_rad,
             fit_rms_m=rms,
-            ambiguous=is_ambiguous(alone, self._settings.ambiguous_ratio),
-            unconstrained=tuple(camera_T_world.inverse() * each.camera_T_marker * marker_T_object for each in alone),
+            ambiguous=is_ambiguous(alone, self._settings.ambiguous_ratio, self._settings.corner_sigma_px),
+            unconstrained=free,
+            reprojection_px=tuple(each.reprojection_px for each in alone),
             object_corners_px=corners_px,
             world_corners_px=np.array(self.world.corners_px),
         )
 
-    def _sigmas(self, camera_T_world: Pose3) -> tuple[float, float]:
-        """From the corners of both markers, each four at half a diagonal from the centre, and the table."""
-        metres_per_px = abs(camera_T_world.inverse().z()) / float(np.mean(self._camera.focal_px))
-        corner = self._settings.corner_sigma_px * metres_per_px
-        mean_corner = corner / np.sqrt(self.world.frames)
-        position = np.hypot(corner, mean_corner) / 2.0
-        turn = np.hypot(corner / self._settings.object_side_m, mean_corner / self._settings.world_side_m) / np.sqrt(2)
-        return float(np.hypot(position, self._settings.table_sigma_m)), float(
-            np.hypot(turn, self._settings.table_sigma_rad)
+    def _alone(self, camera_T_world: Pose3, corners_px: Array) -> tuple[MarkerPose, ...]:
+        """The poses the marker's corners allow by themselves, seen through the glass, better first."""
+        side_m = self._settings.object_side_m * self._settings.print_scale
+        poses = [found.camera_T_marker for found in marker_poses(corners_px, side_m, self._camera)]
+        glass, corners = table_glass(self._settings), self._settings.object_corners_m
+        eye = np.array(camera_T_world.inverse().translation())
+        refined = []
+        for pose in poses:
+            for _ in range(2 if glass.thickness_m else 0):
+                bent = glass.apparent(transform_points(camera_T_world.inverse() * pose, corners), eye)
+                seen = transform_points(pose.inverse() * camera_T_world, bent)
+                pose = refine_pose(pose, seen, corners_px, self._camera)
+            bent = glass.apparent(transform_points(camera_T_world.inverse() * pose, corners), eye)
+            refined.append(MarkerPose(pose, points_reprojection_px(camera_T_world, bent, corners_px, self._camera)))
+        return tuple(sorted(refined, key=lambda found: found.reprojection_px))
+
+    def _jointly(self, camera_T_world: Pose3, start: Pose3, corners_px: Array) -> JointPose:
+        settings, sigma_px = self._settings, self._settings.corner_sigma_px
+        is_planar = settings.freedom == "planar"
+        mean_px = float(np.hypot(sigma_px / np.sqrt(self.world.frames), _MEAN_FLOOR_px))
+        world_points_m = transform_points(settings.world_T_worldmarker.pose(), settings.world_corners_m)
+        object_points_m = transform_points(self._object_T_marker, settings.object_corners_m)
+        found = solve_jointly(
+            self._camera,
+            table_glass(settings),
+            (camera_T_world, start),
+            Corners(world_points_m, np.array(self.world.corners_px), mean_px),
+            Corners(object_points_m, corners_px, sigma_px),
+            planar=is_planar,
         )
+        shift, turn = settings.table_sigma_m**2, settings.table_sigma_rad**2
+        glue = np.diag([shift, shift, turn] if is_planar else [turn] * 3 + [shift] * 3)
+        return JointPose(found.world_T_object, found.covariance + glue)
+
+
+def found_in(frame: Frame, dictionary: str) -> Detection:
+    """What was found when the frame was taken; else what its picture shows."""
+    if frame.detection is not None:
+        return frame.detection
+    if frame.image is None:
+        return Detection(dictionary, (0, 0), {})
+    return detection(frame.image, dictionary)
 
 
 def fit_in_plane(model: Array, seen: Array) -> tuple[Array, float, float]:
@@ -198,6 +242,23 @@ def fit_in_plane(model: Array, seen: Array) -> tuple[Array, float, float]:
     return seen.mean(axis=0) - turn @ model.mean(axis=0), angle, misfit
 
 
-def is_ambiguous(poses: tuple[MarkerPose, ...], ratio: float) -> bool:
-    """Whether the second pose of a square explains its corners nearly as well as the first."""
-    return len(poses) > 1 and poses[1].reprojection_px < ratio * poses[0].reprojection_px
+def is_ambiguous(poses: tuple[MarkerPose, ...], ratio: float, corner_sigma_px: float = 0.0) -> bool:
+    """Whether the second pose of a square explains its corners nearly as well as the first.
+
+    An error below the corners' own noise says nothing, however small it is beside the other.
+    """
+    if len(poses) < 2:
+        return False
+    floor_px = max(poses[0].reprojection_px, float(np.sqrt(2.0)) * corner_sigma_px)
+    return poses[1].reprojection_px < ratio * floor_px
+
+
+def _sigmas(covariance: Array) -> tuple[float, float]:
+    """Of the position, its larger axis in the plane (m), and about the vertical (rad)."""
+    place = covariance[:2, :2] if len(covariance) == 3 else covariance[3:5, 3:5]
+    return float(np.sqrt(np.linalg.eigvalsh(place)[-1])), float(np.sqrt(covariance[2, 2]))
+
+
+def _ambiguity(sighting: ObjectSighting) -> str:
+    errors = " and ".join(f"{error:.2f}" for error in sighting.reprojection_px)
+    return f"ambiguous: the marker allows two poses (reprojection errors {errors} px)"

@@ -14,6 +14,8 @@ from tactile_lab.geometry.contacts import Array
 from tactile_lab.strict_yaml import StrictModel, validate
 
 _DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+_UNDISTORTION = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 40, 1e-9)
+"""The five rounds that OpenCV takes by itself leave half a pixel at the edge of a wide picture."""
 
 
 class CameraCalibration(StrictModel):
@@ -60,8 +62,13 @@ class CameraCalibration(StrictModel):
 
     def rays(self, pixels: Array) -> Array:
         """Directions of pixels (n, 2), distortion undone: shape (n, 3), camera frame, z = 1."""
-        points = cv2.undistortPoints(
-            np.asarray(pixels, float).reshape(-1, 1, 2), self.matrix, self.distortion_coefficients
+        points = cv2.undistortPointsIter(
+            np.asarray(pixels, float).reshape(-1, 1, 2),
+            self.matrix,
+            self.distortion_coefficients,
+            np.eye(3),
+            np.eye(3),
+            _UNDISTORTION,
         )
         return np.hstack([np.asarray(points, float)[:, 0], np.ones((len(points), 1))])
 
@@ -71,6 +78,13 @@ class CameraCalibration(StrictModel):
             points_camera_m, np.zeros(3), np.zeros(3), self.matrix, self.distortion_coefficients
         )
         return np.asarray(pixels[:, 0], float)
+
+    def projection(self, points_camera_m: Array) -> tuple[Array, Array]:
+        """Pixels (n, 2) of points (n, 3) in the camera frame, and their derivatives by the points, shape (n, 2, 3)."""
+        pixels, slopes = cv2.projectPoints(
+            points_camera_m, np.zeros(3), np.zeros(3), self.matrix, self.distortion_coefficients
+        )
+        return np.asarray(pixels[:, 0], float), np.asarray(slopes, float)[:, 3:6].reshape(-1, 2, 3)
 
 
 def load_camera(path: Path) -> CameraCalibration:

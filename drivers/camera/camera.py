@@ -1,11 +1,12 @@
-"""The camera under the table: a trigger out, one encoded picture back."""
+"""The camera under the table: a trigger out, one picture with its markers back; some send markers all the time."""
 
 from __future__ import annotations
 
 from pydantic import Field
 
-from drivers.camera.frames import Frame, decode_image
-from drivers.links import Datagram, Link
+from drivers.camera.frames import Frame
+from drivers.camera.packet import decode_packet
+from drivers.links import Datagram, Link, link_health
 from tactile_lab.clock import Clock
 from tactile_lab.errors import DeviceError
 from tactile_lab.strict_yaml import StrictModel
@@ -39,6 +40,10 @@ class Camera:
             self._connected = False
             self._link.close()
 
+    def poll(self) -> None:
+        """Take what the camera has sent by itself, so that it is recorded in time. Raises DeviceError."""
+        self._link.receive()
+
     def capture(self) -> Frame:
         """Trigger and wait for the picture; one that was still on its way from before is left out.
 
@@ -49,7 +54,7 @@ class Camera:
         self._link.receive()
         self._link.send(TRIGGER)
         deadline_ns = self._clock.now_ns() + round(1e6 * self._settings.timeout_ms)
-        while not (arrived := self._link.receive()):
+        while (frame := self._newest_picture()) is None:
             if self._clock.now_ns() >= deadline_ns:
                 raise DeviceError(
                     f"no picture within {self._settings.timeout_ms:.0f} ms",
@@ -57,8 +62,16 @@ class Camera:
                     hint="Check the camera's power, cable and trigger",
                 )
             self._clock.sleep_until_ns(self._clock.now_ns() + round(1e6 * self._settings.look_every_ms))
-        return self.receive(arrived[-1])
+        return frame
+
+    def _newest_picture(self) -> Frame | None:
+        frames = [self.receive(datagram) for datagram in self._link.receive()]
+        return next((frame for frame in reversed(frames) if frame.image is not None), None)
 
     def receive(self, datagram: Datagram) -> Frame:
-        """Decode one picture; changes nothing. Raises CodecError."""
-        return Frame(datagram.stamp_ns, decode_image(datagram.payload))
+        """Decode what the camera sent; changes nothing. Raises CodecError."""
+        return decode_packet(datagram)
+
+    def health(self) -> tuple[str, ...]:
+        """What the camera's link knows to be wrong, in words."""
+        return link_health(self._link)

@@ -1,8 +1,9 @@
-"""Encoded pictures (JPEG, PNG) to images, checked before the decoder sees them."""
+"""Frames of a camera; encoded pictures (JPEG, PNG) to images, checked before the decoder sees them."""
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import cv2
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.errors import CodecError
+from tactile_lab.geometry.contacts import Array
 
 Image = NDArray[np.uint8]
 LARGEST_PIXELS = 40_000_000
@@ -21,16 +23,50 @@ _JPEG_SIZES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
 
 @dataclass(frozen=True, eq=False)
+class SeenMarker:
+    """A marker in a picture.
+
+    Attributes:
+        corners_px: shape (4, 2), pixels, clockwise from the print's top left.
+        blur_px: width of its widest edge, one standard deviation.
+    """
+
+    corners_px: Array
+    blur_px: float
+
+
+@dataclass(frozen=True, eq=False)
+class Detection:
+    """The markers that were found where the picture was taken.
+
+    Attributes:
+        dictionary: OpenCV's name of the dictionary that was looked for.
+        size_px: width and height of the picture.
+        markers: by number.
+    """
+
+    dictionary: str
+    size_px: tuple[int, int]
+    markers: Mapping[int, SeenMarker]
+
+
+@dataclass(frozen=True, eq=False)
 class Frame:
-    """One picture.
+    """One picture, what was found in it, or both.
 
     Attributes:
         stamp_ns: arrival at the host.
-        image: grey levels, shape (height, width), uint8.
+        image: grey levels, shape (height, width), uint8; None where only the corners were kept.
+        counter: number of the frame since the camera was opened.
+        dropped: frames the camera took and the program did not get, since it was opened.
+        detection: the markers as they were found at once; None where nobody looked.
     """
 
     stamp_ns: int
-    image: Image
+    image: Image | None
+    counter: int = 0
+    dropped: int = 0
+    detection: Detection | None = None
 
 
 def decode_image(payload: bytes, *, largest_pixels: int = LARGEST_PIXELS) -> Image:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -16,8 +16,8 @@ from gtsam import Pose3
 from pydantic import Field, field_validator
 
 from drivers.camera.calibration import CameraCalibration
-from drivers.camera.edges import refine_corners
-from drivers.camera.frames import Image
+from drivers.camera.edges import edge_blur_px, refine_corners
+from drivers.camera.frames import Detection, Image, SeenMarker
 from drivers.fingertip import RigidTransform
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import transform_points
@@ -26,21 +26,33 @@ from tactile_lab.strict_yaml import StrictModel
 _DOWN = RigidTransform(translation_m=(0.0, 0.0, 0.0), rpy_rad=(float(np.pi), 0.0, 0.0))
 
 
+_NAMES = (name for name in dir(cv2.aruco) if name.startswith("DICT_"))
+DICTIONARIES: tuple[str, ...] = tuple(sorted(_NAMES, key=lambda name: int(getattr(cv2.aruco, name))))
+"""Names of OpenCV's dictionaries in the order of their numbers."""
+
+
 class MarkerSettings(StrictModel):
     """The two markers of the rig.
 
     Attributes:
         dictionary: OpenCV's name of the dictionary.
-        world_id, world_side_m: marker fixed to the table; side of its black square.
+        world_id, world_side_m: marker fixed to the table; side of its black square as it was meant to be printed.
         object_id, object_side_m: marker under the object.
+        print_scale: what the check bar of the print measures over what it should.
         world_T_worldmarker: its pose in the world; z down.
         object_T_objectmarker: pose of the other in the object's frame; z down while the object stands on the table.
         corner_sigma_px: error of a detected corner, per axis.
         glass_thickness_m, glass_index: the table's plate between camera and markers.
         table_sigma_m, table_sigma_rad: error that stays however sharp the picture is (markers are glued on by hand).
+        freedom: planar: the object stands on the table, whatever its marker alone would say; spatial: it may be
+            anywhere, and pictures that allow two poses are refused.
         ambiguous_ratio: two poses of a single marker whose reprojection errors differ by less than this factor can
             not be told apart.
-        moved_px: a world marker that far from its mean has moved, and its mean begins anew.
+        moved_px: a world marker that far from its mean is not where it was.
+        world_marker_fixed: the world marker can not move (it is part of the table): where it seems to, the camera
+            did, and its mean begins anew. Otherwise truth ends there, as nobody knows which of them was bumped.
+        largest_blur_px: wider edges belong to a picture that is not sharp, or of something that moved.
+        largest_misfit_m: a worse fit of the object's square on the table means that it is lifted or tilted.
     """
 
     dictionary: str = "DICT_4X4_50"
@@ -48,6 +60,7 @@ class MarkerSettings(StrictModel):
     world_side_m: float = Field(default=0.050, gt=0.0)
     object_id: int = Field(default=7, ge=0)
     object_side_m: float = Field(default=0.035, gt=0.0)
+    print_scale: float = Field(default=1.0, ge=0.995, le=1.005)
     world_T_worldmarker: RigidTransform = _DOWN
     object_T_objectmarker: RigidTransform = _DOWN
     corner_sigma_px: float = Field(default=0.1, gt=0.0)
@@ -55,15 +68,58 @@ class MarkerSettings(StrictModel):
     glass_index: float = Field(default=1.5, ge=1.0)
     table_sigma_m: float = Field(default=0.0003, ge=0.0)
     table_sigma_rad: float = Field(default=0.001, ge=0.0)
+    freedom: Literal["planar", "spatial"] = "planar"
     ambiguous_ratio: float = Field(default=3.0, gt=1.0)
-    moved_px: float = Field(default=2.0, gt=0.0)
+    moved_px: float = Field(default=1.0, gt=0.0)
+    world_marker_fixed: bool = False
+    largest_blur_px: float = Field(default=2.0, gt=0.0)
+    largest_misfit_m: float = Field(default=0.001, gt=0.0)
 
     @field_validator("dictionary")
     @classmethod
     def _known(cls, value: str) -> str:
-        if not value.startswith("DICT_") or not isinstance(getattr(cv2.aruco, value, None), int):
-            raise ValueError(f"{value!r} is no dictionary of OpenCV")
-        return value
+        return known_dictionary(value)
+
+    @property
+    def world_corners_m(self) -> Array:
+        """The world marker's corners in its own frame, true size, shape (4, 3)."""
+        return marker_corners(self.world_side_m * self.print_scale)
+
+    @property
+    def object_corners_m(self) -> Array:
+        """The object marker's corners in its own frame, true size, shape (4, 3)."""
+        return marker_corners(self.object_side_m * self.print_scale)
+
+
+def known_dictionary(name: str) -> str:
+    """The name, if OpenCV has a dictionary called so. Raises ValueError."""
+    if name not in DICTIONARIES:
+        raise ValueError(f"{name!r} is no dictionary of OpenCV")
+    return name
+
+
+def dictionary_or_file(name: str) -> str:
+    """The name of one of OpenCV's dictionaries or of a file that holds one. Raises ValueError."""
+    if name.endswith((".yml", ".yaml")):
+        opencv_dictionary(name)
+        return name
+    return known_dictionary(name)
+
+
+@lru_cache(maxsize=16)
+def opencv_dictionary(name: str) -> Any:
+    """A dictionary by its name, or from a file in OpenCV's form. Raises ValueError for a file that is none."""
+    if not name.endswith((".yml", ".yaml")):
+        return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+    dictionary = cv2.aruco.Dictionary()
+    try:
+        storage = cv2.FileStorage(name, cv2.FILE_STORAGE_READ)
+        good = storage.isOpened() and dictionary.readDictionary(storage.root())
+    except (cv2.error, SystemError) as error:
+        raise ValueError(f"{name!r} holds no dictionary in OpenCV's form") from error
+    if not good:
+        raise ValueError(f"{name!r} holds no dictionary in OpenCV's form")
+    return dictionary
 
 
 @dataclass(frozen=True)
@@ -83,7 +139,7 @@ class MarkerPose:
 def _detector(dictionary: str) -> Any:
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    return cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary)), parameters)
+    return cv2.aruco.ArucoDetector(opencv_dictionary(dictionary), parameters)
 
 
 def detect(image: Image, dictionary: str) -> dict[int, Array]:
@@ -91,13 +147,33 @@ def detect(image: Image, dictionary: str) -> dict[int, Array]:
 
     A number seen more than once is left out: which of the two it is can not be known.
     """
+    return {number: refine_corners(image, corners) for number, corners in coarse_markers(image, dictionary).items()}
+
+
+def coarse_markers(image: Image, dictionary: str) -> dict[int, Array]:
+    """As :func:`detect`, with corners as OpenCV refines them: good to about a quarter of a pixel."""
     corners, numbers, _ = _detector(dictionary).detectMarkers(image)
     found = [] if numbers is None else [int(number) for number in np.ravel(numbers)]
-    return {
-        number: refine_corners(image, np.asarray(quad, float).reshape(4, 2))
-        for number, quad in zip(found, corners, strict=True)
-        if found.count(number) == 1
+    quads = [np.asarray(quad, float).reshape(4, 2) for quad in corners]
+    return {number: quad for number, quad in zip(found, quads, strict=True) if found.count(number) == 1}
+
+
+def detection(image: Image, dictionary: str) -> Detection:
+    """Everything a picture says of markers, with how sharp each of them is."""
+    found = detect(image, dictionary)
+    markers = {number: SeenMarker(corners, edge_blur_px(image, corners)) for number, corners in found.items()}
+    return Detection(dictionary, (image.shape[1], image.shape[0]), markers)
+
+
+def other_dictionary(image: Image, dictionary: str) -> str | None:
+    """Another dictionary whose markers the picture shows, two at least; None when there is none."""
+    sizes = ("4X4", "5X5", "6X6", "7X7")
+    candidates = [f"DICT_{size}_1000" for size in sizes] + ["DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_36h11"]
+    counts = {
+        name: len(coarse_markers(image, name)) for name in candidates if name.rpartition("_")[0] not in dictionary
     }
+    best = max(counts, key=counts.__getitem__)
+    return best if counts[best] >= 2 else None
 
 
 def marker_corners(side_m: float) -> Array:

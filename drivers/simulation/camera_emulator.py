@@ -1,4 +1,4 @@
-"""The camera under the table as seen from its link: a trigger in, one encoded picture out."""
+"""The camera under the table as seen from its link: a trigger in, one picture with its markers out."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import cv2
 import numpy as np
 
 from drivers.camera.camera import TRIGGER
+from drivers.camera.frames import Frame, decode_image
+from drivers.camera.markers import detection
+from drivers.camera.packet import encode_packet
 from drivers.links import Datagram
 from drivers.simulation.camera_renderer import Placed, TableCamera
 from drivers.simulation.hand_plant import SeenPlant
@@ -41,6 +44,7 @@ class CameraEmulator:
         self._table_marker, self._object_marker = table_marker, object_marker
         self._jpeg = [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality]
         self._outbox: list[Datagram] = []
+        self._counter = 0
 
     def write(self, payload: bytes) -> None:
         """Take a trigger and a picture.
@@ -50,7 +54,11 @@ class CameraEmulator:
         """
         if payload != TRIGGER:
             raise CodecError(f"{len(payload)} bytes that are no trigger", where="simulated camera")
-        self._outbox.append(Datagram(self._picture(), self._plant.stamp_ns))
+        self._counter += 1
+        picture, stamp_ns = self._picture(), self._plant.stamp_ns
+        found = detection(decode_image(picture), self._table_marker[0].dictionary)
+        frame = Frame(stamp_ns, None, self._counter, detection=found)
+        self._outbox.append(Datagram(encode_packet(frame, picture), stamp_ns))
 
     def read(self) -> list[Datagram]:
         """The pictures taken since the last call."""

@@ -12,6 +12,7 @@ import pytest
 from gtsam import Pose2, Pose3, Rot3
 from simulated_program import MS, Program
 
+from drivers.camera.packet import picture_of
 from drivers.positioner_codec import PositionerCommand, decode_status, encode_command
 from drivers.positioner_kinematics import mount_T_forearm
 from drivers.shadow.kinematics import JOINTS, JOINT_LIMITS_rad, forearm_T_palm, palm_T_distal_matrices
@@ -172,7 +173,7 @@ def test_each_trigger_gives_one_picture() -> None:
     camera.send(b"TRIGGER")
     program.wait()
     (picture,) = camera.receive()
-    assert picture.payload.startswith(b"\xff\xd8")
+    assert picture_of(picture.payload).startswith(b"\xff\xd8")
     assert picture.stamp_ns == 0
     assert camera.receive() == []
 

@@ -1,0 +1,105 @@
+"""The camera in a process of its own: ``python -m drivers.camera.camera_worker``, started by ``CameraProcess``.
+
+Takes lines of JSON on standard input, first what to open, then orders. Looks for markers in every frame as it comes
+and gives a packet of each on standard output, with the picture in it when that was asked for; it never waits for the
+reader. When its standard input ends, the program that started it is gone, and the process ends.
+"""
+
+from __future__ import annotations
+
+import json
+import select
+import sys
+from typing import Any
+
+import cv2
+
+from drivers.camera.frames import Frame
+from drivers.camera.markers import detection
+from drivers.camera.packet import encode_packet
+from drivers.camera.source_settings import CameraSourceSettings
+from drivers.camera.sources import Picture, Source, open_source
+from drivers.shadow.hand_records import RecordKind, RecordPipe
+from tactile_lab.clock import MonotonicClock
+from tactile_lab.errors import DeviceError, TactileLabError
+from tactile_lab.strict_yaml import validate
+
+
+class CameraWorker:
+    """Watches for markers frame by frame, obeying orders.
+
+    Args:
+        source: opened.
+        settings: what to look for.
+        pipe: where packets go.
+    """
+
+    def __init__(self, source: Source, settings: CameraSourceSettings, pipe: RecordPipe) -> None:
+        self._source, self._settings, self._pipe = source, settings, pipe
+        self._clock = MonotonicClock()
+        self._wanted = self._frames = self._markers = 0
+        self._ended = False
+
+    def run(self) -> None:
+        """Take frames until the orders end. Raises DeviceError, also when the source has ended."""
+        while not self._ended:
+            picture = self._source.read()
+            if picture is None:
+                raise DeviceError("the video or folder has ended", where="camera")
+            self._hand_on(picture)
+            while not self._ended and select.select([sys.stdin], [], [], 0)[0]:
+                self._obey(sys.stdin.readline())
+
+    def _hand_on(self, picture: Picture) -> None:
+        found = detection(picture.image, self._settings.dictionary)
+        self._frames += 1
+        self._markers += len(found.markers)
+        encoded = b""
+        if self._wanted:
+            self._wanted -= 1
+            quality = [cv2.IMWRITE_JPEG_QUALITY, self._settings.jpeg_quality]
+            encoded = cv2.imencode(".jpg", picture.image, quality)[1].tobytes()
+        frame = Frame(picture.stamp_ns, None, picture.counter, picture.dropped, found)
+        self._pipe.put(RecordKind.RECEIVED, picture.stamp_ns, encode_packet(frame, encoded))
+        self._pipe.flush()
+
+    def _obey(self, line: str) -> None:
+        order: dict[str, Any] = json.loads(line) if line else {"end": True}
+        self._wanted += int(order.get("pictures", 0))
+        if order.get("report"):
+            self._report()
+        self._ended = bool(order.get("end"))
+
+    def _report(self) -> None:
+        report = {
+            "frames": self._frames,
+            "markers": self._markers,
+            "dropped_blocks": self._pipe.dropped_blocks,
+            "notes": self._source.notes(),
+        }
+        self._pipe.put(RecordKind.REPORT, self._clock.now_ns(), json.dumps(report).encode())
+        self._pipe.flush()
+
+
+def main() -> None:
+    """Open what the first line names, watch it, close it."""
+    cv2.setNumThreads(1)
+    clock, pipe = MonotonicClock(), RecordPipe(sys.stdout.fileno())
+    try:
+        settings = validate(json.loads(sys.stdin.readline()), CameraSourceSettings, where="camera")
+        source = open_source(settings, clock)
+        try:
+            pipe.put(RecordKind.READY, clock.now_ns(), json.dumps({"notes": source.notes()}).encode())
+            pipe.flush()
+            CameraWorker(source, settings, pipe).run()
+        finally:
+            source.close()
+    except TactileLabError as error:
+        pipe.put(RecordKind.ERROR, clock.now_ns(), str(error).encode())
+        sys.exit(error.exit_code)
+    finally:
+        pipe.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,115 @@
+"""The object's pose and the camera's together, from the corners of both markers; and how well they tell it.
+
+One square tells the camera's tilt badly, and a tilt moves an object that lies beside the world marker. The object's own
+square knows about the tilt too. So both poses are the unknowns of one least squares problem, whose observations are all
+corners, each weighted by its noise. Its normal equations give the covariance, with the share that the camera adds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from gtsam import Pose3
+
+from drivers.camera.calibration import CameraCalibration
+from drivers.camera.glass import Glass
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.geometry.poses import transform_points
+
+_PLANAR, _SPATIAL = (3, 4, 2), (0, 1, 2, 3, 4, 5)
+"""Which changes of the object's pose are free, of rotation about x, y, z and translation along them: x, y, yaw; all."""
+_ROUNDS, _ENOUGH = 6, 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """The corners of one marker.
+
+    Attributes:
+        points_m: where they are, shape (n, 3): world frame for the world marker, object frame for the object's.
+        pixels: where they were seen, shape (n, 2).
+        sigma_px: error of each, per axis.
+    """
+
+    points_m: Array
+    pixels: Array
+    sigma_px: float
+
+
+@dataclass(frozen=True, eq=False)
+class JointPose:
+    """The object's pose.
+
+    Attributes:
+        world_T_object: the pose.
+        covariance: for changes along the world's axes about the object's origin: x, y (m) and yaw (rad), shape (3, 3);
+            of a free object rotation (rad), then translation (m), shape (6, 6).
+    """
+
+    world_T_object: Pose3
+    covariance: Array
+
+
+def solve_jointly(
+    camera: CameraCalibration,
+    glass: Glass,
+    start: tuple[Pose3, Pose3],
+    world: Corners,
+    target: Corners,
+    *,
+    planar: bool,
+) -> JointPose:
+    """Gauss-Newton from a good start: ``camera_T_world``, ``world_T_object``; a planar object keeps height and tilt."""
+    problem = _Problem(camera, glass, world, target, _PLANAR if planar else _SPATIAL)
+    camera_T_world, world_T_object = start
+    for _ in range(_ROUNDS):
+        rows, errors = problem.linearised(camera_T_world, world_T_object)
+        change = np.asarray(np.linalg.lstsq(rows, -errors, rcond=None)[0], float)
+        camera_T_world, world_T_object = problem.changed(camera_T_world, world_T_object, change)
+        if np.abs(change).max() < _ENOUGH:
+            break
+    return JointPose(world_T_object, np.asarray(np.linalg.pinv(rows.T @ rows)[6:, 6:]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    camera: CameraCalibration
+    glass: Glass
+    world: Corners
+    target: Corners
+    free: tuple[int, ...]
+
+    def linearised(self, camera_T_world: Pose3, world_T_object: Pose3) -> tuple[Array, Array]:
+        """Derivatives of all errors by all unknowns, and the errors; in standard deviations.
+
+        How the glass's shift changes with the poses is left out: a per cent of a slope, nothing of an error.
+        """
+        points = np.vstack([self.world.points_m, transform_points(world_T_object, self.target.points_m)])
+        apparent = self.glass.apparent(points, np.array(camera_T_world.inverse().translation()))
+        seen = transform_points(camera_T_world, apparent)
+        pixels, by_place = self.camera.projection(seen)
+        unit, is_object = np.eye(3), np.arange(len(points)) >= len(self.world.points_m)
+        arm = points - np.array(world_T_object.translation())
+        on_object = np.concatenate([-cross_matrices(arm), np.broadcast_to(unit, (len(points), 3, 3))], axis=2)
+        moved = camera_T_world.rotation().matrix() @ on_object[..., list(self.free)] * is_object[:, None, None]
+        by_camera = np.concatenate([-cross_matrices(seen), np.broadcast_to(unit, (len(points), 3, 3))], axis=2)
+        slopes = by_place @ np.concatenate([by_camera, moved], axis=2)
+        sigmas = np.where(is_object, self.target.sigma_px, self.world.sigma_px)[:, None]
+        misses = pixels - np.vstack([self.world.pixels, self.target.pixels])
+        return (slopes / sigmas[..., None]).reshape(-1, slopes.shape[2]), (misses / sigmas).ravel()
+
+    def changed(self, camera_T_world: Pose3, world_T_object: Pose3, change: Array) -> tuple[Pose3, Pose3]:
+        """Both poses after a small change: the camera's six, then the object's free ones along the world's axes."""
+        full = np.zeros(6)
+        full[list(self.free)] = change[6:]
+        turned = Pose3.Expmap(np.concatenate([full[:3], np.zeros(3)])).rotation() * world_T_object.rotation()
+        moved = Pose3(turned, np.array(world_T_object.translation()) + full[3:])
+        return Pose3.Expmap(change[:6]) * camera_T_world, moved
+
+
+def cross_matrices(vectors: Array) -> Array:
+    """Matrices of the cross product with each vector (n, 3), shape (n, 3, 3)."""
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)

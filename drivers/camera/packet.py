@@ -1,0 +1,92 @@
+"""What a camera sends: the markers of every frame, and the picture of those that were asked for.
+
+::
+
+    "TLCP"  version u8  dictionary u8  width u16  height u16  markers u16  counter u32  dropped u32  picture bytes u32
+    for each marker: number u16, blur f32, corners 8 x f32
+    the picture as JPEG or PNG, none or one
+
+All little-endian; the dictionary is its place in OpenCV's list. A bare JPEG or PNG is a packet too: nobody has looked
+for markers in it. The bytes are recorded as they are, so that truth can be recomputed from the corners with another
+lens, and from the pictures with another detector.
+"""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+
+from drivers.camera.frames import LARGEST_PIXELS, Detection, Frame, SeenMarker, decode_image
+from drivers.camera.markers import DICTIONARIES
+from drivers.links import Datagram
+from tactile_lab.errors import CodecError
+
+MAGIC, VERSION = b"TLCP", 1
+_HEAD = struct.Struct("<4sBBHHHIII")
+_MARKER = np.dtype([("number", "<u2"), ("blur_px", "<f4"), ("corners_px", "<f4", (4, 2))])
+
+
+def encode_packet(frame: Frame, picture: bytes = b"") -> bytes:
+    """The packet of a frame with its detection, and its encoded picture where that was asked for."""
+    found = frame.detection
+    if found is None:
+        raise ValueError("a packet holds what was detected")
+    rows = [(number, marker.blur_px, marker.corners_px) for number, marker in sorted(found.markers.items())]
+    head = _HEAD.pack(
+        MAGIC,
+        VERSION,
+        DICTIONARIES.index(found.dictionary),
+        *found.size_px,
+        len(rows),
+        frame.counter,
+        frame.dropped,
+        len(picture),
+    )
+    return head + np.array(rows, _MARKER).tobytes() + picture
+
+
+def decode_packet(datagram: Datagram, *, largest_pixels: int = LARGEST_PIXELS) -> Frame:
+    """A frame from what a camera sent.
+
+    Raises:
+        CodecError: neither a packet nor a picture, a damaged one, or a picture of more than ``largest_pixels``.
+    """
+    payload = datagram.payload
+    if not payload.startswith(MAGIC):
+        return Frame(datagram.stamp_ns, decode_image(payload, largest_pixels=largest_pixels))
+    version, dictionary, width, height, markers, counter, dropped, picture = _head(payload)
+    if version != VERSION or dictionary >= len(DICTIONARIES):
+        raise _error(f"a packet of version {version}, dictionary {dictionary}")
+    rows_end = _HEAD.size + markers * _MARKER.itemsize
+    if len(payload) != rows_end + picture:
+        raise _error(f"{len(payload)} bytes instead of {rows_end + picture}")
+    rows = np.frombuffer(payload, _MARKER, markers, _HEAD.size)
+    if not (np.isfinite(rows["corners_px"]).all() and (rows["blur_px"] >= 0.0).all()):
+        raise _error("corners that are no numbers")
+    found = Detection(DICTIONARIES[dictionary], (width, height), {int(row["number"]): _marker(row) for row in rows})
+    image = decode_image(payload[rows_end:], largest_pixels=largest_pixels) if picture else None
+    if image is not None and image.shape != (height, width):
+        raise _error(f"a picture of {image.shape[1]} x {image.shape[0]} pixels instead of {width} x {height}")
+    return Frame(datagram.stamp_ns, image, counter, dropped, found)
+
+
+def picture_of(payload: bytes) -> bytes:
+    """The encoded picture in what a camera sent; empty when it holds none."""
+    if not payload.startswith(MAGIC):
+        return payload
+    return payload[len(payload) - _head(payload)[-1] :] if len(payload) >= _HEAD.size else b""
+
+
+def _head(payload: bytes) -> tuple[int, ...]:
+    if len(payload) < _HEAD.size:
+        raise _error(f"a packet of {len(payload)} bytes")
+    return tuple(_HEAD.unpack_from(payload)[1:])
+
+
+def _marker(row: np.void) -> SeenMarker:
+    return SeenMarker(np.asarray(row["corners_px"], float), float(row["blur_px"]))
+
+
+def _error(what: str) -> CodecError:
+    return CodecError(what, where="camera", hint="Check the camera's link and its version")

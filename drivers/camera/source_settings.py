@@ -1,0 +1,73 @@
+"""Where pictures come from, in one word, and how they should be taken."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from pydantic import Field, field_validator
+
+from drivers.camera.markers import known_dictionary
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.strict_yaml import StrictModel
+
+Kind = Literal["device", "gstreamer", "folder", "video", "simulated"]
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+
+
+class Place(NamedTuple):
+    """What kind of source, and which one."""
+
+    kind: Kind
+    name: str
+
+
+class CameraSourceSettings(StrictModel):
+    """A camera, or what stands for one.
+
+    Attributes:
+        source: number or device file of a V4L2 camera (``0``, ``/dev/video2``), ``gstreamer:`` and a pipeline that
+            ends in ``appsink``, a folder of pictures, a video file, or ``simulated`` (``simulated:board``).
+        dictionary: markers to look for in every frame.
+        size_px: width and height of the pictures.
+        rate_hz: frames per second.
+        exposure_ms, gain, focus: held fixed where the driver lets them; None leaves them to the camera, but the
+            automatic focus is switched off all the same, as each of its moves changes the lens.
+        pixel_format: four letters that the camera knows; MJPG for most USB cameras above 640 x 480.
+        jpeg_quality: of the pictures handed on.
+    """
+
+    source: str = "0"
+    dictionary: str = "DICT_4X4_50"
+    size_px: tuple[int, int] = (1280, 720)
+    rate_hz: float = Field(default=30.0, gt=0.0, le=1000.0)
+    exposure_ms: float | None = Field(default=None, gt=0.0)
+    gain: float | None = None
+    focus: float | None = None
+    pixel_format: str = Field(default="MJPG", min_length=4, max_length=4)
+    jpeg_quality: int = Field(default=90, ge=1, le=100)
+
+    @field_validator("dictionary")
+    @classmethod
+    def _known(cls, value: str) -> str:
+        return known_dictionary(value)
+
+    def place(self) -> Place:
+        """What ``source`` means. Raises ConfigurationError when it is nothing that is there."""
+        return place_of(self.source)
+
+
+def place_of(source: str) -> Place:
+    """What a source's word means. Raises ConfigurationError when it is nothing that is there."""
+    head, _, rest = source.partition(":")
+    if head in ("gstreamer", "simulated"):
+        return Place("gstreamer" if head == "gstreamer" else "simulated", rest)
+    if source.isdigit() or source.startswith("/dev/"):
+        return Place("device", source)
+    path = Path(source)
+    if path.is_dir():
+        return Place("folder", source)
+    if path.is_file():
+        return Place("video", source)
+    hint = "Name a camera (0, /dev/video0), a folder of pictures, a video, gstreamer:PIPELINE or simulated"
+    raise ConfigurationError("no such camera, folder or file", where=source, hint=hint)

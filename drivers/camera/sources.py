@@ -1,0 +1,221 @@
+"""Pictures from V4L2 and GStreamer cameras, videos and folders, one after the other, through OpenCV.
+
+Every picture is stamped when it arrived and numbered; frames that were lost on the way are found by the gap they leave
+in time and counted. A camera that changes the size of its pictures is an error: no lens calibration fits it then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+import numpy as np
+
+from drivers.camera.frames import Image
+from drivers.camera.source_settings import PICTURES, CameraSourceSettings
+from tactile_lab.clock import NANOSECONDS, Clock
+from tactile_lab.errors import ConfigurationError, DeviceError
+
+_MANUAL_EXPOSURE_V4L2 = 1.0
+_EXPOSURE_UNITS_PER_ms = 10.0  # V4L2 counts in 100 microseconds
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """One picture as it arrived: stamp (session clock), number, frames lost so far, grey levels (height, width)."""
+
+    stamp_ns: int
+    counter: int
+    dropped: int
+    image: Image
+
+
+class Source(Protocol):
+    """Something that gives pictures."""
+
+    def open(self) -> None:
+        """Begin. Raises DeviceError, ConfigurationError."""
+
+    def read(self) -> Picture | None:
+        """Wait for the next picture; None at the end. Raises DeviceError."""
+
+    def close(self) -> None:
+        """End; idempotent."""
+
+    def notes(self) -> tuple[str, ...]:
+        """What could not be had as it was asked for, in words."""
+
+
+class OpenCvSource:
+    """A camera or video behind OpenCV.
+
+    Args:
+        settings: which, and how.
+        clock: for the stamps.
+        capture: makes OpenCV's capture from a name and a back end.
+    """
+
+    def __init__(
+        self, settings: CameraSourceSettings, clock: Clock, capture: Callable[..., Any] = cv2.VideoCapture
+    ) -> None:
+        self._settings, self._clock, self._make = settings, clock, capture
+        self._capture: Any = None
+        self._notes: list[str] = []
+        self._size: tuple[int, ...] | None = None
+        self._counter = self._dropped = 0
+        self._last_ns: int | None = None
+
+    def open(self) -> None:
+        """Open the device and fix what can be fixed. Raises DeviceError."""
+        kind, name = self._settings.place()
+        if kind == "gstreamer" and "GStreamer:                   YES" not in cv2.getBuildInformation():
+            hint = "Install an OpenCV with it, or use the camera's device file"
+            raise DeviceError("this OpenCV was built without GStreamer", where="camera", hint=hint)
+        number: int | str = int(name) if name.isdigit() else name
+        back_end = {"device": cv2.CAP_V4L2, "gstreamer": cv2.CAP_GSTREAMER}.get(kind, cv2.CAP_ANY)
+        capture = self._make(number, back_end)
+        if not capture.isOpened():
+            hint = "Check its cable and permissions" if kind == "device" else "Check the file or pipeline"
+            raise DeviceError("can not be opened", where=f"camera {name}", hint=hint)
+        self._capture = capture
+        if kind == "device":
+            self._configure()
+
+    def read(self) -> Picture | None:
+        """The next picture, stamped as soon as the driver has it."""
+        grabbed = self._capture.grab()
+        stamp_ns = self._clock.now_ns()
+        good, image = self._capture.retrieve() if grabbed else (False, None)
+        if not good:
+            self._check_end()
+            return None
+        self._check_size(image)
+        self._count(stamp_ns)
+        return Picture(stamp_ns, self._counter, self._dropped, grey(image))
+
+    def close(self) -> None:
+        """Let go of the device; idempotent."""
+        capture, self._capture = self._capture, None
+        if capture is not None:
+            capture.release()
+
+    def notes(self) -> tuple[str, ...]:
+        """What the driver did not take."""
+        return tuple(self._notes)
+
+    def _configure(self) -> None:
+        wanted, (width, height) = self._settings, self._settings.size_px
+        self._capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*wanted.pixel_format))
+        self._fix("width", cv2.CAP_PROP_FRAME_WIDTH, width)
+        self._fix("height", cv2.CAP_PROP_FRAME_HEIGHT, height)
+        self._fix("frames per second", cv2.CAP_PROP_FPS, wanted.rate_hz)
+        self._fix("automatic focus", cv2.CAP_PROP_AUTOFOCUS, 0.0)
+        if wanted.focus is not None:
+            self._fix("focus", cv2.CAP_PROP_FOCUS, wanted.focus)
+        if wanted.exposure_ms is not None:
+            self._fix("automatic exposure", cv2.CAP_PROP_AUTO_EXPOSURE, _MANUAL_EXPOSURE_V4L2)
+            self._fix("exposure", cv2.CAP_PROP_EXPOSURE, round(_EXPOSURE_UNITS_PER_ms * wanted.exposure_ms))
+        if wanted.gain is not None:
+            self._fix("gain", cv2.CAP_PROP_GAIN, wanted.gain)
+
+    def _fix(self, what: str, key: int, value: float) -> None:
+        taken = self._capture.set(key, value)
+        now = self._capture.get(key)
+        if not taken or abs(now - value) > 0.01 * max(abs(value), 1.0):
+            self._notes.append(f"the driver does not take {what} {value:g} (it stays {now:g})")
+
+    def _check_size(self, image: Any) -> None:
+        size = image.shape[:2]
+        expected = self._size or (self._settings.size_px[::-1] if self._settings.place().kind == "device" else size)
+        if size != expected:
+            shown = [f"{width} x {height}" for height, width in (expected, size)]
+            what = f"gives pictures of {shown[1]} pixels instead of {shown[0]}"
+            raise DeviceError(what, where="camera", hint="State the size it was calibrated with, and calibrate for it")
+        self._size = size
+
+    def _count(self, stamp_ns: int) -> None:
+        """One more frame; a gap of several periods before it tells how many were lost."""
+        self._counter += 1
+        if self._settings.place().kind in ("device", "gstreamer") and self._last_ns is not None:
+            periods = (stamp_ns - self._last_ns) * self._settings.rate_hz / NANOSECONDS
+            lost = max(round(periods) - 1, 0)
+            self._counter += lost
+            self._dropped += lost
+        self._last_ns = stamp_ns
+
+    def _check_end(self) -> None:
+        """A video ends; a camera does not. Raises DeviceError."""
+        if self._settings.place().kind != "video":
+            raise DeviceError("gives no more pictures", where="camera", hint="Check its cable and power")
+
+
+class FolderSource:
+    """The pictures of a folder, in the order of their names, as fast as they can be read."""
+
+    def __init__(self, settings: CameraSourceSettings, clock: Clock) -> None:
+        self._settings, self._clock = settings, clock
+        self._files: list[Path] = []
+        self._next = 0
+        self._size: tuple[int, ...] | None = None
+
+    def open(self) -> None:
+        """Find the pictures. Raises ConfigurationError when there are none."""
+        folder = Path(self._settings.place().name)
+        self._files = sorted(file for file in folder.iterdir() if file.suffix.lower() in PICTURES)
+        if not self._files:
+            hint = f"Pictures end in {', '.join(PICTURES)}"
+            raise ConfigurationError("no picture in the folder", where=str(folder), hint=hint)
+
+    def read(self) -> Picture | None:
+        """The next picture. Raises DeviceError for one that can not be read, or of another size."""
+        if self._next == len(self._files):
+            return None
+        file = self._files[self._next]
+        self._next += 1
+        image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
+        if image is None:
+            raise DeviceError("is no picture that can be read", where=str(file), hint="Take it out of the folder")
+        self._size = self._size or image.shape
+        if image.shape != self._size:
+            shown = [f"{width} x {height}" for height, width in (image.shape, self._size)]
+            what = f"has {shown[0]} pixels, the pictures before it {shown[1]}"
+            raise DeviceError(what, where=str(file), hint="Keep to pictures of one camera at one resolution")
+        return Picture(self._clock.now_ns(), self._next, 0, np.asarray(image, np.uint8))
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+    def notes(self) -> tuple[str, ...]:
+        """Nothing was asked for."""
+        return ()
+
+
+def open_source(settings: CameraSourceSettings, clock: Clock) -> Source:
+    """The source that the settings name, opened.
+
+    Raises:
+        ConfigurationError: nothing of that name.
+        DeviceError: it can not be opened.
+    """
+    source = _source(settings, clock)
+    source.open()
+    return source
+
+
+def _source(settings: CameraSourceSettings, clock: Clock) -> Source:
+    kind = settings.place().kind
+    if kind == "folder":
+        return FolderSource(settings, clock)
+    if kind == "simulated":
+        from drivers.simulation.board_camera import SimulatedSource
+
+        return SimulatedSource(settings, clock)
+    return OpenCvSource(settings, clock)
+
+
+def grey(image: Any) -> Image:
+    """Grey levels of a colour or grey picture, shape (height, width)."""
+    return np.asarray(image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
