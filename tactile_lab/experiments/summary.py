@@ -16,7 +16,7 @@ from tactile_lab.experiments.cells import Row, Setting, Value
 REFERENCE_METHOD = "known-pose"
 UNKNOWN = "–"
 
-Kind: TypeAlias = Literal["spread", "mean", "median", "pooled", "percent", "sum"]
+Kind: TypeAlias = Literal["spread", "mean", "estimate", "median", "pooled", "percent", "sum", "correlation"]
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,8 @@ class Column:
         key: name of the figure in a row.
         digits: behind the point.
         kind: "spread" gives median / p90 / maximum, "median" the median, "mean" the mean, "pooled" median / p95 of all
-            numbers in the lists of all runs, "percent" the mean of shares or flags, "sum" the total.
+            numbers in the lists of all runs, "percent" the mean of shares or flags, "sum" the total, "estimate" the
+            mean with its standard error, "correlation" Pearson's of all pairs in the lists of all runs.
         versus: add the ratio of the medians to the reference method's.
     """
 
@@ -96,6 +97,10 @@ class Group:
     def spread(self, key: str) -> Spread:
         """Over all runs."""
         return Spread.of(self.values(key))
+
+    def pairs(self, key: str) -> list[list[float]]:
+        """The pairs of numbers in all lists of that name."""
+        return [pair for row in self.rows for pair in (row.figures or {}).get(key, [])]
 
     def pooled(self, key: str) -> list[float]:
         """The numbers in all lists of that name."""
@@ -185,6 +190,32 @@ def _pooled(group: Group, column: Column) -> str:
     return " / ".join(number(quantile(values, share), column.digits) for share in (0.5, 0.95)) if values else UNKNOWN
 
 
+def _estimate(group: Group, column: Column) -> str:
+    values = group.values(column.key)
+    mean, count = sum(values) / len(values), len(values)
+    if not math.isfinite(mean) or count < 2:
+        return number(mean, column.digits)
+    error = math.sqrt(sum((value - mean) ** 2 for value in values) / (count - 1) / count)
+    return f"{number(mean, column.digits)} ± {number(error, column.digits)}"
+
+
+def correlation(pairs: Sequence[Sequence[float]]) -> float | None:
+    """Pearson's correlation of pairs of numbers; None where there are too few or one of them never changes."""
+    if len(pairs) < 3:
+        return None
+    means = [sum(pair[side] for pair in pairs) / len(pairs) for side in (0, 1)]
+    spreads = [[pair[side] - means[side] for pair in pairs] for side in (0, 1)]
+    lengths = [math.sqrt(sum(value**2 for value in spread)) for spread in spreads]
+    if min(lengths) == 0.0:
+        return None
+    return float(sum(one * other for one, other in zip(*spreads, strict=True)) / (lengths[0] * lengths[1]))
+
+
+def _correlation(group: Group, column: Column) -> str:
+    found = correlation(group.pairs(column.key))
+    return UNKNOWN if found is None else number(found, column.digits)
+
+
 def _percent(group: Group, column: Column) -> str:
     values = [value for value in group.values(column.key) if math.isfinite(value)]
     return f"{100 * sum(values) / len(values):.{column.digits}f} %" if values else UNKNOWN
@@ -198,6 +229,8 @@ def _sum(group: Group, column: Column) -> str:
 _SHOWN: Mapping[Kind, Callable[[Group, Column], str]] = {
     "spread": lambda group, column: group.spread(column.key).text(column.digits),
     "mean": lambda group, column: number(sum(values := group.values(column.key)) / len(values), column.digits),
+    "estimate": _estimate,
+    "correlation": _correlation,
     "median": lambda group, column: number(group.spread(column.key).median, column.digits),
     "pooled": _pooled,
     "percent": _percent,
@@ -227,6 +260,10 @@ def group_json(group: Group, columns: Sequence[Column]) -> dict[str, Any]:
 
 
 def _figure_json(group: Group, column: Column) -> Any:
+    if column.kind == "correlation":
+        return {"correlation": correlation(group.pairs(column.key))}
+    if column.kind == "estimate":
+        return {**group.spread(column.key).as_json(), "text": _estimate(group, column)}
     if column.kind != "pooled":
         return group.spread(column.key).as_json()
     values = group.pooled(column.key)
