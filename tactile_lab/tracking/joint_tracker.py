@@ -38,6 +38,9 @@ _POOR_GAIN = 2.5
 """Evidence (natural logarithm) that a contact brings on unknown ground, at most; on known ground it is 6 to 10."""
 
 
+_MOST_REGROUPINGS = 3
+"""A trajectory that took several wrong turns is mended at one after the other."""
+
 _BACKWARD_HYPOTHESES = 4
 """Kept when a session is read backwards: a second opinion need not be as thorough as the first."""
 
@@ -166,18 +169,28 @@ class JointTracker:
         readable = len(self.map.placed) > 2 and len(self.map.placed[-1].contacts_world) > 0
         if self._settings.backwards and is_short and readable:
             self._hypotheses = different(self._hypotheses + self._backwards())
-        self._hypotheses = different(self._hypotheses + self._regrouped(min(self._hypotheses, key=cost)))
-        self._hypotheses = self._likeliest(self._hypotheses, self._settings.hypotheses)
+        self._regroup()
         for _ in range(2):
             iterations = self._settings.final_iterations
             smoothed = [self._judge.smoothed(one.map, iterations) for one in self._hypotheses]
             self._hypotheses = self._likeliest(different(smoothed), self._settings.hypotheses)
             self._share_best_kernel()
         self._hypotheses = [self._placed_late(one) for one in self._hypotheses]
-        sharp = SharpJudge(self._judge, self._noise)
-        faceted = sorted((sharp.better(one.map) for one in self._hypotheses), key=cost)
+        faceted = self._faceted()
         faceted[0] = replace(faceted[0], map=self._judge.with_covariances(faceted[0].map))
         self._hypotheses = [replace(one, map=unfolded(one.map)) for one in faceted]
+
+    def _faceted(self) -> list[Hypothesis]:
+        """The hypotheses in the light of flat faces, the likeliest first.
+
+        Where the likeliest one can be joined otherwise and then is likelier without faces, that is looked at too.
+        """
+        sharp = SharpJudge(self._judge, self._noise)
+        found = [sharp.better(one.map) for one in self._hypotheses]
+        best = min(found, key=cost)
+        limit = self._judge.rated(best.map).cost
+        others = [one for one in different(self._regrouped(best)) if one.cost < limit]
+        return sorted(found + [sharp.better(one.map) for one in others], key=cost)
 
     def _placed_late(self, hypothesis: Hypothesis) -> Hypothesis:
         return placed_late(hypothesis, self._noise, self._settings.proposals, self._relocate, self._judge)
@@ -195,6 +208,15 @@ class JointTracker:
             tracker.update_shape(grasp.contacts_world, certain=True)
             tracker.resample()
         return [self._judge.rated(_forward(one.map, self.map)) for one in tracker.hypotheses]
+
+    def _regroup(self) -> None:
+        """Join the likeliest hypothesis otherwise, and what is likelier then once more."""
+        for _ in range(_MOST_REGROUPINGS):
+            best = min(self._hypotheses, key=cost)
+            found = different(self._hypotheses + self._regrouped(best))
+            self._hypotheses = self._likeliest(found, self._settings.hypotheses)
+            if self._hypotheses[0].cost >= best.cost:
+                break
 
     def _regrouped(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """The hypothesis joined otherwise at its unlikeliest steps."""
