@@ -18,7 +18,7 @@ from drivers.ati.force_tip import ForceTip, ForceTipSettings, WrenchSample
 from drivers.ati.intrinsic_contact import wrench_transform
 from drivers.ati.rdt_wire import RdtWire
 from drivers.ati.sequences import SequenceMonitor
-from drivers.ati.wire import ForceWire
+from drivers.ati.wire import FastWire, ForceWire
 from drivers.fingertip import FingertipCalibration, RigidTransform
 from drivers.links import Datagram, Link, link_health
 from tactile_lab.clock import NANOSECONDS, Clock
@@ -118,14 +118,22 @@ class Nano17(ForceTip):
         Raises:
             DeviceError: the link failed.
         """
-        samples: list[WrenchSample] = []
-        for datagram in self._link.receive():
-            try:
-                samples += self.receive(datagram)
-            except CodecError:
-                self.foreign_datagrams += 1
+        samples = self._decoded(self._link.receive())
         self.ask()
         return samples
+
+    def _decoded(self, datagrams: list[Datagram]) -> list[WrenchSample]:
+        if len(datagrams) > 1 and self._to_tool is None and isinstance(self.wire, FastWire):
+            samples, foreign = self.wire.receive_many(datagrams)
+            self.foreign_datagrams += foreign
+            return samples
+        found: list[WrenchSample] = []
+        for datagram in datagrams:
+            try:
+                found += self.receive(datagram)
+            except CodecError:
+                self.foreign_datagrams += 1
+        return found
 
     def receive(self, datagram: Datagram) -> list[WrenchSample]:
         """Decode one message; changes nothing but the wire's own state.

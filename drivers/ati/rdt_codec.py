@@ -146,8 +146,13 @@ def records(payload: bytes) -> Iterator[tuple[int, ...]]:
     return _RECORD.iter_unpack(payload)
 
 
+def holds_records(payload: bytes) -> bool:
+    """Whether a datagram's length is that of whole records."""
+    return bool(payload) and not len(payload) % RECORD.itemsize
+
+
 def _check_length(payload: bytes) -> None:
-    if not payload or len(payload) % RECORD.itemsize:
+    if not holds_records(payload):
         raise CodecError(
             f"{len(payload)} bytes are not a whole number of {RECORD.itemsize}-byte records",
             where="RDT record",

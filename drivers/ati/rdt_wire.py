@@ -94,6 +94,17 @@ class RdtWire:
         self._records += len(samples)
         return samples
 
+    def receive_many(self, datagrams: list[Datagram]) -> tuple[list[WrenchSample], int]:
+        """As :meth:`receive` for many datagrams at once, in a fraction of the time; and how many held no records."""
+        sound = [datagram for datagram in datagrams if rdt_codec.holds_records(datagram.payload)]
+        table = np.frombuffer(b"".join(datagram.payload for datagram in sound), rdt_codec.RECORD)
+        wrenches = table["counts"].astype(float) / self._scale
+        shares = [len(datagram.payload) // rdt_codec.RECORD.itemsize for datagram in sound]
+        stamps_ns = np.repeat(np.array([datagram.stamp_ns for datagram in sound], np.int64), shares).tolist()
+        words = (table[name].tolist() for name in ("rdt_sequence", "ft_sequence", "status"))
+        self._records += len(table)
+        return list(map(WrenchSample, stamps_ns, wrenches, *words)), len(datagrams) - len(sound)
+
     def health(self) -> tuple[str, ...]:
         """A stream has no faults of its own beside those of its records."""
         return ()

@@ -7,7 +7,7 @@ messages alone, decodes what the session did.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -53,6 +53,14 @@ class ForceWire(Protocol):
 
     def health(self) -> tuple[str, ...]:
         """What is wrong with the wire, in words."""
+
+
+@runtime_checkable
+class FastWire(Protocol):
+    """A wire that decodes many messages faster together than one by one."""
+
+    def receive_many(self, datagrams: list[Datagram]) -> tuple[list[WrenchSample], int]:
+        """The samples of all messages, oldest first, and how many messages were none of this protocol."""
 
 
 class GaugeSamples:

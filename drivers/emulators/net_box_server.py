@@ -81,8 +81,7 @@ class NetBoxServer:
             while True:
                 payload, client = self._socket.recvfrom(100)
                 self._take(payload, client)
-        for _ in range(self._pace.due(self.unit.rate_hz)):
-            self._send_next()
+        self._send(self._pace.due(self.unit.rate_hz))
 
     def _take(self, payload: bytes, client: tuple[str, int]) -> None:
         with self._lock:
@@ -91,16 +90,18 @@ class NetBoxServer:
             if self.unit.refused == refused:
                 self._client = client  # a later request redirects the stream
 
-    def _send_next(self) -> None:
+    def _send(self, due: int) -> None:
+        """Send the records that are due, a few milliseconds' worth with one look at the sensor."""
         with self._lock:
-            record, number = self.unit.tick(), self.unit.sent
-        if record is None or self._client is None:
+            records, last, client = self.unit.ticks(due), self.unit.sent, self._client
+        if client is None:
             return
-        if self.lose(number):
-            self.lost += 1
-            return
-        with contextlib.suppress(BlockingIOError, ConnectionError):  # a box does not care who listens
-            self._socket.sendto(record, self._client)
+        for number, record in enumerate(records, last - len(records) + 1):
+            if self.lose(number):
+                self.lost += 1
+                continue
+            with contextlib.suppress(BlockingIOError, ConnectionError):  # a box does not care who listens
+                self._socket.sendto(record, client)
 
 
 class _Pages(BaseHTTPRequestHandler):

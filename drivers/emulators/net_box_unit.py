@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from urllib.parse import parse_qsl, urlsplit
 from xml.sax.saxutils import escape
 
@@ -13,6 +14,8 @@ from drivers.emulators.ati_sensor import EmulatedSensor
 from tactile_lab.errors import CodecError
 
 COUNTS_PER_UNIT = 1_000_000
+COUNTS_BYTES = 24
+_HEAD = struct.Struct(">III")
 
 
 class NetBoxUnit:
@@ -64,13 +67,36 @@ class NetBoxUnit:
 
     def tick(self) -> bytes | None:
         """The next record; the measuring counter runs whether anybody listens or not."""
-        self._measured += round(net_box.INTERNAL_RATE_Hz / self._rate_hz)
+        self._measured += self._step
         if not self.streaming:
             return None
         self._left -= self._left > 0
         self.sent += 1
         counts = np.rint((self.sensor.wrench() - self._bias) * COUNTS_PER_UNIT).astype(int).tolist()
         return rdt_codec.encode_record(self.sent, self._measured, self.status, counts)
+
+    def ticks(self, count: int) -> list[bytes]:
+        """As many records as are due, as :meth:`tick` gives them one by one; what is felt is read once for all."""
+        first = self.tick() if count else None
+        if first is None:
+            self._measured += (count - 1) * self._step if count else 0
+            return []
+        counts = first[-COUNTS_BYTES:]
+        heads = (self._next_head() for _ in range(count - 1))
+        return [first, *(head + counts for head in heads if head)]
+
+    def _next_head(self) -> bytes:
+        """The record's beginning; empty when no client wants more."""
+        self._measured += self._step
+        if not self.streaming:
+            return b""
+        self._left -= self._left > 0
+        self.sent += 1
+        return _HEAD.pack(self.sent & 0xFFFFFFFF, self._measured & 0xFFFFFFFF, self.status & 0xFFFFFFFF)
+
+    @property
+    def _step(self) -> int:
+        return round(net_box.INTERNAL_RATE_Hz / self._rate_hz)
 
     def page(self, target: str) -> bytes | None:
         """What the web server gives for a path with its query; None for a page that does not exist."""

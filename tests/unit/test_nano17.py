@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
@@ -74,11 +75,12 @@ def test_the_shipped_calibration_has_all_five_fingers() -> None:
 
 
 def test_an_unknown_finger_or_a_flat_tip_is_refused(tmp_path: Path) -> None:
-    text = TIPS.read_text().replace("MF: *tip", "XX: *tip")
-    (tmp_path / "tips.yaml").write_text(text)
+    tip = load_fingertips(TIPS)["MF"].model_dump(mode="json")
+    (tmp_path / "tips.yaml").write_text(json.dumps({"fingertips": {"XX": tip}}))
     with pytest.raises(ConfigurationError, match="XX"):
         load_fingertips(tmp_path / "tips.yaml")
-    (tmp_path / "tips.yaml").write_text(TIPS.read_text().replace("0.013]", "0.0]"))
+    flat = {"fingertips": {"MF": tip | {"semi_axes_m": [0.0085, 0.0085, 0.0]}}}
+    (tmp_path / "tips.yaml").write_text(json.dumps(flat))
     with pytest.raises(ConfigurationError, match="semi_axes_m"):
         load_fingertips(tmp_path / "tips.yaml")
 
