@@ -31,8 +31,8 @@ from tactile_lab.tracking.contact_set import planar_rotation
 
 Verdicts = NDArray[np.bool_]
 
-_TAP_FROM_m = 0.15
-"""Height that the rays of a tap begin at; objects are lower."""
+_TAP_FROM_m = 0.025
+"""Height over the object's top that the rays of a tap begin at."""
 
 _PALM_THICKNESS_m = 0.030
 """Of the palm below its own origin, where the object's top must not be."""
@@ -113,7 +113,8 @@ def offer(
         if failed := int(np.count_nonzero(~passed)):
             ruled_out[reason] += failed
         plans = [plan for plan, fine in zip(plans, passed, strict=True) if fine]
-    return Offer(tuple(_as_candidate(plan, limits, here) for plan in plans), dict(ruled_out))
+    tap_from_m = (known.top_height_m or 0.0) + _TAP_FROM_m
+    return Offer(tuple(_as_candidate(plan, limits, here, tap_from_m) for plan in plans), dict(ruled_out))
 
 
 def _plans(limits: HandLimits, centre_world_m: Array) -> Iterator[GraspPlan]:
@@ -177,25 +178,25 @@ def _open_tips_m(plan: GraspPlan, tip: TipEllipsoid) -> Array:
 # --- what policies see ---------------------------------------------------------------------------------------------
 
 
-def _as_candidate(plan: GraspPlan, limits: HandLimits, here: GraspFrame | None) -> HandCandidate:
+def _as_candidate(plan: GraspPlan, limits: HandLimits, here: GraspFrame | None, tap_from_m: float) -> HandCandidate:
     rays = closing_rays(table_of(plan, limits.tip))
     if limits.dimension == 3:
-        rays = _with_tap(rays, plan, limits.tip)
+        rays = _with_tap(rays, plan.tap, tap_from_m, limits.tip)
     frame = plan.frame
     pose = Pose2(frame.x_m, frame.y_m, frame.yaw_rad)
     return HandCandidate(plan, Candidate(pose, plan.closing, rays, grasp_time_s(plan, limits.cycle, here)))
 
 
-def _with_tap(rays: ClosingRays, plan: GraspPlan, tip: TipEllipsoid) -> ClosingRays:
+def _with_tap(rays: ClosingRays, taps: bool, from_m: float, tip: TipEllipsoid) -> ClosingRays:
     """The rays with those of a tap behind them; without a tap these have no length, so that all plans have as many."""
     table = closing(TAP.closing, TAP_HEIGHT_m, tip)
     above_m = np.array([table.path(finger).centre_m(TAP.progress[finger]) for finger in FINGERS])
-    above_m[:, 2] = _TAP_FROM_m
+    above_m[:, 2] = from_m
     return ClosingRays(
         fingers=(*rays.fingers, *FINGERS),
         starts_m=np.vstack([rays.starts_m, above_m]),
         directions=np.vstack([rays.directions, np.tile([0.0, 0.0, -1.0], (len(FINGERS), 1))]),
-        lengths_m=np.append(rays.lengths_m, np.full(len(FINGERS), _TAP_FROM_m if plan.tap else 0.0)),
+        lengths_m=np.append(rays.lengths_m, np.full(len(FINGERS), from_m if taps else 0.0)),
     )
 
 

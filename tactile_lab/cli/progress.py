@@ -28,10 +28,11 @@ class LiveProgress:
     Args:
         title: of the session.
         live: show the step in hand; a guided session shows it itself.
+        reasons: say below each grasp why it was chosen.
     """
 
-    def __init__(self, title: str, *, live: bool = True) -> None:
-        self._title, self._begun, self._listed = title, False, False
+    def __init__(self, title: str, *, live: bool = True, reasons: bool = False) -> None:
+        self._title, self._begun, self._listed, self._reasons = title, False, False, reasons
         live = live and people.is_terminal
         self._live = Live(console=people, refresh_per_second=8, transient=True) if live else None
 
@@ -61,6 +62,8 @@ class LiveProgress:
             say(LEGEND, "dim")
             _line(HEAD, "bold")
         _line(_cells(report))
+        if self._reasons:
+            say(f"        {report.reason}", "dim")
 
     def told(self, message: str) -> None:
         """Something a person should know at once."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Literal
@@ -51,6 +52,15 @@ def run(
     pace: Annotated[
         float, typer.Option(min=0.0, help="Guided, simulated rig: its seconds for a real one; 0: as fast as it goes.")
     ] = 1.0,
+    policy: Annotated[
+        str | None,
+        typer.Option(
+            help="Exploration policy that chooses the grasps (docs/exploration.md).", show_default="the rig's"
+        ),
+    ] = None,
+    confirm: Annotated[bool, typer.Option("--confirm", help="Ask before every grasp; a veto takes the next best.")] = (
+        False
+    ),
     allow_uncalibrated: AllowUncalibrated = False,
     as_json: Json = False,
     no_input: NoInput = False,
@@ -63,6 +73,7 @@ def run(
     Ctrl+C once finishes the step in hand and closes the session; twice ends at once. Both leave a readable session.
     """
     with interruptions_held():
+        from tactile_lab.cli.approval import TerminalApproval
         from tactile_lab.cli.attending import GuidedWay, attendance
         from tactile_lab.cli.progress import LiveProgress
         from tactile_lab.cli.results import conclude
@@ -70,12 +81,17 @@ def run(
         from tactile_lab.workflow.running import SessionRequest, run_session
 
     guided = mode is Mode.GUIDED
+    if confirm and (no_input or guided):
+        raise typer.BadParameter("asks before every grasp of an autonomous session", param_hint="'--confirm'")
     way = GuidedWay(_led_by(led_by), automatic_capture or None, pedal, pace, no_input)
     tell_left_open(out)
-    request = SessionRequest(rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated)
+    request = SessionRequest(rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy)
     title = f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}"
-    with LiveProgress(title, live=not guided) as progress, attendance(way if guided else None) as present:
-        finished = run_session(request, progress, present)
+    with (
+        LiveProgress(title, live=not (guided or confirm), reasons=policy is not None) as progress,
+        attendance(way if guided else None) as present,
+    ):
+        finished = run_session(request, progress, replace(present, approve=TerminalApproval()) if confirm else present)
     conclude(finished, as_json)
 
 

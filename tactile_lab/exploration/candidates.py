@@ -107,8 +107,10 @@ def predict_contacts(candidate: Candidate, known: ModelledObject) -> PredictedCo
     rays = candidate.rays
     steps = np.arange(0.0, float(rays.lengths_m.max()) + _STEP_m, _STEP_m)
     samples = starts[:, None] + steps[:, None] * directions[:, None]
-    values = known.field.predict(samples.reshape(-1, known.dimension)).mean_m.reshape(len(starts), -1)
-    crossing = (values[:, :-1] > 0) & (values[:, 1:] <= 0) & (steps[1:] <= rays.lengths_m[:, None])
+    asked = steps <= rays.lengths_m[:, None]
+    values = np.full(asked.shape, np.inf)
+    values[asked] = known.field.predict(samples[asked]).mean_m
+    crossing = (values[:, :-1] > 0) & (values[:, 1:] <= 0)
     touching = np.flatnonzero(crossing.any(axis=1))
     before = crossing[touching].argmax(axis=1)
     outside, inside = values[touching, before], values[touching, before + 1]

@@ -14,6 +14,7 @@ from sessions.guided.attended import AttendedDecisions
 from sessions.guided.crew import guided_crew
 from sessions.guided.operator import Operator
 from sessions.guided.pace import Pace
+from sessions.policy_decisions import Approve, everything_approved
 from sessions.recorder import TrafficSink
 from tactile_lab.clock import MonotonicClock, VirtualClock
 from tactile_lab.slam import TactileSlam
@@ -30,6 +31,7 @@ class Attendance:
         automatic: captures come by themselves; None for what the rig says.
         pace: simulated seconds for a real one in a guided session; 0 for as fast as it goes.
         onlooker: is given what viewers show.
+        approve: asked before every grasp of an autonomous session.
     """
 
     operator: Operator | None = None
@@ -38,6 +40,7 @@ class Attendance:
     automatic: bool | None = None
     pace: float = 1.0
     onlooker: TrafficSink | None = None
+    approve: Approve = everything_approved
 
 
 def settings_for(settings: ConductorSettings, attendance: Attendance) -> ConductorSettings:
@@ -66,7 +69,7 @@ def crew_for(
     if operator is not None and attendance.guides:
         pace = _pace(bench, attendance)
         return guided_crew(bench, slam, settings, operator, session_folder, seed=seed, dimension=dimension, pace=pace)
-    crew = autonomous_crew(bench, slam, settings, seed=seed, dimension=dimension)
+    crew = autonomous_crew(bench, slam, settings, seed=seed, dimension=dimension, approve=attendance.approve)
     if operator is None:
         return crew
     assert isinstance(crew.decisions, AutonomousDecisions)

@@ -19,6 +19,7 @@ from tactile_lab.exploration.policies import make_policy
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.laboratory import Laboratory, open_laboratory
+from tactile_lab.rigs.recording import record_camera, stampers, traffic_settings
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.strict_yaml import validate
 from tactile_lab.tracking.motion import MotionNoise
@@ -127,6 +128,7 @@ def _record(
             session.recorder.watched_by(attendance.onlooker)
         bench = laboratory.bench(session.recorder)
         bench.connect()
+        record_camera(rig, session.recorder, bench.clock.now_ns())
         settings = settings_for(_conductor_settings(rig, request), attendance)
         seed, dimension = request.seed, request.dimension
         try:
@@ -157,6 +159,8 @@ def _new_session(
         },
         notes=request.notes,
         truth_mesh_ply=None if laboratory.target is None else _ply(laboratory.target),
+        stampers=stampers(rig),
+        traffic_settings=traffic_settings(rig),
     )
 
 

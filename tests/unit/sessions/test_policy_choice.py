@@ -1,0 +1,373 @@
+"""Policies at work: what the hand offers, the planner with a policy, vetoes, the record; on fakes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from gtsam import Pose2, Pose3, Rot3
+
+from drivers.shadow.closing import closing
+from drivers.shadow.posture import TipEllipsoid
+from sessions.cycle_settings import CycleSettings
+from sessions.decisions import DoGrasp, End
+from sessions.explorer import ExplorationSettings, KnownShape, known_shape
+from sessions.grasp_cycle import GraspPlan
+from sessions.hand_candidates import LANDED, NO_ROOM, OUT_OF_REACH, TOO_TALL, HandLimits, grasp_time_s, offer
+from sessions.motion import GraspFrame
+from sessions.next_grasp import FixedRule, PlanSettings
+from sessions.planner import Planner
+from sessions.policy_choice import Choice, Knowledge, PolicyChooser
+from sessions.policy_decisions import PolicyDecisions, Proposal
+from sessions.safety import SafetySettings
+from tactile_lab.exploration.candidates import Candidate, predict_contacts
+from tactile_lab.exploration.policies import POLICIES, make_policy
+from tactile_lab.exploration.policy import Belief, Decision, best_of, nothing_to_choose
+from tactile_lab.geometry.contacts import Contact, Grasp
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.tracking.motion import MotionNoise
+
+HEIGHT_m = 0.022
+
+
+def sides(half_x_m: float = 0.05, half_y_m: float = 0.03) -> tuple[np.ndarray, np.ndarray]:
+    """Points and normals on the four sides of a box, in the plane."""
+    along, across = np.linspace(-0.9, 0.9, 7) * half_x_m, np.linspace(-0.9, 0.9, 5) * half_y_m
+    rows = [
+        (np.column_stack([along, np.full(7, half_y_m)]), (0.0, 1.0)),
+        (np.column_stack([along, np.full(7, -half_y_m)]), (0.0, -1.0)),
+        (np.column_stack([np.full(5, half_x_m), across]), (1.0, 0.0)),
+        (np.column_stack([np.full(5, -half_x_m), across]), (-1.0, 0.0)),
+    ]
+    return np.vstack([row[0] for row in rows]), np.vstack([np.tile(row[1], (len(row[0]), 1)) for row in rows])
+
+
+def flat_box(half_x_m: float = 0.05, half_y_m: float = 0.03) -> KnownShape:
+    return known_shape(Gpis.fit(*sides(half_x_m, half_y_m), 0.001, 0.05), 2, HEIGHT_m, ExplorationSettings())
+
+
+def solid_box(height_m: float = 0.04, half_x_m: float = 0.05, half_y_m: float = 0.03) -> KnownShape:
+    """Its sides at two heights and its top, frame on the table."""
+    points, normals = sides(half_x_m, half_y_m)
+    layers = [np.column_stack([points, np.full(len(points), part * height_m)]) for part in (0.25, 0.75)]
+    flat = np.column_stack([normals, np.zeros(len(normals))])
+    grid = np.stack(np.meshgrid([-0.03, 0.0, 0.03], [-0.015, 0.015]), axis=-1).reshape(-1, 2)
+    top = np.column_stack([grid, np.full(len(grid), height_m)])
+    field = Gpis.fit(
+        np.vstack([*layers, top]), np.vstack([flat, flat, np.tile([0.0, 0.0, 1.0], (len(top), 1))]), 0.001, 0.05
+    )
+    return known_shape(field, 3, 0.0, ExplorationSettings())
+
+
+FLAT_BOX, SOLID_BOX = flat_box(), solid_box()
+
+
+def limits(dimension: int = 2, **changes: object) -> HandLimits:
+    made = HandLimits(
+        PlanSettings(), ExplorationSettings(), CycleSettings(), SafetySettings(), TipEllipsoid(), dimension
+    )
+    return replace(made, **changes)  # type: ignore[arg-type]
+
+
+# --- what the hand offers ------------------------------------------------------------------------------------------
+
+
+def test_every_yaw_shift_and_closing_is_considered() -> None:
+    found = offer(limits(), FLAT_BOX, Pose2())
+    assert len(found.usable) + sum(found.ruled_out.values()) == 12 * 3 * 2
+    assert {one.plan.closing for one in found.usable} == {"pinch", "radial"}
+    assert not any(one.plan.tap for one in found.usable)
+
+
+def test_in_space_heights_and_taps_come_on_top() -> None:
+    found = offer(limits(3), SOLID_BOX, Pose2())
+    assert len(found.usable) + sum(found.ruled_out.values()) == 12 * 3 * 2 * 3 + 12 * 2
+    assert len({one.plan.height_m for one in found.usable}) == 3
+    taps = [one for one in found.usable if one.plan.tap]
+    assert taps
+    assert len({len(one.candidate.rays.fingers) for one in found.usable}) == 1  # policies compare like with like
+    plain = next(one for one in found.usable if not one.plan.tap and one.plan.frame == taps[0].plan.frame)
+    assert taps[0].candidate.time_s > plain.candidate.time_s + 2.0
+
+
+def test_a_tap_is_expected_on_the_top() -> None:
+    found = offer(limits(3), SOLID_BOX, Pose2())
+    tap = next(one for one in found.usable if one.plan.tap)
+    belief = Belief(
+        SOLID_BOX.field,
+        SOLID_BOX.surface,
+        SOLID_BOX.field.contacts_m,
+        SOLID_BOX.field.normals,
+        np.zeros(len(SOLID_BOX.field.contacts_m), dtype=np.int64),
+        Pose2(),
+    )
+    expected = predict_contacts(tap.candidate, belief.modelled)
+    heights = expected.points_object_m[:, 2]
+    assert np.count_nonzero(np.abs(heights - 0.04) < 0.003) >= 3
+
+
+def test_object_out_of_reach_offers_nothing_and_says_so() -> None:
+    found = offer(limits(), FLAT_BOX, Pose2(0.6, 0.0, 0.0))
+    assert found.usable == ()
+    assert found.ruled_out == {OUT_OF_REACH: 72}
+    assert found.obstacles == f"72: {OUT_OF_REACH}"
+
+
+def test_object_too_large_for_the_opening_offers_nothing() -> None:
+    huge = flat_box(0.09, 0.09)
+    found = offer(limits(), huge, Pose2())
+    assert found.usable == ()
+    assert found.ruled_out[NO_ROOM] == 72
+
+
+def test_object_as_high_as_the_palm_offers_nothing() -> None:
+    found = offer(limits(3), replace(SOLID_BOX, top_height_m=0.14), Pose2())
+    assert found.usable == ()
+    assert found.ruled_out[TOO_TALL] > 0
+
+
+def test_places_the_hand_has_landed_at_are_ruled_out() -> None:
+    found = offer(limits(), FLAT_BOX, Pose2(), has_room=lambda plan: plan.closing == "pinch")
+    assert {one.plan.closing for one in found.usable} == {"pinch"}
+    assert found.ruled_out[LANDED] == 36
+
+
+def test_fingers_come_down_clear_of_what_bulges_above_them() -> None:
+    """On a sphere's equator higher than the fingertips there is less room than at their own height."""
+    for one in offer(limits(3), SOLID_BOX, Pose2()).usable:
+        paths = closing(one.plan.closing, one.plan.height_m, TipEllipsoid()).paths
+        tips = np.array([one.plan.frame.pose.transformFrom(p.centre_m(p.valid[0])) for p in paths.values()])
+        outside = np.linalg.norm(np.maximum(np.abs(tips[:, :2]) - [0.05, 0.03], 0.0), axis=1)
+        assert outside.min() > 0.008
+
+
+def test_time_grows_with_the_way_to_the_grasp() -> None:
+    plan = GraspPlan(GraspFrame(0.0, 0.0, 1.0), "pinch", HEIGHT_m)
+    near = grasp_time_s(plan, CycleSettings(), GraspFrame(0.0, 0.0, 0.9))
+    far = grasp_time_s(plan, CycleSettings(), GraspFrame(0.0, 0.0, -1.2))
+    assert far - near == pytest.approx((2.2 - 0.1) / 1.5)
+
+
+# --- the chooser ---------------------------------------------------------------------------------------------------
+
+
+def knowledge(known: KnownShape = FLAT_BOX, left: int | None = 5, x_m: float = 0.0) -> Knowledge:
+    count = len(known.field.contacts_m)
+    return Knowledge(known, Pose2(x_m, 0.0, 0.2), 1e-6 * np.eye(3), np.arange(count) // 5, left)
+
+
+def chooser(policy: str = "variance", dimension: int = 2) -> PolicyChooser:
+    return PolicyChooser(make_policy(policy), limits(dimension), MotionNoise(), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("name", sorted(POLICIES))
+def test_every_policy_chooses_among_the_hands_candidates(name: str) -> None:
+    choice = chooser(name).choose(3, knowledge())
+    assert choice.decision.outcome == "grasp"
+    assert choice.plan is not None
+    assert choice.plan.reason.startswith(f"{name}: ")
+    assert len(choice.decision.scores) == len(choice.offered.usable)
+
+
+@pytest.mark.parametrize("name", ["random", "variance", "clusters", "information"])
+def test_policies_work_in_space_with_taps(name: str) -> None:
+    choice = chooser(name, 3).choose(3, knowledge(SOLID_BOX))
+    assert choice.decision.outcome == "grasp"
+
+
+def test_no_candidate_is_told_with_its_obstacles() -> None:
+    choice = chooser().choose(3, knowledge(x_m=0.6))
+    assert choice.plan is None
+    assert choice.decision.outcome == "nothing"
+    assert OUT_OF_REACH in choice.decision.reason
+
+
+def test_budget_of_zero_stops() -> None:
+    choice = chooser().choose(3, knowledge(left=0))
+    assert choice.decision.outcome == "stop"
+    assert "budget" in choice.decision.reason
+
+
+@dataclass(frozen=True)
+class Indifferent:
+    """All candidates are the same to it."""
+
+    name: str = "indifferent"
+
+    def choose(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Decision:
+        if settled := nothing_to_choose(self.name, candidates, belief):
+            return settled
+        return best_of(self.name, np.ones(len(candidates)), "all tell the same", rng)
+
+
+def test_equal_candidates_are_chosen_by_chance_and_it_says_so() -> None:
+    choice = PolicyChooser(Indifferent(), limits(), MotionNoise(), np.random.default_rng(0)).choose(3, knowledge())
+    assert choice.plan is not None
+    assert "chance" in choice.decision.reason
+
+
+def touching(*fingers: str) -> Grasp:
+    contacts = [
+        Contact(f, np.array([0.03, 0.0, 0.02]), np.array([1.0, 0, 0]), 1e-6 * np.eye(3), 0.05, 0.5) for f in fingers
+    ]
+    return Grasp(2, 0, tuple(contacts), Pose3())
+
+
+def test_fingers_that_met_nothing_are_remembered_where_they_were_expected() -> None:
+    one, known = chooser("information"), knowledge()
+    choice = one.choose(3, known)
+    one.decided(choice, known)
+    expected = predict_contacts(
+        choice.offered.usable[choice.decision.chosen or 0].candidate, one._belief(known).modelled
+    )
+    one.grasped(touching(*expected.fingers[1:]))
+    missed = one._belief(known).missed_m
+    np.testing.assert_allclose(missed, expected.points_object_m[:1], atol=1e-6)
+
+
+def test_a_region_that_never_yields_contact_is_given_up() -> None:
+    """A candidate whose fingers have met nothing again and again is not chosen for ever."""
+    one, known = chooser("information"), knowledge()
+    chosen = []
+    for number in range(6):
+        choice = one.choose(number, known)
+        chosen.append(choice.decision.chosen)
+        one.decided(choice, known)
+        one.grasped(touching())
+    assert len(set(chosen)) > 1
+
+
+def test_turns_keep_the_hand_in_its_window() -> None:
+    one = chooser()
+    for yaw in (-1.2, 0.0, 1.2):
+        turn = one.turn(GraspFrame(0.0, 0.0, yaw), knowledge(), 0.3)
+        assert -1.31 <= yaw + turn <= 1.31
+        assert 0.2 < abs(turn) < 0.8
+
+
+def test_record_is_plain_json_with_all_candidates() -> None:
+    choice = chooser().choose(3, knowledge())
+    document = json.loads(json.dumps(choice.as_plain(), allow_nan=False))
+    assert document["number"] == 3
+    assert len(document["candidates"]) == len(choice.offered.usable)
+    assert document["candidates"][document["chosen"]]["score"] == max(
+        one["score"] for one in document["candidates"] if one["score"] is not None
+    )
+
+
+# --- the planner with a policy, and vetoes -------------------------------------------------------------------------
+
+
+@dataclass
+class KnownSlam:
+    """An estimation that knows a box."""
+
+    x_m: float = 0.0
+    is_lost: bool = False
+    origin_height_m: float = HEIGHT_m
+
+    @property
+    def surface(self) -> Gpis:
+        return FLAT_BOX.field
+
+    @property
+    def surface_grasps(self) -> np.ndarray:
+        return np.arange(len(FLAT_BOX.field.contacts_m)) // 5
+
+    @property
+    def world_T_object(self) -> Pose3:
+        return Pose3(Rot3(), np.array([self.x_m, 0.0, HEIGHT_m]))
+
+    @property
+    def pose_covariance(self) -> np.ndarray:
+        return 1e-6 * np.eye(3)
+
+
+def planner(policy: str = "variance", grasps: int = 10, slam: KnownSlam | None = None) -> Planner:
+    rule = FixedRule(PlanSettings(), np.random.default_rng(0))
+    return Planner(
+        slam or KnownSlam(),
+        rule,
+        ExplorationSettings(),
+        1,
+        TipEllipsoid(),
+        2,
+        chooser(policy),
+        grasps,  # type: ignore[arg-type]
+    )
+
+
+def decisions(made: Planner, approve: object = None) -> tuple[PolicyDecisions, list[Choice]]:
+    told: list[Choice] = []
+    if approve is None:
+        return PolicyDecisions(made, told.append), told
+    return PolicyDecisions(made, told.append, approve), told  # type: ignore[arg-type]
+
+
+def test_the_policy_is_asked_after_the_fixed_grasps_and_its_decision_is_told_once() -> None:
+    who, told = decisions(planner())
+    who.think(0)
+    assert isinstance(who.decide(0), DoGrasp)
+    assert told == []
+    who.think(1)
+    decision = who.decide(1)
+    assert isinstance(decision, DoGrasp)
+    assert decision.plan.reason.startswith("variance: ")
+    who.decide(1)
+    assert [choice.number for choice in told] == [2]
+
+
+def test_a_veto_takes_the_next_best_and_is_recorded() -> None:
+    asked: list[Proposal] = []
+
+    def refuse_two(proposal: Proposal) -> bool:
+        asked.append(proposal)
+        return proposal.vetoed == 2
+
+    who, told = decisions(planner(), refuse_two)
+    who.think(1)
+    decision = who.decide(1)
+    assert isinstance(decision, DoGrasp)
+    assert len({proposal.plan.frame for proposal in asked} | {p.plan.closing for p in asked}) >= 2
+    assert decision.plan == asked[-1].plan
+    assert "vetoed by the operator" in decision.plan.reason
+    assert len(told[0].vetoed) == 2
+    scores = told[0].decision.scores
+    assert scores[told[0].vetoed[0]] >= scores[told[0].vetoed[1]] >= scores[told[0].decision.chosen or 0]
+
+
+def test_when_all_are_vetoed_the_fixed_rule_stands_in_and_says_why() -> None:
+    candidates = len(offer(limits(), FLAT_BOX, Pose2()).usable)
+    who, _ = decisions(planner(), lambda proposal: proposal.vetoed > candidates)
+    who.think(1)
+    decision = who.decide(1)
+    assert isinstance(decision, DoGrasp)
+    assert "vetoed" in decision.plan.reason
+
+
+def test_grasps_of_the_fixed_rule_may_be_vetoed_too() -> None:
+    who, told = decisions(planner(), lambda proposal: proposal.vetoed == 1)
+    who.think(0)
+    decision = who.decide(0)
+    assert isinstance(decision, DoGrasp)
+    assert "vetoed" in decision.plan.reason
+    assert told == []
+
+
+def test_without_a_reachable_candidate_the_rule_stands_in_and_says_why() -> None:
+    made = planner(slam=KnownSlam(x_m=0.6))
+    plan = made.plan(1)
+    assert OUT_OF_REACH in plan.reason
+    assert plan.reason.startswith("alternating yaw, as ")
+
+
+def test_a_policy_that_stops_ends_the_session_with_its_reason() -> None:
+    who, told = decisions(planner(grasps=1))
+    who.think(1)
+    decision = who.decide(1)
+    assert isinstance(decision, End)
+    assert "budget" in decision.reason
+    assert told[0].decision.outcome == "stop"
