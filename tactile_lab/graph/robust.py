@@ -4,12 +4,13 @@ The hand carries the object by 20 degrees at a time with an uncertainty of as mu
 a wrong association (another side of a box) fits as well as a right one until others contradict it. The solver
 
 1. finds the likeliest combinations of right loops from headings alone (:mod:`heading_hypotheses`),
-2. solves each for all poses (eq. 3.19 to 3.25 with a redescending cost on loops, Levenberg-Marquardt),
+2. solves each for all poses (eq. 3.19 to 3.25, Levenberg-Marquardt),
 3. tests every loop against all others: the loops in the graph by leaving each out, those outside by their gap;
    admits and refuses, and solves again until nothing changes,
 4. keeps the combination that explains most at least cost.
 
-Graphs too large for step 1 start from odometry, with the cost tightened step by step.
+Graphs too large for step 1 start from odometry, with a redescending cost on loops that is tightened step by step;
+steps 3 and 4 follow.
 """
 
 from __future__ import annotations

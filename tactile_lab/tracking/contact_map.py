@@ -128,6 +128,12 @@ class ContactMap:
         """The grasp that each of :attr:`contacts` comes from, and its index among that grasp's contacts."""
         return [(index, int(each)) for index, grasp in enumerate(self.placed) for each in grasp.kept]
 
+    @property
+    def trailing_unplaced(self) -> int:
+        """How many grasps in a row were left out last."""
+        used = [grasp.used for grasp in reversed(self.placed)]
+        return used.index(True)
+
     def without_contact(self, grasp: int, contact: int) -> ContactMap:
         """The map with one contact left out."""
         emptier = replace(self.placed[grasp], left_out=self.placed[grasp].left_out | {contact})
@@ -150,6 +156,20 @@ class ContactMap:
         """The map with other poses, shape (n, 3), covariances kept."""
         moved = [replace(grasp, row=row) for grasp, row in zip(self.placed, rows, strict=True)]
         return replace(self, placed=tuple(moved))
+
+    def reread(self, backward: ContactMap) -> ContactMap:
+        """This map with the poses and doubts of another one, of the same grasps in the opposite order.
+
+        The other's poses are brought into this map's object frame.
+        """
+        space, theirs = self.space, backward.placed[::-1]
+        frame_T_ours = space.compose(space.inverse(theirs[0].row), self.placed[0].row)
+        placed = [
+            replace(our, row=space.compose(their.row, frame_T_ours), left_out=their.left_out)
+            for our, their in zip(self.placed, theirs, strict=True)
+        ]
+        first = replace(placed[0], row=self.placed[0].row)  # equal but for rounding
+        return replace(self, placed=(first, *placed[1:]))
 
     def fit(self) -> Gpis:
         """The shape, with the current kernel parameters."""

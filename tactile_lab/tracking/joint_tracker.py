@@ -207,7 +207,7 @@ class JointTracker:
             tracker.weigh(grasp.contacts_world)
             tracker.update_shape(grasp.contacts_world, certain=True)
             tracker.resample()
-        return [self._judge.rated(_forward(one.map, self.map)) for one in tracker.hypotheses]
+        return [self._judge.rated(self.map.reread(one.map)) for one in tracker.hypotheses]
 
     def _regroup(self) -> None:
         """Join the likeliest hypothesis otherwise, and what is likelier then once more."""
@@ -261,7 +261,7 @@ class JointTracker:
 
     def _proposed(self, hypothesis: Hypothesis, contacts: ContactSet) -> list[Hypothesis]:
         """Continuations of a hypothesis, rated contact by contact only."""
-        noise = self._noise.accumulated(1 + _trailing_unplaced(hypothesis.map))
+        noise = self._noise.accumulated(1 + hypothesis.map.trailing_unplaced)
         predicted = self._space.compose(self._motion, hypothesis.map.placed[-1].row)
         fitted = hypothesis.map.fit()
         rows, fit = propose(predicted, contacts, fitted, noise, self._settings.proposals, self._space)
@@ -289,21 +289,3 @@ class JointTracker:
     def _share_best_kernel(self) -> None:
         best = self._hypotheses[0].map.with_best_kernel()
         self._hypotheses = [replace(one, map=replace(one.map, settings=best.settings)) for one in self._hypotheses]
-
-
-def _forward(backward: ContactMap, present: ContactMap) -> ContactMap:
-    """A map of the same grasps in the opposite order, turned round and brought into the present object frame."""
-    space, grasps = present.space, backward.placed[::-1]
-    body_T_frame = space.compose(space.inverse(grasps[0].row), present.placed[0].row)
-    placed = [
-        replace(ours, row=space.compose(theirs.row, body_T_frame), left_out=theirs.left_out)
-        for ours, theirs in zip(present.placed, grasps, strict=True)
-    ]
-    first = replace(placed[0], row=present.placed[0].row)  # equal but for rounding
-    return replace(present, placed=(first, *placed[1:]))
-
-
-def _trailing_unplaced(contact_map: ContactMap) -> int:
-    """How many grasps in a row were left out last."""
-    used = [grasp.used for grasp in reversed(contact_map.placed)]
-    return used.index(True)
