@@ -24,7 +24,7 @@ from tactile_lab.geometry.poses import planar, spatial
 from tactile_lab.strict_yaml import validate
 from tactile_lab.tracking.contact_checks import opposing_pairs
 from tactile_lab.tracking.contact_set import LARGEST_SLOPE
-from tactile_lab.tracking.trackers import palm_heading
+from tactile_lab.tracking.first_pose import palm_heading
 
 __all__ = ["FORMAT", "ContactLog", "MotionSigma", "ObjectTruth", "read_contact_log", "write_contact_log"]
 

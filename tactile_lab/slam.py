@@ -39,17 +39,15 @@ from tactile_lab.shape.surface import Contour, SurfaceMesh
 from tactile_lab.slam_result import SlamResult, SlamStep, Verdict
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.observability import observability, planar_observability
+from tactile_lab.tracking.first_pose import first_row
+from tactile_lab.tracking.observability import observability, placement_sigma_m, planar_observability
 from tactile_lab.tracking.particle_filter import CERTAIN_VARIANCE, PoseEstimate
-from tactile_lab.tracking.pose_rows import PoseRows
-from tactile_lab.tracking.spatial_rows import SPATIAL
 from tactile_lab.tracking.trackers import (
     GRAPH_METHODS,
     THESIS_METHODS,
     Tracker,
     TrackingSettings,
     make_tracker,
-    palm_heading,
 )
 
 
@@ -237,7 +235,7 @@ class TactileSlam:
     def _judge(self, contacts: ContactSet, estimate: PoseEstimate, explained: bool) -> tuple[Verdict, str]:
         if not explained:
             return "untracked", "no pose explains the contacts" if len(contacts) else "no contacts"
-        spread_m = placement_sigma_m(contacts, estimate, self._space)
+        spread_m = placement_sigma_m(contacts, estimate.row, estimate.covariance, self._space)
         if spread_m > self._settings.placement_limit_m:
             return "uncertain", f"contacts uncertain to {1e3 * spread_m:.0f} mm"
         return "tracked", f"contacts placed to {1e3 * spread_m:.1f} mm"
@@ -301,17 +299,3 @@ def _only_for_known_pose(method: str, poses: Sequence[Pose3 | None] | None) -> t
 def relocated_rows(contact_map: ContactMap, contacts: ContactSet) -> Array:
     """Poses of contacts anywhere on a known object on the table, the best first, shape (m, 3)."""
     return relocation_candidates(contact_map, contacts).rows
-
-
-def first_row(grasp: Grasp, contacts: ContactSet, *, on_table: bool) -> Array:
-    """The pose of the object frame at its birth: at the contacts' centre, along the palm (section 3.4)."""
-    if on_table:
-        return np.array([*contacts.points_m[:, :2].mean(axis=0), palm_heading(grasp.world_T_palm)])
-    return SPATIAL.row(Pose3(grasp.world_T_palm.rotation(), contacts.points_m.mean(axis=0)))
-
-
-def placement_sigma_m(contacts: ContactSet, estimate: PoseEstimate, space: PoseRows) -> float:
-    """How far the pose's uncertainty moves the contacts along their normals, root mean square."""
-    points, normals = space.to_object(estimate.row, contacts.points_m, contacts.normals)
-    rows = space.by_row(estimate.row, points, normals, normals, np.zeros_like(normals))
-    return float(np.sqrt(np.mean(np.einsum("ni,ij,nj->n", rows, estimate.covariance, rows))))

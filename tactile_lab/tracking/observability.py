@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactile_lab.geometry.contacts import Array
+from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.pose_rows import PoseRows
 
 SCALE_m = 0.030
 """Length that scales the lever arms: about half the size of an object that fits into the hand."""
@@ -64,3 +66,16 @@ def observability(points_m: Array, normals: Array, scale_m: float = SCALE_m) -> 
 def planar_observability(points_m: Array, normals: Array, scale_m: float = SCALE_m) -> Observability:
     """The same for an object that only moves on the table, from contacts in the plane or in space."""
     return observability(points_m[:, :2], normals[:, :2], scale_m)
+
+
+def placement_sigma_m(contacts: ContactSet, row: Array, covariance: Array, space: PoseRows) -> float:
+    """How far the uncertainty of a pose moves the contacts along their normals, root mean square.
+
+    Args:
+        contacts: world frame.
+        row, covariance: of the pose, shapes (size,) and (size, size).
+        space: what rows mean.
+    """
+    points, normals = space.to_object(row, contacts.points_m, contacts.normals)
+    rows = space.by_row(row, points, normals, normals, np.zeros_like(normals))
+    return float(np.sqrt(np.mean(np.einsum("ni,ij,nj->n", rows, covariance, rows))))

@@ -187,14 +187,3 @@ def _particle_tracker(settings: TrackingSettings, start: ContactMap, rng: np.ran
         field_of=field_of,
         rng=rng,
     )
-
-
-def palm_heading(world_T_palm: Pose3) -> float:
-    """Direction of the palm's horizontal axis in the world, radians.
-
-    The palm's z axis points along the fingers. Where that is close to vertical its x axis, to the thumb's side,
-    is used instead.
-    """
-    axes = world_T_palm.rotation().matrix()
-    along = axes[:2, 2] if np.linalg.norm(axes[:2, 2]) > 0.5 else axes[:2, 0]
-    return float(np.arctan2(along[1], along[0]))

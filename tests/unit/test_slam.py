@@ -19,7 +19,7 @@ from tactile_lab.geometry.poses import spatial
 from tactile_lab.shape.metrics import contour_errors
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.slam_result import SlamResult
-from tactile_lab.tracking.trackers import palm_heading
+from tactile_lab.tracking.first_pose import palm_heading
 from tests.support.simulated_contacts import registration_mm
 
 
