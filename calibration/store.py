@@ -18,7 +18,7 @@ from typing import Any, Literal
 import yaml
 from pydantic import Field, field_validator
 
-from tactile_lab.calibration_file import FORMAT, SEAL, check_seal, is_stored, plain, seal_of
+from tactile_lab.calibration_file import SEAL, check_seal, is_stored, plain, seal_of
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.strict_yaml import StrictModel, load, validate
@@ -90,7 +90,7 @@ class CalibrationRecord(StrictModel):
         notes: the operator's.
     """
 
-    format: Literal["tactile-calibration/1"] = FORMAT
+    format: Literal["tactile-calibration/1"] = "tactile-calibration/1"
     kind: Kind
     rig: str = Field(min_length=1)
     devices: dict[str, str] = Field(default_factory=dict)

@@ -1,0 +1,113 @@
+"""Simulated calibration data by kinematics alone, fast enough for hundreds of runs: touches, and views of a board."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from gtsam import Pose3
+
+from calibration.hand_chain import mount_T_link
+from calibration.observations import HandPose, Touch, View
+from calibration.touch_plan import PlannedTouch, pointing_vector
+from calibration.view_plan import PALM_T_BOARD, PlannedView
+from drivers.camera.calibration import CameraCalibration
+from drivers.camera.markers import MarkerSettings, marker_corners
+from drivers.fingertip import RigidTransform
+from drivers.shadow.kinematics import JOINTS
+from drivers.shadow.posture import TipEllipsoid
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.geometry.poses import transform_points
+
+JOINT_BIAS_rad = float(np.radians(0.6))
+JOINT_NOISE_rad = float(np.radians(0.1))
+SAMPLES = 20
+"""Joint readings averaged in one press or picture."""
+
+CONTACT_SIGMA_m = 1e-3
+YIELD_m_N = 3e-4
+FORCES_N = (0.2, 1.0)
+CORNER_SIGMA_px = 0.15
+BASE_SIGMA_m = 1e-4
+
+CAMERA = CameraCalibration(
+    focal_px=(773.0, 773.8), centre_px=(322.8, 237.4), distortion=(-0.12, 0.06, 8e-4, -6e-4, 0.0), size_px=(640, 480)
+)
+WORLD_T_CAMERA = RigidTransform(translation_m=(-0.005, -0.04, -0.58), rpy_rad=(-0.07, 0.05, 0.0))
+MARKERS = MarkerSettings(
+    world_T_worldmarker=RigidTransform(translation_m=(0.2, 0.0, 0.0), rpy_rad=(float(np.pi), 0.0, 0.1))
+)
+BOARD_m = np.concatenate(
+    [marker_corners(0.03) + np.array([0.019 * x, 0.019 * y, 0.0]) for x in (-1, 1) for y in (-1, 1)]
+)
+"""Corners of a board of four markers of 30 mm, shape (16, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrueRig:
+    """What is to be found.
+
+    Attributes:
+        world_T_mount: where the mount stands.
+        bias_rad: of every joint, measured minus true, shape (24,).
+        yield_m_N: how far its tips yield.
+    """
+
+    world_T_mount: Pose3
+    bias_rad: Array
+    yield_m_N: float
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, *, place_m: float = 0.02, turn_rad: float = 0.03) -> TrueRig:
+        """A rig some way off the nominal place, with a bias on every joint, those of the wrist included."""
+        motion = np.concatenate([turn_rad * rng.standard_normal(3), place_m * rng.standard_normal(3)])
+        bias = JOINT_BIAS_rad * rng.standard_normal(len(JOINTS))
+        return cls(Pose3.Expmap(motion), bias, YIELD_m_N * abs(rng.standard_normal()))
+
+    def measured(self, base_q: Array, joints_rad: Array, rng: np.random.Generator) -> HandPose:
+        """What the sensors say of a true pose: bias, and noise averaged over a press."""
+        noise = JOINT_NOISE_rad / np.sqrt(SAMPLES) * rng.standard_normal(len(JOINTS))
+        return HandPose(base_q, joints_rad + self.bias_rad + noise)
+
+
+def touches_of(plan: Sequence[PlannedTouch], rig: TrueRig, rng: np.random.Generator) -> list[Touch]:
+    """Every planned touch as the sensors would tell it: 1 mm of noise per axis on the contact point."""
+    return [_touch(planned, rig, rng) for planned in plan]
+
+
+def _touch(planned: PlannedTouch, rig: TrueRig, rng: np.random.Generator) -> Touch:
+    tip, joints = TipEllipsoid(), pointing_vector(planned.finger)
+    force_N = float(rng.uniform(*FORCES_N))
+    base_q = planned.base_q(rig.world_T_mount, joints, tip, -rig.yield_m_N * force_N)
+    axes, inward = np.array(tip.semi_axes_m), -planned.world_R_distal.T @ planned.patch.normal_world
+    support = axes**2 * inward / np.linalg.norm(axes * inward)
+    return Touch(
+        finger=planned.finger,
+        pose=rig.measured(base_q, joints, rng),
+        point_distal_m=np.array(tip.centre_distal_m) + support + CONTACT_SIGMA_m * rng.standard_normal(3),
+        normal_distal=-inward,
+        point_covariance_m2=CONTACT_SIGMA_m**2 * np.eye(3),
+        target=planned.patch.target,
+        force_N=force_N,
+    )
+
+
+def views_of(plan: Sequence[PlannedView], rig: TrueRig, rng: np.random.Generator) -> list[View]:
+    """Every planned picture as the camera would give it, with the board glued on a little askew."""
+    askew = Pose3.Expmap(np.concatenate([0.03 * rng.standard_normal(3), 0.003 * rng.standard_normal(3)]))
+    return [_view(planned, rig, PALM_T_BOARD.pose() * askew, rng) for planned in plan]
+
+
+def _view(planned: PlannedView, rig: TrueRig, palm_T_board: Pose3, rng: np.random.Generator) -> View:
+    base_q = planned.base_q(Pose3())
+    mount_T_palm = Pose3(mount_T_link(HandPose(base_q, planned.joints_rad), "palm"))
+    board = transform_points(rig.world_T_mount * mount_T_palm * palm_T_board, BOARD_m)
+    world = transform_points(MARKERS.world_T_worldmarker.pose(), MARKERS.world_corners_m)
+    shaken = base_q + np.repeat([BASE_SIGMA_m, 0.0], 3) * rng.standard_normal(6)
+    return View(rig.measured(shaken, planned.joints_rad, rng), BOARD_m, _seen(board, rng), _seen(world, rng))
+
+
+def _seen(points_world_m: Array, rng: np.random.Generator) -> Array:
+    pixels = CAMERA.project(transform_points(WORLD_T_CAMERA.pose().inverse(), points_world_m))
+    return np.asarray(pixels + CORNER_SIGMA_px * rng.standard_normal(pixels.shape))
