@@ -2,9 +2,10 @@
 
 What a grasp z tells about the pose x and the shape f is, by the chain rule, ``I(x, f; z) = I(x; z) + I(f; z | x)``.
 
-- The first term is that of the linearised contacts: ``log det(1 + P J' J / r) / 2`` with the covariance P of the
-  particles at the time of the grasp, and r the variance of a contact *on an uncertain surface*: where the surface is
-  not known, a contact says nothing about the pose.
+- The first term is that of the linearised contacts, with the covariance P of the particles at the time of the grasp,
+  what it becomes, and the precision G at which the pose is good enough (its finer digits are nobody's gain):
+  ``log det(1 + P / G) / 2 - log det(1 + P' / G) / 2``, ``P' = (1 / P + J' J / r)^-1``. Here r is the variance of a
+  contact *on an uncertain surface*: where the surface is not known, a contact says nothing about the pose.
 - The second is summed over the surface: every patch of the size that one contact tells about (``reach_m``) hides a
   deviation of its own, beside what the field is uncertain about, until a contact has been there. A contact reveals it
   up to the sensor's noise and the pose's remaining uncertainty.
@@ -25,6 +26,7 @@ from pydantic import Field
 from scipy.spatial import cKDTree
 
 from tactile_lab.exploration.candidates import Candidate
+from tactile_lab.exploration.information.particles import ARM_m
 from tactile_lab.exploration.policy import Belief, Decision, Surface, best_of, nothing_to_choose
 from tactile_lab.exploration.prediction import (
     ExecutionNoise,
@@ -47,11 +49,12 @@ class InformationSettings(StrictModel):
     """Parameters.
 
     Attributes:
-        worlds: how many are sampled for a decision.
+        worlds, worlds_in_space: how many are sampled for a decision, for a contour and for a surface.
         execution: how well the hand does what is planned.
         reach_m: so far along the surface a contact tells about it.
         detail_m: standard deviation of what the field does not foresee between contacts (edges, corners).
         point_sigma_m, normal_sigma_rad: of a contact's measurement.
+        pose_sigma_m: a pose known to this (a turn with an arm of 30 mm) is good enough.
         pose_weight: of the pose's information against the shape's; 1 is the chain rule, 0 asks for the shape alone.
         look_ahead: how many grasps are planned together; 1 is greedy.
         least_gain: stop when no grasp promises so many nats; 0 never does.
@@ -60,11 +63,13 @@ class InformationSettings(StrictModel):
     """
 
     worlds: int = Field(default=48, ge=1)
+    worlds_in_space: int = Field(default=24, ge=1)
     execution: ExecutionNoise = ExecutionNoise()
     reach_m: float = Field(default=0.0045, gt=0)
     detail_m: float = Field(default=0.003, ge=0)
     point_sigma_m: float = Field(default=0.001, gt=0)
     normal_sigma_rad: float = Field(default=float(np.deg2rad(5.0)), gt=0)
+    pose_sigma_m: float = Field(default=0.001, gt=0)
     pose_weight: float = Field(default=1.0, ge=0)
     look_ahead: int = Field(default=1, ge=1)
     least_gain: float = Field(default=0.0, ge=0)
@@ -161,7 +166,8 @@ def promised(
     rng: np.random.Generator,
 ) -> Promise:
     """What each candidate is expected to tell, over sampled worlds."""
-    worlds = possible_worlds(belief, surface, most_fingers(candidates), settings.worlds, settings.execution, rng)
+    count = settings.worlds if belief.dimension == 2 else settings.worlds_in_space
+    worlds = possible_worlds(belief, surface, most_fingers(candidates), count, settings.execution, rng)
     touches = expected_touches(candidates, belief, worlds)
     pose, placed = _pose_information(touches, belief, worlds, settings)
     fresh, patches = unexplored(surface, belief, settings.reach_m), _patches(surface, settings.reach_m)
@@ -240,11 +246,17 @@ def _pose_information(
     variance = settings.point_sigma_m**2 + surface.sigma_m[touches.vertices] ** 2 + settings.detail_m**2
     told = np.einsum("csfi,csf,csfj->csij", rows, met / variance, rows)
     told[..., 2, 2] += _told_by_normals(surface, touches, met, settings)
-    nats = 0.5 * np.linalg.slogdet(np.eye(3) + prior @ told)[1]
     after = np.linalg.inv(np.linalg.inv(prior + _SMALLEST_VARIANCE * np.eye(3)) + told)
+    wanted = np.array([1.0, 1.0, ARM_m**2]) / settings.pose_sigma_m**2
+    nats = 0.5 * (_log_det(prior * wanted) - _log_det(after * wanted))
     moved = np.einsum("csfi,csij,csfj->csf", rows, after, rows)
     placed = np.sum(moved * met, axis=(1, 2)) / np.maximum(met.sum(axis=(1, 2)), 1)
     return nats.mean(axis=1), placed
+
+
+def _log_det(scaled: Array) -> Array:
+    """Of one plus covariances in units of what is good enough, shape (..., 3, 3)."""
+    return np.asarray(np.linalg.slogdet(np.eye(3) + scaled)[1])
 
 
 def _told_by_normals(surface: Surface, touches: ExpectedTouches, met: Mask, settings: InformationSettings) -> Array:

@@ -15,9 +15,9 @@ from tactile_lab.exploration.surface_policies import (
     ClustersPolicy,
     ContactsPolicy,
     RandomPolicy,
-    entropy_at,
+    entropy_rating,
     igef_rating,
-    variance_at,
+    variance_rating,
 )
 
 DEFAULT_POLICY = "information"
@@ -25,11 +25,13 @@ _LOOK_AHEAD = 3
 
 
 def _variance() -> Policy:
-    return ContactsPolicy("variance", variance_at, "its fingers are expected where the surface is known least (4.20)")
+    return ContactsPolicy(
+        "variance", variance_rating, "its fingers are expected where the surface is known least (4.20)"
+    )
 
 
 def _entropy() -> Policy:
-    return ContactsPolicy("entropy", entropy_at, "its contacts have the largest joint entropy (4.10)")
+    return ContactsPolicy("entropy", entropy_rating, "its contacts have the largest joint entropy (4.10)")
 
 
 def _igef() -> Policy:

@@ -36,7 +36,7 @@ class PoseSwitchSettings(StrictModel):
         translation_m, rotation_rad: the threshold is the determinant of a pose known to these standard deviations.
         particles: so many are weighted for each candidate.
         point_sigma_m, normal_sigma_rad: of an imagined contact.
-        grid_m: spacing of the grid on which the particles look the surface up.
+        contour_grid_m, surface_grid_m: spacing of the grid on which the particles look the surface up.
         likelihood: the calibrated measurement model.
     """
 
@@ -45,7 +45,8 @@ class PoseSwitchSettings(StrictModel):
     particles: int = Field(default=500, ge=10)
     point_sigma_m: float = Field(default=0.001, gt=0)
     normal_sigma_rad: float = Field(default=float(np.deg2rad(5.0)), gt=0)
-    grid_m: float = Field(default=0.004, gt=0)
+    contour_grid_m: float = Field(default=0.004, gt=0)
+    surface_grid_m: float = Field(default=0.010, gt=0)
     likelihood: CalibratedSettings = CalibratedSettings()
 
     @property
@@ -118,7 +119,7 @@ class PoseSwitchPolicy:
         assert belief.surface is not None
         chosen = rng.choice(len(belief.particles), self.settings.particles, p=belief.weights / belief.weights.sum())
         rows, before = belief.particles[chosen], np.full(self.settings.particles, 1.0 / self.settings.particles)
-        known = _known(belief, self.settings.grid_m)
+        known = _known(belief, self.settings)
         measurement = CalibratedMeasurement(self.settings.likelihood)
         scores = np.full(len(candidates), -np.inf)
         for index, points in enumerate(expected_contacts(candidates, belief, belief.surface)):
@@ -145,11 +146,12 @@ def imagined(points_m: Array, belief: Belief, settings: PoseSwitchSettings) -> C
     )
 
 
-def _known(belief: Belief, spacing_m: float) -> Known:
+def _known(belief: Belief, settings: PoseSwitchSettings) -> Known:
     """The surface tabulated for many particles; grids that are given as such are used."""
     nothing = ContactSet(belief.contacts_m[:0], belief.normals[:0], np.empty(0), np.empty(0))
     if isinstance(belief.field, FieldGrid):
         return Known(belief.field, nothing)
     lower, upper = belief.contacts_m.min(axis=0) - _MARGIN_m, belief.contacts_m.max(axis=0) + _MARGIN_m
+    spacing_m = settings.contour_grid_m if belief.dimension == 2 else settings.surface_grid_m
     grid = FieldGrid.tabulate(belief.field, lower, upper, spacing_m, gradient=True, variance=True, variance_step=2)
     return Known(grid, nothing)

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from gtsam import Pose2
 from numpy.typing import NDArray
 from pydantic import Field
 
@@ -133,12 +132,9 @@ def expected_touches(candidates: Sequence[Candidate], belief: Belief, worlds: Po
     """Cast the fingers' ways of all candidates in all worlds; candidates with fewer fingers touch with fewer."""
     fingers = worlds.finger_errors_m.shape[1]
     padded = [_padded(candidate.rays, fingers) for candidate in candidates]
-    rays = [
-        _in_worlds(candidate.world_T_grasp, *way[:2], belief, worlds)
-        for candidate, way in zip(candidates, padded, strict=True)
-    ]
-    starts, ways = (np.concatenate(parts, axis=1) for parts in zip(*rays, strict=True))
-    longest = np.concatenate([lengths for _, _, lengths in padded])
+    starts, ways, longest = (np.array(parts) for parts in zip(*padded, strict=True))
+    frames = np.array([pose_row(candidate.world_T_grasp) for candidate in candidates])
+    starts, ways, longest = *_in_worlds(frames, starts, ways, belief, worlds), longest.ravel()
     distances = first_hits(worlds.corners_m, worlds.surface.cells, starts, ways, longest)
     touching = np.isfinite(distances)
     points = starts + np.where(touching, distances, np.nan)[..., None] * ways
@@ -153,6 +149,8 @@ def expected_touches(candidates: Sequence[Candidate], belief: Belief, worlds: Po
 def _padded(rays: ClosingRays, fingers: int) -> tuple[Array, Array, Array]:
     """Starts, directions and lengths for so many fingers; those that are not there have no way to go."""
     absent = fingers - len(rays.fingers)
+    if absent == 0:
+        return rays.starts_m, rays.directions, rays.lengths_m
     ways = np.vstack([rays.directions, np.tile([1.0, 0.0, 0.0], (absent, 1))])
     return np.pad(rays.starts_m, ((0, absent), (0, 0))), ways, np.pad(rays.lengths_m, (0, absent))
 
@@ -167,17 +165,25 @@ def _nearest(worlds: PossibleWorlds, points: Array, touching: NDArray[np.bool_])
 
 
 def _in_worlds(
-    world_T_grasp: Pose2, starts_m: Array, directions: Array, belief: Belief, worlds: PossibleWorlds
+    frames: Array, starts_m: Array, directions: Array, belief: Belief, worlds: PossibleWorlds
 ) -> tuple[Array, Array]:
-    """Starts and unit directions in the object frame of every world, each of shape (s, fingers, d)."""
-    rows = compose(compose(inverse(worlds.world_T_object), pose_row(world_T_grasp)), worlds.palm_errors)
-    cosine, sine = np.cos(rows[:, 2]), np.sin(rows[:, 2])
-    turn = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
+    """Starts and unit directions in the object frame of every world, each of shape (s, c fingers, d).
+
+    Args:
+        frames: grasp frames in the world, rows, shape (c, 3).
+        starts_m, directions: in their grasp frames, shape (c, fingers, 3).
+        belief, worlds: as they are.
+    """
+    rows = compose(inverse(worlds.world_T_object)[:, None], frames[None])
+    rows = compose(rows, worlds.palm_errors[:, None])
+    cosine, sine = np.cos(rows[..., 2]), np.sin(rows[..., 2])
+    turns = np.stack([np.stack([cosine, sine], axis=-1), np.stack([-sine, cosine], axis=-1)], axis=-2)
     starts, ways = (np.repeat(rays[None], len(rows), axis=0) for rays in (starts_m, directions))
-    starts[..., :2] = np.einsum("sij,sfj->sfi", turn, starts[..., :2] + worlds.finger_errors_m) + rows[:, None, :2]
-    ways[..., :2] = np.einsum("sij,sfj->sfi", turn, ways[..., :2])
+    starts[..., :2] = (starts[..., :2] + worlds.finger_errors_m[:, None]) @ turns + rows[..., None, :2]
+    ways[..., :2] = ways[..., :2] @ turns
     starts[..., 2] -= belief.origin_height_m
-    starts, ways = starts[..., : belief.dimension], ways[..., : belief.dimension]
+    flat = (len(rows), -1, belief.dimension)
+    starts, ways = (rays[..., : belief.dimension].reshape(flat) for rays in (starts, ways))
     return starts, ways / np.maximum(np.linalg.norm(ways, axis=-1, keepdims=True), 1e-9)
 
 

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from tactile_lab.exploration.candidates import Candidate
 from tactile_lab.exploration.information.igef import IgefMetrics, IgefSettings, igef
-from tactile_lab.exploration.information.surface_uncertainty import contact_entropy
+from tactile_lab.exploration.information.surface_uncertainty import POINT_SIGMA_m, contact_entropy
 from tactile_lab.exploration.policy import Belief, Decision, Surface, best_of, nothing_to_choose
 from tactile_lab.exploration.prediction import expected_touches, most_fingers, nominal_world
 from tactile_lab.exploration.regions import Region, RegionSettings, nearest_first, unexplored_regions
@@ -37,8 +37,8 @@ class RandomPolicy:
         return Decision(self.name, "grasp", chosen, (0.0,) * len(candidates), "chosen by chance, as asked")
 
 
-Rating = Callable[[Belief, Surface, Array], float]
-"""Score of a candidate from where its contacts are expected, shape (m, d), m at least 1."""
+Rating = Callable[[Belief, Surface, Sequence[Array]], Array]
+"""Scores of all candidates, shape (c,), from where the contacts of each are expected, shape (m, d), m may be 0."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,11 @@ class ContactsPolicy:
             return best_of(self.name, np.zeros(len(candidates)), _NOTHING_YET, rng)
         surface = belief.surface
         found = expected_contacts(candidates, belief, surface)
-        scores = [self.rating(belief, surface, points) if len(points) else -np.inf for points in found]
-        return best_of(self.name, np.array(scores), self.reason, rng)
+        touching = np.array([len(points) > 0 for points in found])
+        if not touching.any():
+            return best_of(self.name, np.full(len(candidates), -np.inf), self.reason, rng)
+        scores = np.where(touching, self.rating(belief, surface, found), -np.inf)
+        return best_of(self.name, scores, self.reason, rng)
 
 
 @dataclass(frozen=True)
@@ -81,15 +84,16 @@ class ClustersPolicy:
         surface = belief.surface
         found = expected_contacts(candidates, belief, surface)
         regions = self._in_turn(belief, surface)
+        variances = variances_at(belief, found)
         for number, region in enumerate(regions):
-            scores = np.array([_reward_in(region, surface, belief, points) for points in found])
+            scores = _rewards_in(region, surface, found, variances)
             if scores.max() > 0:
                 passed = f" ({number} nearer ones are out of reach)" if number else ""
                 reason = f"explores the region nearest to the last grasp{passed}, {len(regions)} are unexplored"
                 return best_of(self.name, np.where(scores > 0, scores, -np.inf), reason, rng)
         why = "no candidate reaches an unexplored region" if regions else "no region is unexplored"
-        rewards = [variance_at(belief, surface, points) if len(points) else -np.inf for points in found]
-        return best_of(self.name, np.array(rewards), f"{why}: the largest variance counts instead", rng)
+        rewards = np.array([own.sum() if len(own) else -np.inf for own in variances])
+        return best_of(self.name, rewards, f"{why}: the largest variance counts instead", rng)
 
     def _in_turn(self, belief: Belief, surface: Surface) -> list[Region]:
         """Nearest first; regions in which fingers have met nothing again and again come last."""
@@ -106,38 +110,49 @@ def expected_contacts(candidates: Sequence[Candidate], belief: Belief, surface: 
     return [points[0][met[0]] for points, met in zip(touches.points_m, touches.touching, strict=True)]
 
 
-def variance_at(belief: Belief, surface: Surface, points_m: Array) -> float:
-    """Equation 4.20: the sum of the field's variances, square metres."""
-    del surface
-    return float(np.sum(belief.field.predict(points_m, variance=True).variance_m2))
+def variances_at(belief: Belief, found: Sequence[Array]) -> list[Array]:
+    """The field's variance at every expected contact of every candidate, square metres."""
+    together = np.concatenate(found)
+    if len(together) == 0:
+        return [np.empty(0) for _ in found]
+    variances = np.asarray(belief.field.predict(together, variance=True).variance_m2)
+    return np.split(variances, np.cumsum([len(points) for points in found])[:-1])
 
 
-def entropy_at(belief: Belief, surface: Surface, points_m: Array) -> float:
-    """Equation 4.10 for fields that know their joint covariance, else the same of independent contacts."""
-    if isinstance(belief.field, Gpis):
-        return contact_entropy(belief.field, points_m)
+def variance_rating(belief: Belief, surface: Surface, found: Sequence[Array]) -> Array:
+    """Equation 4.20: the sum of the field's variances at each candidate's contacts, square metres."""
     del surface
-    variances = np.asarray(belief.field.predict(points_m, variance=True).variance_m2)
-    return float(np.sum(np.log1p(variances / 1e-6)))
+    return np.array([own.sum() for own in variances_at(belief, found)])
+
+
+def entropy_rating(belief: Belief, surface: Surface, found: Sequence[Array]) -> Array:
+    """Equation 4.10 of each candidate's contacts; of independent ones where the field knows no joint covariance."""
+    del surface
+    if not isinstance(belief.field, Gpis):
+        return np.array([np.log1p(own / POINT_SIGMA_m**2).sum() for own in variances_at(belief, found)])
+    joint = belief.field.joint_covariance(np.concatenate(found))
+    ends = np.cumsum([len(points) for points in found])
+    blocks = [joint[end - len(points) : end, end - len(points) : end] for points, end in zip(found, ends, strict=True)]
+    return np.array([contact_entropy(block) for block in blocks])
 
 
 def igef_rating(part: Callable[[IgefMetrics], Array], settings: IgefSettings) -> Rating:
     """Sum of (4.15), or of a part of it, over the expected contacts, seen from the latest grasp's contacts."""
 
-    def rating(belief: Belief, surface: Surface, points_m: Array) -> float:
+    def rating(belief: Belief, surface: Surface, found: Sequence[Array]) -> Array:
         latest = belief.latest_contacts
-        metrics = igef(surface, belief.contacts_m[latest], belief.normals[latest], points_m, settings)
-        return float(np.sum(part(metrics)))
+        metrics = igef(surface, belief.contacts_m[latest], belief.normals[latest], np.concatenate(found), settings)
+        owners = np.repeat(np.arange(len(found)), [len(points) for points in found])
+        return np.asarray(np.bincount(owners, part(metrics), minlength=len(found)), dtype=float)
 
     return rating
 
 
-def _reward_in(region: Region, surface: Surface, belief: Belief, points_m: Array) -> float:
-    """Reward of the contacts that lie in a region; 0 if none does."""
-    if len(points_m) == 0:
-        return 0.0
-    inside = np.asarray(cKDTree(surface.points_m[region.members]).query(points_m)[0] < _BESIDE_m)
-    return variance_at(belief, surface, points_m[inside]) if inside.any() else 0.0
+def _rewards_in(region: Region, surface: Surface, found: Sequence[Array], variances: Sequence[Array]) -> Array:
+    """Reward (4.20) of each candidate's contacts in a region, 0 where none is."""
+    tree = cKDTree(surface.points_m[region.members])
+    inside = [np.asarray(tree.query(points)[0] < _BESIDE_m) if len(points) else np.empty(0, bool) for points in found]
+    return np.array([own[near].sum() for own, near in zip(variances, inside, strict=True)])
 
 
 def _misses(region: Region, surface: Surface, belief: Belief) -> int:

@@ -7,7 +7,9 @@ import numpy as np
 from tactile_lab.exploration.policy import Surface
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import Field
-from tactile_lab.shape.gpis import Gpis
+
+POINT_SIGMA_m = 0.001
+"""Of a contact along its normal, where nothing else is said."""
 
 _JITTER = 1e-9
 
@@ -30,15 +32,12 @@ def differential_entropy(covariance: Array) -> float:
     return 0.5 * (count * float(np.log(2 * np.pi * np.e)) + log_determinant(covariance))
 
 
-def contact_entropy(gpis: Gpis, points_m: Array, point_sigma_m: float = 0.001) -> float:
-    """Equations 4.9 and 4.10 for contacts that are expected at ``points_m``, shape (q, d), nats.
+def contact_entropy(covariance: Array, point_sigma_m: float = POINT_SIGMA_m) -> float:
+    """Equations 4.9 and 4.10 for contacts that are expected where the field has this posterior covariance, nats.
 
     ``log det K*`` with the expected contacts bordering the present ones is ``log det K`` plus the logarithm of the
-    determinant of their posterior covariance. The first is the same for all candidates and left out, so that a grasp
-    without contacts has 0. The measurement's noise is part of the covariance: without it a second touch of the same
-    place would count as minus infinity. Normalised by the noise, so that the value is a pure number.
+    determinant of their posterior covariance, shape (q, q). The first is the same for all candidates and left out, so
+    that a grasp without contacts has 0. The measurement's noise is part of the covariance: without it a second touch
+    of the same place would count as minus infinity. Relative to the noise, so that the value is a pure number.
     """
-    if len(points_m) == 0:
-        return 0.0
-    noise = point_sigma_m**2
-    return log_determinant(gpis.joint_covariance(points_m) / noise + np.eye(len(points_m)))
+    return log_determinant(covariance / point_sigma_m**2 + np.eye(len(covariance))) if len(covariance) else 0.0
