@@ -10,23 +10,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from gtsam import Pose3
 
 from drivers.fingertip import FingertipCalibration, FingertipSensor
 from drivers.links import Link
 from drivers.shadow.kinematics import JOINTS
+from sessions.black_box import Situation
 from sessions.fingertip_samples import record_fingertips
 from sessions.instruments import (
     AskedInstrument,
     BaseInstrument,
     CameraInstrument,
+    CyclingInstrument,
     HandInstrument,
     Instrument,
     PolledInstrument,
+    warmest_C,
 )
-from sessions.interpreter import Observer
+from sessions.interpreter import HAND_LINK, Observer, fingertip_link
 from sessions.marks import Mark, MarkKind
 from sessions.perception import Outcome, Perception, TareReport, TruthFrame, Undone
 from sessions.recorder import Level, Recorder
@@ -95,6 +98,7 @@ class Bench:
         observer: the tap of all those links; its Perception and its recorder are the bench's.
         fingertip_calibrations: by finger.
         truth: the truth channel of a simulated rig; goes to the recorder and nowhere else.
+        force_ranges_N: calibrated range of the fingertips' sensors, smallest axis, by finger.
     """
 
     def __init__(
@@ -109,6 +113,7 @@ class Bench:
         camera: CameraInstrument | None = None,
         fingertip_calibrations: Mapping[str, FingertipCalibration] | None = None,
         truth: Callable[[], TruthReading] | None = None,
+        force_ranges_N: Mapping[str, float] | None = None,
     ) -> None:
         self.clock, self.cycle_ns = clock, cycle_ns
         self.hand, self.base, self.camera = hand, base, camera
@@ -117,7 +122,9 @@ class Bench:
         self.counts = CycleCounts()
         self._observer = observer
         self._truth = truth
+        self._force_ranges_N = dict(force_ranges_N or {})
         self._deadline_ns: int | None = None
+        self._looked_ns = clock.now_ns()
 
     @property
     def perception(self) -> Perception:
@@ -157,6 +164,7 @@ class Bench:
         try:
             for instrument in self._instruments():
                 instrument.connect()
+                self._catch_up()
             self._await_first_samples()
         except BaseException as error:
             for problem in self._close_all():
@@ -192,6 +200,11 @@ class Bench:
         camera = [] if self.camera is None else [self.camera]
         return [self.hand, self.base, *self.wrench_devices.values(), *camera]
 
+    def _catch_up(self) -> None:
+        """Record what a hand that cycles by itself has sent while another device connects."""
+        if isinstance(self.hand, CyclingInstrument):
+            self.hand.catch_up()
+
     def _await_first_samples(self) -> None:
         give_up_ns = self.clock.now_ns() + READY_TIMEOUT_ns
         while not self.perception.ready:
@@ -218,14 +231,30 @@ class Bench:
 
     def cycle(self) -> None:
         """Run one cycle over all devices and wait for the next deadline. Raises DeviceError."""
+        self._looked_ns = self.clock.now_ns()
         if self._deadline_ns is None:
-            self._deadline_ns = self.clock.now_ns()
+            self._deadline_ns = self._looked_ns
         self.hand.exchange()
         self.base.exchange()
         for device in self.wrench_devices.values():
             device.poll()
         self._record_state()
         self._wait(self._deadline_ns + self.cycle_ns)
+
+    def situation(self) -> Situation:
+        """What the last cycle looks like to a safety supervisor."""
+        seen, newest = self.perception, self._observer.interpreter.newest
+        tips = {finger: newest.get(fingertip_link(finger)) for finger in self.wrench_devices}
+        hand = newest.get(HAND_LINK)
+        return Situation(
+            stamp_ns=self._looked_ns,
+            hand_stamp_ns=seen.hand_stamp_ns,
+            loads_N=seen.loads_N(),
+            palm_world_m=seen.palm_world_m,
+            tip_stamps_ns={finger: None if heard is None else heard.stamp_ns for finger, heard in tips.items()},
+            force_ranges_N=self._force_ranges_N,
+            warmest_C=None if hand is None else warmest_C(hand.sample),
+        )
 
     def run(self, duration_ns: int) -> None:
         """Run cycles for a time, at least one."""
@@ -319,6 +348,12 @@ class Bench:
         undone = self._mark(MarkKind.UNDO)
         assert isinstance(undone, Undone)
         return undone
+
+    def report_stop(self, cause: str, cycles: list[dict[str, Any]]) -> None:
+        """Record why everything was stopped, with the last cycles. Raises SessionError."""
+        now_ns = self.clock.now_ns()
+        self.recorder.safety_stop(now_ns, cause, cycles)
+        self.event(Level.ERROR, "safety", f"stopped: {cause}")
 
     def event(self, level: Level, source: str, message: str) -> None:
         """Record something a person should be able to read later."""

@@ -176,8 +176,8 @@ class Conductor:
             return self._ended(ending, reason)
         except TactileLabError as error:
             return self._ended(Ending.STOPPED, str(error), error)
-        except BaseException:
-            self._supervisor.stop()
+        except BaseException as error:
+            self._supervisor.stop(error)
             raise
 
     def _grasp_until_done(self) -> tuple[Ending, str]:
@@ -228,7 +228,7 @@ class Conductor:
         """Stop everything and go on, if whoever decides wants to. Raises the error otherwise."""
         if not self._decisions.failed(error):
             raise error
-        problems = self._supervisor.stop()
+        problems = self._supervisor.stop(error)
         if self._bench.perception.is_holding:
             self._bench.end_hold()
         self._paused, self._thought_of = True, None
@@ -248,7 +248,7 @@ class Conductor:
         return None
 
     def _ended(self, ending: Ending, reason: str, error: TactileLabError | None = None) -> SessionOutcome:
-        problems = self._supervisor.stop()
+        problems = self._supervisor.stop(error)
         text = "; ".join([reason, *(f"while stopping: {problem}" for problem in problems)])
         self._bench.event(Level.ERROR if error else Level.INFO, "conductor", f"{ending}: {text}")
         return SessionOutcome(ending, text, tuple(self._grasps), dict(self._bench.perception.drop_counts), error)

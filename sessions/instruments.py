@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
+import numpy as np
+
 from drivers.fingertip import FingertipSensor
 from drivers.links import Datagram
 from tactile_lab.geometry.contacts import Array
@@ -25,6 +27,22 @@ class HandReading(Protocol):
     def joints_rad(self) -> Array: ...
     @property
     def fresh(self) -> bool: ...
+
+
+@runtime_checkable
+class MotorTemperatures(Protocol):
+    """Temperatures near the motors, shape (20,), degrees Celsius; NaN where none is known."""
+
+    @property
+    def temperature_C(self) -> Array: ...
+
+
+def warmest_C(reading: object) -> float | None:
+    """Temperature of the warmest motor in a sample of the hand; None while none is known."""
+    motors = getattr(reading, "motor", None)
+    if not isinstance(motors, MotorTemperatures) or not (known := np.isfinite(motors.temperature_C)).any():
+        return None
+    return float(motors.temperature_C[known].max())
 
 
 class BaseReading(Protocol):
@@ -128,6 +146,14 @@ class AskedInstrument(Protocol):
 
     def ask(self) -> None:
         """Ask for the next reading where the device needs it. Raises DeviceError."""
+
+
+@runtime_checkable
+class CyclingInstrument(Protocol):
+    """A device that another process keeps cycling, whatever the session does."""
+
+    def catch_up(self) -> None:
+        """Show the tap what has come since the last look. Raises DeviceError."""
 
 
 class CameraInstrument(Instrument, Protocol):

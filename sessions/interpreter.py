@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from drivers.camera.packet import picture_of
@@ -28,6 +29,14 @@ HAND_LINK, BASE_LINK, CAMERA_LINK = "hand", "base", "camera"
 def fingertip_link(finger: str) -> str:
     """Name of the link of a fingertip's own sensor."""
     return f"ft/{finger}"
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A sample and its arrival."""
+
+    stamp_ns: int
+    sample: Any
 
 
 class Interpreter:
@@ -53,16 +62,19 @@ class Interpreter:
     ) -> None:
         self.perception = perception
         self.clock = clock or VirtualClock()
+        self.newest: dict[str, Heard] = {}
+        """The newest sample of each link that gave one, and when it came."""
         self.undecodable: Counter[str] = Counter()
         """Datagrams that broke their protocol, by link."""
         self._routes: dict[str, Callable[[Datagram], None]] = {
-            HAND_LINK: _route(hand, perception.on_hand),
-            BASE_LINK: _route(base, perception.on_base),
+            HAND_LINK: self._route(HAND_LINK, hand, perception.on_hand),
+            BASE_LINK: self._route(BASE_LINK, base, perception.on_base),
         }
         for finger, decoder in (wrenches or {}).items():
-            self._routes[fingertip_link(finger)] = _route(decoder, _for_finger(perception, finger))
+            link = fingertip_link(finger)
+            self._routes[link] = self._route(link, decoder, _for_finger(perception, finger))
         if camera is not None:
-            self._routes[CAMERA_LINK] = _route(camera, perception.on_frame)
+            self._routes[CAMERA_LINK] = self._route(CAMERA_LINK, camera, perception.on_frame)
 
     def received(self, link: str, payload: bytes, stamp_ns: int) -> None:
         """Take one received datagram. Bytes that break the protocol are counted; links not known are left alone."""
@@ -80,13 +92,16 @@ class Interpreter:
         self.clock.sleep_until_ns(mark.stamp_ns)
         return self.perception.mark(mark)
 
-
-def _route(decoder: Decoder[Any], take: Callable[[Any], None]) -> Callable[[Datagram], None]:
-    def route(datagram: Datagram) -> None:
-        if (sample := decoder.receive(datagram)) is not None:
+    def _route(self, link: str, decoder: Decoder[Any], take: Callable[[Any], None]) -> Callable[[Datagram], None]:
+        def route(datagram: Datagram) -> None:
+            sample = decoder.receive(datagram)
+            if sample is None:
+                return
+            if not (isinstance(sample, list) and not sample):  # a message may hold no reading
+                self.newest[link] = Heard(datagram.stamp_ns, sample)
             take(sample)
 
-    return route
+        return route
 
 
 def _for_finger(perception: Perception, finger: str) -> Callable[[Sequence[Any]], None]:

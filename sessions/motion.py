@@ -17,7 +17,7 @@ from drivers.shadow.closing import Closing
 from drivers.shadow.kinematics import JOINTS, forearm_T_palm
 from drivers.shadow.posture import TipEllipsoid
 from sessions.bench import Bench
-from sessions.safety import SafetySupervisor, Situation
+from sessions.safety import SafetySupervisor
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.geometry.contacts import FINGERS, Array
 
@@ -79,11 +79,9 @@ class Motion:
             DeviceError: a device failed.
         """
         self.bench.cycle()
-        seen = self.bench.perception
-        self._loads_N = seen.loads_N()
-        self.supervisor.check(
-            Situation(self.bench.clock.now_ns(), seen.hand_stamp_ns, self._loads_N, seen.palm_world_m)
-        )
+        situation = self.bench.situation()
+        self._loads_N = dict(situation.loads_N)
+        self.supervisor.check(situation)
 
     def wait(self, duration_s: float) -> None:
         """Cycles for a time."""

@@ -181,6 +181,11 @@ class Recorder:
         """What the person of a guided session is shown, plain data."""
         self._put_json(schemas.GUIDE_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)
 
+    def safety_stop(self, stamp_ns: int, cause: str, cycles: list[dict[str, Any]]) -> None:
+        """Why everything was stopped, with the last cycles before it as plain data, oldest first."""
+        content = {"timestamp": foxglove.time(stamp_ns), "cause": cause, "cycles": cycles}
+        self._put_json(schemas.SAFETY_TOPIC, content, stamp_ns)
+
     def event(self, stamp_ns: int, level: Level, source: str, message: str) -> None:
         """Something a person should be able to read later."""
         content = {"timestamp": foxglove.time(stamp_ns), "level": int(level), "message": message, "name": source}

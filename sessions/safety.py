@@ -2,20 +2,23 @@
 
 The supervisor looks at every cycle. A limit that is passed raises :class:`SafetyError`; whoever runs the session then
 calls :meth:`SafetySupervisor.stop`, which is also the way out of every other failure: zero demands to the hand, the
-positioner held where it is, for several cycles (the hand's own motors halt 20 ms after the last demand).
+positioner held where it is, for several cycles (the hand's own motors halt 20 ms after the last demand). The reason
+goes into the recording with the last cycles. What the hand itself and its process watch, and how soon each cause leads
+to zero demands, stands in docs/real-laboratory.md.
 """
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
+from contextlib import suppress
 from types import FrameType, TracebackType
 from typing import Any, Protocol
 
 from pydantic import Field
 
+from sessions.black_box import BlackBox, Situation
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import SafetyError, TactileLabError
 from tactile_lab.geometry.contacts import Array
@@ -26,10 +29,15 @@ class SafetySettings(StrictModel):
     """The limits.
 
     Attributes:
-        force_limit_N: largest contact force on one fingertip.
+        force_limit_N: largest contact force on any fingertip.
+        force_share: largest contact force as a share of the sensor's calibrated range on its smallest axis; the smaller
+            of both limits holds for a finger.
         force_cycles: cycles in a row over the limit that stop the rig: a fingertip that slips along the object jerks.
         stale_s: without a fresh hand status for this long the rig stops; never less than ``stale_cycles`` cycles.
-        stale_cycles: see ``stale_s``.
+        stale_cycles: see ``stale_s`` and ``tip_stale_s``.
+        tip_stale_s: the same for the readings of a fingertip that has a link of its own.
+        warm_C: from this temperature of the warmest motor on everything moves at ``warm_scale`` of its speed.
+        warm_scale: see ``warm_C``.
         palm_minimum_height_m: lowest height of the palm's origin above the table.
         workspace_radius_m: largest horizontal distance of the palm's origin from the workspace centre.
         workspace_centre_m: centre of the workspace on the table, world x, y.
@@ -40,9 +48,13 @@ class SafetySettings(StrictModel):
     """
 
     force_limit_N: float = Field(default=6.0, gt=0.0)
+    force_share: float = Field(default=0.5, gt=0.0, le=0.8)
     force_cycles: int = Field(default=3, ge=1)
     stale_s: float = Field(default=0.010, gt=0.0)
     stale_cycles: int = Field(default=5, ge=1)
+    tip_stale_s: float = Field(default=0.2, gt=0.0)
+    warm_C: float = Field(default=50.0, gt=0.0)
+    warm_scale: float = Field(default=0.5, gt=0.0, le=1.0)
     palm_minimum_height_m: float = Field(default=0.08, ge=0.0)
     workspace_radius_m: float = Field(default=0.45, gt=0.0)
     workspace_centre_m: tuple[float, float] = (0.0, 0.0)
@@ -50,23 +62,6 @@ class SafetySettings(StrictModel):
     empty_grasps: int = Field(default=3, ge=1)
     session_limit_s: float = Field(default=3600.0, gt=0.0)
     first_moves_scale: float = Field(default=0.4, gt=0.0, le=1.0)
-
-
-@dataclass(frozen=True)
-class Situation:
-    """What one cycle looks like to the supervisor.
-
-    Attributes:
-        stamp_ns: session clock.
-        hand_stamp_ns: arrival of the newest fresh hand status; None before the first.
-        loads_N: contact force on each fingertip.
-        palm_world_m: origin of the palm, shape (3,), world; None before the first status.
-    """
-
-    stamp_ns: int
-    hand_stamp_ns: int | None
-    loads_N: Mapping[str, float]
-    palm_world_m: Array | None
 
 
 class Stoppable(Protocol):
@@ -77,6 +72,9 @@ class Stoppable(Protocol):
 
     def cycle(self) -> object:
         """One cycle over all devices."""
+
+    def report_stop(self, cause: str, cycles: list[dict[str, Any]]) -> None:
+        """Record why everything was stopped, with the last cycles."""
 
 
 _STOP_CYCLES = 5
@@ -93,7 +91,11 @@ class SafetySupervisor:
 
     def __init__(self, bench: Stoppable, settings: SafetySettings, cycle_ns: int) -> None:
         self._bench, self.settings = bench, settings
-        self._stale_ns = max(round(settings.stale_s * NANOSECONDS), settings.stale_cycles * cycle_ns)
+        patience_ns = settings.stale_cycles * cycle_ns
+        self._stale_ns = max(round(settings.stale_s * NANOSECONDS), patience_ns)
+        self._tip_stale_ns = max(round(settings.tip_stale_s * NANOSECONDS), patience_ns)
+        self._black_box = BlackBox()
+        self._warm = False
         self._start_ns: int | None = None
         self._over_limit: dict[str, int] = {}
         self._empty_grasps = 0
@@ -109,28 +111,43 @@ class SafetySupervisor:
         """
         if self._start_ns is None:
             self._start_ns = situation.stamp_ns
+        self._black_box.note(situation)
+        self._warm = situation.warmest_C is not None and situation.warmest_C >= self.settings.warm_C
         self._check_freshness(situation)
-        self._check_forces(situation.loads_N)
+        self._check_forces(situation)
         if situation.palm_world_m is not None:
             self._check_workspace(situation.palm_world_m)
 
     def _check_freshness(self, situation: Situation) -> None:
-        last_ns = self._start_ns if situation.hand_stamp_ns is None else situation.hand_stamp_ns
-        if last_ns is not None and (silent_ns := situation.stamp_ns - last_ns) > self._stale_ns:
+        if (silent_ns := self._silent_ns(situation, situation.hand_stamp_ns)) > self._stale_ns:
             raise SafetyError(
                 f"no fresh status for {silent_ns / 1e6:.0f} ms", where="hand", hint="Check cable, power and the bus"
             )
+        for finger, stamp_ns in situation.tip_stamps_ns.items():
+            if (silent_ns := self._silent_ns(situation, stamp_ns)) > self._tip_stale_ns:
+                what = f"no reading of the fingertip for {silent_ns / 1e6:.0f} ms"
+                raise SafetyError(what, where=finger, hint="Check the sensor's box, power and cable")
 
-    def _check_forces(self, loads_N: Mapping[str, float]) -> None:
-        over = {f: load_N for f, load_N in loads_N.items() if not load_N <= self.settings.force_limit_N}  # NaN is over
+    def _silent_ns(self, situation: Situation, heard_ns: int | None) -> int:
+        last_ns = self._start_ns if heard_ns is None else heard_ns
+        return 0 if last_ns is None else situation.stamp_ns - last_ns
+
+    def _check_forces(self, situation: Situation) -> None:
+        limits_N = {finger: self.force_limit_N(situation.force_ranges_N.get(finger)) for finger in situation.loads_N}
+        over = {f: load_N for f, load_N in situation.loads_N.items() if not load_N <= limits_N[f]}  # NaN is over
         self._over_limit = {finger: self._over_limit.get(finger, 0) + 1 for finger in over}
         for finger, cycles in self._over_limit.items():
             if cycles >= self.settings.force_cycles:
                 raise SafetyError(
-                    f"fingertip force {over[finger]:.1f} N is over the limit of {self.settings.force_limit_N:.1f} N",
+                    f"fingertip force {over[finger]:.1f} N is over the limit of {limits_N[finger]:.1f} N",
                     where=finger,
                     hint="Look at the hand and the object before going on",
                 )
+
+    def force_limit_N(self, range_N: float | None) -> float:
+        """Largest force on a fingertip whose sensor has this range; None where it has none."""
+        own_N = self.settings.force_limit_N
+        return own_N if range_N is None else min(own_N, self.settings.force_share * range_N)
 
     def _check_workspace(self, palm_world_m: Array) -> None:
         x_m, y_m, height_m = palm_world_m.tolist()
@@ -162,8 +179,9 @@ class SafetySupervisor:
 
     @property
     def speed_scale(self) -> float:
-        """Factor on all speeds: slow until the first approach has ended well."""
-        return 1.0 if self._approached else self.settings.first_moves_scale
+        """Factor on all speeds: slow until the first approach has ended well, and while a motor is warm."""
+        usual = 1.0 if self._approached else self.settings.first_moves_scale
+        return usual * self.settings.warm_scale if self._warm else usual
 
     def approached(self) -> None:
         """The first approach has ended well: ordinary speed from here on."""
@@ -171,19 +189,27 @@ class SafetySupervisor:
 
     # --- stopping ----------------------------------------------------------------------------------------------
 
-    def stop(self) -> tuple[str, ...]:
+    def stop(self, cause: BaseException | None = None) -> tuple[str, ...]:
         """Zero demands and hold the base, for several cycles. Never raises.
+
+        Args:
+            cause: why, when it is no ordinary end; recorded with the last cycles.
 
         Returns:
             What went wrong while stopping, in words; a dead device can not be exchanged with any more.
         """
         self._bench.stop()
+        problems: dict[str, None] = {}
         for _ in range(_STOP_CYCLES):
             try:
                 self._bench.cycle()
             except TactileLabError as error:
-                return (str(error),)
-        return ()
+                problems[str(error)] = None
+        if cause is not None:
+            words = str(cause) or "stopped at once by the operator"
+            with suppress(TactileLabError):  # a recording that is broken has ended the session already
+                self._bench.report_stop(words, self._black_box.plain())
+        return tuple(words for words in problems if cause is None or words != str(cause))
 
     def _from_centre_m(self, x_m: float, y_m: float) -> float:
         centre_x_m, centre_y_m = self.settings.workspace_centre_m

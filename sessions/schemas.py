@@ -48,6 +48,7 @@ SCENE_TOPIC = "/contacts/scene"
 CAMERA_TOPIC = "/camera/calibration"
 EVENTS_TOPIC = "/events"
 STREAMS_TOPIC = "/recorder/streams"
+SAFETY_TOPIC = "/safety/stop"
 IMAGE_TOPIC = "/camera/image"
 SLAM_POSE_TOPIC = "/slam/pose"
 SLAM_STATE_TOPIC = "/slam/state"
@@ -95,6 +96,7 @@ SCHEMAS: Mapping[str, Schema] = {
     CLOUD_TOPIC: Schema("foxglove.PointCloud", foxglove.POINT_CLOUD),
     SCENE_TOPIC: Schema("foxglove.SceneUpdate", foxglove.SCENE_UPDATE),
     CAMERA_TOPIC: Schema("foxglove.CameraCalibration", foxglove.CAMERA_CALIBRATION),
+    SAFETY_TOPIC: Schema("tactile_lab.SafetyStop", fields(timestamp=TIME, cause=TEXT, cycles=list_of(_FREE))),
     EVENTS_TOPIC: Schema(
         "foxglove.Log",
         fields(timestamp=TIME, level=INTEGER, message=TEXT, name=TEXT, file=TEXT, line=INTEGER),

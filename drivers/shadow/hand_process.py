@@ -158,6 +158,10 @@ class HandProcess:
         """
         targets_rad, self._targets_rad = self._targets_rad, {}
         self._order({"targets": targets_rad} if targets_rad else {"alive": True})
+        self.catch_up()
+
+    def catch_up(self) -> None:
+        """Show the tap what has come since the last look. Raises DeviceError as :meth:`exchange`."""
         errors = [self._show(record) for record in self.receive()]
         if told := [error for error in errors if error]:
             raise DeviceError(told[0])
@@ -207,7 +211,7 @@ class HandProcess:
         self._orders.give(order)
 
     def _wait_for(self, kind: RecordKind, patience_s: float) -> Record:
-        """The next record of a kind; the others are kept for :meth:`receive`. An error while starting is raised."""
+        """The next record of a kind; traffic goes to the tap, errors are kept. An error while starting is raised."""
         until_ns = self._clock.now_ns() + round(patience_s * NANOSECONDS)
         wanted: Record | None = None
         while wanted is None and (left_ns := until_ns - self._clock.now_ns()) > 0:
@@ -216,8 +220,10 @@ class HandProcess:
                     raise DeviceError(record.payload.decode())
                 if record.kind is kind and wanted is None:
                     wanted = record
-                else:
+                elif self._tap is None or record.kind is RecordKind.ERROR:
                     self._kept.append(record)
+                else:
+                    self._show(record)
         if wanted is None:
             raise DeviceError("its process does not answer", where=self.name, hint="Connect again")
         return wanted

@@ -21,13 +21,13 @@ def request_real_time(priority: int = PRIORITY) -> str:
 
 @contextmanager
 def preferred(priority: int = SESSION_PRIORITY) -> Iterator[str]:
-    """Let the calling thread come before usual programs while the context lasts; gives what came of it, in words.
+    """Let a session come before usual programs while the context lasts; gives what came of it, in words.
 
-    For the thread that cycles devices from a program that also computes: threads and processes that it starts
-    meanwhile are scheduled as usual.
+    Threads that it starts meanwhile are scheduled alike and take turns with it: one that held the interpreter's lock
+    but never got its turn would hold up the session's cycle.
     """
     try:
-        os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(priority))
     except PermissionError:
         yield "usual scheduling of the session's cycle"
         return

@@ -81,6 +81,7 @@ def build_bench(rig: Rig, world: SimulatedWorld, recorder: Recorder) -> Bench:
         camera=Camera(tapped(CAMERA_LINK), world.clock) if "camera" in rig.files else None,
         fingertip_calibrations=force_tips(rig),
         truth=world.truth,
+        force_ranges_N=force_ranges_N(rig),
     )
 
 
@@ -131,6 +132,11 @@ def force_tips(rig: Rig) -> dict[str, FingertipCalibration]:
             what, where=rig.source, hint="Calibrate the finger, or take it out of wires.fingertips"
         )
     return {finger: calibrations[finger] for finger in FINGERS if finger in fitted}
+
+
+def force_ranges_N(rig: Rig) -> dict[str, float]:
+    """Calibrated range of the force fingertips, smallest axis; sensors that tell a smaller one do not connect."""
+    return dict.fromkeys(force_tips(rig), min(rig.description.nano17.force_range_N))
 
 
 def _decoder(rig: Rig, finger: str, calibration: FingertipCalibration, clock: Clock) -> Nano17:

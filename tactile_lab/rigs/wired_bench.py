@@ -16,7 +16,7 @@ from sessions.bench import Bench, SensorStream, TruthReading
 from sessions.interpreter import BASE_LINK, CAMERA_LINK, Observer, fingertip_link
 from sessions.recorder import Recorder
 from tactile_lab.clock import NANOSECONDS, Clock
-from tactile_lab.rigs.build import build_interpreter, force_tips
+from tactile_lab.rigs.build import build_interpreter, force_ranges_N, force_tips
 from tactile_lab.rigs.description import Rig
 from tactile_lab.rigs.wired import force_wire, hand_setup, wires_of
 
@@ -55,6 +55,7 @@ def build_wired_bench(
         camera=_camera(rig, observer, clock),
         fingertip_calibrations=force_tips(rig),
         truth=truth,
+        force_ranges_N=force_ranges_N(rig),
     )
 
 

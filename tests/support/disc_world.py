@@ -15,6 +15,7 @@ from gtsam import Pose3
 from drivers.fingertip import TipContact
 from drivers.positioner import mount_T_forearm
 from drivers.shadow.kinematics import JOINT_INDEX, JOINTS
+from sessions.black_box import Situation
 from sessions.marks import Mark, MarkKind
 from sessions.perception import Perception, TareReport, Undone
 from sessions.recorder import Level, NullRecorder
@@ -113,6 +114,7 @@ class DiscWorld:
     """
 
     def __init__(self, disc: Disc | None, before_cycle: Callable[[DiscWorld], None] | None = None) -> None:
+        self.stop_reports: list[tuple[str, int]] = []
         self.disc, self.before_cycle = disc, before_cycle
         self.clock, self.cycle_ns = VirtualClock(), CYCLE_ns
         self.hand, self.base = Mover(self._move_fingers), Mover(self._move_base)
@@ -239,6 +241,13 @@ class DiscWorld:
     def stop(self) -> None:
         self.hand.stop()
         self.base.stop()
+
+    def situation(self) -> Situation:
+        seen = self.perception
+        return Situation(self.clock.now_ns(), seen.hand_stamp_ns, seen.loads_N(), seen.palm_world_m)
+
+    def report_stop(self, cause: str, cycles: list[dict[str, object]]) -> None:
+        self.stop_reports.append((cause, len(cycles)))
 
     def event(self, level: Level, source: str, message: str) -> None:
         self.events.append((level, message))

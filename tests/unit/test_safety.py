@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 
-from sessions.safety import InterruptGuard, SafetySettings, SafetySupervisor, Situation
+from sessions.black_box import Situation
+from sessions.safety import InterruptGuard, SafetySettings, SafetySupervisor
 from tactile_lab.errors import DeviceError, SafetyError
 from tactile_lab.geometry.contacts import Array
 
@@ -23,6 +24,7 @@ class StoppableBench:
 
     failure: Exception | None = None
     calls: list[str] = field(default_factory=list)
+    reports: list[tuple[str, list[dict[str, object]]]] = field(default_factory=list)
 
     def stop(self) -> None:
         self.calls.append("stop")
@@ -31,6 +33,9 @@ class StoppableBench:
         self.calls.append("cycle")
         if self.failure is not None:
             raise self.failure
+
+    def report_stop(self, cause: str, cycles: list[dict[str, object]]) -> None:
+        self.reports.append((cause, cycles))
 
 
 def supervisor(**settings: object) -> SafetySupervisor:
@@ -70,6 +75,40 @@ def test_a_jerk_shorter_than_the_allowed_cycles_passes() -> None:
 
 def test_force_at_the_limit_passes() -> None:
     supervisor(force_limit_N=3.0).check(situation(loads_N={"FF": 3.0}))
+
+
+def test_the_limit_follows_the_sensors_calibrated_range() -> None:
+    watch = supervisor(force_share=0.5, force_cycles=1)
+    ranges = {"FF": 4.0, "TH": 50.0}
+    watch.check(replace(situation(loads_N={"FF": 1.9, "TH": 5.9}), force_ranges_N=ranges))
+    with pytest.raises(SafetyError, match=r"FF: fingertip force 2.1 N is over the limit of 2.0 N"):
+        watch.check(replace(situation(loads_N={"FF": 2.1}), force_ranges_N=ranges))
+    with pytest.raises(SafetyError, match=r"TH: fingertip force 6.1 N is over the limit of 6.0 N"):
+        watch.check(replace(situation(loads_N={"TH": 6.1}), force_ranges_N=ranges))
+
+
+def test_a_silent_fingertip_stops_and_is_named() -> None:
+    watch = supervisor(tip_stale_s=0.2)
+    heard = {"FF": 200_000_000, "MF": 10_000_000}
+    watch.check(replace(situation(stamp_ns=210_000_000, hand_stamp_ns=210_000_000), tip_stamps_ns=heard))
+    with pytest.raises(SafetyError, match="MF: no reading of the fingertip for 240 ms"):
+        watch.check(replace(situation(stamp_ns=250_000_000, hand_stamp_ns=250_000_000), tip_stamps_ns=heard))
+
+
+def test_a_fingertip_that_never_speaks_stops() -> None:
+    watch = supervisor(tip_stale_s=0.2)
+    silent = {"FF": None}
+    watch.check(replace(situation(), tip_stamps_ns=silent))
+    with pytest.raises(SafetyError, match="FF: no reading"):
+        watch.check(replace(situation(stamp_ns=300_000_000, hand_stamp_ns=300_000_000), tip_stamps_ns=silent))
+
+
+def test_a_warm_motor_slows_everything_down() -> None:
+    watch = supervisor(warm_C=50.0, warm_scale=0.5)
+    watch.approached()
+    for warmest_C, scale in ((None, 1.0), (49.9, 1.0), (50.0, 0.5), (40.0, 1.0)):
+        watch.check(replace(situation(), warmest_C=warmest_C))
+        assert watch.speed_scale == scale
 
 
 def test_low_palm_stops() -> None:
@@ -146,6 +185,25 @@ def test_stop_sends_zero_demands_for_several_cycles() -> None:
 def test_stop_tells_what_failed_and_never_raises() -> None:
     bench = StoppableBench(failure=DeviceError("link is down", where="hand"))
     assert SafetySupervisor(bench, SafetySettings(), CYCLE_ns).stop() == ("hand: link is down",)
+    assert bench.calls.count("cycle") == 5
+
+
+def test_the_cause_is_told_with_the_last_cycles() -> None:
+    bench = StoppableBench()
+    watch = SafetySupervisor(bench, SafetySettings(), CYCLE_ns)
+    for cycle in range(150):
+        stamp_ns = cycle * CYCLE_ns
+        watch.check(situation(stamp_ns, stamp_ns - 1_000_000, {"FF": 0.01 * cycle}))
+    watch.stop()
+    assert bench.reports == []  # an ordinary end
+    watch.stop(SafetyError("too much", where="FF"))
+    ((cause, cycles),) = bench.reports
+    assert cause == "FF: too much"
+    assert len(cycles) == 100
+    assert cycles[-1]["load_N"] == {"FF": pytest.approx(1.49)}
+    assert cycles[-1]["hand_age_ms"] == 1.0
+    watch.stop(KeyboardInterrupt())
+    assert bench.reports[1][0] == "stopped at once by the operator"
 
 
 def test_first_interrupt_is_noted_second_is_immediate() -> None:

@@ -36,9 +36,9 @@ def say(answer: dict[str, Any]) -> None:
 def main() -> None:
     """Read what to be, be it, and serve."""
     start: dict[str, Any] = json.loads(sys.stdin.readline())
+    request_real_time(PRIORITY)
     try:
         station = _made(start.pop("role"), start)
-        request_real_time(PRIORITY)
         say({"ready": True})
         station.serve()
     except TactileLabError as error:

@@ -1,0 +1,66 @@
+"""The last cycles before a stop, kept so that they can be told with it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from tactile_lab.geometry.contacts import Array
+
+LAST_CYCLES = 100
+"""As many are kept."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What one cycle looks like to the supervisor.
+
+    Attributes:
+        stamp_ns: when the cycle began to look at its devices, session clock. What came before that has been seen,
+            however long the look took.
+        hand_stamp_ns: arrival of the newest fresh hand status; None before the first.
+        loads_N: contact force on each fingertip.
+        palm_world_m: origin of the palm, shape (3,), world; None before the first status.
+        tip_stamps_ns: arrival of the newest reading of each fingertip that has a link of its own; None before it.
+        force_ranges_N: calibrated range of the fingertips' sensors, smallest axis.
+        warmest_C: temperature of the hand's warmest motor; None while none is known.
+    """
+
+    stamp_ns: int
+    hand_stamp_ns: int | None
+    loads_N: Mapping[str, float]
+    palm_world_m: Array | None
+    tip_stamps_ns: Mapping[str, int | None] = field(default_factory=dict)
+    force_ranges_N: Mapping[str, float] = field(default_factory=dict)
+    warmest_C: float | None = None
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data; ages in milliseconds."""
+        return {
+            "stamp_ns": self.stamp_ns,
+            "hand_age_ms": self._age_ms(self.hand_stamp_ns),
+            "load_N": dict(self.loads_N),
+            "palm_world_m": None if self.palm_world_m is None else self.palm_world_m.tolist(),
+            "tip_age_ms": {finger: self._age_ms(stamp_ns) for finger, stamp_ns in self.tip_stamps_ns.items()},
+            "warmest_C": self.warmest_C,
+        }
+
+    def _age_ms(self, stamp_ns: int | None) -> float | None:
+        return None if stamp_ns is None else (self.stamp_ns - stamp_ns) / 1e6
+
+
+class BlackBox:
+    """Keeps the newest cycles."""
+
+    def __init__(self) -> None:
+        self._cycles: deque[Situation] = deque(maxlen=LAST_CYCLES)
+
+    def note(self, situation: Situation) -> None:
+        """Keep a cycle, and forget the oldest."""
+        self._cycles.append(situation)
+
+    def plain(self) -> list[dict[str, Any]]:
+        """The cycles as plain data, oldest first."""
+        return [situation.plain() for situation in self._cycles]
