@@ -56,13 +56,15 @@ class StreamCounts:
         return {f"{kind} {topic}": n for kind, counts in kinds.items() for topic, n in sorted(counts.items()) if n}
 
     def plain(self) -> dict[str, dict[str, int]]:
-        """All counters by topic, as plain data."""
+        """All counters by topic, as plain data: of the links, and of whatever else lost anything."""
+        lossy = {topic for counts in (self.gaps, self.late, self.dropped) for topic, number in counts.items() if number}
+        topics = [topic for topic in sorted(self.messages) if topic.startswith("/link/") or topic in lossy]
         return {
             topic: {
-                "messages": number,
+                "messages": self.messages[topic],
                 "gaps": self.gaps[topic],
                 "late": self.late[topic],
                 "dropped": self.dropped[topic],
             }
-            for topic, number in sorted(self.messages.items())
+            for topic in topics
         }
