@@ -72,6 +72,17 @@ class EthercatCounts:
     empty: int = 0
     openings: int = 0
 
+    def problems(self) -> tuple[str, ...]:
+        """What was lost or late, in words; empty when nothing was."""
+        remarks = {
+            f"{self.lost} of {self.cycles} frames lost": self.lost,
+            f"{self.stale} frames came back late": self.stale,
+            f"{self.damaged} frames came back damaged": self.damaged,
+            f"{self.refused} commands not taken by a late palm": self.refused,
+            f"{self.empty} cycles without a new status": self.empty,
+        }
+        return tuple(words for words, count in remarks.items() if count)
+
 
 class EthercatLink:
     """A link to the palm.
@@ -209,13 +220,5 @@ class EthercatLink:
 
     def health(self) -> tuple[str, ...]:
         """What is wrong with the wire, in words; empty when all is well."""
-        counts = self.counts
-        remarks = {
-            f"{counts.lost} of {counts.cycles} frames lost": counts.lost,
-            f"{counts.stale} frames came back late": counts.stale,
-            f"{counts.damaged} frames came back damaged": counts.damaged,
-            f"{counts.refused} commands not taken by a late palm": counts.refused,
-            f"{counts.empty} cycles without a new status": counts.empty,
-        }
-        problems = tuple(words for words, count in remarks.items() if count)
+        problems = self.counts.problems()
         return ((str(self._failure),) if self._failure else ()) + problems

@@ -131,7 +131,7 @@ class HandWorker:
     def _report(self) -> None:
         report = {
             "punctuality": dataclasses.asdict(self._statistics.summary()),
-            "wire": dataclasses.asdict(self._link.counts) if isinstance(self._link, EthercatLink) else {},
+            "wire": dataclasses.asdict(self._link.counts),
             "hand": dataclasses.asdict(self._hand.counters),
             "dropped_blocks": self._pipe.dropped_blocks,
             "health": self._hand.health() + self._link.health(),

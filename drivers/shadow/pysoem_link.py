@@ -20,7 +20,7 @@ from typing import Any
 
 from drivers.ethercat.registers import AL_ERROR, AL_STATE_MASK, AlState, AlStatus
 from drivers.links import Datagram
-from drivers.shadow.ethercat_link import EthercatSettings
+from drivers.shadow.ethercat_link import EthercatCounts, EthercatSettings
 from drivers.shadow.palm_images import SHADOW_VENDOR, PalmImage, describe_product, palm_of_product
 from tactile_lab.clock import Clock
 from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
@@ -51,7 +51,7 @@ class PysoemLink:
         self._image: PalmImage | None = None
         self._sent: tuple[int, int] | None = None
         self._taken: tuple[int, int] | None = None
-        self.stale = self.lost = self.cycles = 0
+        self.counts = EthercatCounts()
 
     def open(self) -> None:
         """Bring the ring to OP. All or nothing, repeatable.
@@ -75,7 +75,7 @@ class PysoemLink:
             raise
         self._master = master
         self._sent = self._taken = None
-        self.stale = self.lost = self.cycles = 0
+        self.counts = EthercatCounts()
 
     def close(self) -> None:
         """Bring the slaves to INIT and release the interface. Idempotent."""
@@ -99,7 +99,7 @@ class PysoemLink:
         self._sent = command.from_motor_data_type, command.which_motors
         self._master.slaves[1].output = payload
         self._master.send_processdata()
-        self.cycles += 1
+        self.counts.cycles += 1
 
     def receive(self) -> list[Datagram]:
         """The status of this cycle; nothing when the frame was lost, the palm was late or the answer was old.
@@ -110,21 +110,26 @@ class PysoemLink:
         image = self._opened()
         counter = self._master.receive_processdata(round(self._settings.master.answer_s * 1e6), release_gil=True)
         stamp_ns = self._clock.now_ns()
-        if self.cycles % self._settings.poll_every == 0:
+        if self.counts.cycles % self._settings.poll_every == 0:
             self._check_states()
         expected, self._taken = self._taken, self._sent if counter > 0 and counter & _WRITTEN else self._taken
         if counter < 0:
-            self.lost += 1
+            self.counts.lost += 1
             self._taken = None  # the palm may have taken that command, or not
             return []
         if not counter & _READ:
+            self.counts.empty += 1
             return []
         payload = bytes(self._master.slaves[1].input)
         status = image.decode_status(payload)
         if status.written and expected not in (None, (status.motor_data_type, status.which_motors)):
-            self.stale += 1
+            self.counts.stale += 1
             return []
         return [Datagram(payload, stamp_ns)]
+
+    def health(self) -> tuple[str, ...]:
+        """What is wrong with the wire, in words; empty when all is well."""
+        return self.counts.problems()
 
     def _opened(self) -> PalmImage:
         if self._master is None or self._image is None:

@@ -11,6 +11,7 @@ from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_samples import HandSample
 from drivers.shadow.motors import MotorMap
 from drivers.shadow.palm_codec import SENSORS
+from drivers.shadow.pysoem_link import PysoemLink
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import DeviceError
 from tactile_lab.rigs.findings import Finding
@@ -67,8 +68,8 @@ def _ring(link: Link) -> Finding:
     return Finding("ring", True, words)
 
 
-def _cycle(hand: ShadowHand, link: Link, statistics: CycleStatistics) -> Finding:
-    counters, remarks = hand.counters, link.health() if isinstance(link, EthercatLink) else ()
+def _cycle(hand: ShadowHand, link: EthercatLink | PysoemLink, statistics: CycleStatistics) -> Finding:
+    counters, remarks = hand.counters, link.health()
     share = counters.lost / max(counters.cycles, 1)
     words = f"{statistics.summary()}; {counters.lost} of {counters.cycles} without a status"
     return Finding("cycle", share < 0.01, "; ".join((words, *remarks)))
