@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 
@@ -27,6 +29,7 @@ class CameraEmulator:
         table_marker: the marker on the table and its pose in the world.
         object_marker: the marker under the object and its pose in the object frame.
         jpeg_quality: of the pictures.
+        carried: gives the markers on the hand and their poses in the world; they lie above all others.
     """
 
     def __init__(
@@ -37,7 +40,9 @@ class CameraEmulator:
         table_marker: Placed,
         object_marker: Placed,
         jpeg_quality: int,
+        carried: Callable[[], tuple[Placed, ...]] = tuple,
     ) -> None:
+        self._carried = carried
         self._plant, self._camera = plant, camera
         foot = target.foot_object_m
         self._foot_object_m = np.column_stack([foot, np.full(len(foot), -target.rest_height_m)])
@@ -69,5 +74,6 @@ class CameraEmulator:
         world_T_object = self._plant.world_T_object
         marker, object_T_marker = self._object_marker
         foot_world_m = transform_points(world_T_object, self._foot_object_m)
-        image = self._camera.render((self._table_marker, (marker, world_T_object * object_T_marker)), foot_world_m)
+        markers = (self._table_marker, (marker, world_T_object * object_T_marker), *self._carried())
+        image = self._camera.render(markers, foot_world_m)
         return cv2.imencode(".jpg", image, self._jpeg)[1].tobytes()

@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from drivers.camera.boards import GridBoard
 from drivers.fingertip import RigidTransform
 from tactile_lab.strict_yaml import StrictModel
 
@@ -88,6 +89,13 @@ class CameraSettings(StrictModel):
     jpeg_quality: int = Field(default=90, ge=1, le=100)
 
 
+class HandBoard(StrictModel):
+    """A board that the simulated hand carries for calibrating: its markers, and where it is glued to the palm."""
+
+    board: GridBoard
+    palm_T_board: RigidTransform
+
+
 class SimulationSettings(StrictModel):
     """The simulated rig.
 
@@ -97,6 +105,7 @@ class SimulationSettings(StrictModel):
         start: where it lies at the beginning; drawn from the seed when not given.
         start_sigma_m: spread of the drawn position per axis, about the middle of the table. Any turn is as likely.
         fingertips: the kind on all five fingers.
+        hand_board: what the hand carries for the camera; nothing when None.
         world_T_mount: where the positioner really stands; a rig's forearm-to-world calibration may be off from it.
     """
 
@@ -105,6 +114,7 @@ class SimulationSettings(StrictModel):
     start: ObjectStart | None = None
     start_sigma_m: float = Field(default=0.01, ge=0.0, le=0.1)
     fingertips: Literal["nano17", "biotac"] = "nano17"
+    hand_board: HandBoard | None = None
     world_T_mount: RigidTransform = RigidTransform(translation_m=(0.0, 0.0, 0.0))
     joint_sensors: JointSensorSettings = JointSensorSettings()
     force_sensors: ForceSensorSettings = ForceSensorSettings()

@@ -7,12 +7,12 @@ commands give the same bytes again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from gtsam import Pose2, Pose3
+from gtsam import Pose2, Pose3, Rot3
 
 from drivers.camera.markers import MarkerSettings
 from drivers.fingertip import RigidTransform
@@ -20,7 +20,7 @@ from drivers.links import Datagram, Link, MemoryLink, Peer
 from drivers.simulation.biotac_emulator import BiotacSection, BiotacSkin
 from drivers.simulation.calibration import SimulatedCalibration
 from drivers.simulation.camera_emulator import CameraEmulator
-from drivers.simulation.camera_renderer import PrintedMarker, TableCamera
+from drivers.simulation.camera_renderer import Placed, PrintedMarker, TableCamera
 from drivers.simulation.hand_plant import SeenPlant
 from drivers.simulation.model import build_model
 from drivers.simulation.motor_bank import MotorBank
@@ -120,7 +120,7 @@ class SimulatedWorld:
         self._peers["base"] = PositionerEmulator(self._plant)
         if settings.fingertips == "nano17":
             self._add_force_sensors()
-        self._peers["camera"] = self.build_camera(self._plant)
+        self._peers["camera"] = self.build_camera(self._plant, self._markers_on_hand)
         self._plugs = {name: _Plug(peer) for name, peer in self._peers.items()}
         self.clock = SimulatedClock(self)
 
@@ -219,8 +219,8 @@ class SimulatedWorld:
         }
         return BiotacSection(self._plant, biotacs)
 
-    def build_camera(self, plant: SeenPlant) -> CameraEmulator:
-        """This rig's camera over a plant."""
+    def build_camera(self, plant: SeenPlant, carried: Callable[[], tuple[Placed, ...]] = tuple) -> CameraEmulator:
+        """This rig's camera over a plant, which sees what is carried too."""
         markers = self.marker_settings
         camera = TableCamera(self.calibration.camera, self.settings.camera, self._random["camera"])
         table = PrintedMarker(markers.dictionary, markers.world_id, markers.world_side_m)
@@ -232,6 +232,20 @@ class SimulatedWorld:
             (table, markers.world_T_worldmarker.pose()),
             (glued, markers.object_T_objectmarker.pose()),
             self.settings.camera.jpeg_quality,
+            carried,
+        )
+
+    def _markers_on_hand(self) -> tuple[Placed, ...]:
+        """The markers of the board on the palm, where they are now."""
+        held = self.settings.hand_board
+        if held is None:
+            return ()
+        board, world_T_board = held.board, self._plant.world_T_palm * held.palm_T_board.pose()
+        side_m = board.side_m * board.scale
+        places = {number: board.marker_corners_m(number).mean(axis=0) for number in board.numbers}
+        return tuple(
+            (PrintedMarker(board.dictionary, number, side_m), world_T_board * Pose3(Rot3(), place))
+            for number, place in places.items()
         )
 
 
