@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from gtsam import Pose2
+from numpy.typing import NDArray
 
 from sessions.explorer import KnownShape
 from sessions.grasp_cycle import GraspPlan
@@ -46,7 +47,7 @@ class Knowledge:
     known: KnownShape
     world_T_object: Pose2
     covariance: Array
-    grasp_indices: Array
+    grasp_indices: NDArray[np.intp]
     grasps_left: int | None = None
     here: GraspFrame | None = None
 

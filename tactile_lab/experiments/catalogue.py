@@ -10,7 +10,14 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from tactile_lab.errors import ConfigurationError
-from tactile_lab.experiments import crash_runs, exploration_runs, graph_runs, shape_runs, tracking_runs
+from tactile_lab.experiments import (
+    crash_runs,
+    exploration_runs,
+    graph_runs,
+    hand_exploration,
+    shape_runs,
+    tracking_runs,
+)
 from tactile_lab.experiments.cells import Cell, Row, Setting, Value, Work, grid, planned_cells
 from tactile_lab.experiments.graph_stress import stock_solvers
 from tactile_lab.experiments.plots import CurvePanel, RangePanel, curve_of, curves_svg, ranges_svg
@@ -48,6 +55,15 @@ EXPLORATION_COLUMNS = (
     Column("by B: median / p90 / max", "actions_B", 0),
     Column("by A: median / p90 / max", "actions_A", 0),
     Column("decision, ms: median / p95", "decision_ms", 0, kind="pooled"),
+    Column("correlation of promised and realised share", "promises", 2, kind="correlation"),
+)
+HAND_COLUMNS = (
+    Column("actions by B: median / p90 / max", "actions_B", 0),
+    Column("by A", "actions_A", 0),
+    Column("explored by B at the end", "share_B", 0, kind="percent"),
+    Column("simulated minutes", "minutes", 1),
+    HAUSDORFF,
+    REGISTRATION,
     Column("correlation of promised and realised share", "promises", 2, kind="correlation"),
 )
 _ACTIONS_LABEL = "actions until 90 % of the contour is explored (definition B)"
@@ -225,6 +241,10 @@ def _condition(cell: Cell) -> str:
     return f"{cell['noise']} % motion noise{outliers}"
 
 
+def _hand_condition(cell: Cell) -> str:
+    return f"{cell['object']}, {cell['dimension']}-D"
+
+
 def _kind_of_solid(cell: Cell) -> str:
     kinds = {"flat faces": FACETED_SOLIDS, "curved": CURVED_SOLIDS, "scanned": SCANNED_SOLIDS}
     return next(kind for kind, names in kinds.items() if cell["shape"] in names)
@@ -357,6 +377,16 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             exploration_runs.explore_moving,
             (*EXPLORATION_COLUMNS, REGISTRATION),
             _ranges("policy", _ACTIONS_LABEL, "actions_B", lambda cell: f"followed by {cell['tracking']}", columns=1),
+        ),
+        Experiment(
+            "exploration-hand",
+            "The simulated hand's own candidates, 72 and more: actions until 90 % of an object is explored, by policy.",
+            hand_exploration.settings,
+            hand_exploration.explore_by_hand,
+            HAND_COLUMNS,
+            _ranges("policy", "grasps until 90 % is explored (definition B)", "actions_B", _hand_condition, columns=2),
+            pooled=("object",),
+            grasps=hand_exploration.GRASPS,
         ),
         Experiment(
             "graph-stress",
