@@ -8,6 +8,7 @@ it, and places where fingertips were are outside.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
 from tactile_lab.errors import ShapeError
@@ -16,6 +17,7 @@ from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.model import FittedShape
 from tactile_lab.shape.outlines import encloses
 from tactile_lab.shape.polygon import Polygon
+from tactile_lab.shape.polygon_corners import at_corners
 from tactile_lab.shape.polygon_regularity import with_right_angles
 from tactile_lab.shape.polygon_segmentation import PlanarContacts, segment
 from tactile_lab.shape.sampling import distances_to_polygon
@@ -83,12 +85,35 @@ def best_shape(gpis: Gpis, free_points_m: Array | None = None, floor_m: float | 
 
 def polygon_of(gpis: Gpis, provisional: Contour) -> Polygon:
     """The facet model of a planar field's contacts, whatever its evidence. Raises ShapeError if there is none."""
+    return outlined(gpis, provisional)[0]
+
+
+def outlined(gpis: Gpis, provisional: Contour) -> tuple[Polygon, NDArray[np.bool_]]:
+    """As :func:`polygon_of`, and which of the field's contacts lie at its corners, shape (n,). Raises ShapeError."""
     seen = gpis.observations
     contacts = PlanarContacts.of(gpis.contacts_m, gpis.normals, seen.value_sigma_m, seen.gradient_sigma)
-    faces = segment(
-        gpis.contacts_m, gpis.normals, contacts.point_sigma_m, contacts.normal_sigma_rad, provisional.points_m
-    )
-    return Polygon.of(contacts, with_right_angles(contacts, faces), provisional)
+    faces = segment(contacts, provisional.points_m)
+    leaning = at_corners(contacts, faces)
+    cornered = _cornered(contacts, leaning, provisional) if leaning.any() else None
+    try:
+        plain = Polygon.of(contacts, with_right_angles(contacts, faces), provisional)
+    except ShapeError:  # corners taken for faces may enclose nothing
+        if cornered is None:
+            raise
+        return cornered, leaning
+    if cornered is not None and cornered.log_evidence > plain.log_evidence:
+        return cornered, leaning
+    return plain, np.zeros_like(leaning)
+
+
+def _cornered(contacts: PlanarContacts, leaning: NDArray[np.bool_], provisional: Contour) -> Polygon | None:
+    """The polygon of the other contacts, these at its corners; None if those enclose nothing."""
+    on_faces = contacts.selected(~leaning)
+    try:
+        faces = with_right_angles(on_faces, segment(on_faces, provisional.points_m))
+        return Polygon.of(on_faces, faces, provisional, contacts.selected(leaning))
+    except ShapeError:
+        return None
 
 
 def _free_points(gpis: Gpis, free_points_m: Array | None) -> Array:

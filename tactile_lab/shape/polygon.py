@@ -10,6 +10,7 @@ import numpy as np
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.outlines import is_simple
+from tactile_lab.shape.polygon_corners import Corners
 from tactile_lab.shape.polygon_joints import Joint, JointMaker
 from tactile_lab.shape.polygon_segmentation import Faces, PlanarContacts, log_evidence
 from tactile_lab.shape.polygon_uncertainty import FaceUncertainty
@@ -27,8 +28,9 @@ class Polygon:
 
     Attributes:
         name: "polygon".
-        contacts: what it was made from.
-        faces: which contact lies on which face.
+        contacts: those that lie on faces.
+        faces: which of them lies on which face.
+        corner_contacts: the others, each at one of the corners.
         outline_m: vertices of the simple closed outline, counter-clockwise, shape (k, 2): its corners, and the points
             of bridges where two neighbouring faces do not meet in a plausible corner.
         vertex_sigma_m: standard deviation across the outline at the points of bridges, NaN at corners, shape (k,).
@@ -37,15 +39,23 @@ class Polygon:
 
     name = "polygon"
 
-    def __init__(self, contacts: PlanarContacts, faces: Faces, joints: list[Joint]) -> None:
-        self.contacts, self.faces = contacts, faces
+    def __init__(
+        self, contacts: PlanarContacts, faces: Faces, joints: list[Joint], corner_contacts: PlanarContacts
+    ) -> None:
+        self.contacts, self.faces, self.corner_contacts = contacts, faces, corner_contacts
         self.outline_m = np.vstack([joint.points_m for joint in joints])
         self.vertex_sigma_m = np.concatenate([joint.sigma_m for joint in joints])
         following = [[BRIDGE] * (len(joint.points_m) - 1) + [(i + 1) % len(joints)] for i, joint in enumerate(joints)]
         self.edge_faces = np.concatenate(following).astype(np.int64)
 
     @classmethod
-    def of(cls, contacts: PlanarContacts, faces: Faces, provisional: Contour | None = None) -> Self:
+    def of(
+        cls,
+        contacts: PlanarContacts,
+        faces: Faces,
+        provisional: Contour | None = None,
+        corner_contacts: PlanarContacts | None = None,
+    ) -> Self:
         """The outline of faces, each met by its neighbours.
 
         Args:
@@ -53,6 +63,7 @@ class Polygon:
             faces: at least three.
             provisional: an outline that corners must not stray from, and that bridges gaps where faces do not meet;
                 straight lines do if it is None or goes a long way round.
+            corner_contacts: further contacts, which lie at corners and not on the faces.
 
         Raises:
             ShapeError: fewer than three faces, or faces that do not enclose one simple region: no polygon then.
@@ -60,7 +71,9 @@ class Polygon:
         if faces.count < LEAST_FACES:
             raise ShapeError(f"{faces.count} faces enclose nothing", hint="Contacts on three sides are needed")
         maker = JointMaker(contacts, faces, provisional)
-        polygon = cls(contacts, faces, [maker.between(i, (i + 1) % faces.count) for i in range(faces.count)])
+        joints = [maker.between(i, (i + 1) % faces.count) for i in range(faces.count)]
+        none = contacts.selected(np.zeros(len(contacts), dtype=bool))
+        polygon = cls(contacts, faces, joints, corner_contacts or none)
         if polygon_area(polygon.outline_m) > 0 and is_simple(polygon.outline_m):
             return polygon
         raise ShapeError("the faces do not enclose one region", hint="More contacts near the corners would help")
@@ -68,8 +81,17 @@ class Polygon:
     @cached_property
     def log_evidence(self) -> float:
         """Comparable with the log marginal likelihood of a field from the same contacts; see :func:`log_evidence`."""
-        contacts, faces = self.contacts, self.faces
-        return log_evidence(faces.chi_square, faces.count, contacts.point_sigma_m, contacts.normal_sigma_rad)
+        on_faces, at_corners, faces = self.contacts, self.corner_contacts, self.faces
+        chi_square = faces.chi_square + float(self.corners.chi_squares(at_corners).sum())
+        point_sigma_m = np.append(on_faces.point_sigma_m, at_corners.point_sigma_m)
+        normal_sigma_rad = np.append(on_faces.normal_sigma_rad, at_corners.normal_sigma_rad)
+        return log_evidence(chi_square, faces.count, point_sigma_m, normal_sigma_rad)
+
+    @property
+    def corners(self) -> Corners:
+        """The convex ones that a fingertip may straddle."""
+        before, after = np.roll(self.edge_faces, 1)[self._is_corner], self.edge_faces[self._is_corner]
+        return Corners.between(self.faces, np.column_stack([before, after]))
 
     @cached_property
     def uncertainty(self) -> FaceUncertainty:

@@ -104,23 +104,24 @@ class PlanarContacts:
             raise ShapeError("faces need contacts with standard deviations above zero")
         return cls(points_m, normals, *sigmas)
 
+    def selected(self, mask: NDArray[np.bool_]) -> PlanarContacts:
+        """The contacts picked by a boolean array."""
+        return PlanarContacts(
+            self.points_m[mask], self.normals[mask], self.point_sigma_m[mask], self.normal_sigma_rad[mask]
+        )
 
-def segment(
-    points_m: Array, normals: Array, point_sigma_m: Array | float, normal_sigma_rad: Array | float, contour_m: Array
-) -> Faces:
+
+def segment(contacts: PlanarContacts, contour_m: Array) -> Faces:
     """Divide contacts into the straight faces of least BIC.
 
     Args:
-        points_m: contacts, shape (n, 2), metres.
-        normals: outward unit normals, shape (n, 2).
-        point_sigma_m, normal_sigma_rad: standard deviations, one each or one for all.
+        contacts: all of an object.
         contour_m: a provisional closed outline, shape (m, 2), in any direction of turning; it only orders the
             contacts, and is replaced by the faces found as soon as those make an outline themselves.
 
     Raises:
-        ShapeError: see :meth:`PlanarContacts.of`, or an outline of less than three points.
+        ShapeError: an outline of less than three points.
     """
-    contacts = PlanarContacts.of(points_m, normals, point_sigma_m, normal_sigma_rad)
     if len(contour_m) < 3:
         raise ShapeError("the outline that orders the contacts has less than three points")
     faces = divide(contacts, order_along(contacts, contour_m))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.choice import polygon_of
+from tactile_lab.shape.choice import outlined
 from tactile_lab.shape.polygon_segmentation import price_of_face
 from tactile_lab.shape.polyhedron_planes import segment_planes
 from tactile_lab.shape.surface import extract_contour
@@ -44,11 +44,13 @@ class FlatFaces:
         labels: face of each contact, shape (n,).
         normals: outward unit normals u, shape (s, d).
         offsets_m: shape (s,).
+        leaning: contacts at corners, on their face but with a normal that is not the face's, shape (n,).
     """
 
     labels: NDArray[np.int64]
     normals: Array
     offsets_m: Array
+    leaning: NDArray[np.bool_]
 
     @property
     def count(self) -> int:
@@ -63,7 +65,8 @@ class FlatFaces:
         normals[kept], offsets[kept] = between / np.linalg.norm(between), weights @ offsets[[kept, dropped]]
         labels = np.where(self.labels == dropped, kept, self.labels)
         labels = labels - (labels > dropped)
-        return FlatFaces(labels, np.delete(normals, dropped, axis=0), np.delete(offsets, dropped))
+        normals, offsets = np.delete(normals, dropped, axis=0), np.delete(offsets, dropped)
+        return FlatFaces(labels, normals, offsets, self.leaning)
 
 
 @dataclass(frozen=True)
@@ -159,7 +162,8 @@ class FacetSmoother:
         points, normals = self._space.to_object(rows[self._grasp_of], self._world.points_m, self._world.normals)
         outward = faces.normals[faces.labels]
         away = np.einsum("nd,nd->n", outward, points) - faces.offsets_m[faces.labels]
-        return away / self._world.point_sigma_m, (normals - outward) / self._world.normal_sigma_rad[:, None]
+        tilts = np.where(faces.leaning[:, None], 0.0, normals - outward)
+        return away / self._world.point_sigma_m, tilts / self._world.normal_sigma_rad[:, None]
 
     def _normal_equations(self, at: FacetedTrajectory) -> tuple[Array, Array]:
         """Gauss-Newton information and gradient by all poses but the first, then by each face's tilt and offset."""
@@ -184,14 +188,15 @@ class FacetSmoother:
         by_faces = np.zeros(((dimension + 1) * count, faces.count, dimension))
         value = self._space.by_row(each, points, normals, outward, still)
         by_poses[contact, self._grasp_of] = value / world.point_sigma_m[:, None]
+        stiffness = ~faces.leaning / world.normal_sigma_rad
         tilt = np.column_stack([np.einsum("ndt,nd->nt", tangents, points), -np.ones(count)])
         by_faces[contact, faces.labels] = tilt / world.point_sigma_m[:, None]
         for axis in range(dimension):
             unit = np.broadcast_to(np.eye(dimension)[axis], normals.shape)
             lines = (axis + 1) * count + contact
             turned = self._space.by_row(each, points, normals, still, unit)
-            by_poses[lines, self._grasp_of] = turned / world.normal_sigma_rad[:, None]
-            by_faces[lines, faces.labels, :-1] = -tangents[:, axis] / world.normal_sigma_rad[:, None]
+            by_poses[lines, self._grasp_of] = turned * stiffness[:, None]
+            by_faces[lines, faces.labels, :-1] = -tangents[:, axis] * stiffness[:, None]
         free = by_poses[:, 1:].reshape(len(by_poses), -1)
         return np.hstack([free, by_faces.reshape(len(by_faces), -1)])
 
@@ -235,10 +240,12 @@ def smoothed_with_faces(contact_map: ContactMap, noise: MotionNoise, rounds: int
     price = price_of_face(world.point_sigma_m, world.normal_sigma_rad)
     best: FacetedTrajectory | None = None
     for _ in range(rounds):
-        divided = _outline_faces(contact_map) if contact_map.dimension == 2 else _solid_faces(contact_map)
-        if divided is None:
+        try:
+            faces, neighbours = flat_faces(contact_map)
+        except ShapeError:  # nothing enclosed, or no faces in it
             return best
-        faces, neighbours = divided
+        if contact_map.dimension == 3 and faces.count > _MOST_PLANES_SHARE * len(faces.labels):
+            return best  # round: planes would only follow the noise
         found = FacetSmoother(contact_map, noise).simplified(contact_map.rows, faces, price, neighbours)
         if best and found.description_length(price) >= best.description_length(price) - 1e-3:
             return best
@@ -246,14 +253,23 @@ def smoothed_with_faces(contact_map: ContactMap, noise: MotionNoise, rounds: int
     return best
 
 
-def _outline_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours] | None:
-    """The faces of an outline; only those that follow each other along it may be one."""
-    fitted = contact_map.fit()
-    try:
-        divided = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m)).faces
-    except ShapeError:  # nothing enclosed, or no faces in it
-        return None
-    order = divided.order
+def flat_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
+    """The faces of a map's contacts, and which of them may be one.
+
+    Raises:
+        ShapeError: contacts in the plane whose faces enclose nothing.
+    """
+    return _outline_faces(contact_map) if contact_map.dimension == 2 else _solid_faces(contact_map)
+
+
+def _outline_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
+    """The faces of an outline; only those that follow each other along it may be one. Raises ShapeError."""
+    fitted, seen = contact_map.fit(), contact_map.contacts
+    polygon, leaning = outlined(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
+    found, order = polygon.faces, np.flatnonzero(~leaning)[polygon.faces.order]
+    away = np.abs(seen.points_m @ found.normals.T - found.offsets_m)
+    labels = np.where(seen.normals @ found.normals.T > 0, away, np.inf).argmin(axis=1)
+    labels[~leaning] = found.labels
 
     def in_turn(faces: FlatFaces) -> list[tuple[int, int]]:
         along = faces.labels[order]
@@ -261,20 +277,18 @@ def _outline_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours] | No
         pairs = np.sort(np.column_stack([along[borders - 1], along[borders]]), axis=1)
         return [(int(one), int(other)) for one, other in np.unique(pairs, axis=0)]
 
-    return FlatFaces(divided.labels, divided.normals, divided.offsets_m), in_turn
+    return FlatFaces(labels, found.normals, found.offsets_m, leaning), in_turn
 
 
-def _solid_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours] | None:
+def _solid_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
     """The planes of a solid; any two may be one."""
     seen = contact_map.contacts
     planes = segment_planes(seen.points_m, seen.normals, seen.point_sigma_m, seen.normal_sigma_rad)
-    if planes.count > _MOST_PLANES_SHARE * len(seen):  # round: planes would only follow the noise
-        return None
 
     def all_pairs(faces: FlatFaces) -> list[tuple[int, int]]:
         return [(one, other) for other in range(faces.count) for one in range(other)]
 
-    return FlatFaces(planes.labels, planes.normals, planes.offsets_m), all_pairs
+    return FlatFaces(planes.labels, planes.normals, planes.offsets_m, np.zeros(len(seen), dtype=bool)), all_pairs
 
 
 def _tangents(normals: Array) -> Array:

@@ -12,11 +12,10 @@ from tactile_lab.errors import ShapeError
 from tactile_lab.shape.choice import best_shape, free_evidence, polygon_of
 from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.polyhedron import Polyhedron
-from tactile_lab.shape.polyhedron_planes import segment_planes
 from tactile_lab.shape.prism import Prism
 from tactile_lab.shape.surface import extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
-from tactile_lab.tracking.facet_smoothing import FlatFaces, smoothed_with_faces
+from tactile_lab.tracking.facet_smoothing import flat_faces, smoothed_with_faces
 from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge
 from tactile_lab.tracking.motion import MotionNoise
@@ -124,30 +123,20 @@ def _prism_evidence(fitted: Gpis) -> float:
 
 def _doubtful(contact_map: ContactMap) -> list[tuple[int, int]]:
     """Origins of contacts on faces of one or two, and those that do not fit their face, the worst first."""
-    seen, fitted = contact_map.contacts, contact_map.fit()
+    seen = contact_map.contacts
     try:
-        faces = _faces(contact_map, fitted)
+        faces, _ = flat_faces(contact_map)
     except ShapeError:
         return []
     outward = faces.normals[faces.labels]
     away = np.einsum("nd,nd->n", outward, seen.points_m) - faces.offsets_m[faces.labels]
     misfit = (away / seen.point_sigma_m) ** 2
-    misfit += np.sum((seen.normals - outward) ** 2, axis=1) / seen.normal_sigma_rad**2
+    misfit += ~faces.leaning * np.sum((seen.normals - outward) ** 2, axis=1) / seen.normal_sigma_rad**2
     lonely = np.bincount(faces.labels, minlength=faces.count)[faces.labels] <= _SMALL_FACE
     doubts = np.flatnonzero(lonely | (misfit > _DOUBTFUL_CHI_SQUARE))
     worst_first = doubts[np.argsort(-misfit[doubts], kind="stable")][:_MOST_DOUBTS]
     origins = contact_map.origins
     return [origins[i] for i in worst_first]
-
-
-def _faces(contact_map: ContactMap, fitted: Gpis) -> FlatFaces:
-    """The faces of the present contacts. Raises ShapeError where there are none."""
-    if contact_map.dimension == 2:
-        found = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m)).faces
-        return FlatFaces(found.labels, found.normals, found.offsets_m)
-    seen = contact_map.contacts
-    planes = segment_planes(seen.points_m, seen.normals, seen.point_sigma_m, seen.normal_sigma_rad)
-    return FlatFaces(planes.labels, planes.normals, planes.offsets_m)
 
 
 def _likelier(one: Hypothesis, other: Hypothesis | None) -> Hypothesis:

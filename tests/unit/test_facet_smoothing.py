@@ -9,13 +9,10 @@ import pytest
 
 from tactile_lab.experiments import planar_data
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.choice import polygon_of
-from tactile_lab.shape.polyhedron_planes import segment_planes
 from tactile_lab.shape.sampling import distances_to_polygon
-from tactile_lab.shape.surface import extract_contour
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.tracking.contact_map import ContactMap
-from tactile_lab.tracking.facet_smoothing import FacetSmoother, FlatFaces, smoothed_with_faces
+from tactile_lab.tracking.facet_smoothing import FacetSmoother, FlatFaces, flat_faces, smoothed_with_faces
 from tactile_lab.tracking.hypotheses import Judge
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.pose_evidence import PoseEvidence
@@ -31,19 +28,10 @@ def shaken(contact_map: ContactMap, scale: float) -> Array:
     return np.asarray(contact_map.rows + shake)
 
 
-def true_faces(contact_map: ContactMap) -> FlatFaces:
-    seen, fitted = contact_map.contacts, contact_map.fit()
-    if contact_map.dimension == 2:
-        found = polygon_of(fitted, extract_contour(fitted)).faces
-        return FlatFaces(found.labels, found.normals, found.offsets_m)
-    planes = segment_planes(seen.points_m, seen.normals, seen.point_sigma_m, seen.normal_sigma_rad)
-    return FlatFaces(planes.labels, planes.normals, planes.offsets_m)
-
-
 @pytest.mark.parametrize(("shape", "dimension"), [("rectangle", 2), ("L", 2), ("box-12x6x6", 3)])
 def test_shaken_poses_settle_on_the_faces_to_within_the_noise(shape: str, dimension: int) -> None:
     contact_map = true_map(shape, dimension=dimension)
-    smoother, faces = FacetSmoother(contact_map, NOISE), true_faces(contact_map)
+    smoother, faces = FacetSmoother(contact_map, NOISE), flat_faces(contact_map)[0]
     start = smoother.fitted(shaken(contact_map, 4.0), faces, 0)
     found = smoother.fitted(start.rows, faces, 20)
     observed = len(contact_map.contacts) * dimension
@@ -66,14 +54,16 @@ def test_smoothing_never_raises_the_cost_and_keeps_the_first_pose() -> None:
     angles = np.arctan2(*contact_map.contacts.normals.T[::-1])
     labels = np.digitize(angles, np.linspace(-np.pi, np.pi, 7)[1:-1])
     normals = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(-np.pi, np.pi, 13)[1::2]])
-    faces = FlatFaces(labels, normals, np.full(6, 0.035))
+    faces = FlatFaces(labels, normals, np.full(6, 0.035), np.zeros(len(labels), dtype=bool))
     few, many = smoother.fitted(rows, faces, 1), smoother.fitted(rows, faces, 10)
     assert many.cost <= few.cost
     assert np.array_equal(many.rows[0], rows[0])
 
 
 def test_merged_faces_hold_the_contacts_of_both() -> None:
-    faces = FlatFaces(np.array([0, 1, 2, 2, 1]), np.eye(3)[:, :2] + [[0, 0], [0, 0], [1, 0]], np.arange(3.0))
+    faces = FlatFaces(
+        np.array([0, 1, 2, 2, 1]), np.eye(3)[:, :2] + [[0, 0], [0, 0], [1, 0]], np.arange(3.0), np.zeros(5, dtype=bool)
+    )
     merged = faces.merged(0, 1)
     assert merged.labels.tolist() == [0, 0, 1, 1, 0]
     assert merged.offsets_m.tolist() == [pytest.approx(2 / 3), 2.0]

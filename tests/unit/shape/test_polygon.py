@@ -45,9 +45,7 @@ def contacts_on(outline: Array, count: int, seed: int, noise: float = 1.0) -> Pl
 
 
 def faces_of(contacts: PlanarContacts, outline: Array) -> Faces:
-    return segment(
-        contacts.points_m, contacts.normals, contacts.point_sigma_m, contacts.normal_sigma_rad, outline_rounded(outline)
-    )
+    return segment(contacts, outline_rounded(outline))
 
 
 def outline_rounded(outline: Array) -> Array:
@@ -203,7 +201,7 @@ def test_gaps_are_bridged_by_the_provisional_outline() -> None:
     field = Gpis.fit(points[seen], normals[seen]).optimise()
     provisional = extract_contour(field)
     contacts = PlanarContacts.of(points[seen], normals[seen], POINT_SIGMA_m, NORMAL_SIGMA_rad)
-    faces = segment(points[seen], normals[seen], POINT_SIGMA_m, NORMAL_SIGMA_rad, provisional.points_m)
+    faces = segment(contacts, provisional.points_m)
     polygon = Polygon.of(contacts, faces, provisional)
     bridge = polygon.outline_m[polygon.edge_faces == BRIDGE]
     assert len(bridge) > 20
@@ -224,7 +222,7 @@ def test_contacts_that_make_no_sense_are_refused() -> None:
     with pytest.raises(ShapeError, match="above zero"):
         PlanarContacts.of(np.zeros((4, 2)), np.zeros((4, 2)), 0.0, 0.1)
     with pytest.raises(ShapeError, match="less than three"):
-        segment(np.zeros((4, 2)), np.ones((4, 2)), 0.001, 0.1, np.zeros((2, 2)))
+        segment(PlanarContacts.of(np.zeros((4, 2)), np.ones((4, 2)), 0.001, 0.1), np.zeros((2, 2)))
 
 
 def test_every_outline_is_simple_even_from_few_contacts_on_a_curve() -> None:
