@@ -12,7 +12,7 @@ from tactile_lab.calibration_file import is_stored
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.strict_yaml import load
 
-DEVICE_TABLES = frozenset({"joints", "motors", "markers", "boards", "rates"})
+DEVICE_TABLES = frozenset({"joints", "motors", "markers", "boards", "rates", "geometry", "board"})
 """Roles that may be plain files: the maker's tables of a device, and descriptions of what a rig is built of."""
 
 UNCALIBRATED = "uncalibrated"
@@ -103,7 +103,7 @@ def check_record(record: CalibrationRecord, here: Installation, now: datetime) -
 
 
 def _command(record: CalibrationRecord) -> str:
-    return {"fingertips": "fingertip", "biotacs": "fingertip"}.get(record.kind, record.kind)
+    return {"fingertips": "fingertip", "biotacs": "fingertip", "normals": "biotac"}.get(record.kind, record.kind)
 
 
 def _objection(role: str, path: Path, here: Installation, now: datetime) -> Objection | None:

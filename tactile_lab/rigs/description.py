@@ -40,6 +40,8 @@ class CalibrationFiles(StrictModel):
         forearm: where the positioner stands in the world.
         normals: learned contact normals of BioTacs; the skin's at equation 2.24's point without.
         camera, markers: lens, and the markers of the rig; left out for a rig without a camera.
+        geometry: what fingertips press to calibrate: edges of the table, a block, marked points.
+        board: what the hand shows to the camera to calibrate.
     """
 
     joints: str
@@ -51,6 +53,8 @@ class CalibrationFiles(StrictModel):
     normals: str | None = None
     camera: str | None = None
     markers: str | None = None
+    geometry: str | None = None
+    board: str | None = None
 
     @model_validator(mode="after")
     def _camera_with_markers(self) -> CalibrationFiles:

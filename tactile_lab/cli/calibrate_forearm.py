@@ -1,0 +1,293 @@
+"""``tactile-lab calibrate forearm``: where the forearm's mount stands in the world, and how well that is known."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactile_lab.cli.options import Json, NoInput, RigName
+
+if TYPE_CHECKING:
+    from calibration.forearm_wizard import ForearmResult, ForearmWizard, Station, Step
+    from calibration.motion_check import MotionReport
+    from calibration.recordings import ForearmData
+    from calibration.store import CalibrationRecord
+    from tactile_lab.cli.wizard import Asker
+    from tactile_lab.workflow.calibrating import CalibrationSettings
+
+OUTSIDE = 3
+
+
+class ForearmMethod(StrEnum):
+    """Ways to find where the mount stands."""
+
+    TOUCH = "touch"
+    MARKER = "marker"
+    MANUAL = "manual"
+
+
+Triple = tuple[float, float, float]
+
+
+def forearm(
+    rig: RigName = "sim",
+    method: Annotated[
+        ForearmMethod,
+        typer.Option(help="touch: fingertips press known geometry; marker: a board on the hand; manual: stated."),
+    ] = ForearmMethod.TOUCH,
+    out: Annotated[
+        Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/forearm.yaml")
+    ] = None,
+    source: Annotated[
+        Path | None, typer.Option("--from", help="Solve recorded poses instead of measuring (any method but manual).")
+    ] = None,
+    record: Annotated[Path | None, typer.Option(help="Keep the measured poses in this file too.")] = None,
+    settings: Annotated[Path | None, typer.Option(help="Settings: limits, least motion, errors, speeds.")] = None,
+    geometry: Annotated[Path | None, typer.Option(help="What is pressed, instead of the rig's.")] = None,
+    board: Annotated[Path | None, typer.Option(help="Board on the hand, instead of the rig's.")] = None,
+    fingers: Annotated[str, typer.Option(help="Long fingers that press.")] = "FF,MF",
+    touches: Annotated[int, typer.Option(min=1, help="Touches of each face.")] = 8,
+    pictures: Annotated[int | None, typer.Option(min=3, help="Pictures of the board.", show_default="20")] = None,
+    translation_mm: Annotated[Triple, typer.Option(help="manual: world_T_mount, x y z.")] = (0.0, 0.0, 0.0),
+    rpy_deg: Annotated[Triple, typer.Option(help="manual: roll pitch yaw about fixed axes.")] = (0.0, 0.0, 0.0),
+    sigma_mm: Annotated[float | None, typer.Option(min=0.0, help="manual: standard deviation per axis.")] = None,
+    sigma_deg: Annotated[float | None, typer.Option(min=0.0, help="manual: the same of the rotation.")] = None,
+    valid_days: Annotated[float, typer.Option(min=0.01, help="How long the result may be used.")] = 90.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
+    notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
+    as_json: Json = False,
+    no_input: NoInput = False,
+) -> None:
+    """Find where the forearm's mount stands in the world, step by step, and say how good the answer is.
+
+    The motion is checked before anything is solved, and what is missing is told. Ctrl+C or q at any step stores
+    nothing.
+
+    Exit code 0: PASS; 2: the input, or too little motion; 3: FAIL, outside a limit (kept as NAME.failed.yaml, which
+    sessions refuse); 4: a device; 130: ended by the operator.
+    """
+    from calibration.forearm_record import manual_record, record_of, target_file, transform_of
+    from calibration.recordings import save_data
+    from calibration.store import write_record
+    from tactile_lab.cli.wizard import Asker, may_write
+    from tactile_lab.rigs.description import load_rig
+
+    here, asker = load_rig(rig).installation, Asker(no_input, "calibrate forearm")
+    file = out or Path("calibrations") / here.rig / "forearm.yaml"
+    may_write(file, replace, asker, no_input)
+    if method is ForearmMethod.MANUAL:
+        sigmas = _stated(sigma_mm, sigma_deg)
+        pose = transform_of([value / 1e3 for value in translation_mm], rpy_deg)
+        found = manual_record(pose, *sigmas, here, notes=notes, valid_days=valid_days)
+    else:
+        wanted = _settings(settings)
+        if source is not None:
+            data = _recorded(source, here)
+        else:
+            names = tuple(name.strip() for name in fingers.split(","))
+            data = _measured(asker, wanted, rig, method, seed, geometry, board, names, touches, pictures)
+            if record is not None:
+                save_data(record, data)
+        result = _solved(data, wanted)
+        show_result(result)
+        found = record_of(result, here, notes=notes, valid_days=valid_days)
+    target = target_file(file, found)
+    if not asker.agree(f"Store it as {target}?"):
+        raise asker.ended()
+    write_record(target, found, "Forearm to world: pose of the positioner's mount in the world frame.")
+    _conclude(target, found, as_json)
+
+
+def _stated(sigma_mm: float | None, sigma_deg: float | None) -> tuple[float, float]:
+    """The stated uncertainty, metres and radians. Raises ConfigurationError when there is none."""
+    from math import radians
+
+    from tactile_lab.errors import ConfigurationError
+
+    if not sigma_mm or not sigma_deg:
+        hint = "Give --sigma-mm and --sigma-deg: how far the figures may be off, one standard deviation, above 0"
+        raise ConfigurationError("a pose without its uncertainty", where="--method manual", hint=hint)
+    return sigma_mm / 1e3, radians(sigma_deg)
+
+
+def _settings(path: Path | None) -> CalibrationSettings:
+    from tactile_lab.strict_yaml import load_model
+    from tactile_lab.workflow.calibrating import CalibrationSettings
+
+    return CalibrationSettings() if path is None else load_model(path, CalibrationSettings)
+
+
+def _recorded(path: Path, here: object) -> ForearmData:
+    """Recorded poses of this rig. Raises ConfigurationError for another's."""
+    from calibration.admission import Installation
+    from calibration.forearm_record import check_origin
+    from calibration.recordings import load_data
+
+    assert isinstance(here, Installation)
+    data = load_data(path)
+    check_origin(data, here, str(path))
+    return data
+
+
+def _measured(
+    asker: Asker,
+    settings: CalibrationSettings,
+    rig: str,
+    method: ForearmMethod,
+    seed: int,
+    geometry: Path | None,
+    board: Path | None,
+    fingers: tuple[str, ...],
+    touches: int,
+    pictures: int | None,
+) -> ForearmData:
+    from tactile_lab.workflow.calibrating import ForearmRequest, forearm_wizard
+
+    request = ForearmRequest(rig, method.value, seed, geometry, board, fingers, touches, pictures, settings)
+    with forearm_wizard(request) as (wizard, station):
+        _tell_plan(rig, wizard)
+        asker.choose("The hand will move. Is its way clear?", {"y": "begin"}, "y")
+        measure_all(wizard, station, asker)
+        return wizard.measured
+
+
+def _tell_plan(rig: str, wizard: ForearmWizard) -> None:
+    from tactile_lab.cli.console import say
+
+    what = "touches of known geometry" if wizard.method == "touch" else "pictures of the board on the hand"
+    say(f"Forearm to world on rig {rig}: {len(wizard.plan)} {what}", "bold")
+
+
+def measure_all(wizard: ForearmWizard, station: Station, asker: Asker) -> None:
+    """Go through the steps; when all are done, tell what is missing, and let a person add or give up.
+
+    Raises:
+        InterruptionError: the person quits.
+        SafetyError: a limit was passed.
+    """
+    steps, index = wizard.steps(), 0
+    while index < len(steps):
+        index = _one_step(wizard, steps, index, station, asker)
+    _tell_motion(wizard.motion())
+
+
+def _one_step(wizard: ForearmWizard, steps: tuple[Step, ...], index: int, station: Station, asker: Asker) -> int:
+    """Do, skip or take back a step; gives the number of the next one."""
+    step = steps[index]
+    answers = {"": "measure", "s": "skip", "u": "undo the last", "d": "done measuring"}
+    answer = asker.choose(f"{step.number}/{step.count} {step.instruction}", answers, "")
+    if answer == "d":
+        return len(steps)
+    if answer == "u":
+        undone = wizard.undo()
+        return index if undone is None else undone - 1
+    if answer == "" and not _measure(wizard, step, station, asker):
+        return index
+    return index + 1
+
+
+def _measure(wizard: ForearmWizard, step: Step, station: Station, asker: Asker) -> bool:
+    """Measure one step; False to ask for it again."""
+    from tactile_lab.cli.console import say, warn
+    from tactile_lab.errors import DeviceError
+
+    try:
+        wizard.measure(step, station)
+    except DeviceError as error:
+        warn(str(error))
+        return asker.choose("Not measured. Again, or skip it?", {"s": "skip", "a": "again"}, "s") == "s"
+    say(f"{step.number}/{step.count} {step.instruction}: done", "dim")
+    return True
+
+
+def _tell_motion(report: MotionReport) -> None:
+    from tactile_lab.cli.console import show_table
+
+    rows = [
+        [check.name, f"{check.value:.4g} {check.unit}", f"{check.needed:.4g}", "enough" if check.ok else check.advice]
+        for check in report.checks
+    ]
+    show_table("Motion", ["", "is", "needed", ""], rows, right=(1, 2))
+
+
+def _solved(data: ForearmData, settings: CalibrationSettings) -> ForearmResult:
+    from rich.progress import Progress
+
+    from calibration.forearm_wizard import solve_forearm, solving_steps
+    from tactile_lab.cli.console import people
+
+    with Progress(console=people, transient=True, disable=not people.is_terminal) as progress:
+        task = progress.add_task("solving, and leaving out one after the other", total=solving_steps(data))
+        return solve_forearm(data, settings.wizard, lambda: progress.advance(task))
+
+
+def show_result(result: ForearmResult) -> None:
+    """Residuals of every pose, the figures against their limits, and the transform."""
+    from math import degrees
+
+    from tactile_lab.cli.console import show_table
+
+    rows = [
+        [
+            residual.label,
+            f"{1e3 * residual.distance_m:.2f}",
+            "" if residual.angle_rad is None else f"{degrees(residual.angle_rad):.2f}",
+            "" if residual.pixels is None else f"{residual.pixels:.2f}",
+            "outlier" if residual.label in result.quality.outliers else "",
+        ]
+        for residual in result.quality.residuals
+    ]
+    show_table("Residuals", ["pose", "mm", "deg", "px", ""], rows, right=(1, 2, 3))
+    _show_pose(result)
+    figures = [
+        [j.name, f"{j.value:.2f} {j.unit}", f"{j.limit:.2f}", "ok" if j.ok else "OUTSIDE"]
+        for j in result.quality.judgements
+    ]
+    show_table("Quality", ["", "is", "limit", ""], figures, right=(1, 2))
+
+
+def _show_pose(result: ForearmResult) -> None:
+    from math import degrees, sqrt
+
+    from tactile_lab.cli.console import show_facts
+
+    pose, spread = result.solution.world_T_mount, result.solution.covariance
+    sigmas = [sqrt(spread[i, i]) for i in range(6)]
+    inverse = pose.inverse().translation()
+    facts = [
+        ("world_T_mount", _three([1e3 * value for value in pose.translation()], "mm")),
+        ("", _three([degrees(value) for value in pose.rotation().xyz()], "deg roll pitch yaw")),
+        ("sigma", _three([1e3 * value for value in sigmas[3:]], "mm")),
+        ("", _three([degrees(value) for value in sigmas[:3]], "deg")),
+        ("mount_T_world", _three([1e3 * value for value in inverse], "mm")),
+        ("noise", f"{sqrt(result.solution.variance_factor):.2f} of what was stated"),
+    ]
+    for joint, offset in result.solution.offsets.items():
+        if offset.observable:
+            facts.append(
+                (f"offset of {joint}", f"{degrees(offset.offset_rad):+.2f} +- {degrees(offset.sigma_rad):.2f} deg")
+            )
+    show_facts("Result", facts)
+
+
+def _three(values: list[float], unit: str) -> str:
+    return "  ".join(f"{value:9.3f}" for value in values) + f"  {unit}"
+
+
+def _conclude(file: Path, record: CalibrationRecord, as_json: bool) -> None:
+    """The verdict, how to use the file, and the exit code."""
+    from tactile_lab.calibration_file import plain
+    from tactile_lab.cli.calibration_tables import tell_verdict
+    from tactile_lab.cli.console import emit_json, say
+
+    if as_json:
+        emit_json({"file": str(file), **plain(record)})
+    tell_verdict(record)
+    say(f"stored  {file}")
+    if record.verdict == "FAIL":
+        raise typer.Exit(OUTSIDE)
+    say(f"To use it, name it in the rig file: calibration.forearm: {file}")
