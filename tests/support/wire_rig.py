@@ -1,0 +1,36 @@
+"""The shipped sim-wire rig with a cable, addresses and patience of its own, so that tests can run beside others."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from tactile_lab import rigs
+
+SHIPPED = Path(rigs.__file__).parent
+
+
+def wire_rig(folder: Path, **changes: Any) -> Path:
+    """A rig file in ``folder``: calm enough for a busy machine, without the check of the motor map.
+
+    Args:
+        folder: where the file is written.
+        changes: keys of the rig file to replace.
+    """
+    content = yaml.safe_load((SHIPPED / "sim-wire.yaml").read_text())
+    content["calibration"] = {role: str(SHIPPED / file) for role, file in content["calibration"].items()}
+    wires, net = content["wires"], f"127.{1 + os.getpid() % 250}.{os.getpid() // 250 % 250}"
+    ethercat = {"interface": f"tln{os.getpid()}", "master": {"answer_s": 0.02, "setup_answer_s": 0.2}}
+    wires["hand"] |= {"ethercat": ethercat, "far_end": f"tlf{os.getpid()}", "first_move": False, "patience_s": 10.0}
+    wires["base"]["host"], wires["camera"]["host"] = f"{net}.20", f"{net}.21"
+    for number, wire in enumerate(wires["fingertips"].values()):
+        wire["host"] = f"{net}.{11 + number}"
+    content["hand"] |= {"cycle_s": 0.004, "lost_limit": 100}
+    content["base"] |= {"lost_limit": 100}
+    content["conductor"]["safety"] = {"tip_stale_s": 2.0, "stale_s": 2.0}
+    path = folder / "wire.yaml"
+    path.write_text(yaml.safe_dump(content | changes))
+    return path
