@@ -104,8 +104,8 @@ class GridBoard(Printed):
     kind: Literal["grid"] = "grid"
     columns: int = Field(default=5, ge=1, le=50)
     rows: int = Field(default=7, ge=1, le=50)
-    side_m: float = Field(default=0.03, gt=0.0)
-    gap_m: float = Field(default=0.0075, gt=0.0)
+    side_m: float = Field(default=0.027, gt=0.0)
+    gap_m: float = Field(default=0.0065, gt=0.0)
     first_number: int = Field(default=0, ge=0)
 
     @model_validator(mode="after")
@@ -158,8 +158,8 @@ class CharucoBoard(Printed):
     kind: Literal["charuco"] = "charuco"
     columns: int = Field(default=7, ge=2, le=50)
     rows: int = Field(default=5, ge=2, le=50)
-    square_m: float = Field(default=0.036, gt=0.0)
-    marker_m: float = Field(default=0.027, gt=0.0)
+    square_m: float = Field(default=0.028, gt=0.0)
+    marker_m: float = Field(default=0.021, gt=0.0)
     legacy: bool = False
 
     @model_validator(mode="after")
@@ -208,14 +208,15 @@ class CharucoBoard(Printed):
         return cv2.aruco.CharucoDetector(self.opencv_board)
 
 
-Board: TypeAlias = Annotated[SingleMarker | GridBoard | CharucoBoard, Field(discriminator="kind")]
+AnyBoard: TypeAlias = SingleMarker | GridBoard | CharucoBoard
+Board: TypeAlias = Annotated[AnyBoard, Field(discriminator="kind")]
 
 
 class _BoardFile(RootModel[Board]):
     """A board in a file: its ``kind`` says which of the three."""
 
 
-def load_board(path: Path) -> SingleMarker | GridBoard | CharucoBoard:
+def load_board(path: Path) -> AnyBoard:
     """Read a board's description as ``tactile-lab markers`` wrote it. Raises ConfigurationError."""
     content = load(path)
     if not isinstance(content, dict):

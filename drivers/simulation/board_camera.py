@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from gtsam import Pose3, Rot3
 
-from drivers.camera.boards import CharucoBoard, GridBoard, SingleMarker
+from drivers.camera.boards import AnyBoard, CharucoBoard, GridBoard
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.frames import Image
 from drivers.camera.markers import MarkerSettings, opencv_dictionary
@@ -43,7 +43,7 @@ class BoardView:
 
 
 def draw_board(
-    board: SingleMarker | GridBoard | CharucoBoard,
+    board: AnyBoard,
     camera_T_board: Pose3,
     lens: CameraCalibration,
     rng: np.random.Generator,
@@ -69,7 +69,7 @@ def draw_board(
 
 
 @lru_cache(maxsize=4)
-def board_texture(board: SingleMarker | GridBoard | CharucoBoard) -> Array:
+def board_texture(board: AnyBoard) -> Array:
     """The print with its white margin, grey levels, so fine that a module has many texels."""
     width_m, height_m = board.size_m
     size = (round(width_m * _TEXELS_PER_m), round(height_m * _TEXELS_PER_m))
@@ -107,9 +107,7 @@ def _rays(lens: CameraCalibration) -> Array:
     return lens.rays(pixels).reshape(height * _RAYS, width * _RAYS, 3)
 
 
-def board_poses(
-    board: SingleMarker | GridBoard | CharucoBoard, lens: CameraCalibration, count: int, rng: np.random.Generator
-) -> list[Pose3]:
+def board_poses(board: AnyBoard, lens: CameraCalibration, count: int, rng: np.random.Generator) -> list[Pose3]:
     """Where a person would hold the board for a calibration: all over the picture, tilted, near and far."""
     assert lens.size_px is not None
     facing, size_m = Rot3(np.diag([1.0, -1.0, -1.0])), max(board.size_m)
@@ -126,7 +124,7 @@ def board_poses(
     return poses
 
 
-def _inside(board: SingleMarker | GridBoard | CharucoBoard, camera_T_board: Pose3, lens: CameraCalibration) -> bool:
+def _inside(board: AnyBoard, camera_T_board: Pose3, lens: CameraCalibration) -> bool:
     half = np.array([*board.size_m, 0.0]) / 2 * board.scale
     corners = half * np.array([[-1.0, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]])
     pixels = lens.project(transform_points(camera_T_board, corners))

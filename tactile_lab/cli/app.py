@@ -6,7 +6,20 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli import bench, calibrate, evaluate, experiment, reconstruct, report, rig, run, session, sweep
+from tactile_lab.cli import (
+    bench,
+    calibrate,
+    evaluate,
+    experiment,
+    markers,
+    reconstruct,
+    report,
+    rig,
+    run,
+    session,
+    sweep,
+    view,
+)
 
 app = typer.Typer(
     help="Tactile SLAM in the laboratory: the shape and pose of an unknown object from a few fingertip contacts.",
@@ -19,6 +32,8 @@ app.command("run")(run.run)
 app.command("reconstruct")(reconstruct.reconstruct)
 app.command("evaluate")(evaluate.evaluate)
 app.command("report")(report.report)
+app.command("view")(view.view)
+app.command("markers")(markers.markers)
 app.command("sweep")(sweep.sweep)
 app.command("bench")(bench.bench)
 app.command("experiment")(experiment.experiment)

@@ -1,0 +1,165 @@
+"""``tactile-lab markers``: sheets of markers and boards to print, at true size."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tactile_lab.cli.options import Json
+
+if TYPE_CHECKING:
+    from drivers.camera.boards import AnyBoard
+    from tactile_lab.workflow.printing import PrintedSheet
+
+KINDS = ("single", "grid", "charuco", "rig")
+
+
+def markers(
+    what: Annotated[
+        str,
+        typer.Argument(metavar="WHAT", help="single, grid, charuco, rig; or the .yaml of a print, to store its bar."),
+    ],
+    number: Annotated[list[int] | None, typer.Option(help="Number of a single marker; again for more.")] = None,
+    side_mm: Annotated[float | None, typer.Option(help="Side of a marker's black square (single, grid).")] = None,
+    columns: Annotated[int | None, typer.Option(help="Columns of a grid or ChArUco board.")] = None,
+    rows: Annotated[int | None, typer.Option(help="Rows of a grid or ChArUco board.")] = None,
+    gap_mm: Annotated[float | None, typer.Option(help="Gap between the markers of a grid.")] = None,
+    square_mm: Annotated[float | None, typer.Option(help="Side of a ChArUco board's squares.")] = None,
+    marker_mm: Annotated[float | None, typer.Option(help="Side of a ChArUco board's markers.")] = None,
+    dictionary: Annotated[str | None, typer.Option(help="OpenCV's name of the dictionary (DICT_4X4_50).")] = None,
+    rig: Annotated[str, typer.Option(help="Rig whose two markers 'rig' prints.")] = "sim",
+    paper: Annotated[str, typer.Option(help="A4, A3, A2 or letter.")] = "A4",
+    out: Annotated[Path, typer.Option(help="Folder of the files.")] = Path("markers"),
+    measured_mm: Annotated[
+        float | None, typer.Option(help="Length of the print's check bar (100 mm), measured on the paper.")
+    ] = None,
+    as_json: Json = False,
+    no_input: Annotated[bool, typer.Option("--no-input", help="Never ask for the measured bar.")] = False,
+) -> None:
+    """Write markers or a board as PDF and SVG at true size, with a check bar, and a description for the detection.
+
+    Print at 100 % (actual size), measure the bar of 100 mm, and tell it: the detection then uses the true size. A
+    print more than 0.5 % off is refused.
+    """
+    if what.endswith((".yaml", ".yml")):
+        _store(Path(what), measured_mm, as_json, no_input)
+        return
+    if what not in KINDS:
+        problem = f"{what!r} is none of {', '.join(KINDS)}, and no .yaml file"
+        raise typer.BadParameter(problem, param_hint="'WHAT'")
+    given = {
+        "single": {"dictionary": dictionary, "side_m": _m(side_mm)},
+        "grid": {
+            "dictionary": dictionary,
+            "columns": columns,
+            "rows": rows,
+            "side_m": _m(side_mm),
+            "gap_m": _m(gap_mm),
+        },
+        "charuco": {
+            "dictionary": dictionary,
+            "columns": columns,
+            "rows": rows,
+            "square_m": _m(square_mm),
+            "marker_m": _m(marker_mm),
+        },
+    }
+    if what == "rig":
+        sheet = _rig_sheet(rig, out, paper, measured_mm)
+    else:
+        sheet = _board_sheet(what, number or [0], given[what], out, paper, measured_mm)
+    if measured_mm is None and (length := _ask(no_input)) is not None:
+        from tactile_lab.workflow.printing import measure
+
+        if what == "rig":
+            sheet = _rig_sheet(rig, out, paper, length)
+        else:
+            for description in sheet.descriptions:
+                measure(description, length)
+    _tell(sheet, as_json)
+
+
+def _rig_sheet(rig: str, out: Path, paper: str, measured_mm: float | None) -> PrintedSheet:
+    from tactile_lab.errors import ConfigurationError
+    from tactile_lab.rigs.description import load_rig
+    from tactile_lab.workflow.printing import print_rig_markers
+
+    files = load_rig(rig).files
+    if "markers" not in files:
+        raise ConfigurationError("has no camera, so no markers", where=rig, hint="Name another rig with --rig")
+    return print_rig_markers(files["markers"], out, paper, measured_mm)
+
+
+def _board_sheet(
+    kind: str, numbers: list[int], given: dict[str, Any], out: Path, paper: str, measured_mm: float | None
+) -> PrintedSheet:
+    from tactile_lab.workflow.printing import print_sheet
+
+    content = {key: value for key, value in {**given, "measured_bar_mm": measured_mm}.items() if value is not None}
+    if kind == "single":
+        boards = {f"single-{number}": _board("single", {**content, "number": number}) for number in numbers}
+    else:
+        boards = {kind: _board(kind, content)}
+    return print_sheet(boards, out, kind, paper)
+
+
+def _board(kind: str, content: dict[str, Any]) -> AnyBoard:
+    from drivers.camera.boards import CharucoBoard, GridBoard, SingleMarker
+    from tactile_lab.strict_yaml import validate
+
+    models: dict[str, type[AnyBoard]] = {"single": SingleMarker, "grid": GridBoard, "charuco": CharucoBoard}
+    return validate(content, models[kind], where="markers", hint="Change the options")
+
+
+def _store(description: Path, measured_mm: float | None, as_json: bool, no_input: bool) -> None:
+    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.workflow.printing import check_bar_words, measure
+
+    length = measured_mm if measured_mm is not None else _ask(no_input)
+    if length is None:
+        raise typer.BadParameter("how long is the check bar?", param_hint="'--measured-mm'")
+    scale = measure(description, length)
+    if as_json:
+        emit_json({"description": str(description), "scale": scale})
+    say(f"{description}: {check_bar_words(scale, True)}")
+
+
+def _ask(no_input: bool) -> float | None:
+    """The measured bar, asked for on a terminal; None for later."""
+    if no_input or not sys.stdin.isatty():
+        return None
+    answer = typer.prompt(
+        "Length of the printed check bar in mm (empty: later)", default="", show_default=False, err=True
+    )
+    if not str(answer).strip():
+        return None
+    try:
+        return float(str(answer).replace(",", "."))
+    except ValueError:
+        raise typer.BadParameter(f"{answer!r} is no length in mm", param_hint="'--measured-mm'") from None
+
+
+def _tell(sheet: PrintedSheet, as_json: bool) -> None:
+    from drivers.camera.boards import load_board
+    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.workflow.printing import check_bar_words
+
+    measured, scale = sheet.measured, sheet.scale
+    if sheet.pdf.stem != "rig-markers":
+        board = load_board(sheet.descriptions[0])
+        measured, scale = board.measured_bar_mm is not None, board.scale
+    if as_json:
+        files = {"pdf": str(sheet.pdf), "svg": str(sheet.svg), "descriptions": [str(d) for d in sheet.descriptions]}
+        emit_json({**files, "scale": scale, "measured": measured})
+    say(f"to print    {sheet.pdf} (100 %, actual size)")
+    say(f"            {sheet.svg}")
+    for description in sheet.descriptions:
+        say(f"describes   {description}")
+    say(check_bar_words(scale, measured))
+
+
+def _m(length_mm: float | None) -> float | None:
+    return None if length_mm is None else length_mm / 1e3
