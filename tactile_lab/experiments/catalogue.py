@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.experiments import (
+    calibration_runs,
     crash_runs,
     exploration_runs,
     graph_runs,
@@ -369,6 +370,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             exploration_runs.explore_fixed,
             EXPLORATION_COLUMNS,
             _ranges("policy", _ACTIONS_LABEL, "actions_B", lambda cell: f"{cell['candidates']} candidates", columns=1),
+            grasps=exploration_runs.MOST_GRASPS,
         ),
         Experiment(
             "table-4.3",
@@ -377,6 +379,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             exploration_runs.explore_moving,
             (*EXPLORATION_COLUMNS, REGISTRATION),
             _ranges("policy", _ACTIONS_LABEL, "actions_B", lambda cell: f"followed by {cell['tracking']}", columns=1),
+            grasps=exploration_runs.MOST_GRASPS,
         ),
         Experiment(
             "exploration-hand",
@@ -402,6 +405,22 @@ EXPERIMENTS: Mapping[str, Experiment] = {
                 Column("right ones refused", "right_refused", 0, kind="sum"),
             ),
             _ranges("solver", "position error, mm", "error_mm", lambda cell: "50 grasps, 20 % wrong loops", columns=1),
+        ),
+        Experiment(
+            "calibrate-forearm",
+            "Forearm to world by touch and by a board on the palm: joint bias 0.6°, contacts 1 mm, corners 0.15 px.",
+            lambda grasps: (
+                grid(method=[calibration_runs.TOUCH], poses=[20, 40])
+                + grid(method=[calibration_runs.MARKER], poses=[10, 20])
+            ),
+            calibration_runs.calibrate_forearm,
+            (
+                Column("position, mm: median / p95", "errors_mm", 2, kind="pooled"),
+                Column("rotation, °: median / p95", "errors_deg", 2, kind="pooled"),
+                Column("inside the 95 % region", "inside", 1, kind="percent"),
+                Column("noise found, of that stated", "noise", 2, kind="median"),
+            ),
+            _ranges("method", "position error, mm", "error_mm", lambda cell: f"{cell['poses']} poses"),
         ),
         Experiment(
             "crash-recovery",

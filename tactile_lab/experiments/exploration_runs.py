@@ -41,42 +41,44 @@ def palms_called(name: str, seed: int) -> Array:
     return shifted(TEN_PALMS, _SHIFT_m, _TURN_rad) if name == "10 shifted" else TEN_PALMS
 
 
-def fixed_settings(_: int) -> list[Setting]:
+def fixed_settings(grasps: int) -> list[Setting]:
     """Table 4.2: every policy with the ten candidates, the main ones with the others."""
     thesis = ("random", "variance", "clusters", "clusters-appendix", "entropy", "igef", "igef-shape")
     ours = ("information", "look-ahead", INFORMED, CLAIRVOYANT)
     return [
-        *grid(candidates=["10"], policy=[*thesis, *ours]),
-        *grid(candidates=["100"], policy=["random", "variance", *ours]),
-        *grid(candidates=["10 shifted"], policy=["random", "variance", "information"]),
+        *grid(candidates=["10"], policy=[*thesis, *ours], grasps=[grasps]),
+        *grid(candidates=["100"], policy=["random", "variance", *ours], grasps=[grasps]),
+        *grid(candidates=["10 shifted"], policy=["random", "variance", "information"], grasps=[grasps]),
     ]
 
 
-def moving_settings(_: int) -> list[Setting]:
+def moving_settings(grasps: int) -> list[Setting]:
     """Table 4.3: the thesis's filter with its policies, then all with the default method."""
     everyone = ("random", "variance", "clusters", "entropy", "igef", "det", "kl", "mutual-information", "information")
     return [
-        *grid(tracking=["thesis-pf"], policy=["random", "det", "kl"]),
-        *grid(tracking=["joint"], policy=everyone),
+        *grid(tracking=["thesis-pf"], policy=["random", "det", "kl"], grasps=[grasps]),
+        *grid(tracking=["joint"], policy=everyone, grasps=[grasps]),
     ]
 
 
 def explore_fixed(cell: Cell) -> dict[str, Any]:
-    """Pose known and fixed. Cell: candidates, policy."""
+    """Pose known and fixed. Cell: candidates, policy, grasps (the budget)."""
     hand = PlanarHand(OUTLINE_m, np.random.default_rng([cell.seed, 6]))
     palms = palms_called(cell["candidates"], cell.seed)
     if cell["policy"] == CLAIRVOYANT:
-        return {"actions_B": fewest_grasps(hand, palms, "B", TRUE_POINTS_m, GOAL, MOST_GRASPS)}
+        return {"actions_B": fewest_grasps(hand, palms, "B", TRUE_POINTS_m, GOAL, cell["grasps"])}
     rng = np.random.default_rng([cell.seed, 5])
-    return Exploration(FixedObject(hand), palms, ("A3", "B"), cell["policy"], rng).until_explored()
+    run = Exploration(FixedObject(hand), palms, ("A3", "B"), cell["policy"], rng)
+    return run.until_explored(cell["grasps"])
 
 
 def explore_moving(cell: Cell) -> dict[str, Any]:
-    """Pushed at full motion noise by every grasp, ten candidates. Cell: tracking, policy."""
+    """Pushed at full motion noise by every grasp, ten candidates. Cell: tracking, policy, grasps (the budget)."""
     hand = PlanarHand(OUTLINE_m, np.random.default_rng([cell.seed, 16]))
     thing = MovingObject.tracked_by(cell["tracking"], hand, cell.seed)
     rng = np.random.default_rng([cell.seed, 15])
-    return Exploration(thing, TEN_PALMS, ("A5", "B"), cell["policy"], rng).until_explored()
+    run = Exploration(thing, TEN_PALMS, ("A5", "B"), cell["policy"], rng)
+    return run.until_explored(cell["grasps"])
 
 
 @dataclass
@@ -101,11 +103,11 @@ class Exploration:
     _decision_ms: list[float] = field(default_factory=list)
     _promises: list[float | None] = field(default_factory=list)
 
-    def until_explored(self) -> dict[str, Any]:
+    def until_explored(self, budget: int) -> dict[str, Any]:
         """Grasp until the goal is reached or the budget is spent; the figures of the run."""
         policy = None if self.policy_name == INFORMED else make_policy(self.policy_name)
         chosen = int(self.rng.integers(len(self.palms)))
-        for count in range(1, MOST_GRASPS + 1):
+        for count in range(1, budget + 1):
             self.thing.grasp(self.palms[chosen])
             known = self.thing.map()
             if self._judged(known, count):
