@@ -128,6 +128,11 @@ class ForceTip:
         axis = int(np.argmax(share))
         return f"{AXES[axis]} at {100 * share[axis]:.0f} % of the calibration range"
 
+    @property
+    def noise(self) -> Array:
+        """Standard deviation of the newest usable samples, shape (6,), N and N m; zero for fewer than two."""
+        return np.std(self._recent, axis=0) if len(self._recent) > 1 else np.zeros(6)
+
     def begin_capture(self) -> None:
         """From here on samples are gathered for :meth:`contact`."""
         self._capture.clear()

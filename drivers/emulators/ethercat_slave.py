@@ -7,14 +7,14 @@ SyncManagers have one buffer; others are refused on the way to SAFEOP. No mailbo
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
-from typing import Protocol
 
 from drivers.emulators.ethercat_eeprom import EepromInterface
 from drivers.emulators.ethercat_states import StateMachine
+from drivers.emulators.slave_application import Application, Block, SlaveCounts
 from drivers.ethercat.frames import Command, Telegram, physical
-from drivers.ethercat.registers import FMMU_BYTES, SYNC_MANAGER_BYTES, AlState, AlStatus, Register, SyncManager
+from drivers.ethercat.registers import FMMU_BYTES, SYNC_MANAGER_BYTES, AlState, AlStatus, Register
 from tactile_lab.clock import Clock
 
 _FMMUS, _SYNC_MANAGERS, _RAM_KIB = 3, 4, 1
@@ -28,74 +28,6 @@ _BY_POSITION = {Command.APRD, Command.APWR, Command.APRW, Command.ARMW}
 _BY_STATION = {Command.FPRD, Command.FPWR, Command.FPRW, Command.FRMW}
 _TO_ALL = {Command.BRD, Command.BWR, Command.BRW}
 _LOGICAL = {Command.LRD, Command.LWR, Command.LRW}
-
-
-class Application(Protocol):
-    """The processor behind the controller.
-
-    Attributes:
-        sync_managers: what it insists on before it goes to SAFEOP.
-        service_ns: how long it takes from a command's arrival to its status.
-    """
-
-    sync_managers: tuple[SyncManager, ...]
-    service_ns: int
-
-    def start(self) -> tuple[bytes, ...]:
-        """SAFEOP is reached: what the blocks to the master hold at first."""
-
-    def serve(self, blocks: tuple[bytes, ...], *, operating: bool) -> tuple[bytes, ...] | None:
-        """Take the blocks from the master; those to the master, or None when it writes nothing.
-
-        Args:
-            blocks: contents, in the order of the SyncManagers.
-            operating: in OP; else outputs must stay safe.
-        """
-
-
-class NoApplication:
-    """A slave without process data, such as the bridge."""
-
-    sync_managers: tuple[SyncManager, ...] = ()
-    service_ns = 0
-
-    def start(self) -> tuple[bytes, ...]:
-        return ()
-
-    def serve(self, blocks: tuple[bytes, ...], *, operating: bool) -> tuple[bytes, ...] | None:
-        return None
-
-
-@dataclass
-class _Block:
-    """Memory guarded by an active SyncManager; ``full`` while the other side has not taken it."""
-
-    number: int
-    start: int
-    end: int
-    to_slave: bool
-    watched: bool
-    one_buffer: bool
-    full: bool = False
-
-
-@dataclass
-class SlaveCounts:
-    """What happened to process data.
-
-    Attributes:
-        commands: accepted from the master.
-        refused: not accepted, because the application had not taken the one before.
-        statuses: collected by the master.
-        empty: asked for by the master while there was nothing new.
-        watchdog_trips: falls to SAFEOP for want of commands.
-    """
-
-    commands: int = 0
-    refused: int = 0
-    statuses: int = 0
-    empty: int = 0
-    watchdog_trips: int = 0
 
 
 class SlaveController:
@@ -121,7 +53,7 @@ class SlaveController:
         struct.pack_into("<H", self._memory, Register.WATCHDOG_DIVIDER, _DIVIDER)
         struct.pack_into("<H", self._memory, Register.WATCHDOG_TIME_PDI, _WATCHDOG_TICKS)
         struct.pack_into("<H", self._memory, Register.WATCHDOG_TIME, _WATCHDOG_TICKS)
-        self._blocks: list[_Block] = []
+        self._blocks: list[Block] = []
         self._fmmus: list[tuple[int, int, int, int]] = []
         self._states = StateMachine(self._setup_error)
         self._pending_since_ns: int | None = None
@@ -244,7 +176,7 @@ class SlaveController:
                 self._filled(block)
         return taken
 
-    def _filled(self, block: _Block) -> None:
+    def _filled(self, block: Block) -> None:
         block.full = True
         now_ns = self._clock.now_ns()
         if block.number == 0:
@@ -253,7 +185,7 @@ class SlaveController:
         if block.watched:
             self._fed_ns = now_ns
 
-    def _segments(self, address: int, end: int) -> list[tuple[int, int, _Block | None]]:
+    def _segments(self, address: int, end: int) -> list[tuple[int, int, Block | None]]:
         """An address range cut at the borders of the guarded blocks."""
         borders = {address, end}
         borders |= {edge for block in self._blocks for edge in (block.start, block.end) if address < edge < end}
@@ -296,7 +228,7 @@ class SlaveController:
             if active & 1 and length:
                 full = before.get((number, start, start + length), False)
                 to_slave, watched = bool(control & 0x04), bool(control & 0x40)
-                block = _Block(number, start, start + length, to_slave, watched, control & 3 == 2, full)
+                block = Block(number, start, start + length, to_slave, watched, control & 3 == 2, full)
                 self._blocks.append(block)
 
     def _request_state(self) -> None:

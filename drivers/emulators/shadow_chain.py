@@ -9,8 +9,9 @@ import numpy as np
 
 from drivers.emulators.ethercat_eeprom import SlaveIdentity, bare_eeprom, mapped_eeprom
 from drivers.emulators.ethercat_ring import EmulatedRing
-from drivers.emulators.ethercat_slave import Application, NoApplication, SlaveController
+from drivers.emulators.ethercat_slave import SlaveController
 from drivers.emulators.free_hand import FreeHand
+from drivers.emulators.slave_application import Application, NoApplication
 from drivers.ethercat.registers import SyncManager
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motors import MotorMap

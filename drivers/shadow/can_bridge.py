@@ -17,13 +17,13 @@ from typing import Any
 import can
 from can.typechecking import AutoDetectedConfig, CanFilters
 
-from drivers.links import Link
+from drivers.links import Link, link_health
 from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings
 from drivers.shadow.motor_can import BITRATE
-from drivers.shadow.palm_codec import CanFrame, EdcCommand, PalmCommand
+from drivers.shadow.palm_codec import CanFrame, EdcCommand, PalmCommand, PalmStatus
 from drivers.shadow.palm_images import PALMS, PalmName
 from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock
-from tactile_lab.errors import TactileLabError
+from tactile_lab.errors import CodecError, TactileLabError
 
 CYCLE_ns = 1_000_000
 _BUS_NAMES = {"1": 1, "2": 2, "can1": 1, "can2": 2}
@@ -43,6 +43,10 @@ class ShadowBridgeBus(can.BusABC):
         palm: which palm the hand has.
         link: a link to the palm in place of one over EtherCAT on ``channel``; it need not be open.
         clock: paces the cycles.
+
+    Attributes:
+        cycles, lost: cycles, and those without a status.
+        damaged, surplus: messages that were no status, and statuses beyond one a cycle.
 
     Raises:
         can.CanInitializationError: no hand, or an option that does not fit; in the driver's own words.
@@ -66,6 +70,7 @@ class ShadowBridgeBus(can.BusABC):
         self._next_ns = self._clock.now_ns()
         self._epoch_ns = time.time_ns() - self._next_ns
         self._received: deque[can.Message] = deque()
+        self.cycles = self.lost = self.damaged = self.surplus = 0
         self.channel_info = f"Shadow hand's motor buses at {channel or self._link.name}, {BITRATE // 1000} kbit/s"
         self._open_link()
         super().__init__(channel=channel, can_filters=can_filters, **options)
@@ -75,6 +80,7 @@ class ShadowBridgeBus(can.BusABC):
         try:
             self._link.open()
             self._cycle(CanFrame())
+            self.cycles = self.lost = 0  # the first cycle has nothing to answer yet
         except TactileLabError as error:
             self._link.close()
             self._is_shutdown = True  # so that python-can does not remind of closing what never opened
@@ -135,11 +141,31 @@ class ShadowBridgeBus(can.BusABC):
         refused = self._refused
         self._link.send(self._image.encode_command(PalmCommand(edc_command=EdcCommand.CAN_DIRECT, can=frame)))
         datagrams = self._link.receive()
-        for datagram in datagrams:
-            status = self._image.decode_status(datagram.payload)
+        self.cycles, self.lost = self.cycles + 1, self.lost + (not datagrams)
+        self.surplus += max(len(datagrams) - 1, 0)
+        for datagram in {each.payload: each for each in datagrams}.values():  # a doubled one is no second message
+            status = self._decoded(datagram.payload)
+            if status is None:
+                continue
             if status.written and status.can.bus:
                 self._received.append(self._message(status.can, datagram.stamp_ns))
         return bool(datagrams) and self._refused == refused
+
+    def _decoded(self, payload: bytes) -> PalmStatus | None:
+        try:
+            return self._image.decode_status(payload)
+        except CodecError:
+            self.damaged += 1
+            return None
+
+    def health(self) -> tuple[str, ...]:
+        """What the motors may have said without anyone hearing it, in words; empty when nothing was lost."""
+        problems = [f"{self.lost} of {self.cycles} cycles without a status"] if self.lost else []
+        if self.damaged:
+            problems.append(f"{self.damaged} messages were no status of a {self._image.name} palm")
+        if self.surplus:
+            problems.append(f"{self.surplus} statuses more than cycles")
+        return tuple(problems) + link_health(self._link)
 
     @property
     def _refused(self) -> int:

@@ -110,12 +110,9 @@ class ShadowHand:
             self._link.close()
 
     def reconnect(self) -> int:
-        """Close the link without ceremony, open it again and wake the palm, after a fault or a loss of the link.
+        """Close the link without ceremony, open it again and wake the palm; nothing moves until :meth:`set_targets`.
 
-        Nothing moves afterwards until :meth:`set_targets`.
-
-        Returns how long it took, nanoseconds. Raises DeviceError when the hand does not come back; it is disconnected
-        then.
+        Returns how long it took, nanoseconds. Raises DeviceError when the hand does not come back, disconnected.
         """
         started_ns = self._clock.now_ns()
         self._connected = False
@@ -281,6 +278,11 @@ class ShadowHand:
     def counters(self) -> HandCounters:
         """A copy of the counters."""
         return replace(self._counters)
+
+    @property
+    def newest(self) -> HandSample | None:
+        """The newest good sample; None before connecting."""
+        return self._last
 
     def health(self) -> tuple[str, ...]:
         """What is wrong with the hand, in words; empty when all is well."""

@@ -83,7 +83,7 @@ def check(
     findings = check_rig(rig, seed)
     ready = all(finding.ok for finding in findings)
     if as_json:
-        devices = [{"device": f.device, "ok": f.ok, "detail": f.detail} for f in findings]
+        devices = [{"device": f.device, "ok": f.ok, "detail": f.detail, "figures": dict(f.figures)} for f in findings]
         emit_json({"rig": rig, "ready": ready, "devices": devices})
     else:
         rows = [[finding.device, "ok" if finding.ok else "NOT READY", finding.detail] for finding in findings]

@@ -2,28 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
+
+from calibration.admission import objections
+from calibration.store import read_record
+from drivers.ati.force_tip import ForceTip
+from drivers.biotac import units
+from drivers.biotac.biotac import BioTac
+from drivers.biotac.slot_codec import Channel
 from drivers.fingertip import FingertipSensor
+from drivers.shadow.hand import ShadowHand
+from drivers.shadow.hand_process import HandProcess
 from drivers.simulation.objects import CATALOGUE
 from sessions.bench import Bench
-from sessions.recorder import NullTraffic, Recorder
+from sessions.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, fingertip_link
+from sessions.recorder import Recorder
+from tactile_lab.calibration_file import is_stored
 from tactile_lab.clock import MonotonicClock
 from tactile_lab.errors import DeviceError
 from tactile_lab.geometry.contacts import FINGERS
-from tactile_lab.rigs.build import build_bench, check_calibration, simulated_world
+from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.check_fingertips import check_fingertips
 from tactile_lab.rigs.check_hand import check_hand
-from tactile_lab.rigs.description import load_rig
+from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.findings import Finding
 from tactile_lab.rigs.fingertip_rig import is_fingertip_rig, load_fingertip_rig
 from tactile_lab.rigs.hand_rig import is_hand_rig, load_hand_rig
+from tactile_lab.rigs.laboratory import open_laboratory
+from tactile_lab.rigs.stream_watch import StreamWatch, in_words
+from tactile_lab.strict_yaml import load
 
-LISTEN_ns = 300_000_000
+LISTEN_ns = 500_000_000
+_NOISY = 6.0
+"""How many times the calibrated noise a still force sensor may show."""
+
+Figures = dict[str, float | str]
 
 
 def check_rig(name: str, seed: int = 0) -> list[Finding]:
-    """Findings of all devices; a device that does not connect ends the list.
+    """Findings of all calibrations and devices; a device that does not connect ends the list.
 
     Raises:
         ConfigurationError: the rig file, or a calibration file it names.
@@ -34,34 +55,146 @@ def check_rig(name: str, seed: int = 0) -> list[Finding]:
         return check_hand(load_hand_rig(Path(name)), MonotonicClock())
     rig = load_rig(name)
     check_calibration(rig)
-    bench = build_bench(rig, simulated_world(rig, seed, next(iter(CATALOGUE))), Recorder(NullTraffic()))
+    return _calibrations(rig) + _devices(rig, seed)
+
+
+def _devices(rig: Rig, seed: int) -> list[Finding]:
+    watch = StreamWatch()
     try:
-        bench.connect()
-        bench.run(LISTEN_ns)
-        return _findings(bench)
+        with open_laboratory(rig, seed, next(iter(CATALOGUE))) as laboratory:
+            bench = laboratory.bench(Recorder(watch))
+            try:
+                bench.connect()
+                bench.run(LISTEN_ns)
+                return _findings(bench, watch)
+            finally:
+                bench.close()
     except DeviceError as error:
         return [Finding(error.where or "rig", False, str(error))]
-    finally:
-        bench.close()
 
 
-def _findings(bench: Bench) -> list[Finding]:
-    bench.tare()
-    place = ", ".join(f"{value:.3f}" for value in bench.perception.base_q[:3])
-    findings = [_finding("hand", bench.hand.health(), "answers"), Finding("base", True, f"at {place} m")]
-    findings += [_fingertip(finger, bench.fingertips.get(finger)) for finger in FINGERS]
-    if bench.camera is not None:
-        height, width = bench.camera.capture().image.shape[:2]
-        findings.append(Finding("camera", True, f"{width} x {height} pixels"))
+# --- calibrations --------------------------------------------------------------------------------------------------
+
+
+def _calibrations(rig: Rig) -> list[Finding]:
+    """Age of every calibration, and what would keep a session from using it."""
+    now = datetime.now(UTC)
+    against = {each.role: each for each in objections(rig.files, rig.installation, now)}
+    findings = []
+    for role, file in rig.files.items():
+        objection = against.get(role)
+        words, figures = _age(file, now)
+        detail = f"{objection.reason}. {objection.hint}" if objection else words
+        findings.append(Finding(f"calibration {role}", objection is None, detail, figures))
     return findings
 
 
-def _fingertip(finger: str, tip: FingertipSensor | None) -> Finding:
+def _age(file: Path, now: datetime) -> tuple[str, Figures]:
+    if not is_stored(load(file)):
+        return "plain figures, of unknown age", {}
+    record = read_record(file)
+    days = (now - record.created).total_seconds() / 86400.0
+    until = "for ever" if record.valid_until_utc is None else f"until {record.valid_until_utc}"
+    figures: Figures = {"age_days": days, "valid_until_utc": record.valid_until_utc or "", "verdict": record.verdict}
+    return f"{days:.1f} days old, valid {until}, {record.method}", figures
+
+
+# --- devices -------------------------------------------------------------------------------------------------------
+
+
+def _findings(bench: Bench, watch: StreamWatch) -> list[Finding]:
+    bench.tare()
+    findings = [_hand(bench, watch), _base(bench, watch)]
+    findings += [_fingertip(finger, bench.fingertips.get(finger), watch) for finger in FINGERS]
+    if bench.camera is not None:
+        findings.append(_camera(bench, watch))
+    return findings
+
+
+def _hand(bench: Bench, watch: StreamWatch) -> Finding:
+    figures: Figures = watch.figures(HAND_LINK)
+    words = [in_words(figures)]
+    if isinstance(bench.hand, HandProcess):
+        report = bench.hand.report()
+        punctual, counts = report["punctuality"], report["hand"]
+        figures |= {"start_late_p50_us": punctual["median_us"], "start_late_p99_us": punctual["p99_us"]}
+        words += [str(bench.hand.ready), f"starts late by {punctual['p99_us']:.0f} us (99 %)"]
+        figures |= {"serial": str(bench.hand.ready.serial or ""), "palm": str(bench.hand.ready.palm or "")}
+        figures["lost_share"] = counts["lost"] / max(counts["cycles"], 1)
+    elif isinstance(bench.hand, ShadowHand):
+        counters = bench.hand.counters
+        figures["lost_share"] = counters.lost / max(counters.cycles, 1)
+        figures |= _motors(bench.hand)
+        if "warmest_C" in figures:
+            words.append(f"warmest motor {figures['warmest_C']:.0f} C")
+    words.append(f"{100 * float(figures.get('lost_share', 0.0)):.1f} % of cycles lost")
+    return _finding("hand", bench.hand.health(), words, figures)
+
+
+def _motors(hand: ShadowHand) -> Figures:
+    sample = hand.newest
+    if sample is None or not np.isfinite(sample.motor.temperature_C).any():
+        return {}
+    return {"warmest_C": float(np.nanmax(sample.motor.temperature_C)), "spare_us": float(sample.idle_us)}
+
+
+def _base(bench: Bench, watch: StreamWatch) -> Finding:
+    place = ", ".join(f"{value:.3f}" for value in bench.perception.base_q[:3])
+    figures = watch.figures(BASE_LINK)
+    return _finding("base", bench.base.health(), [f"at {place} m", in_words(figures)], figures)
+
+
+def _fingertip(finger: str, tip: FingertipSensor | None, watch: StreamWatch) -> Finding:
     """A finger without a sensor is allowed, but nobody should have to notice it by themselves."""
     if tip is None:
         return Finding(f"fingertip {finger}", True, "none: the fingertip calibration does not name it")
-    return _finding(f"fingertip {finger}", tip.health(), "streams, tared")
+    figures = watch.figures(fingertip_link(finger))
+    words, problems = ["tared", in_words(figures)], list(tip.health())
+    if isinstance(tip, ForceTip):
+        figures |= _force(tip)
+        words.append(
+            f"{figures['lost']:.0f} lost, noise {figures['noise_mN']:.1f} mN (expected {figures['expected_mN']:.1f}), "
+            f"bias {figures['bias_N']:.2f} N"
+        )
+        if float(figures["noise_mN"]) > _NOISY * float(figures["expected_mN"]):
+            problems.append("noisier than its calibration says: is it touched, or is a cable loose?")
+    if isinstance(tip, BioTac):
+        figures |= _biotac(tip)
+        words.append(f"core {figures['core_C']:.0f} C, pressure at rest {figures['pdc_counts']:.0f} counts")
+    return _finding(f"fingertip {finger}", tuple(problems), words, figures)
 
 
-def _finding(device: str, problems: tuple[str, ...], well: str) -> Finding:
-    return Finding(device, not problems, "; ".join(problems) or well)
+def _force(tip: ForceTip) -> Figures:
+    tare, noise = tip.tare_record, tip.noise
+    bias = np.zeros(6) if tare is None else tare.bias
+    return {
+        "lost": float(tip.sequences.lost),
+        "noise_mN": float(1e3 * noise[:3].max()),
+        "noise_mNm": float(1e3 * noise[3:].max()),
+        "expected_mN": float(1e3 * tip.calibration.force_sigma_N),
+        "expected_mNm": float(1e3 * tip.calibration.moment_sigma_Nm),
+        "bias_N": float(np.abs(bias[:3]).max()),
+        "bias_mNm": float(1e3 * np.abs(bias[3:]).max()),
+    }
+
+
+def _biotac(tip: BioTac) -> Figures:
+    core = units.core_temperature_degC(tip.channels.newest((Channel.TDC,)))[0]
+    rest = tip.channels.recent(Channel.PDC)
+    return {
+        "core_C": float(core),
+        "pdc_counts": float(rest.mean()),
+        "pdc_spread_counts": float(np.ptp(rest)),
+        "electrodes": float(tip.calibration.electrodes),
+    }
+
+
+def _camera(bench: Bench, watch: StreamWatch) -> Finding:
+    assert bench.camera is not None
+    height, width = bench.camera.capture().image.shape[:2]
+    figures: Figures = {"width_px": float(width), "height_px": float(height)} | dict(watch.figures(CAMERA_LINK))
+    return _finding("camera", bench.camera.health(), [f"{width} x {height} pixels"], figures)
+
+
+def _finding(device: str, problems: tuple[str, ...], words: list[str], figures: Mapping[str, float | str]) -> Finding:
+    return Finding(device, not problems, "; ".join([*problems, *(word for word in words if word)]), figures)

@@ -12,6 +12,7 @@ from drivers.ati.nano17 import Nano17
 from drivers.ati.wiring import ControllerWiring, DigitalWiring
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import DeviceError
+from tactile_lab.geometry.contacts import Array
 from tactile_lab.rigs.findings import Finding
 from tactile_lab.rigs.fingertip_rig import FingertipRig, place_of
 
@@ -46,7 +47,8 @@ def _check(rig: FingertipRig, finger: str, tip: Nano17, clock: Clock) -> Finding
     if len(usable) < 2:
         return Finding(device, False, f"{place}: {'; '.join(problems) or 'no usable sample'}")
     problems += _noise_problem(tip, usable)
-    return Finding(device, not problems, f"{place}: {'; '.join((*problems, _figures(tip, samples, usable)))}")
+    words = f"{place}: {'; '.join((*problems, _words(tip, samples, usable)))}"
+    return Finding(device, not problems, words, _figures(tip, samples, usable))
 
 
 def _listen(tip: Nano17, clock: Clock) -> list[WrenchSample]:
@@ -60,7 +62,24 @@ def _listen(tip: Nano17, clock: Clock) -> list[WrenchSample]:
     return taken
 
 
-def _figures(tip: Nano17, samples: list[WrenchSample], usable: np.ndarray[Any, np.dtype[np.float64]]) -> str:
+def _figures(tip: Nano17, samples: list[WrenchSample], usable: Array) -> dict[str, float | str]:
+    intervals_s = np.diff([sample.stamp_ns for sample in samples]) / NANOSECONDS
+    noise, bias = usable.std(axis=0), np.abs(usable.mean(axis=0))
+    return {
+        "identity": _serial(tip),
+        "rate_Hz": float(1.0 / intervals_s.mean()) if intervals_s.sum() > 0 else 0.0,
+        "jitter_ms": float(1e3 * intervals_s.std()),
+        "lost": float(tip.sequences.lost),
+        "noise_mN": float(1e3 * noise[:3].max()),
+        "noise_mNm": float(1e3 * noise[3:].max()),
+        "expected_mN": float(1e3 * tip.calibration.force_sigma_N),
+        "expected_mNm": float(1e3 * tip.calibration.moment_sigma_Nm),
+        "bias_N": float(bias[:3].max()),
+        "bias_mNm": float(1e3 * bias[3:].max()),
+    }
+
+
+def _words(tip: Nano17, samples: list[WrenchSample], usable: Array) -> str:
     span_s = (samples[-1].stamp_ns - samples[0].stamp_ns) / NANOSECONDS
     rate = f"{(len(samples) - 1) / span_s:.0f} samples/s" if span_s > 0 else f"{len(samples)} samples"
     noise, bias = usable.std(axis=0), np.abs(usable.mean(axis=0))
@@ -81,7 +100,7 @@ def _serial(tip: Nano17) -> str:
     return f"{told.serial}, firmware {firmware}" if firmware else str(told.serial)
 
 
-def _noise_problem(tip: Nano17, usable: np.ndarray[Any, np.dtype[np.float64]]) -> list[str]:
+def _noise_problem(tip: Nano17, usable: Array) -> list[str]:
     noise, known = usable.std(axis=0), tip.calibration
     allowed = _NOISY * np.repeat([known.force_sigma_N, known.moment_sigma_Nm], 3)
     if np.all(noise <= allowed):

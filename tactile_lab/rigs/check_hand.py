@@ -72,7 +72,9 @@ def _cycle(hand: ShadowHand, link: EthercatLink | PysoemLink, statistics: CycleS
     counters, remarks = hand.counters, link.health()
     share = counters.lost / max(counters.cycles, 1)
     words = f"{statistics.summary()}; {counters.lost} of {counters.cycles} without a status"
-    return Finding("cycle", share < 0.01, "; ".join((words, *remarks)))
+    punctual = statistics.summary()
+    figures = {"start_late_p50_us": punctual.median_us, "start_late_p99_us": punctual.p99_us, "lost_share": share}
+    return Finding("cycle", share < 0.01, "; ".join((words, *remarks)), figures)
 
 
 def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
@@ -85,7 +87,12 @@ def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
     figures = f"{int(heard.sum())} of 20 answer, warmest {motors.names[hottest]} {temperature[hottest]:.0f} C"
     if np.isfinite(supply).any():
         figures += f", supply {np.nanmin(supply):.1f} V"
-    return Finding("motors", not problems and bool(heard.all()), "; ".join((*problems, figures)))
+    told = {
+        "warmest_C": float(temperature[hottest]),
+        "answering": float(heard.sum()),
+        "spare_us": float(sample.idle_us),
+    }
+    return Finding("motors", not problems and bool(heard.all()), "; ".join((*problems, figures)), told)
 
 
 def _joints(sample: HandSample) -> Finding:

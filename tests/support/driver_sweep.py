@@ -18,10 +18,10 @@ from typing import Any, ClassVar, Protocol
 
 import pytest
 
-from drivers.faults import FaultyLink, MessageLayout, standard_faults
+from drivers.faults import FarEnd, Fault, FaultyLink, Injectable, MessageLayout, When, standard_faults
 from drivers.links import Link
 from tactile_lab.clock import VirtualClock
-from tactile_lab.errors import DeviceError
+from tactile_lab.errors import CodecError, DeviceError, TactileLabError
 
 STEPS = 160
 STEP_ns = 10_000_000
@@ -35,6 +35,10 @@ class SweptDriver(Protocol):
     def health(self) -> tuple[str, ...]: ...
 
 
+def _nothing() -> None:
+    """Nothing to repair."""
+
+
 @dataclass
 class SweptBench:
     """One driver on one in-memory device.
@@ -45,6 +49,7 @@ class SweptBench:
         build: makes the driver on a link.
         step: lets the device send its next message, or do whatever it does in one cycle.
         use: lets the driver take what has arrived and gives what it made of it.
+        repair: makes the device whole again after a fault of its own.
     """
 
     link: Link
@@ -52,6 +57,7 @@ class SweptBench:
     build: Callable[[Link], SweptDriver]
     step: Callable[[], None]
     use: Callable[[Any], Any]
+    repair: Callable[[], None] = _nothing
 
 
 @dataclass
@@ -59,7 +65,7 @@ class Outcome:
     """What came of one run: the health's words without figures, the error that ended it, and samples taken."""
 
     words: set[str]
-    stopped: DeviceError | None
+    stopped: TactileLabError | None
     samples: int
 
 
@@ -76,7 +82,7 @@ def run(bench: SweptBench, driver: SweptDriver) -> Outcome:
         bench.step()
         try:
             samples += len(bench.use(driver))
-        except DeviceError as error:
+        except (DeviceError, CodecError) as error:
             return Outcome(words, error, samples)
         words |= {_without_figures(text) for text in driver.health()}
     return Outcome(words, None, samples)
@@ -89,9 +95,11 @@ class DriverSweep:
     blind: ClassVar[dict[str, str]] = {}
     harmless: ClassVar[frozenset[str]] = frozenset({"counter wrap"})
     stops: ClassVar[frozenset[str]] = frozenset({"unplug"})
+    far_end: ClassVar[tuple[str, ...]] = ()
+    """Faults of the device itself, that the bench's link can inject (:class:`drivers.faults.Injectable`)."""
 
     def __init_subclass__(cls) -> None:
-        names = sorted(standard_faults(cls.layout))
+        names = cls.fault_names()
 
         def swept(self: DriverSweep, fault_name: str, record_property: Callable[[str, object], None]) -> None:
             self.sweep(fault_name, record_property)
@@ -105,9 +113,21 @@ class DriverSweep:
             cls, "test_a_fault_is_counted_or_ends_in_order", pytest.mark.parametrize("fault_name", names)(swept)
         )
 
+    @classmethod
+    def fault_names(cls) -> list[str]:
+        """All faults of the sweep."""
+        return sorted([*standard_faults(cls.layout), *cls.far_end])
+
     def bench(self) -> SweptBench:
         """A fresh driver's bench."""
         raise NotImplementedError
+
+    def fault(self, name: str, link: Link) -> tuple[Fault, When]:
+        """A fresh fault and when it strikes."""
+        if name not in self.far_end:
+            return standard_faults(self.layout)[name]
+        assert isinstance(link, Injectable)
+        return FarEnd(name, link), When()
 
     def sweep(self, fault_name: str, record_property: Callable[[str, object], None]) -> None:
         """Inject one fault and judge what the driver made of it."""
@@ -119,8 +139,7 @@ class DriverSweep:
         assert clean.stopped is None
 
         bench = self.bench()
-        fault, when = standard_faults(self.layout)[fault_name]
-        link = FaultyLink(bench.link, fault, when)
+        link = FaultyLink(bench.link, *self.fault(fault_name, bench.link))
         driver = bench.build(link)
         link.armed = False
         driver.connect()
@@ -134,21 +153,23 @@ class DriverSweep:
         driver.close()
         driver.close()
         link.armed = False
+        bench.repair()
         self._works_again(bench, driver)
 
     def connect_under(self, fault_name: str) -> None:
         """Inject one fault from the first message on: the driver connects all the same, or says why not."""
         bench = self.bench()
-        fault, when = standard_faults(self.layout)[fault_name]
+        fault, when = self.fault(fault_name, bench.link)
         link = FaultyLink(bench.link, fault, replace(when, first=0))
         driver = bench.build(link)
         try:
             driver.connect()
-        except DeviceError as error:
+        except (DeviceError, CodecError) as error:
             if not (error.where and error.hint):
                 pytest.fail(f"an error that does not say where and what to do: {error}")
         driver.close()
         link.armed = False
+        bench.repair()
         self._works_again(bench, driver)
 
     def _judge(self, fault_name: str, outcome: Outcome, new: set[str], clean: Outcome) -> None:

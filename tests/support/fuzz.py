@@ -1,6 +1,6 @@
 """Random and damaged bytes against every codec: each input decodes or raises our error, and nothing else.
 
-    python -m tests.support.fuzz --count 1000000 --seed 1 --only modbus
+    python -m tests.support.fuzz --count 1000000 --seed 1 --into docs/results.md
 
 Half of the inputs are random, half are valid messages with bytes changed, cut, added or repeated. A codec is added by a
 line in :data:`CODECS`.
@@ -12,23 +12,49 @@ import argparse
 import random
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
+from drivers import positioner_codec
 from drivers.ati import can_codec, controller_codec, digital_calibration, gauge_stream, gauge_volts, modbus, rdt_codec
 from drivers.ati.controller_codec import AsciiLines, BinaryAnswers, Record
 from drivers.ati.gauge_stream import GaugeStream
 from drivers.ati.net_box import parse_page
+from drivers.biotac import cheetah_log, slot_codec
+from drivers.biotac.slot_codec import Slot
 from drivers.emulators import slcan_unit
 from drivers.emulators.ati_sensor import emulated_calibration
 from drivers.emulators.net_box_unit import NetBoxUnit
+from drivers.ethercat import frames as ethercat
 from drivers.hardware.can_bus import CanFrame, decode_frame, encode_frame
+from drivers.positioner_codec import PositionerCommand, PositionerStatus
+from drivers.shadow.palm_codec import PalmCommand
+from drivers.shadow.palm_images import PALMS
 from tactile_lab.errors import CodecError
+from tests.support.results_section import write_section
 
 Codec = tuple[Callable[[bytes], object], bytes]
 
 _RECORD = Record(0, (-102, -99, -225, -20, 39, -39))
 _ONE = np.ones(1, np.int64)
+_SLOT = slot_codec.encode_slot(Slot((2040, 2041), {1: 1700, 2: 2000}), 1)
+_TELEGRAMS = (
+    ethercat.Telegram(ethercat.Command.LRW, 0x10000, bytes(302)),
+    ethercat.Telegram(ethercat.Command.BRD, ethercat.physical(0, 0x130), bytes(2)),
+)
+_LOG = "Sensor: BT1\n\nBegin File\n0.000000 1 1 17 2602 0 2713 0\n0.000227 1 1 0 2040 0 2041 1\n"
+
+
+def _palm_statuses() -> dict[str, Codec]:
+    """A status of each palm, as its emulator would send it."""
+    return {
+        f"palm {name} status": (image.decode_status, bytes(image.status_bytes)) for name, image in PALMS.items()
+    } | {
+        f"palm {name} command": (image.decode_command, image.encode_command(PalmCommand(1, 3, 1, 2)))
+        for name, image in PALMS.items()
+    }
+
 
 CODECS: dict[str, Codec] = {
     "rdt records": (
@@ -60,6 +86,18 @@ CODECS: dict[str, Codec] = {
     "can gauges": (can_codec.decode_first, can_codec.encode_gauges(0, (1, 2, 3, 4, 5, 6))[0].data),
     "slcan line": (slcan_unit.decode_line, slcan_unit.encode_line(CanFrame(0x200, b"\x01"))[:-1]),
     "gauge volts": (gauge_volts.decode_volts, gauge_volts.encode_volts(1, (0.1, 0.2, 0.3, 0.4, 0.5, 0.6))),
+    "ethercat frame": (ethercat.decode_frame, ethercat.encode_frame(_TELEGRAMS, bytes(6))),
+    **_palm_statuses(),
+    "biotac slot": (lambda payload: slot_codec.decode_slot(payload, 1), _SLOT),
+    "cheetah log": (lambda payload: cheetah_log.decode_log(payload.decode("latin-1")), _LOG.encode()),
+    "positioner status": (
+        positioner_codec.decode_status,
+        positioner_codec.encode_status(PositionerStatus(7, np.arange(6.0))),
+    ),
+    "positioner command": (
+        positioner_codec.decode_command,
+        positioner_codec.encode_command(PositionerCommand(7, np.arange(6.0))),
+    ),
 }
 
 
@@ -97,19 +135,35 @@ def fuzz(codec: Codec, count: int, seed: int) -> tuple[int, int]:
     return decoded, count - decoded
 
 
+HEAD = """## Codecs against random and damaged bytes
+
+`python -m tests.support.fuzz --count {count} --seed {seed} --into docs/results.md`: half of the inputs are random, half
+are valid messages with bytes changed, cut, added or repeated. Each decoded or raised our error; nothing else came.
+
+| Codec | Inputs | Seed | Decoded | Refused | Time, s |
+|---|---:|---:|---:|---:|---:|
+"""
+
+
 def main() -> None:
-    """Fuzz the chosen codecs and print one line for each."""
+    """Fuzz the chosen codecs, print one line for each, and write the table where it is wanted."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="")
+    parser.add_argument("--into", type=Path)
     chosen = parser.parse_args()
+    rows = []
     for name, codec in CODECS.items():
         if chosen.only in name:
             began = time.monotonic()
             decoded, refused = fuzz(codec, chosen.count, chosen.seed)
             took = time.monotonic() - began
+            rows.append(f"| {name} | {chosen.count} | {chosen.seed} | {decoded} | {refused} | {took:.0f} |\n")
             print(f"{name:20} seed {chosen.seed}  {decoded:9} decoded  {refused:9} refused  {took:6.1f} s", flush=True)
+    if chosen.into:
+        head = HEAD.format(count=chosen.count, seed=chosen.seed)
+        write_section(chosen.into, "fuzz", head + "".join(rows))
 
 
 if __name__ == "__main__":
