@@ -151,9 +151,9 @@ class GraspByKeys(GraspCycle):
             self._desk.tell(f"{', '.join(stopped)} stopped")
 
     def settle(self) -> None:
-        self._desk.enter(Stage.HOLD, "Hold still. SPACE: capture; x: give up", Ask.CAPTURE, Ask.FINGERS, Ask.GIVE_UP)
+        self._desk.enter(Stage.HOLD, "Bringing the fingers to the contact force", Ask.GIVE_UP)
         super().settle()
-        self._desk.take()
+        self._desk.enter(Stage.HOLD, "Hold still. SPACE: capture; x: give up", Ask.CAPTURE, Ask.GIVE_UP)
         hold_N = self._balanced_forces_N(self._touching, self.settings.contact_force_N)
         while not self._desk.wants_capture():
             self._servo_forces(hold_N)

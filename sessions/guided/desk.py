@@ -230,7 +230,7 @@ class Desk:
                 self.tell(f"still paused: {error}", Level.WARNING)
                 return
         self.paused = ""
-        self.tell("goes on")
+        self.tell("resumed")
         self._next_panel_ns = 0
 
     def _ask_end(self, request: Request) -> None:

@@ -22,7 +22,7 @@ class Sight:
     """What is seen at one instant.
 
     Attributes:
-        forces_N: contact force on each fingertip; None where its sensor says nothing usable.
+        forces_N: contact force on each fingertip; None where its sensor says nothing usable or is not zeroed yet.
         touching: fingers in contact.
         steady_s: how long contacts and hand have not changed.
         is_steady: long enough, with enough fingers.
@@ -67,11 +67,13 @@ class Watcher:
 
     def __init__(self, perception: Perception, settings: GuidedSettings, touch_force_N: float) -> None:
         self._seen, self._settings, self._touch_force_N = perception, settings, touch_force_N
+        self._begun_ns: int | None = None
         self._since: _Instant | None = None
         """From here on nothing has changed."""
 
     def take(self, stamp_ns: int) -> None:
         """Note one cycle: where it differs from what was, steadiness begins anew."""
+        self._begun_ns = stamp_ns if self._begun_ns is None else self._begun_ns
         loads_N = self._seen.loads_N()
         forces_N = np.array([min(load_N, 1e6) for load_N in loads_N.values()])
         touching = frozenset(finger for finger, load_N in loads_N.items() if load_N > self._touch_force_N)
@@ -92,11 +94,12 @@ class Watcher:
         """What is seen now."""
         loads_N = self._seen.loads_N()
         silent = tuple(f for f in loads_N if not np.isfinite(loads_N[f]) or self._is_silent(f, stamp_ns))
-        touching = tuple(f for f, load_N in loads_N.items() if load_N > self._touch_force_N and f not in silent)
+        usable = [finger for finger in loads_N if finger not in silent and self._is_zeroed(finger)]
+        touching = tuple(finger for finger in usable if loads_N[finger] > self._touch_force_N)
         steady_s = 0.0 if self._since is None else (stamp_ns - self._since.stamp_ns) / NANOSECONDS
         enough = len(touching) >= self._settings.least_contacts and steady_s >= self._settings.steady_s
         return Sight(
-            forces_N={f: None if f in silent else round(load_N, 3) for f, load_N in loads_N.items()},
+            forces_N={finger: round(loads_N[finger], 3) if finger in usable else None for finger in loads_N},
             touching=touching,
             steady_s=steady_s,
             is_steady=enough,
@@ -109,7 +112,12 @@ class Watcher:
         tip = self._seen.fingertips[finger]
         if not isinstance(tip, ForceTip):
             return False
-        return tip.newest is None or stamp_ns - tip.newest.stamp_ns > self._settings.silent_s * NANOSECONDS
+        heard_ns = self._begun_ns if tip.newest is None else tip.newest.stamp_ns
+        return heard_ns is not None and stamp_ns - heard_ns > self._settings.silent_s * NANOSECONDS
+
+    def _is_zeroed(self, finger: str) -> bool:
+        tip = self._seen.fingertips[finger]
+        return not isinstance(tip, ForceTip) or tip.tare_record is not None
 
     def _observability(self, touching: tuple[str, ...]) -> float | None:
         """Of contacts computed from the newest samples alone; a capture will average."""

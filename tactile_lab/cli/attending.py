@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Literal
 
-from sessions.guided.operator import Operator
+from sessions.guided.operator import Operator, Together
 from sessions.guided.simulated_operator import SimulatedOperator
-from tactile_lab.cli.guided_terminal import terminal_for
+from tactile_lab.cli.console import say, warn
+from tactile_lab.cli.guided_terminal import KeyTerminal, LineTerminal, terminal_for
+from tactile_lab.cli.page_address import PageAddress
+from tactile_lab.view.feed import ViewFeed
 from tactile_lab.workflow.attending import Attendance
 
 
@@ -33,16 +36,40 @@ class GuidedWay:
 
 
 @contextmanager
-def attendance(way: GuidedWay | None) -> Iterator[Attendance]:
-    """Who is there, for as long as the session runs; the terminal is as it was afterwards."""
+def attendance(way: GuidedWay | None, page: PageAddress | None, title: str) -> Iterator[Attendance]:
+    """Who is there, for as long as the session runs; the terminal is as it was afterwards.
+
+    Args:
+        way: None for an autonomous session.
+        page: where the live page is to be; None for none.
+        title: of the page.
+
+    Raises:
+        ConfigurationError, DeviceError: the page can not be opened there.
+    """
+    with ExitStack() as stack:
+        feed = None if page is None else stack.enter_context(_page(page, title))
+        operators: list[Operator] = [] if feed is None else [feed]
+        if way is not None and way.no_input:
+            operators.append(SimulatedOperator())
+        elif way is not None:
+            terminal: KeyTerminal | LineTerminal = stack.enter_context(terminal_for(way.pedal))
+            operators.append(terminal)
+        yield _attendance(way, Together(*operators) if operators else None, feed)
+
+
+def _attendance(way: GuidedWay | None, operator: Operator | None, feed: ViewFeed | None) -> Attendance:
     if way is None:
-        yield Attendance()
-    elif way.no_input:
-        yield _guided(way, SimulatedOperator(), 0.0)
-    else:
-        with terminal_for(way.pedal) as terminal:
-            yield _guided(way, terminal, way.pace)
+        return Attendance(operator, onlooker=feed)
+    pace = 0.0 if way.no_input else way.pace
+    return Attendance(operator, True, way.led_by, way.automatic, pace, feed)
 
 
-def _guided(way: GuidedWay, operator: Operator, pace: float) -> Attendance:
-    return Attendance(operator, guides=True, led_by=way.led_by, automatic=way.automatic, pace=pace)
+@contextmanager
+def _page(page: PageAddress, title: str) -> Iterator[ViewFeed]:
+    address, port, token = page.checked()
+    with ViewFeed(address, port, token, title) as feed:
+        say(f"page: {feed.url}")
+        yield feed
+    if feed.dropped:
+        warn(f"the page was slower than the session: {feed.dropped} messages were not shown; all of them are recorded")

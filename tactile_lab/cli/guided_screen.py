@@ -11,8 +11,8 @@ from sessions.guided.operator import Panel, Stage
 from tactile_lab.geometry.contacts import FINGERS
 
 STEPS = (Stage.PLACE, Stage.GUIDE, Stage.CLOSE, Stage.HOLD, Stage.CAPTURE, Stage.ROTATE, Stage.RELEASE)
-KEYS = "SPACE next/capture  g go  u undo  x give up  p pause  e end  a automatic  n note  m marker  i image  t attach"
-_BAR_N, _BAR_WIDTH = 1.0, 10
+KEYS = "SPACE next · g go · u undo · x give up · p pause · e end · a automatic · n note · m marker"
+_BAR_N, _BAR_WIDTH = 1.0, 8
 
 
 def as_panel(panel: Panel, typing: str = "") -> RenderableType:
@@ -65,14 +65,17 @@ def _forces(panel: Panel) -> RenderableType:
     cells = []
     for finger in FINGERS:
         grid.add_column(no_wrap=True)
-        cells.append(_force(finger, panel.sight.forces_N.get(finger), finger in panel.sight.touching))
+        cells.append(_force(finger, panel))
     grid.add_row(*cells)
     return grid
 
 
-def _force(finger: str, force_N: float | None, touches: bool) -> Text:
+def _force(finger: str, panel: Panel) -> Text:
+    force_N, touches = panel.sight.forces_N.get(finger), finger in panel.sight.touching
+    if finger in panel.sight.silent:
+        return Text(f"{finger} no reading     ", style="yellow")
     if force_N is None:
-        return Text(f"{finger} no reading", style="yellow")
+        return Text(f"{finger} not zeroed     ", style="dim")
     filled = min(_BAR_WIDTH, round(_BAR_WIDTH * force_N / _BAR_N))
     bar = "#" * filled + "." * (_BAR_WIDTH - filled)
     return Text(f"{finger} {bar} {force_N:4.2f}", style="green" if touches else "dim")

@@ -11,6 +11,7 @@ import typer
 
 from tactile_lab.cli.loading import interruptions_held
 from tactile_lab.cli.options import METHOD_HELP, AllowUncalibrated, Json, Method, NoInput, RigName
+from tactile_lab.cli.page_address import PORT, Listen, PageAddress, Port, Token
 
 
 class Mode(StrEnum):
@@ -52,6 +53,10 @@ def run(
     pace: Annotated[
         float, typer.Option(min=0.0, help="Guided, simulated rig: its seconds for a real one; 0: as fast as it goes.")
     ] = 1.0,
+    view: Annotated[bool, typer.Option("--view", help="Show the session live in a browser.")] = False,
+    view_port: Port = PORT,
+    listen: Listen = "127.0.0.1",
+    token: Token = "",
     policy: Annotated[
         str | None,
         typer.Option(
@@ -83,13 +88,14 @@ def run(
     guided = mode is Mode.GUIDED
     if confirm and (no_input or guided):
         raise typer.BadParameter("asks before every grasp of an autonomous session", param_hint="'--confirm'")
+    page = PageAddress(listen, view_port, token) if view else None
     way = GuidedWay(_led_by(led_by), automatic_capture or None, pedal, pace, no_input)
     tell_left_open(out)
     request = SessionRequest(rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy)
     title = f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}"
     with (
         LiveProgress(title, live=not (guided or confirm), reasons=policy is not None) as progress,
-        attendance(way if guided else None) as present,
+        attendance(way if guided else None, page, title) as present,
     ):
         finished = run_session(request, progress, replace(present, approve=TerminalApproval()) if confirm else present)
     conclude(finished, as_json)

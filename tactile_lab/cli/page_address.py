@@ -1,0 +1,48 @@
+"""Where a page is to be, by what was asked for on the command line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import typer
+
+from tactile_lab.errors import ConfigurationError
+
+PORT = 8090
+LEAST_TOKEN = 16
+
+Port = Annotated[int, typer.Option("--view-port", min=0, max=65535, help="Port of the page; 0 takes a free one.")]
+Listen = Annotated[
+    str, typer.Option("--listen", metavar="ADDRESS", help="Address of the page; others than this computer's: --token.")
+]
+Token = Annotated[
+    str,
+    typer.Option("--token", envvar="TACTILE_LAB_TOKEN", help="What a visitor of the page must show; 'new' makes one."),
+]
+
+
+@dataclass(frozen=True)
+class PageAddress:
+    """Address, port and token as typed."""
+
+    address: str
+    port: int
+    token: str
+
+    def checked(self) -> tuple[str, int, str]:
+        """Address, port and token to use. Raises ConfigurationError."""
+        from tactile_lab.view.gate import is_loopback, new_token
+
+        token = new_token() if self.token == "new" else self.token
+        if not token and not is_loopback(self.address):
+            hint = "Give --token new, or listen on 127.0.0.1"
+            raise ConfigurationError(
+                "whoever reaches this address could press the buttons", where=self.address, hint=hint
+            )
+        if token and (
+            len(token) < LEAST_TOKEN or not all(c.isalnum() or c in "-_" for c in token) or not token.isascii()
+        ):
+            text = f"a token has at least {LEAST_TOKEN} letters, digits, - or _"
+            raise ConfigurationError(text, where="--token", hint="Give --token new to have one made")
+        return self.address, self.port, token

@@ -1,0 +1,152 @@
+"""The panel of the page: what to do, what is seen, the grasps so far, and buttons."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import viser
+from viser import Icon, IconName
+
+from sessions.guided.operator import Ask
+from tactile_lab.geometry.contacts import FINGERS
+from tactile_lab.view.scene import Scene
+
+Press = Callable[[Ask, str], None]
+"""Called with what was pressed and a text."""
+
+BUTTONS: tuple[tuple[Ask, str, IconName, str], ...] = (
+    (Ask.NEXT, "Next step", Icon.PLAYER_SKIP_FORWARD, "This step is done"),
+    (Ask.GO, "Do it", Icon.ROBOT, "Let the rig do this step by itself"),
+    (Ask.CAPTURE, "Capture", Icon.FOCUS_CENTERED, "Measure this grasp now"),
+    (Ask.UNDO, "Undo", Icon.ARROW_BACK_UP, "Take the last grasp back"),
+    (Ask.PAUSE, "Pause / go on", Icon.PLAYER_PAUSE, "Nothing moves until it is pressed again"),
+    (Ask.END, "End", Icon.PLAYER_STOP, "End the session; press twice"),
+)
+_ROWS = 8
+_STYLE = "padding:0 0.9em 0.6em 0.9em;font-size:0.85em;line-height:1.45"
+
+
+class Controls:
+    """Draws the panel.
+
+    Args:
+        server: the page.
+        press: called with what was pressed and a text.
+        live: there is a session that can be asked for something.
+    """
+
+    def __init__(self, server: viser.ViserServer, press: Press, *, live: bool) -> None:
+        self._status = server.gui.add_html("")
+        if live:
+            for ask, label, icon, hint in BUTTONS:
+                self._button(server, ask, label, icon, hint, press)
+            self._note(server, press)
+        self._history = server.gui.add_html("")
+
+    def _button(
+        self,
+        server: viser.ViserServer,
+        ask: Ask,
+        label: str,
+        icon: IconName,
+        hint: str,
+        press: Press,
+    ) -> None:
+        colour: Any = {Ask.END: "red", Ask.PAUSE: "yellow", Ask.CAPTURE: "green"}.get(ask, "gray")
+        button = server.gui.add_button(label, hint=hint, icon=icon, color=colour)
+        button.on_click(lambda event: press(ask, ""))
+
+    def _note(self, server: viser.ViserServer, press: Press) -> None:
+        text: Any = server.gui.add_text("Note", "")
+        button = server.gui.add_button("Keep the note", icon=Icon.PENCIL, color="gray")
+
+        def keep(event: Any) -> None:
+            if text.value.strip():
+                press(Ask.NOTE, text.value)
+                text.value = ""
+
+        button.on_click(keep)
+
+    def draw(self, scene: Scene) -> None:
+        """Bring the panel up to date."""
+        self._status.content = status_html(scene)
+        self._history.content = history_html(scene)
+
+
+def status_html(scene: Scene) -> str:
+    """The state of the session in a few lines."""
+    guide, parts = scene.guide, []
+    if guide.get("paused"):
+        parts.append(_banner(f"Paused: {guide['paused']}", "#b7791f"))
+    if guide:
+        parts.append(_line(f"Grasp {guide.get('grasp', '')}: {guide.get('stage', '')}", "font-weight:600"))
+        parts.append(_line(str(guide.get("prompt", "")), "font-size:1.15em;font-weight:600;color:#1f6feb"))
+        parts.append(_line(str(guide.get("capture", "")), "color:#57606a"))
+    parts.append(_forces(scene))
+    facts = [
+        ("pose", _pose(scene)),
+        ("explored", "" if scene.surface is None else f"{scene.surface.explored:.0%} of the surface is known"),
+        ("object", str(guide.get("unknown", ""))),
+        ("next", str(guide.get("suggestion", "") or scene.plan.get("reason", ""))),
+        ("last", scene.messages[-1] if scene.messages else ""),
+        ("left out", f"{scene.dropped} messages: the page was slower than the session" if scene.dropped else ""),
+    ]
+    parts += [_fact(name, value) for name, value in facts if value]
+    return f'<div style="{_STYLE}">{"".join(parts)}</div>'
+
+
+def _forces(scene: Scene) -> str:
+    cells = []
+    for finger in FINGERS:
+        load_N = scene.loads_N.get(finger, 0.0)
+        share = 0.0 if load_N is None else min(1.0, load_N / 1.5)
+        colour = "#f0aa1e" if load_N is None else "#2ea043" if load_N > 0.1 else "#969eaa"
+        text = "silent" if load_N is None else f"{load_N:.2f} N"
+        cells.append(
+            f'<div style="flex:1"><div style="height:6px;background:#e5e8ec;border-radius:3px">'
+            f'<div style="height:6px;width:{100 * share:.0f}%;background:{colour};border-radius:3px"></div></div>'
+            f'<div style="white-space:nowrap">{finger} {text}</div></div>'
+        )
+    return f'<div style="display:flex;gap:6px;margin:0.5em 0;font-size:0.85em">{"".join(cells)}</div>'
+
+
+def _pose(scene: Scene) -> str:
+    if scene.world_T_object is None:
+        return "not known yet"
+    pose = scene.world_T_object
+    text = f"{1e3 * pose.x():.0f}, {1e3 * pose.y():.0f} mm, {math.degrees(pose.rotation().yaw()):.0f}°"
+    if scene.covariance is None:
+        return text
+    position_mm = 1e3 * math.sqrt(float(np.trace(scene.covariance[:2, :2])) / 2)
+    return f"{text} (± {position_mm:.1f} mm, {math.degrees(math.sqrt(float(scene.covariance[2, 2]))):.1f}°)"
+
+
+def history_html(scene: Scene) -> str:
+    """A row for each of the newest grasps."""
+    rows = []
+    for grasp in scene.grasps[-_ROWS:][::-1]:
+        step = scene.steps.get(grasp.index, {})
+        said = html.escape(f"{step.get('verdict', '')}: {step.get('reason', '')}" if step else "")
+        rows.append(f"<tr><td>{grasp.index + 1}</td><td>{len(grasp.fingers)}</td><td>{said}</td></tr>")
+    if not rows:
+        return f'<div style="{_STYLE}">no grasp yet</div>'
+    head = '<tr style="text-align:left;color:#57606a"><th>grasp</th><th>contacts</th><th>the estimate says</th></tr>'
+    return f'<div style="{_STYLE}"><table style="width:100%">{head}{"".join(rows)}</table></div>'
+
+
+def _line(text: str, style: str) -> str:
+    return f'<div style="{style}">{html.escape(text)}</div>' if text else ""
+
+
+def _banner(text: str, colour: str) -> str:
+    style = f"background:{colour};color:white;border-radius:4px;padding:0.3em 0.6em;margin-bottom:0.4em;font-weight:600"
+    return _line(text, style)
+
+
+def _fact(name: str, value: str) -> str:
+    label = f'<span style="color:#57606a;display:inline-block;min-width:5em">{html.escape(name)}</span>'
+    return f"<div>{label}{html.escape(value)}</div>"

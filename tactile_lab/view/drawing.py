@@ -1,0 +1,220 @@
+"""The scene of a session as objects of viser's page."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import trimesh
+import viser
+from gtsam import Pose3
+
+from drivers.shadow.closing import PRESHAPES, closing
+from sessions import foxglove
+from tactile_lab.geometry.contacts import FINGERS, Array
+from tactile_lab.report.colours import viridis
+from tactile_lab.view.scene import Scene, ShownSurface, ellipse
+
+TIP_CENTRE_m, TIP_RADIUS_m = np.array([0.0, 0.0, 0.019]), 0.0085
+SIGMA_FULL_m = 0.010
+"""Standard deviation at which a surface counts as unknown: the far end of the colour map."""
+_BONE, _IDLE, _TOUCHING, _SILENT = (120, 126, 138), (150, 158, 170), (46, 160, 67), (240, 170, 30)
+_NEXT, _POSE, _CONTACT = (214, 90, 160), (31, 111, 235), (200, 40, 40)
+_FORCE_SCALE_m_N = 0.025
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+class Drawing:
+    """Draws what has changed.
+
+    Args:
+        server: the page.
+    """
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._scene = server.scene
+        self._nodes: dict[str, list[Any]] = {}
+        server.scene.set_up_direction("+z")
+        server.scene.configure_default_lights(True, cast_shadow=False)
+        server.scene.add_grid(
+            "/table",
+            0.6,
+            0.6,
+            cell_size=0.02,
+            section_size=0.1,
+            cell_color=(222, 226, 232),
+            section_color=(190, 197, 206),
+        )
+        server.scene.add_frame("/world", axes_length=0.04, axes_radius=0.0012)
+        server.initial_camera.position = np.array([-0.21, -0.19, 0.20])
+        server.initial_camera.look_at = np.array([0.0, 0.0, 0.03])
+
+    def draw(self, scene: Scene) -> None:
+        """Bring the page up to date."""
+        changed, scene.changed = scene.changed, set()
+        if "hand" in changed:
+            self._hand(scene)
+        if changed & {"object", "grasps"}:
+            self._object(scene)
+            self._grasps(scene)
+        if "plan" in changed:
+            self._plan(scene)
+
+    def _replace(self, group: str, nodes: list[Any]) -> None:
+        for node in self._nodes.get(group, []):
+            node.remove()
+        self._nodes[group] = nodes
+
+    # --- the hand ----------------------------------------------------------------------------------------------
+
+    def _hand(self, scene: Scene) -> None:
+        if scene.world_T_palm is None:
+            return
+        nodes: list[Any] = [self._palm(scene.world_T_palm)]
+        bones = []
+        for finger in FINGERS:
+            pose = scene.world_T_distal.get(finger)
+            if pose is None:
+                continue
+            tip_m = np.asarray(pose.transformFrom(TIP_CENTRE_m))
+            nodes.append(self._tip(finger, tip_m, scene.loads_N.get(finger, 0.0)))
+            bones += [[scene.world_T_palm.translation(), pose.translation()], [pose.translation(), tip_m]]
+        if bones:
+            nodes.append(self._scene.add_line_segments("/hand/bones", np.array(bones), _BONE, thickness=0.005))
+        self._replace("hand", nodes)
+
+    def _palm(self, pose: Pose3) -> Any:
+        return self._scene.add_box(
+            "/hand/palm",
+            color=_BONE,
+            dimensions=(0.08, 0.02, 0.09),
+            opacity=0.35,
+            wxyz=quaternion(pose),
+            position=pose.translation(),
+        )
+
+    def _tip(self, finger: str, centre_m: Array, load_N: float | None) -> Any:
+        colour = _SILENT if load_N is None else _TOUCHING if load_N > 0.1 else _IDLE
+        return self._scene.add_icosphere(
+            f"/hand/{finger}", radius=TIP_RADIUS_m, color=colour, subdivisions=2, position=centre_m, cast_shadow=False
+        )
+
+    # --- the object --------------------------------------------------------------------------------------------
+
+    def _object(self, scene: Scene) -> None:
+        pose = scene.world_T_object
+        if pose is None:
+            self._replace("object", [])
+            return
+        nodes: list[Any] = [
+            self._scene.add_frame(
+                "/object",
+                axes_length=0.03,
+                axes_radius=0.001,
+                wxyz=quaternion(pose),
+                position=pose.translation(),
+            )
+        ]
+        if scene.surface is not None and len(scene.surface.vertices_m):
+            nodes.append(
+                self._scene.add_mesh_trimesh("/object/surface", coloured_mesh(scene.surface), cast_shadow=False)
+            )
+        if scene.covariance is not None:
+            outline_m = np.column_stack([ellipse(scene.covariance), np.full(48, 0.002)])
+            centre_m = pose.translation() * [1.0, 1.0, 0.0]
+            nodes.append(self._line("/uncertainty", outline_m + centre_m, _POSE, 0.0015))
+        self._replace("object", nodes)
+
+    def _grasps(self, scene: Scene) -> None:
+        """All contacts in the object frame, the newest ones with their forces."""
+        nodes: list[Any] = []
+        placed = [grasp.points_object_m for grasp in scene.grasps if grasp.fingers]
+        known = [points_m for points_m in placed if points_m is not None]
+        if known and scene.world_T_object is not None:
+            world_m = np.array([scene.world_T_object.transformFrom(point) for point in np.vstack(known)])
+            ages = np.concatenate([np.full(len(points_m), len(known) - n - 1) for n, points_m in enumerate(known)])
+            nodes.append(
+                self._scene.add_point_cloud(
+                    "/contacts", world_m, fading(ages), point_size=0.005, point_shape="circle", precision="float32"
+                )
+            )
+            nodes += self._forces(scene)
+        self._replace("grasps", nodes)
+
+    def _forces(self, scene: Scene) -> list[Any]:
+        newest = scene.grasps[-1]
+        if not len(newest.fingers):
+            return []
+        ends_m = newest.points_world_m + _FORCE_SCALE_m_N * newest.forces_N[:, None] * newest.normals_world
+        arrows = np.stack([ends_m, newest.points_world_m], axis=1)
+        return [
+            self._scene.add_arrows(
+                "/forces", arrows, _CONTACT, shaft_radius=0.0009, head_radius=0.0024, head_length=0.006
+            )
+        ]
+
+    # --- the next grasp ----------------------------------------------------------------------------------------
+
+    def _plan(self, scene: Scene) -> None:
+        plan = scene.plan
+        if plan.get("closing") not in PRESHAPES:
+            self._replace("plan", [])
+            return
+        table = closing(plan["closing"], float(plan["height_m"]))
+        c, s = np.cos(plan["yaw_rad"]), np.sin(plan["yaw_rad"])
+        turn, place = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([plan["x_m"], plan["y_m"], 0.0])
+        ways = []
+        for finger in FINGERS:
+            path = table.path(finger)
+            ends = np.array([path.centre_m(path.valid[1]), path.centre_m(path.valid[0])])
+            ways.append((ends @ turn.T + place)[::-1])
+        points_m = np.array(ways)
+        label = f"next: {plan['closing']}"
+        self._replace(
+            "plan",
+            [
+                self._scene.add_arrows(
+                    "/next", points_m, _NEXT, shaft_radius=0.0008, head_radius=0.0025, head_length=0.007
+                ),
+                self._scene.add_label("/next/name", label, position=points_m[:, 0].mean(axis=0) + 0.05 * _UP),
+            ],
+        )
+
+    def _line(self, name: str, points_m: Array, colour: tuple[int, int, int], thickness_m: float) -> Any:
+        segments = np.stack([points_m[:-1], points_m[1:]], axis=1)
+        return self._scene.add_line_segments(name, segments, colour, thickness=thickness_m)
+
+
+def quaternion(pose: Pose3) -> Array:
+    """w, x, y, z."""
+    rotation = foxglove.quaternion(pose)
+    return np.array([rotation["w"], rotation["x"], rotation["y"], rotation["z"]])
+
+
+def coloured_mesh(surface: ShownSurface) -> trimesh.Trimesh:
+    """The surface with its colours: dark where it is well known, yellow where it is not.
+
+    An outline is shown as the wall that stands on it, from the table to twice the height of the contacts.
+    """
+    vertices, faces, sigma_m = surface.vertices_m, surface.faces, surface.sigma_m
+    if surface.dimension == 2:
+        vertices, faces, sigma_m = _wall(vertices, surface.origin_height_m, sigma_m)
+    colours = viridis(sigma_m / SIGMA_FULL_m)
+    both = np.vstack([faces, faces[:, ::-1]])  # seen from inside too
+    return trimesh.Trimesh(vertices, both, vertex_colors=colours, process=False)
+
+
+def _wall(outline_m: Array, half_height_m: float, sigma_m: Array) -> tuple[Array, Any, Array]:
+    count, up = len(outline_m), half_height_m * _UP
+    here, after = np.arange(count), np.roll(np.arange(count), -1)
+    faces = np.vstack(
+        [np.column_stack([here, after, after + count]), np.column_stack([here, after + count, here + count])]
+    )
+    return np.vstack([outline_m - up, outline_m + up]), faces, np.concatenate([sigma_m, sigma_m])
+
+
+def fading(ages: Array) -> Any:
+    """Colours (n, 3) of contacts by the number of grasps since: red, then paler."""
+    share = np.clip(1.0 - ages / 8.0, 0.15, 1.0)[:, None]
+    pale = np.array([225.0, 205.0, 205.0])
+    return np.rint(share * np.array(_CONTACT, dtype=float) + (1.0 - share) * pale).astype(np.uint8)

@@ -1,0 +1,156 @@
+"""The door of the page: who may see it and press its buttons.
+
+The page itself listens on an address of the loopback network that is drawn at random for each session, and is reached
+through this door only. The door takes a visitor who names it by the name it is known by (so that no other web site,
+open in the same browser, can press a button), and who shows the token where there is one: once in the address, then in
+a cookie.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hmac
+import ipaddress
+import re
+import secrets
+from dataclasses import dataclass
+from http import HTTPStatus
+
+COOKIE = "tactile_lab_token"
+_HEAD_BYTES, _HEAD_TIMEOUT_s, _BLOCK = 16_384, 10.0, 65_536
+
+
+def is_loopback(address: str) -> bool:
+    """Whether an address can be reached from this computer only."""
+    if address == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return False
+
+
+def new_token() -> str:
+    """A token that can not be guessed."""
+    return secrets.token_urlsafe(24)
+
+
+def inner_address() -> str:
+    """An address of the loopback network that no web page can guess (Linux answers on all of 127/8)."""
+    return str(ipaddress.IPv4Address((127 << 24) | (1 << 16) | secrets.randbelow((1 << 24) - (2 << 16))))
+
+
+@dataclass(frozen=True)
+class Head:
+    """The head of an HTTP request: path with query, and headers by lower-case name."""
+
+    path: str
+    headers: dict[str, str]
+
+
+def parse_head(data: bytes) -> Head | None:
+    """The head of a GET request; None for anything else."""
+    lines = data.decode("latin-1").split("\r\n")
+    words = lines[0].split(" ")
+    if len(words) != 3 or words[0] != "GET" or not words[2].startswith("HTTP/1."):
+        return None
+    pairs = (line.partition(":") for line in lines[1:] if line)
+    return Head(words[1], {name.strip().lower(): value.strip() for name, _, value in pairs})
+
+
+class Gate:
+    """Decides about requests.
+
+    Args:
+        names: host names and addresses by which the page may be called.
+        token: "" for none.
+    """
+
+    def __init__(self, names: frozenset[str], token: str) -> None:
+        self._names, self._token = names, token
+
+    def verdict(self, head: Head) -> tuple[HTTPStatus, str]:
+        """OK: let it through; SEE_OTHER with the cookie to set; anything else with the reason."""
+        host = head.headers.get("host", "")
+        if _host_name(host) not in self._names:
+            return HTTPStatus.FORBIDDEN, f"this page is not called {host[:80]}"
+        origin = head.headers.get("origin")
+        if origin is not None and origin.partition("://")[2] != host:
+            return HTTPStatus.FORBIDDEN, "asked for by another web site"
+        if not self._token:
+            return HTTPStatus.OK, ""
+        if self._same(_cookie(head.headers.get("cookie", ""))):
+            return HTTPStatus.OK, ""
+        shown = re.search(r"[?&]token=([A-Za-z0-9_-]+)", head.path)
+        if shown and self._same(shown[1]):
+            return HTTPStatus.SEE_OTHER, f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
+        return HTTPStatus.FORBIDDEN, "the token is missing or wrong: use the address that the session has shown"
+
+    def _same(self, shown: str) -> bool:
+        return hmac.compare_digest(shown.encode(), self._token.encode())
+
+
+def _host_name(host: str) -> str:
+    if host.startswith("["):
+        return host[1:].partition("]")[0]
+    return host.partition(":")[0].lower()
+
+
+def _cookie(header: str) -> str:
+    for part in header.split(";"):
+        name, _, value = part.strip().partition("=")
+        if name == COOKIE:
+            return value
+    return ""
+
+
+async def serve(gate: Gate, address: str, port: int, inner: tuple[str, int]) -> asyncio.Server:
+    """Listen, and carry what may pass to ``inner``. Raises OSError when the address can not be taken."""
+
+    async def visit(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, TimeoutError):
+            await _visit(gate, reader, writer, inner)
+        writer.close()
+
+    return await asyncio.start_server(visit, address, port, limit=_HEAD_BYTES)
+
+
+async def _visit(
+    gate: Gate, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, inner: tuple[str, int]
+) -> None:
+    data = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _HEAD_TIMEOUT_s)
+    head = parse_head(data)
+    status, text = (HTTPStatus.BAD_REQUEST, "not a page request") if head is None else gate.verdict(head)
+    if status is not HTTPStatus.OK:
+        writer.write(_answer(status, text))
+        await writer.drain()
+        return
+    inner_reader, inner_writer = await asyncio.open_connection(*inner)
+    inner_writer.write(_closing(data))
+    await asyncio.gather(_carry(reader, inner_writer), _carry(inner_reader, writer))
+
+
+def _closing(head: bytes) -> bytes:
+    """Every page request has a connection of its own, so that each one passes the door; a websocket keeps its own."""
+    if re.search(rb"(?im)^upgrade:", head):
+        return head
+    without = re.sub(rb"(?im)^connection:[^\r\n]*\r\n", b"", head)
+    return without[:-2] + b"Connection: close\r\n\r\n"
+
+
+def _answer(status: HTTPStatus, text: str) -> bytes:
+    """An answer without a page; the cookie goes with the way on."""
+    extra = f"Set-Cookie: {text}\r\nLocation: /\r\n" if status is HTTPStatus.SEE_OTHER else ""
+    body = b"" if extra else f"{status.value} {status.phrase}: {text}\n".encode()
+    head = f"HTTP/1.1 {status.value} {status.phrase}\r\n{extra}Content-Type: text/plain; charset=utf-8\r\n"
+    return f"{head}Content-Length: {len(body)}\r\nConnection: close\r\n\r\n".encode() + body
+
+
+async def _carry(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    with contextlib.suppress(OSError):
+        while block := await reader.read(_BLOCK):
+            writer.write(block)
+            await writer.drain()
+    with contextlib.suppress(OSError):
+        writer.close()

@@ -1,0 +1,115 @@
+"""The page: viser behind the door, fed with messages."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from io import StringIO
+from types import TracebackType
+from typing import Self
+
+import viser
+from viser import _messages
+
+from sessions.guided.operator import Ask
+from tactile_lab.errors import DeviceError
+from tactile_lab.view.controls import Controls
+from tactile_lab.view.drawing import Drawing
+from tactile_lab.view.gate import Gate, inner_address, is_loopback, serve
+from tactile_lab.view.scene import Scene
+
+
+class Page:
+    """A page that shows a scene.
+
+    Args:
+        address, port: where it listens; port 0 takes a free one.
+        token: what a visitor has to show; needed for any address but the loopback interface's.
+        title: of the page.
+        press: called with what was pressed, in another thread; None where there is nothing to ask for.
+    """
+
+    def __init__(
+        self, address: str, port: int, token: str, title: str, press: Callable[[Ask, str], None] | None = None
+    ) -> None:
+        if not token and not is_loopback(address):
+            raise DeviceError(
+                "a token is needed to listen there", where=address, hint="Listen on 127.0.0.1, or --token"
+            )
+        self._door, self._token = (address, port), token
+        with redirect_stdout(StringIO()):  # viser greets on standard output
+            self._inner = viser.ViserServer(host=inner_address(), port=0, label=title, verbose=False)
+        refuse_tunnels(self._inner)
+        self._inner.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+        self._inner.gui.set_panel_label(title)
+        self.scene = Scene()
+        self._drawing = Drawing(self._inner)
+        self._controls = Controls(self._inner, press or (lambda ask, text: None), live=press is not None)
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name="door", daemon=True)
+        self._server: asyncio.Server | None = None
+        self.url = ""
+        """Where the page is, token and all."""
+
+    def __enter__(self) -> Self:
+        """Open the door. Raises DeviceError when the address can not be taken."""
+        self._thread.start()
+        address, port = self._door
+        inner = (self._inner.get_host(), self._inner.get_port())
+        gate = Gate(_names(address), self._token)
+        opened = asyncio.run_coroutine_threadsafe(serve(gate, address, port, inner), self._loop)
+        try:
+            server = opened.result(10)
+        except (OSError, TimeoutError) as error:
+            self.close()
+            raise DeviceError(f"can not listen on port {port} ({error})", where=address) from error
+        self._server = server
+        bound = server.sockets[0].getsockname()[1]
+        shown = f"[{address}]" if ":" in address else address
+        self.url = f"http://{shown}:{bound}/" + (f"?token={self._token}" if self._token else "")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Nobody can see the page any more."""
+        if self._server is not None:
+            self._loop.call_soon_threadsafe(self._server.close)
+        asyncio.run_coroutine_threadsafe(_end_visits(), self._loop).result(2.0)
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(2.0)
+        self._loop.close()
+        with redirect_stdout(StringIO()):
+            self._inner.stop()
+
+    def draw(self) -> None:
+        """Show what has changed in the scene."""
+        if self.scene.changed:
+            self._drawing.draw(self.scene)
+            self._controls.draw(self.scene)
+
+
+def refuse_tunnels(server: viser.ViserServer) -> None:
+    """A visitor of viser's page may ask for a public address of it: not here."""
+    for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
+        server._websock_server.unregister_handler(message)
+
+
+async def _end_visits() -> None:
+    """Nobody is carried any further."""
+    others = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
+    for task in others:
+        task.cancel()
+    await asyncio.gather(*others, return_exceptions=True)
+
+
+def _names(address: str) -> frozenset[str]:
+    """By what names a page at an address may be called."""
+    if is_loopback(address):
+        return frozenset({address, "localhost", "127.0.0.1", "::1"})
+    return frozenset({address.lower()})

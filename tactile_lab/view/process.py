@@ -1,0 +1,77 @@
+"""The page's process: settings and messages come on standard input, what is pressed goes out on standard output.
+
+It ends when its input does, so that no page outlives its session.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import sys
+import threading
+from typing import Any, BinaryIO
+
+from sessions.guided.operator import Ask
+from tactile_lab.errors import TactileLabError
+
+DRAW_PERIOD_s = 0.1
+
+
+class Mouth:
+    """Says lines on what was standard output; whatever a library prints goes nowhere."""
+
+    def __init__(self) -> None:
+        self._out: BinaryIO = os.fdopen(os.dup(1), "wb", buffering=0)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.close(nowhere)
+        self._lock = threading.Lock()
+
+    def say(self, **content: Any) -> None:
+        """One line of JSON."""
+        with self._lock:
+            self._out.write(json.dumps(content).encode() + b"\n")
+
+
+def main() -> int:
+    """Show what comes in until it ends; 1 when the page can not be opened."""
+    mouth = Mouth()
+    settings = json.loads(sys.stdin.buffer.readline())
+    from tactile_lab.view.page import Page
+
+    def press(ask: Ask, text: str) -> None:
+        mouth.say(ask=ask.value, text=text)
+
+    try:
+        with Page(**settings, press=press) as page:
+            mouth.say(url=page.url)
+            _show(page)
+    except TactileLabError as error:
+        mouth.say(problem=str(error))
+        return 1
+    return 0
+
+
+def _show(page: Any) -> None:
+    """Take messages in one thread, draw in this one."""
+    lock, ended = threading.Lock(), threading.Event()
+
+    def take() -> None:
+        try:
+            for line in sys.stdin.buffer:
+                message = json.loads(line)
+                with lock:
+                    page.scene.take(message["topic"], base64.b64decode(message["data"]), int(message["stamp_ns"]))
+                    page.scene.dropped = int(message["dropped"])
+        finally:
+            ended.set()
+
+    threading.Thread(target=take, daemon=True).start()
+    while not ended.wait(DRAW_PERIOD_s):
+        with lock:
+            page.draw()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

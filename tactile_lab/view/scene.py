@@ -1,0 +1,208 @@
+"""What a session looks like, put together from the messages that viewers are given."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from gtsam import Pose3, Rot3
+
+from sessions import schemas
+from tactile_lab.geometry.contacts import Array
+
+PALM = "palm"
+MESSAGES = 6
+"""So many of the last events are shown."""
+
+
+@dataclass(frozen=True)
+class ShownGrasp:
+    """The contacts of one grasp.
+
+    Attributes:
+        index: from 0.
+        fingers: of the contacts.
+        points_world_m, normals_world: shape (n, 3), as measured.
+        forces_N: shape (n,).
+        world_T_object: the pose that the estimation gave the grasp; None before it did.
+    """
+
+    index: int
+    fingers: tuple[str, ...]
+    points_world_m: Array
+    normals_world: Array
+    forces_N: Array
+    world_T_object: Pose3 | None = None
+
+    @property
+    def points_object_m(self) -> Array | None:
+        """The contacts in the object frame, shape (n, 3)."""
+        if self.world_T_object is None:
+            return None
+        return np.array([self.world_T_object.transformTo(point) for point in self.points_world_m]).reshape(-1, 3)
+
+
+@dataclass(frozen=True)
+class ShownSurface:
+    """The estimated surface in the object frame: vertices (n, 3), faces (m, 3), standard deviation (n,)."""
+
+    dimension: int
+    vertices_m: Array
+    faces: Any
+    sigma_m: Array
+    explored: float
+    origin_height_m: float
+
+
+@dataclass
+class Scene:
+    """The newest of everything.
+
+    Attributes:
+        world_T_palm, world_T_distal: the hand.
+        loads_N: contact force of each fingertip; None where there is no usable reading.
+        grasps: the contacts so far.
+        world_T_object, covariance: the pose, and that of its x, y (m) and yaw (rad).
+        surface: as estimated.
+        plan: the next grasp, as :func:`sessions.view_messages.plan_message` gives it.
+        steps: what the estimation said of each grasp.
+        guide: what the person of a guided session is shown.
+        messages: the newest events.
+        stamp_ns: session clock of the newest message.
+        dropped: messages that were left out because the page did not keep up.
+        changed: names of the attributes that changed since they were drawn.
+    """
+
+    world_T_palm: Pose3 | None = None
+    world_T_distal: dict[str, Pose3] = field(default_factory=dict)
+    loads_N: dict[str, float | None] = field(default_factory=dict)
+    grasps: list[ShownGrasp] = field(default_factory=list)
+    world_T_object: Pose3 | None = None
+    covariance: Array | None = None
+    surface: ShownSurface | None = None
+    plan: dict[str, Any] = field(default_factory=dict)
+    steps: dict[int, dict[str, Any]] = field(default_factory=dict)
+    guide: dict[str, Any] = field(default_factory=dict)
+    messages: list[str] = field(default_factory=list)
+    stamp_ns: int = 0
+    dropped: int = 0
+    changed: set[str] = field(default_factory=set)
+
+    def take(self, topic: str, data: bytes, stamp_ns: int) -> None:
+        """Take one message; topics that are not shown change nothing. Raises ValueError for content of another form."""
+        read = _READERS.get(topic)
+        if read is None:
+            return
+        self.stamp_ns = max(self.stamp_ns, stamp_ns)
+        try:
+            read(self, json.loads(data))
+        except (KeyError, TypeError, AttributeError, IndexError) as error:
+            raise ValueError(f"{topic}: {error!r}") from error
+
+
+def _hand(scene: Scene, content: dict[str, Any]) -> None:
+    for item in content["transforms"]:
+        pose = _pose(item["translation"], item["rotation"])
+        if item["child_frame_id"] == PALM:
+            scene.world_T_palm = pose
+        else:
+            scene.world_T_distal[item["child_frame_id"]] = pose
+    scene.changed.add("hand")
+
+
+def _loads(scene: Scene, content: dict[str, Any]) -> None:
+    scene.loads_N = {str(finger): load_N for finger, load_N in content["load_N"].items()}
+    scene.changed.add("hand")
+
+
+def _grasp(scene: Scene, content: dict[str, Any]) -> None:
+    contacts, index = content["contacts"], int(content["index"])
+    shown = ShownGrasp(
+        index=index,
+        fingers=tuple(contact["finger"] for contact in contacts),
+        points_world_m=np.array([contact["point_world_m"] for contact in contacts], dtype=float).reshape(-1, 3),
+        normals_world=np.array([contact["normal_world"] for contact in contacts], dtype=float).reshape(-1, 3),
+        forces_N=np.array([contact["force_N"] for contact in contacts], dtype=float),
+    )
+    scene.grasps = [*(grasp for grasp in scene.grasps if grasp.index < index), shown]
+    scene.changed.add("grasps")
+
+
+def _slam_pose(scene: Scene, content: dict[str, Any]) -> None:
+    scene.world_T_object = _pose(content["pose"]["position"], content["pose"]["orientation"])
+    scene.changed.add("object")
+
+
+def _slam_state(scene: Scene, content: dict[str, Any]) -> None:
+    """The state follows its pose: the newest grasp has been placed there, or grasps were taken back."""
+    index = int(content["index"])
+    covariance = content.get("covariance")
+    scene.covariance = None if covariance is None else np.array(covariance, dtype=float)
+    scene.steps = {number: step for number, step in scene.steps.items() if number < index} | {index: content}
+    placed = [_placed(grasp, scene) if grasp.index == index else grasp for grasp in scene.grasps]
+    scene.grasps = [grasp for grasp in placed if grasp.index <= index]
+    scene.changed |= {"object", "grasps"}
+
+
+def _placed(grasp: ShownGrasp, scene: Scene) -> ShownGrasp:
+    return ShownGrasp(
+        grasp.index, grasp.fingers, grasp.points_world_m, grasp.normals_world, grasp.forces_N, scene.world_T_object
+    )
+
+
+def _surface(scene: Scene, content: dict[str, Any]) -> None:
+    scene.surface = ShownSurface(
+        dimension=int(content["dimension"]),
+        vertices_m=np.array(content["vertices_m"], dtype=float).reshape(-1, 3),
+        faces=np.array(content["faces"], dtype=int).reshape(-1, 3),
+        sigma_m=np.array(content["sigma_m"], dtype=float),
+        explored=float(content["explored"]),
+        origin_height_m=float(content["origin_height_m"]),
+    )
+    scene.changed.add("object")
+
+
+def _plan(scene: Scene, content: dict[str, Any]) -> None:
+    scene.plan = content
+    scene.changed.add("plan")
+
+
+def _guide(scene: Scene, content: dict[str, Any]) -> None:
+    scene.guide = content
+    scene.changed.add("guide")
+
+
+def _event(scene: Scene, content: dict[str, Any]) -> None:
+    scene.messages = [*scene.messages, str(content["message"])][-MESSAGES:]
+    scene.changed.add("guide")
+
+
+_READERS = {
+    schemas.TRANSFORMS_TOPIC: _hand,
+    schemas.LOADS_TOPIC: _loads,
+    schemas.CONTACTS_TOPIC: _grasp,
+    schemas.SLAM_POSE_TOPIC: _slam_pose,
+    schemas.SLAM_STATE_TOPIC: _slam_state,
+    schemas.SLAM_SURFACE_TOPIC: _surface,
+    schemas.PLAN_TOPIC: _plan,
+    schemas.GUIDE_TOPIC: _guide,
+    schemas.EVENTS_TOPIC: _event,
+}
+SHOWN_TOPICS = frozenset(_READERS)
+"""What a page needs to be given."""
+
+
+def _pose(position: dict[str, float], rotation: dict[str, float]) -> Pose3:
+    rotated = Rot3.Quaternion(rotation["w"], rotation["x"], rotation["y"], rotation["z"])
+    return Pose3(rotated, np.array([position["x"], position["y"], position["z"]]))
+
+
+def ellipse(covariance: Array, sigmas: float = 2.0, points: int = 48) -> Array:
+    """Outline of the uncertainty of x, y about the origin, shape (points, 2), metres."""
+    values, vectors = np.linalg.eigh(covariance[:2, :2])
+    turns = np.linspace(0.0, 2.0 * math.pi, points)
+    circle = np.column_stack([np.cos(turns), np.sin(turns)])
+    return np.asarray(sigmas * circle * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
