@@ -6,7 +6,7 @@ What a grasp z tells about the pose x and the shape f is, by the chain rule, ``I
   what it becomes, and the precision G at which the pose is good enough (its finer digits are nobody's gain):
   ``log det(1 + P / G) / 2 - log det(1 + P' / G) / 2``, ``P' = (1 / P + J' J / r)^-1``. Here r is the variance of a
   contact *on an uncertain surface*: where the surface is not known, a contact says nothing about the pose.
-- The second is summed over the surface: every patch of the size that one contact tells about (``reach_m``) hides a
+- The second is summed over the surface: every patch of the size that one contact tells about (``reach``) hides a
   deviation of its own, beside what the field is uncertain about, until a contact has been there. A contact reveals it
   up to the sensor's noise and the pose's remaining uncertainty.
 
@@ -51,7 +51,7 @@ class InformationSettings(StrictModel):
     Attributes:
         worlds, worlds_in_space: how many are sampled for a decision, for a contour and for a surface.
         execution: how well the hand does what is planned.
-        reach_m: so far along the surface a contact tells about it.
+        reach_m, reach_in_space_m: so far along a contour, or a surface, a contact tells about it.
         detail_m: standard deviation of what the field does not foresee between contacts (edges, corners).
         point_sigma_m, normal_sigma_rad: of a contact's measurement.
         pose_sigma_m: a pose known to this (a turn with an arm of 30 mm) is good enough.
@@ -66,6 +66,7 @@ class InformationSettings(StrictModel):
     worlds_in_space: int = Field(default=24, ge=1)
     execution: ExecutionNoise = ExecutionNoise()
     reach_m: float = Field(default=0.0045, gt=0)
+    reach_in_space_m: float = Field(default=0.012, gt=0)
     detail_m: float = Field(default=0.003, ge=0)
     point_sigma_m: float = Field(default=0.001, gt=0)
     normal_sigma_rad: float = Field(default=float(np.deg2rad(5.0)), gt=0)
@@ -75,6 +76,10 @@ class InformationSettings(StrictModel):
     least_gain: float = Field(default=0.0, ge=0)
     known_sigma_m: float | None = Field(default=None, gt=0)
     enough: float = Field(default=0.9, gt=0, le=1)
+
+    def reach(self, dimension: int) -> float:
+        """How far a contact tells about a contour (2) or a surface (3), metres."""
+        return self.reach_m if dimension == 2 else self.reach_in_space_m
 
 
 @dataclass(frozen=True)
@@ -144,7 +149,8 @@ class InformationPolicy:
         limit = self.settings.known_sigma_m
         if limit is None or float(np.quantile(surface.sigma_m, self.settings.enough)) > limit:
             return ""
-        share = float(surface.sizes[~unexplored(surface, belief, self.settings.reach_m)].sum() / surface.sizes.sum())
+        fresh = unexplored(surface, belief, self.settings.reach(belief.dimension))
+        share = float(surface.sizes[~fresh].sum() / surface.sizes.sum())
         if share < self.settings.enough:
             return ""
         return f"{100 * share:.0f} % of the surface has been touched and it is known to {1e3 * limit:.3g} mm"
@@ -170,11 +176,12 @@ def promised(
     worlds = possible_worlds(belief, surface, most_fingers(candidates), count, settings.execution, rng)
     touches = expected_touches(candidates, belief, worlds)
     pose, placed = _pose_information(touches, belief, worlds, settings)
-    fresh, patches = unexplored(surface, belief, settings.reach_m), _patches(surface, settings.reach_m)
-    chance = covered_chance(touches, surface, settings.reach_m)
+    reach_m = settings.reach(belief.dimension)
+    fresh, patches = unexplored(surface, belief, reach_m), _patches(surface, reach_m)
+    chance = covered_chance(touches, surface, reach_m)
     hidden = surface.sigma_m**2 + settings.detail_m**2
     worth = 0.5 * np.log1p(hidden / (settings.point_sigma_m**2 + placed[:, None])) * fresh * patches
-    worth = worth * _hope(surface, belief, settings.reach_m)
+    worth = worth * _hope(surface, belief, reach_m)
     new_share = chance @ (fresh * surface.sizes) / surface.sizes.sum()
     touching = touches.touching.sum(axis=2).mean(axis=1)
     return Promise(pose, np.sum(chance * worth, axis=1), touching, chance, worth, new_share)
@@ -261,7 +268,7 @@ def _log_det(scaled: Array) -> Array:
 
 def _told_by_normals(surface: Surface, touches: ExpectedTouches, met: Mask, settings: InformationSettings) -> Array:
     """Precision that measured normals add to the heading, shape (c, s), 1/rad^2; slopes are uncertain too."""
-    slope_rad = np.minimum(surface.sigma_m[touches.vertices] / (2 * settings.reach_m), 1.0)
+    slope_rad = np.minimum(surface.sigma_m[touches.vertices] / (2 * settings.reach(surface.points_m.shape[1])), 1.0)
     level = np.linalg.norm(surface.normals[touches.vertices][..., :2], axis=-1)
     return np.asarray(np.sum(met * level**2 / (settings.normal_sigma_rad**2 + slope_rad**2), axis=2))
 

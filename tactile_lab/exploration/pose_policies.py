@@ -8,7 +8,7 @@ det (4.21), KL (4.6), or mutual information (4.5).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pydantic import Field
@@ -17,6 +17,7 @@ from tactile_lab.exploration.candidates import Candidate
 from tactile_lab.exploration.information.distributions import kl_divergence, mutual_information
 from tactile_lab.exploration.information.particles import determinant, weighted_covariance
 from tactile_lab.exploration.policy import Belief, Decision, Policy, best_of, nothing_to_choose
+from tactile_lab.exploration.prediction import sampled_poses
 from tactile_lab.exploration.surface_policies import expected_contacts
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import FieldGrid
@@ -97,8 +98,8 @@ class PoseSwitchPolicy:
         if settled := nothing_to_choose(self.name, candidates, belief):
             return settled
         uncertain = determinant(belief.pose_covariance) > self.settings.threshold
-        if not uncertain or belief.surface is None or len(belief.particles) < 2:
-            return self._for_shape(candidates, belief, rng, uncertain)
+        if not uncertain or belief.surface is None:
+            return self._for_shape(candidates, belief, rng)
         scores = self._pose_scores(candidates, belief, rng)
         x_mm, y_mm, yaw_deg = np.sqrt(np.maximum(np.diag(belief.pose_covariance), 0)) * [1e3, 1e3, 180 / np.pi]
         reason = (
@@ -106,19 +107,15 @@ class PoseSwitchPolicy:
         )
         return best_of(self.name, scores, reason, rng)
 
-    def _for_shape(
-        self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator, uncertain: bool
-    ) -> Decision:
+    def _for_shape(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Decision:
         chosen = self.otherwise.choose(candidates, belief, rng)
-        why = "nothing tells how the pose spreads" if uncertain else "the pose is known well enough"
-        return Decision(
-            self.name, chosen.outcome, chosen.chosen, chosen.scores, f"{why}: {chosen.reason}", chosen.promised_gain
-        )
+        reason = f"the pose is known well enough: {chosen.reason}" if belief.surface is not None else chosen.reason
+        return replace(chosen, policy=self.name, reason=reason)
 
     def _pose_scores(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Array:
         assert belief.surface is not None
-        chosen = rng.choice(len(belief.particles), self.settings.particles, p=belief.weights / belief.weights.sum())
-        rows, before = belief.particles[chosen], np.full(self.settings.particles, 1.0 / self.settings.particles)
+        count = self.settings.particles
+        rows, before = sampled_poses(belief, count, rng), np.full(count, 1.0 / count)
         known = _known(belief, self.settings)
         measurement = CalibratedMeasurement(self.settings.likelihood)
         scores = np.full(len(candidates), -np.inf)

@@ -107,14 +107,14 @@ def possible_worlds(
     return PossibleWorlds(
         surface=surface,
         corners_m=surface.points_m + moves[..., None] * surface.normals,
-        world_T_object=_sampled_poses(belief, count, rng),
+        world_T_object=sampled_poses(belief, count, rng),
         palm_errors=palm,
         finger_errors_m=noise.finger_m * rng.normal(size=(count, fingers, 2)),
     )
 
 
-def _sampled_poses(belief: Belief, count: int, rng: np.random.Generator) -> Array:
-    """From the particles, or from the Gaussian about the pose where there are none."""
+def sampled_poses(belief: Belief, count: int, rng: np.random.Generator) -> Array:
+    """Rows (x m, y m, yaw rad) from the particles, or from the Gaussian about the pose where there are none."""
     if len(belief.particles):
         places = np.searchsorted(np.cumsum(belief.weights), rng.random(count) * belief.weights.sum())
         return np.asarray(belief.particles[np.minimum(places, len(belief.particles) - 1)])

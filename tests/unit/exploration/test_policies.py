@@ -119,8 +119,8 @@ def test_the_switch_acts_for_the_pose_only_while_it_is_uncertain(half_known: Bel
         decision = choose(name, sure)
         assert decision.reason.startswith("the pose is known well enough")
         assert decision.chosen == choose("variance", sure).chosen
-        blind = replace(half_known, particles=np.empty((0, 3)), weights=np.empty(0))
-        assert choose(name, blind).reason.startswith("nothing tells how the pose spreads")
+        gaussian = replace(half_known, particles=np.empty((0, 3)), weights=np.empty(0))
+        assert choose(name, gaussian).reason.startswith("the pose is uncertain")
 
 
 def test_the_threshold_is_the_determinant_of_a_pose_known_so_well() -> None:
