@@ -17,10 +17,13 @@ def record_fingertips(recorder: Recorder, now_ns: int, tips: Mapping[str, Finger
         if isinstance(tip, ForceTip) and tip.newest is not None:
             recorder.wrench(now_ns, finger, tip.newest)
         elif isinstance(tip, BioTac) and tip.channels.heard:
-            recorder.biotac(now_ns, finger, _counts(tip), tip.channels.vibration)
+            recorder.biotac(now_ns, finger, biotac_counts(tip) or {}, tip.channels.vibration)
 
 
-def _counts(tip: BioTac) -> dict[str, int | None]:
+def biotac_counts(tip: FingertipSensor) -> dict[str, int | None] | None:
+    """The newest counts of a BioTac by channel (PDC, TAC, TDC, E1 ...), None where not heard; None for another tip."""
+    if not isinstance(tip, BioTac):
+        return None
     names = {"PDC": Channel.PDC, "TAC": Channel.TAC, "TDC": Channel.TDC}
     electrodes = {f"E{n}": electrode_channel(n) for n in range(1, tip.calibration.electrodes + 1)}
     return {name: _newest(tip, int(channel)) for name, channel in {**names, **electrodes}.items()}

@@ -227,12 +227,17 @@ def main() -> None:
     parser.add_argument("status", type=Path)
     parser.add_argument("settings", help="LoadSettings as JSON")
     options = parser.parse_args()
+    before_s = _cpu_s()
     try:
         run_load(options.root, LoadSettings(**json.loads(options.settings)), options.status)
     except SessionError as error:
         sys.exit(str(error))
+    options.status.with_suffix(".cpu").write_text(str(_cpu_s() - before_s))
+
+
+def _cpu_s() -> float:
     usage = resource.getrusage(resource.RUSAGE_SELF)
-    options.status.with_suffix(".cpu").write_text(str(usage.ru_utime + usage.ru_stime))
+    return usage.ru_utime + usage.ru_stime
 
 
 if __name__ == "__main__":

@@ -66,6 +66,8 @@ class Interpreter:
         """The newest sample of each link that gave one, and when it came."""
         self.undecodable: Counter[str] = Counter()
         """Datagrams that broke their protocol, by link."""
+        self.listener: Callable[[str, Any], None] | None = None
+        """Is told every sample with the name of its link, after Perception."""
         self._routes: dict[str, Callable[[Datagram], None]] = {
             HAND_LINK: self._route(HAND_LINK, hand, perception.on_hand),
             BASE_LINK: self._route(BASE_LINK, base, perception.on_base),
@@ -100,6 +102,8 @@ class Interpreter:
             if not (isinstance(sample, list) and not sample):  # a message may hold no reading
                 self.newest[link] = Heard(datagram.stamp_ns, sample)
             take(sample)
+            if self.listener is not None:
+                self.listener(link, sample)
 
         return route
 

@@ -21,9 +21,11 @@ from collections.abc import Iterable, Iterator
 from sessions import schemas
 from sessions.interpreter import Interpreter
 from sessions.marks import Mark
+from sessions.pacing import AS_FAST_AS_POSSIBLE, paced
 from sessions.perception import Outcome, Undone
 from sessions.session import Session
 from sessions.traffic_reader import Loss, TrafficReader
+from tactile_lab.clock import Clock, MonotonicClock
 from tactile_lab.geometry.contacts import Grasp
 
 
@@ -44,12 +46,22 @@ class Replay:
     Args:
         source: the session, or its traffic file.
         interpreter: a fresh one, as the session's own was.
+        speed: 1 for the original pace, 4 for four times as fast, 0 (the default) as fast as possible.
+        clock: waits where a pace is asked for.
 
     Raises:
         SessionError: the traffic file can not be used.
     """
 
-    def __init__(self, source: Session | TrafficReader, interpreter: Interpreter) -> None:
+    def __init__(
+        self,
+        source: Session | TrafficReader,
+        interpreter: Interpreter,
+        speed: float = AS_FAST_AS_POSSIBLE,
+        clock: Clock | None = None,
+    ) -> None:
+        self._speed, self._clock = speed, clock or MonotonicClock()
+        self._span_ns = self._taken_ns = 0
         self._reader = source.traffic() if isinstance(source, Session) else source
         self._interpreter = interpreter
 
@@ -58,13 +70,21 @@ class Replay:
         """What could not be read; complete after :meth:`outcomes` has ended."""
         return self._reader.loss
 
+    @property
+    def factor(self) -> float:
+        """How many times faster than at the original pace the bytes were read; 0 before they were."""
+        return self._span_ns / self._taken_ns if self._taken_ns else 0.0
+
     def outcomes(self) -> Iterator[Outcome]:
         """The grasps, camera frames and tare reports, in the order in which they came about.
 
         Raises:
             SessionError: a mark can not be understood.
         """
-        for message in self._reader.messages():
+        begun_ns, first_ns = self._clock.now_ns(), None
+        for message in paced(self._reader.messages(), self._speed, self._clock):
+            first_ns = message.stamp_ns if first_ns is None else first_ns
+            self._span_ns, self._taken_ns = message.stamp_ns - first_ns, self._clock.now_ns() - begun_ns
             if message.topic == schemas.MARKS_TOPIC:
                 mark = Mark.from_bytes(message.data, where=str(self._reader.path))
                 if (outcome := self._interpreter.mark(mark)) is not None:

@@ -169,7 +169,12 @@ def transmitted_topic(link: str) -> str:
 
 def received_link(topic: str) -> str | None:
     """Name of the link whose received bytes a topic carries; None for any other topic."""
-    return topic[len("/link/") : -len("/rx")] if topic.startswith("/link/") and topic.endswith("/rx") else None
+    return link_of(topic) if is_raw(topic) and topic.endswith("/rx") else None
+
+
+def link_of(topic: str) -> str:
+    """Name of the link of a topic that carries bytes."""
+    return topic.removeprefix("/link/").rpartition("/")[0]
 
 
 def pose_in_frame(stamp_ns: int, frame: str, frame_T_object: Pose3) -> Json:

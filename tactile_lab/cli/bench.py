@@ -16,6 +16,7 @@ class Part(StrEnum):
     PATHS = "paths"
     ETHERCAT = "ethercat"
     LOAD = "load"
+    RECORDER = "recorder"
 
 
 def bench(
@@ -23,10 +24,11 @@ def bench(
         Part,
         typer.Option(
             help="paths: costly parts of a step; ethercat: both masters on the emulated hand, and their recoveries; "
-            "load: five force sensors at 7 kHz and the hand at 1 kHz."
+            "load: five force sensors at 7 kHz and the hand at 1 kHz; "
+            "recorder: hand and five force sensors at 1 kHz and 30 pictures a second, recorded."
         ),
     ] = Part.PATHS,
-    seconds: Annotated[float, typer.Option(min=1.0, help="Duration of ethercat and load.")] = 30.0,
+    seconds: Annotated[float, typer.Option(min=1.0, help="Duration of ethercat, load and recorder.")] = 30.0,
     with_hand: Annotated[bool, typer.Option("--hand/--no-hand", help="With load: the hand too.")] = True,
     as_json: Json = False,
     no_input: NoInput = False,
@@ -41,6 +43,8 @@ def bench(
             _ethercat(seconds, as_json)
         case Part.LOAD:
             _load(seconds, with_hand, as_json)
+        case Part.RECORDER:
+            _recorder(seconds, as_json)
         case Part.PATHS:
             _paths(as_json)
 
@@ -90,6 +94,20 @@ def _load(seconds: float, with_hand: bool, as_json: bool) -> None:
     say(f"memory: {result.memory_MB:.0f} MB, growing by {result.memory_slope_MB_per_min:.2f} MB a minute")
     if result.hand:
         say(f"hand: {result.hand}")
+
+
+def _recorder(seconds: float, as_json: bool) -> None:
+    from dataclasses import asdict
+
+    from sessions.recorder_bench import measure_recorder
+    from tactile_lab.cli.console import emit_json, show_facts
+
+    found = measure_recorder(seconds)
+    if as_json:
+        emit_json(asdict(found))
+        return
+    facts = {name.replace("_", " "): f"{value:g}" for name, value in asdict(found).items()}
+    show_facts(f"Recorder at full load for {seconds:g} s", facts.items())
 
 
 def _ms(value: float | None) -> str:

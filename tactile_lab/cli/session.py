@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tactile_lab.cli import session_files
 from tactile_lab.cli.options import METHOD_HELP, Json, Method, NoInput, Root, SessionName
 
 if TYPE_CHECKING:
     from sessions.session import Session
 
 app = typer.Typer(help="Recorded sessions: list them, look at one, understand one again.", no_args_is_help=True)
+app.command("extract")(session_files.extract)
+app.command("export")(session_files.export)
+app.command("import")(session_files.bring_in)
 
 
 @app.command("list")
@@ -58,6 +62,9 @@ def replay(
     seed: Annotated[
         int | None, typer.Option(min=0, help="Seed of the estimation.", show_default="the session's")
     ] = None,
+    speed: Annotated[
+        float, typer.Option(min=0.0, help="1: the original pace; 4: four times as fast; 0: as fast as possible.")
+    ] = 0.0,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -66,6 +73,7 @@ def replay(
     A session that was killed before it had results gets them by its first replay, in its own folder of results.
     """
     from sessions.listing import find_session
+    from tactile_lab.cli.console import say
     from tactile_lab.cli.progress import LiveProgress
     from tactile_lab.cli.results import conclude
     from tactile_lab.workflow.judging import has_results
@@ -79,33 +87,13 @@ def replay(
     settings = own if same else slam_settings(method or own.method, dimension or own.dimension, own.motion)
     comparable = same and has_results(recorded)
     out = into or (recorded.folder / "replay" if comparable or not same else recorded.results)
+    chosen = recorded_seed(recorded) if seed is None else seed
     with LiveProgress(f"replay of {recorded.folder}") as progress:
-        finished = replay_session(recorded, settings, recorded_seed(recorded) if seed is None else seed, out, progress)
+        finished = replay_session(recorded, settings, chosen, out, progress, speed)
     identical = _tell_identity(recorded, out) if comparable and not finished.unread else None
-    conclude(finished, as_json, {"identical": identical})
-
-
-@app.command("export")
-def export(
-    session: SessionName,
-    contacts: Annotated[Path, typer.Option(help="The contact log to write, a JSON file (tactile-contacts/1).")],
-    root: Root = Path("runs"),
-    dimension: Annotated[int | None, typer.Option(min=2, max=3, help="2 or 3.", show_default="the session's")] = None,
-    as_json: Json = False,
-    no_input: NoInput = False,
-) -> None:
-    """Write a session's grasps as a contact log, with the truth where it is known; see 'reconstruct'."""
-    from sessions.listing import find_session
-    from tactile_lab.cli.console import emit_json, say
-    from tactile_lab.workflow.exporting import export_contacts
-
-    del no_input
-    log = export_contacts(find_session(root, session), contacts, dimension)
-    touched = sum(len(grasp.contacts) for grasp in log.grasps)
-    if as_json:
-        emit_json({"log": str(contacts), "dimension": log.dimension, "grasps": len(log.grasps), "contacts": touched})
-    else:
-        say(f"{len(log.grasps)} grasps with {touched} contacts: {contacts}")
+    factor = finished.read_factor or 0.0
+    say(f"bytes read {factor:.3g} times as fast as they were recorded")
+    conclude(finished, as_json, {"identical": identical, "read_factor": round(factor, 3)})
 
 
 @app.command("recover")

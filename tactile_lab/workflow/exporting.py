@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from sessions.archives import export_archive
 from sessions.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
 from sessions.manifest import write_whole
 from sessions.replay import Replay, kept_grasps
+from sessions.sample_tables import SampleTables, read_tables
 from sessions.session import Session
 from tactile_lab.errors import SessionError
 from tactile_lab.geometry.contacts import Contact
@@ -76,3 +78,39 @@ def _truth(session: Session, path: Path) -> ObjectTruth:
     except OSError as error:
         raise SessionError(f"can not be written ({error.strerror})", where=str(path), hint="Check the path") from error
     return ObjectTruth(name=name, mesh=path.with_suffix(".ply").name)
+
+
+def export_csv(session: Session, folder: Path) -> int:
+    """All samples as CSV tables; gives their rows. Raises SessionError."""
+    from sessions.table_files import write_csv
+
+    return write_csv(_tables(session), folder)
+
+
+def export_hdf5(session: Session, path: Path) -> int:
+    """All samples as one HDF5 file; gives their rows. Raises SessionError."""
+    from sessions.table_files import write_hdf5
+
+    return write_hdf5(_tables(session), path)
+
+
+def export_rosbag(session: Session, folder: Path) -> int:
+    """All samples as a ROS 2 bag; gives their number. Raises SessionError, or ConfigurationError without rosbags."""
+    from sessions.ros_bag import write_ros_bag
+
+    return write_ros_bag(_tables(session), folder)
+
+
+def _tables(session: Session) -> SampleTables:
+    return read_tables(session.traffic(), build_interpreter(rig_of_session(session)))
+
+
+EXPORTS: Mapping[str, Callable[[Session, Path], int]] = {
+    "csv": export_csv,
+    "hdf5": export_hdf5,
+    "rosbag": export_rosbag,
+    "archive": export_archive,
+}
+"""Ways to write a whole session, by name."""
+UNITS = {"csv": "rows", "hdf5": "rows", "rosbag": "messages", "archive": "files"}
+"""What each of them counts."""

@@ -6,26 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from gtsam import Pose3
-
-from drivers.camera.aruco import ObjectTracker
 from drivers.camera.calibration import load_camera
-from drivers.camera.camera import Camera
 from drivers.camera.markers import MarkerSettings
-from drivers.links import Datagram, ReplayLink
 from sessions.conductor import SessionOutcome
-from sessions.interpreter import CAMERA_LINK
 from sessions.manifest import write_whole
 from sessions.progress import NullProgress, Progress
 from sessions.session import RESULTS, Session
 from sessions.traffic_reader import Loss
 from tactile_lab import report
-from tactile_lab.clock import VirtualClock
+from tactile_lab.calibration_file import load_parameters
 from tactile_lab.errors import SessionError, TactileLabError
 from tactile_lab.evaluation.evaluation import Evaluation, Truth, evaluate
+from tactile_lab.evaluation.marker_truth import Basis, MarkerTruth, TruthReport
 from tactile_lab.evaluation.result_files import write_results
 from tactile_lab.evaluation.results import read_results
-from tactile_lab.evaluation.session_truth import TRUTH_TRAJECTORY, Look, session_truth
+from tactile_lab.evaluation.session_truth import TRUTH_TRAJECTORY, camera_datagrams, session_truth
 from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
 from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.rigs.description import OTHER_VERSION, Rig, rig_of_session
@@ -52,6 +47,7 @@ class FinishedSession:
         unread: what of the recording could not be read, in words; "" when all of it was.
         problem: why there is no evaluation, "" when there is one.
         overlooked: calibrations that were used though they should not be, in words.
+        read_factor: how many times faster than at the original pace a replay read the bytes; None for no replay.
     """
 
     folder: Path
@@ -62,6 +58,43 @@ class FinishedSession:
     unread: str = ""
     problem: str = ""
     overlooked: tuple[str, ...] = ()
+    read_factor: float | None = None
+
+
+@dataclass(frozen=True)
+class TruthChoice:
+    """With what the truth is computed; the session's own calibrations where none is named.
+
+    Attributes:
+        lens, markers: files of the camera's lens and of the markers.
+        basis: from the corners recorded with each frame, or from the pictures again.
+    """
+
+    lens: Path | None = None
+    markers: Path | None = None
+    basis: Basis = "corners"
+
+    @property
+    def is_recorded(self) -> bool:
+        """Whether this is what a session does by itself."""
+        return self.lens is None and self.markers is None and self.basis == "corners"
+
+
+def judge_results(session: Session, results: Path, choice: TruthChoice) -> tuple[Evaluation, TruthReport | None, str]:
+    """Judge one folder of results with a truth of one's choice; nothing is written.
+
+    Returns:
+        The evaluation, what the truth was worth (None without a camera), and what of the recording could not be read.
+
+    Raises:
+        ConfigurationError: a calibration can not be used.
+        SessionError: there are no results, or the recording can not be read.
+    """
+    traffic, count = session.traffic(), len(read_results(results).trajectory.stamps_s)
+    detector = marker_detector(session, rig_of_session(session), choice)
+    truth = session_truth(session, count, detector, traffic)
+    evaluation = evaluate(results, truth, session.manifest.object_name)
+    return evaluation, None if detector is None else detector.report, traffic.loss.describe()
 
 
 def evaluate_session(session: Session) -> FinishedSession:
@@ -139,18 +172,20 @@ def write_evaluation(out: Path, truth: Truth, object_name: str) -> Evaluation:
     return evaluation
 
 
-def marker_detector(session: Session, rig: Rig) -> Look | None:
-    """Finds the object in the session's recorded pictures; None for a rig without a camera."""
-    if "camera" not in rig.files:
+def marker_detector(session: Session, rig: Rig, choice: TruthChoice | None = None) -> MarkerTruth | None:
+    """Finds the object in what the session's camera sent; None for a rig without a camera.
+
+    Raises:
+        ConfigurationError: the chosen or recorded calibration can not be used.
+        SessionError: the recording can not be read.
+    """
+    choice = choice or TruthChoice()
+    if "camera" not in rig.files and choice.lens is None:
         return None
-    camera = Camera(ReplayLink(CAMERA_LINK, ()), VirtualClock())
     where = f"{session.folder}/session.yaml"
     recorded = session.manifest.settings.get("markers", {})
     markers = validate(recorded, MarkerSettings, where=where, hint=OTHER_VERSION)
-    tracker = ObjectTracker(load_camera(rig.files["camera"]), markers)
-
-    def look(datagram: Datagram) -> Pose3 | None:
-        sighting = tracker.object_pose(camera.receive(datagram))
-        return None if sighting is None else sighting.world_T_object
-
-    return look
+    if choice.markers is not None:
+        markers = load_parameters(choice.markers, MarkerSettings)
+    lens = load_camera(choice.lens or rig.files["camera"])
+    return MarkerTruth(lens, markers, camera_datagrams(session.traffic().messages()), choice.basis)

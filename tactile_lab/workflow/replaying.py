@@ -7,6 +7,7 @@ from pathlib import Path
 
 from gtsam import Pose3
 
+from sessions.pacing import AS_FAST_AS_POSSIBLE
 from sessions.progress import NullProgress, Progress
 from sessions.replay import Replay, kept_grasps
 from sessions.session import Session
@@ -28,7 +29,12 @@ from tactile_lab.workflow.judging import (
 
 
 def replay_session(
-    session: Session, settings: SlamSettings, seed: int, out: Path, progress: Progress | None = None
+    session: Session,
+    settings: SlamSettings,
+    seed: int,
+    out: Path,
+    progress: Progress | None = None,
+    speed: float = AS_FAST_AS_POSSIBLE,
 ) -> FinishedSession:
     """Understand a recorded session again from its raw bytes, and judge it.
 
@@ -37,6 +43,7 @@ def replay_session(
         settings, seed: of the estimation; with the recorded ones the results are the session's own, byte for byte.
         out: folder of the results; those of an earlier replay in it are replaced.
         progress: is told which grasp is being estimated.
+        speed: of the bytes: 1 the original pace, 4 four times as fast, 0 as fast as possible.
 
     Raises:
         ConfigurationError: ``out`` holds other files.
@@ -47,7 +54,7 @@ def replay_session(
         raise ConfigurationError("holds the session's own results", where=str(out), hint=hint)
     check_replaceable(out)
     rig = rig_of_session(session)
-    replay = Replay(session, build_interpreter(rig))
+    replay = Replay(session, build_interpreter(rig), speed)
     progress = progress or NullProgress()
     progress.phase(0, "read")
     grasps = kept_grasps(replay.outcomes())
@@ -57,7 +64,7 @@ def replay_session(
     progress.phase(len(grasps), "model and evaluation")
     finished = judge(session, rig, slam, grasps, out)
     unread = _unread(replay.loss, len(grasps), session.manifest.counts.get("grasps"))
-    return replace(finished, data_loss=session.manifest.data_loss, unread=unread)
+    return replace(finished, data_loss=session.manifest.data_loss, unread=unread, read_factor=replay.factor)
 
 
 def _unread(loss: Loss, grasps: int, recorded: int | None) -> str:

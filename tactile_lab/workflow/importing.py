@@ -1,0 +1,55 @@
+"""Other people's sessions and contacts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from sessions.archives import import_archive
+from sessions.contact_log import ContactLog, read_contact_log, write_contact_log
+from sessions.manifest import write_whole
+from sessions.session import Session
+from sessions.timed_contacts import ImportSettings, read_timed_contacts
+from tactile_lab.errors import ConfigurationError, SessionError, TactileLabError
+from tactile_lab.shape.mesh_io import read_mesh
+
+
+def import_session(archive: Path, root: Path, name: str | None = None) -> Session:
+    """A session out of a ZIP archive. Raises SessionError."""
+    return import_archive(archive, root, name)
+
+
+def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path | None = None) -> ContactLog:
+    """Timed contacts as a contact log, with the true mesh, where there is one, copied beside it.
+
+    Raises:
+        SessionError: a file can not be read or written, or the log exists already.
+        ConfigurationError: the contacts do not fit the form or do not make sense; nothing is left then.
+        ShapeError: the mesh can not be used.
+    """
+    if log.exists():
+        raise SessionError("exists already", where=str(log), hint="Choose another name with --out")
+    copy = None if mesh is None else log.with_suffix(mesh.suffix)
+    contacts = read_timed_contacts(file, replace(settings, mesh=None if copy is None else copy.name))
+    if mesh is not None and copy is not None:
+        read_mesh(mesh)
+        _copy(mesh, copy)
+    try:
+        write_contact_log(log, contacts)
+        read_contact_log(log)  # refuses normals that point inward
+    except TactileLabError as error:
+        log.unlink(missing_ok=True)
+        if isinstance(error, ConfigurationError):
+            raise ConfigurationError(error.what, where=str(file), hint=error.hint) from error
+        raise
+    return contacts
+
+
+def _copy(mesh: Path, copy: Path) -> None:
+    if copy.exists() and copy.resolve() != mesh.resolve():
+        raise SessionError("exists already", where=str(copy), hint="Choose another name with --out")
+    if not copy.exists():
+        try:
+            write_whole(copy, mesh.read_bytes())
+        except OSError as error:
+            raise SessionError(f"can not be read ({error.strerror})", where=str(mesh), hint="Check the path") from error

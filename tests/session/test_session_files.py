@@ -1,0 +1,117 @@
+"""A session out of the simulated rig, and in every form for others."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import h5py
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+
+from sessions.archives import import_archive
+from sessions.extracting import Piece, extract
+from sessions.progress import NullProgress
+from sessions.session import Session
+from sessions.traffic_reader import TrafficReader
+from tactile_lab.errors import ConfigurationError, SessionError
+from tactile_lab.workflow import exporting
+from tactile_lab.workflow.replaying import recorded_seed, recorded_slam, replay_session
+from tactile_lab.workflow.running import SessionRequest, run_session
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    request = SessionRequest("sim", "box-10x6x4", tmp_path_factory.mktemp("runs"), seed=1, grasps=1)
+    return Session.open(run_session(request, NullProgress()).folder)
+
+
+def test_a_standard_reader_lists_topics_schemas_and_the_calibration(session):
+    with (session.folder / "traffic.mcap").open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        named = {c.topic: summary.schemas[c.schema_id].name for c in summary.channels.values() if c.schema_id}
+        attached = {item.name for item in reader.iter_attachments()}
+    assert {
+        "/link/hand/rx": "tactile_lab/msg/RawFrame",
+        "/ft/FF/wrench": "tactile_lab.Wrench",
+        "/hand/joints": "foxglove.JointStates",
+        "/tf": "foxglove.FrameTransforms",
+        "/contacts/points": "foxglove.PointCloud",
+        "/contacts/scene": "foxglove.SceneUpdate",
+        "/camera/image": "foxglove.CompressedImage",
+        "/camera/calibration": "foxglove.CameraCalibration",
+        "/slam/pose": "foxglove.PoseInFrame",
+        "/recorder/streams": "tactile_lab.Streams",
+    }.items() <= named.items()
+    assert {"session.yaml", "calibration/joints.yaml", "calibration/camera.yaml"} <= attached
+
+
+def test_devices_number_their_messages_in_the_recording(session):
+    counters = [m.device.counter for m in session.traffic().messages() if m.topic == "/link/ft/FF/rx"]
+    assert counters == list(range(counters[0], counters[0] + len(counters)))
+    assert session.manifest.data_loss == {}
+
+
+def test_tables_say_the_same_in_every_form(session, tmp_path):
+    rows = exporting.export_csv(session, tmp_path / "csv")
+    assert (
+        rows == exporting.export_hdf5(session, tmp_path / "s.h5") == exporting.export_rosbag(session, tmp_path / "bag")
+    )
+    with (tmp_path / "csv" / "wrench_FF.csv").open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    with h5py.File(tmp_path / "s.h5") as file:
+        assert file["wrench_FF/fx_N"][:].tolist() == [float(line["fx_N"]) for line in lines]
+        assert file["joints/FFJ1_rad"].shape == file["joints/stamp_ns"].shape
+        assert len(file["pictures/encoded"]) == len(list((tmp_path / "csv" / "pictures").iterdir())) > 0
+    with AnyReader([tmp_path / "bag"]) as bag:
+        kinds = {connection.topic: connection.msgtype for connection in bag.connections}
+        wrenches = [c for c in bag.connections if c.topic == "/ft/FF/wrench"]
+        forces = [bag.deserialize(raw, c.msgtype).wrench.force.x for c, _, raw in bag.messages(wrenches)]
+    assert kinds["/joints"] == "sensor_msgs/msg/JointState"
+    assert kinds["/camera/image/compressed"] == "sensor_msgs/msg/CompressedImage"
+    assert np.array_equal(forces, [float(line["fx_N"]) for line in lines])
+    for export, place in (
+        (exporting.export_csv, "csv"),
+        (exporting.export_hdf5, "s.h5"),
+        (exporting.export_rosbag, "bag"),
+    ):
+        with pytest.raises(SessionError, match=r"exists already|can not be written"):
+            export(session, tmp_path / place)
+
+
+def test_a_session_out_of_an_archive_replays_identically(session, tmp_path):
+    exporting.export_archive(session, tmp_path / "a.zip")
+    copy = import_archive(tmp_path / "a.zip", tmp_path / "in", "copy-1")
+    replay_session(copy, recorded_slam(copy), recorded_seed(copy), tmp_path / "out")
+    for name in ("trajectory.csv", "mesh.ply", "contacts.csv"):
+        assert (tmp_path / "out" / name).read_bytes() == (session.results / name).read_bytes()
+
+
+def test_a_piece_of_a_session_is_a_session(session, tmp_path):
+    counts = extract(session, tmp_path / "piece-1", Piece(3.0, 3.5, {"hand", "ft/FF"}))
+    assert {topic for topic in counts if topic.startswith("/link")} == {
+        "/link/hand/tx", "/link/hand/rx", "/link/ft/FF/rx",
+    }  # fmt: skip
+    piece = Session.open(tmp_path / "piece-1")
+    assert piece.calibration_file("joints").is_file()
+    assert sum(1 for _ in piece.traffic().messages()) == sum(counts.values())
+    with pytest.raises(ConfigurationError, match=r"no link called elbow.*Its links are base, camera, ft/FF"):
+        extract(session, tmp_path / "piece-2", Piece(links={"elbow"}))
+    with pytest.raises(SessionError, match="nothing was recorded in that piece"):
+        extract(session, tmp_path / "piece-2", Piece(from_s=1e6))
+    with pytest.raises(SessionError, match="exists already"):
+        extract(session, tmp_path / "piece-1", Piece())
+    with pytest.raises(SessionError, match="can not be the name"):
+        extract(session, tmp_path / "Piece", Piece())
+    assert not (tmp_path / "piece-2").exists()
+
+
+def test_the_record_at_the_end_says_what_was_lost(session):
+    reader = TrafficReader(session.folder / "traffic.mcap")
+    messages = sum(1 for message in reader.messages() if message.topic == "/link/hand/rx")
+    assert reader.streams()["/link/hand/rx"] == {"messages": messages, "gaps": 0, "late": 0, "dropped": 0}
+    assert json.loads(reader.end["lost"]) == {}
+    assert reader.end["status"] == "closed"
