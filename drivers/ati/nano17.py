@@ -105,8 +105,12 @@ class Nano17(ForceTip):
             return
         self._connected = False
         with contextlib.suppress(DeviceError):  # the link is given up anyway
-            self.wire.stop(self._link)
+            self.stop_stream()
         self._link.close()
+
+    def stop_stream(self) -> None:
+        """End the device's stream; what is on its way can still be polled. Raises DeviceError."""
+        self.wire.stop(self._link)
 
     def ask(self) -> None:
         """Ask for the next reading where the wire needs it. Raises DeviceError."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import resource
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,14 +28,15 @@ from drivers.shadow.ethercat_link import EthercatSettings
 from drivers.shadow.hand_process import HandProcess
 from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.hand_setup import HandSetup
+from drivers.shadow.real_time import preferred
 from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock
-from tactile_lab.errors import DeviceError
 from tactile_lab.geometry.contacts import FINGERS
 from tactile_lab.rigs.wire_bench import CALIBRATION, CYCLE_s
 
 RATE_Hz = 7000
 PORT = 49152
 _READ_s = 0.005
+_LAST_s = 0.2
 _MEMORY_s = 1.0
 _WARM_UP_share = 0.2
 
@@ -90,14 +92,16 @@ def measure_load(seconds: float, *, with_hand: bool = True) -> LoadResult:
     """
     clock = MonotonicClock()
     if not with_hand:
-        return _measure(seconds, clock, None)
+        with preferred():
+            return _measure(seconds, clock, None)
     near, far = f"tld{os.getpid()}", f"tle{os.getpid()}"
     chain = ChainSettings(eeprom="mapped")
     with virtual_cable(near, far), EmulatedHandProcess(far, CALIBRATION / "joints.yaml", chain):
         process = HandProcess(_hand(near), clock=clock)
         process.connect()
         try:
-            return _measure(seconds, clock, process)
+            with preferred():
+                return _measure(seconds, clock, process)
         finally:
             process.close()
 
@@ -120,17 +124,23 @@ def _measure(seconds: float, clock: Clock, hand: HandProcess | None) -> LoadResu
             for finger, host, port in zip(FINGERS, hosts, boxes.http_ports, strict=True)
         ]
         try:
-            for sensor in sensors:
+            for number, sensor in enumerate(sensors):
                 sensor.connect()
+                for streaming in sensors[: number + 1]:  # what waits must not overflow while the others connect
+                    _take(streaming)
             began, boxes_began = _own_seconds(), _seconds_of(boxes.process_id)
             memory = _run(seconds, clock, sensors, hand)
             reader, served = _own_seconds() - began, _seconds_of(boxes.process_id) - boxes_began
+            words = [", ".join(sensor.health()) for sensor in sensors]
             report = hand.report() if hand else None
+            _stop(sensors)
         finally:
             for sensor in sensors:
                 sensor.close()
-                _take(sensor)
-    rows = [_row(sensor, sent) for sensor, sent in zip(sensors, boxes.sent, strict=True)]
+    rows = [
+        LoadRow(sensor.finger, sent, sensor.sequences.seen, sensor.sequences.lost, told)
+        for sensor, sent, told in zip(sensors, boxes.sent, words, strict=True)
+    ]
     punctual = ""
     if report is not None:
         counts, cycle = report["hand"], report["punctuality"]
@@ -171,17 +181,17 @@ def _run(
 
 
 def _take(sensor: Nano17) -> None:
-    try:
-        sensor.update(sensor.poll())
-    except DeviceError:
-        if sensor.newest is None:  # a link that has been closed has nothing more to give
-            raise
+    sensor.update(sensor.poll())
 
 
-def _row(sensor: Nano17, sent: int) -> LoadRow:
-    monitor = sensor.sequences
-    words = ", ".join(sensor.health()) or "nothing to tell"
-    return LoadRow(sensor.finger, sent, monitor.seen, monitor.lost, words)
+def _stop(sensors: Sequence[Nano17]) -> None:
+    """End the streams, and take what was still on its way: so that what arrived can be set against what was sent."""
+    for sensor in sensors:
+        sensor.stop_stream()
+    until_ns = time.monotonic_ns() + round(_LAST_s * NANOSECONDS)
+    while time.monotonic_ns() < until_ns:
+        for sensor in sensors:
+            _take(sensor)
 
 
 def _slope_MB_per_min(memory: Sequence[tuple[float, float]]) -> float:
