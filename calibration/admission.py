@@ -12,7 +12,7 @@ from tactile_lab.calibration_file import is_stored
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.strict_yaml import load
 
-DEVICE_TABLES = frozenset({"joints", "motors", "markers", "boards", "rates", "geometry", "board"})
+DEVICE_TABLES = frozenset({"joints", "motors", "markers", "boards", "rates", "gains", "geometry", "board"})
 """Roles that may be plain files: the maker's tables of a device, and descriptions of what a rig is built of."""
 
 UNCALIBRATED = "uncalibrated"

@@ -27,6 +27,7 @@ from sessions.instruments import (
     HandInstrument,
     Instrument,
     PolledInstrument,
+    WatchingCamera,
     warmest_C,
 )
 from sessions.interpreter import HAND_LINK, Observer, fingertip_link
@@ -238,6 +239,8 @@ class Bench:
         self.base.exchange()
         for device in self.wrench_devices.values():
             device.poll()
+        if isinstance(self.camera, WatchingCamera):
+            self.camera.poll()
         self._record_state()
         self._wait(self._deadline_ns + self.cycle_ns)
 

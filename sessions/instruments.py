@@ -161,3 +161,11 @@ class CameraInstrument(Instrument, Protocol):
 
     def capture(self) -> FrameReading:
         """Take one picture. Raises DeviceError."""
+
+
+@runtime_checkable
+class WatchingCamera(Protocol):
+    """A camera that sends markers by itself."""
+
+    def poll(self) -> None:
+        """Take what it has sent, so that it is recorded in time. Raises DeviceError."""

@@ -49,7 +49,9 @@ class CameraProcess:
             return
         self._settings.place()
         command = [sys.executable, "-m", "drivers.camera.camera_worker"]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0
+        )  # Ctrl+C is for the session
         self._reader, self._kept = RecordReader(_LONGEST, "camera process"), []
         try:
             self._order(self._settings.model_dump(mode="json"))

@@ -110,15 +110,17 @@ class HandProcess:
             raise
 
     def close(self) -> None:
-        """End the process: the hand gets zero demands and is disconnected. Idempotent."""
+        """End the process: the hand gets zero demands, which the tap sees, and is disconnected. Idempotent."""
         if self._process is None:
             return
         process, self._process = self._process, None
         try:
-            process.communicate(timeout=_END_s)
+            rest, _ = process.communicate(timeout=_END_s)
         except subprocess.TimeoutExpired:
             process.kill()
-            process.communicate()
+            rest, _ = process.communicate()
+        for record in [*self._kept, *self._reader.feed(rest or b"")]:
+            self._show(record)
 
     # --- motion ------------------------------------------------------------------------------------------------
 

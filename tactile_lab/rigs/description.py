@@ -36,6 +36,7 @@ class CalibrationFiles(StrictModel):
         motors: which motor pulls which joint.
         boards: settings of the motor boards; on wires they are uploaded at every start, and kept when left out.
         rates: how often motors are asked for what; in place of ``hand.polling``.
+        gains: position control of this hand (``sr_edc_joint_position_controllers_PWM.yaml``); for hands on wires.
         fingertips: shape, mounting and weight of the fingertips.
         forearm: where the positioner stands in the world.
         normals: learned contact normals of BioTacs; the skin's at equation 2.24's point without.
@@ -48,6 +49,7 @@ class CalibrationFiles(StrictModel):
     motors: str
     boards: str | None = None
     rates: str | None = None
+    gains: str | None = None
     fingertips: str
     forearm: str
     normals: str | None = None

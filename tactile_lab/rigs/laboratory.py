@@ -36,8 +36,13 @@ class Laboratory(Protocol):
     @property
     def target(self) -> ObjectModel | None: ...
 
-    def bench(self, recorder: Recorder) -> Bench:
-        """Its devices, not yet connected."""
+    def bench(self, recorder: Recorder, *, first_move: bool | None = None) -> Bench:
+        """Its devices, not yet connected.
+
+        Args:
+            recorder: of the session.
+            first_move: nudge each motor of a real hand when connecting; None for what the rig file says.
+        """
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,7 @@ class SimulatedLaboratory:
     def target(self) -> ObjectModel:
         return self.world.object_model
 
-    def bench(self, recorder: Recorder) -> Bench:
+    def bench(self, recorder: Recorder, *, first_move: bool | None = None) -> Bench:
         """See :class:`Laboratory`."""
         return build_bench(self.rig, self.world, recorder)
 
@@ -70,10 +75,10 @@ class WiredLaboratory:
     target: ObjectModel | None = None
     stand_ins: StandIns | None = None
 
-    def bench(self, recorder: Recorder) -> Bench:
+    def bench(self, recorder: Recorder, *, first_move: bool | None = None) -> Bench:
         """See :class:`Laboratory`."""
         truth = None if self.stand_ins is None else self.stand_ins.truth
-        return build_wired_bench(self.rig, recorder, self.clock, truth=truth)
+        return build_wired_bench(self.rig, recorder, self.clock, truth=truth, first_move=first_move)
 
 
 @contextmanager

@@ -6,12 +6,12 @@ from pathlib import Path
 
 from drivers.ati.wire import ForceWire
 from drivers.ati.wiring import NetBoxWiring, VoltsWiring, Wiring, make_wire
-from drivers.emulators.wired.stand_ins import SERIAL, HandPlace, StandInPlan
+from drivers.emulators.wired.stand_ins import SERIAL, HandPlace, Place, StandInPlan
 from drivers.shadow.hand_setup import HandSetup
 from sessions.interpreter import HAND_LINK
 from tactile_lab.errors import CodecError, ConfigurationError
 from tactile_lab.rigs.description import Rig, gauge_role
-from tactile_lab.rigs.wires import Wires
+from tactile_lab.rigs.wires import RemoteCamera, Wires
 
 
 def wires_of(rig: Rig) -> Wires:
@@ -33,6 +33,7 @@ def hand_setup(rig: Rig) -> HandSetup:
         motors=files["motors"].resolve(),
         boards=_whole(files.get("boards")),
         rates=_whole(files.get("rates")),
+        gains=_whole(files.get("gains")),
     )
 
 
@@ -66,7 +67,7 @@ def stand_in_plan(rig: Rig, seed: int, object_name: str) -> StandInPlan:
         hand=_hand_place(rig),
         base=(wires.base.host, wires.base.port),
         boxes={finger: _box(rig, finger, wiring) for finger, wiring in wires.fingertips.items()},
-        camera=None if wires.camera is None else (wires.camera.host, wires.camera.port),
+        camera=_camera_place(rig),
     )
 
 
@@ -83,6 +84,13 @@ def _hand_place(rig: Rig) -> HandPlace:
         palm=rig.description.hand.palm,
         serial=SERIAL if wiring.ethercat.serial is None else wiring.ethercat.serial,
     )
+
+
+def _camera_place(rig: Rig) -> Place | None:
+    camera = wires_of(rig).camera
+    if camera is not None and not isinstance(camera, RemoteCamera):
+        raise ConfigurationError("the simulated plant feeds a camera on tcp alone", where=f"{rig.source}: wires.camera")
+    return None if camera is None else (camera.host, camera.port)
 
 
 def _box(rig: Rig, finger: str, wiring: Wiring) -> NetBoxWiring:

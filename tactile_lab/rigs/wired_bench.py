@@ -7,9 +7,10 @@ from collections.abc import Callable
 from drivers.ati.nano17 import Nano17
 from drivers.ati.wiring import make_link
 from drivers.camera.camera import Camera
+from drivers.camera.camera_process import CameraProcess
 from drivers.hardware.tcp import TcpLink
 from drivers.hardware.udp import UdpLink
-from drivers.links import TappedLink
+from drivers.links import Link, TappedLink
 from drivers.positioner import Positioner
 from drivers.shadow.hand_process import HandProcess
 from sessions.bench import Bench, SensorStream, TruthReading
@@ -19,6 +20,7 @@ from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.rigs.build import build_interpreter, force_ranges_N, force_tips
 from tactile_lab.rigs.description import Rig
 from tactile_lab.rigs.wired import force_wire, hand_setup, wires_of
+from tactile_lab.rigs.wires import RemoteCamera
 
 
 def build_wired_bench(
@@ -68,4 +70,9 @@ def _stream(rig: Rig, finger: str, observer: Observer, clock: Clock) -> SensorSt
 def _camera(rig: Rig, observer: Observer, clock: Clock) -> Camera | None:
     if (wiring := wires_of(rig).camera) is None or "camera" not in rig.files:
         return None
-    return Camera(TappedLink(TcpLink(CAMERA_LINK, wiring.host, wiring.port, clock), observer, clock), clock)
+    link: Link
+    if isinstance(wiring, RemoteCamera):
+        link = TcpLink(CAMERA_LINK, wiring.host, wiring.port, clock)
+    else:
+        link = CameraProcess(CAMERA_LINK, wiring.settings, clock)
+    return Camera(TappedLink(link, observer, clock), clock)

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from drivers.ati.wiring import Port, Wiring
+from drivers.camera.source_settings import CameraSourceSettings
 from drivers.shadow.ethercat_link import EthercatSettings
 from drivers.shadow.hand_setup import Master
 from tactile_lab.rigs.fingertip_rig import one_place_each
@@ -41,12 +42,22 @@ class BaseWiring(StrictModel):
     port: Port
 
 
-class CameraWiring(StrictModel):
-    """The program that takes the pictures: messages behind their length on a TCP connection."""
+class RemoteCamera(StrictModel):
+    """A program that takes pictures: messages behind their length on a TCP connection (docs/real-laboratory.md)."""
 
     wire: Literal["tcp"]
     host: str = Field(min_length=1)
     port: Port
+
+
+class LocalCamera(StrictModel):
+    """A camera of this computer, watched by a process of its own."""
+
+    wire: Literal["source"]
+    settings: CameraSourceSettings
+
+
+CameraWiring = Annotated[RemoteCamera | LocalCamera, Field(discriminator="wire")]
 
 
 class Wires(StrictModel):

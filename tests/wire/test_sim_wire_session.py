@@ -1,0 +1,161 @@
+"""Sessions over real wires: one that is completed and replayed, and what becomes of one when a device dies."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from drivers.emulators.wired.stand_ins import StandIns
+from drivers.shadow.palm_images import PALMS
+from sessions import schemas
+from sessions.bench import Bench
+from sessions.conductor import Ending, SessionOutcome
+from sessions.perception import TareReport
+from sessions.progress import NullProgress
+from sessions.recorder import Recorder
+from sessions.replay import Replay
+from sessions.session import Session
+from tactile_lab.errors import DeviceError
+from tactile_lab.geometry.contacts import Grasp
+from tactile_lab.rigs.build import build_interpreter
+from tactile_lab.rigs.description import Rig, load_rig, rig_of_session
+from tactile_lab.rigs.laboratory import WiredLaboratory, open_laboratory
+from tactile_lab.slam import TactileSlam
+from tactile_lab.workflow import running
+from tests.support.wire_rig import wire_rig
+
+
+@dataclass
+class At(NullProgress):
+    """Does something when a phase begins."""
+
+    phase_name: str = ""
+    act: Callable[[], None] = lambda: None
+    told_of: list[str] = field(default_factory=list)
+
+    def phase(self, number: int, name: str) -> None:
+        self.told_of.append(name)
+        if name == self.phase_name:
+            self.act()
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Rig:
+    if shutil.which("ip") is None:
+        pytest.skip("no ip command to make virtual interfaces with")
+    return load_rig(str(wire_rig(tmp_path_factory.mktemp("rig"))))
+
+
+@pytest.fixture(scope="module")
+def laboratory(rig: Rig) -> Iterator[WiredLaboratory]:
+    try:
+        opened = open_laboratory(rig, 0, "box-10x6x4")
+        with opened as place:
+            assert isinstance(place, WiredLaboratory)
+            yield place
+    except DeviceError as error:
+        if "no right" in str(error) or "no permission" in str(error):
+            pytest.skip(str(error))
+        raise
+
+
+def stations(laboratory: WiredLaboratory) -> StandIns:
+    assert laboratory.stand_ins is not None
+    return laboratory.stand_ins
+
+
+def run(
+    rig: Rig, laboratory: WiredLaboratory, root: Path, progress: At, grasps: int = 1
+) -> tuple[SessionOutcome, Path]:
+    """A session as ``tactile-lab run`` makes it, in a laboratory that is running already."""
+    request = running.SessionRequest(rig.source, "box-10x6x4", root, grasps=grasps)
+    slam = TactileSlam(running.slam_settings("joint", 2, rig.description.motion), 0)
+    session = running._new_session(rig, laboratory, slam, request, ())
+    return running._record(session, rig, laboratory, slam, request, progress, running.ALONE), session.folder
+
+
+def test_a_session_is_completed_and_replays_to_the_same_grasp(
+    rig: Rig, laboratory: WiredLaboratory, tmp_path: Path
+) -> None:
+    outcome, folder = run(rig, laboratory, tmp_path, At())
+    assert outcome.ending is Ending.COMPLETE, outcome.reason
+    session = Session.open(folder)
+    assert session.manifest.status == "closed"
+    replay = Replay(session, build_interpreter(rig_of_session(session)))
+    (grasp,) = [each for each in replay.outcomes() if isinstance(each, Grasp)]
+    assert not replay.loss
+    (live,) = outcome.grasps
+    assert len(live.contacts) >= 3
+    assert [each.finger for each in grasp.contacts] == [each.finger for each in live.contacts]
+    for ours, theirs in zip(live.contacts, grasp.contacts, strict=True):
+        assert ours.point_world_m.tobytes() == theirs.point_world_m.tobytes()
+    links = {"hand", "base", "camera", "ft/FF", "ft/MF", "ft/RF", "ft/LF", "ft/TH"}
+    recorded = {schemas.received_link(message.topic) for message in session.traffic().messages()}
+    assert links <= recorded
+
+
+@pytest.mark.parametrize(
+    ("device", "words"),
+    [
+        ("camera", "camera: lost"),
+        ("hand", "cycles in a row without a valid status"),
+        ("ft/MF", "MF: no reading of the fingertip"),
+        ("base", "cycles in a row without a status"),
+    ],
+)
+def test_a_device_that_dies_ends_the_session_in_order(
+    rig: Rig, laboratory: WiredLaboratory, tmp_path: Path, device: str, words: str
+) -> None:
+    station = stations(laboratory).stations[device]
+    try:
+        outcome, folder = run(rig, laboratory, tmp_path, At("descend", station.kill))
+    finally:
+        station.start()
+        station.await_ready()
+    assert outcome.ending is Ending.STOPPED
+    assert words in outcome.reason
+    check_ended_in_order(folder, words)
+
+
+def test_a_hand_process_that_dies_ends_the_session_in_order(
+    rig: Rig, laboratory: WiredLaboratory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    benches: list[Bench] = []
+
+    def kept(place: WiredLaboratory, recorder: Recorder) -> Bench:
+        benches.append(made(place, recorder))
+        return benches[-1]
+
+    def kill() -> None:
+        benches[0].hand._process.kill()  # type: ignore[attr-defined]
+
+    made = WiredLaboratory.bench
+    monkeypatch.setattr(WiredLaboratory, "bench", kept)
+    outcome, folder = run(rig, laboratory, tmp_path, At("descend", kill))
+    assert outcome.ending is Ending.STOPPED
+    assert "its process has ended" in outcome.reason
+    check_ended_in_order(folder, "its process has ended")
+
+
+def check_ended_in_order(folder: Path, words: str) -> None:
+    """A readable recording that says why, with the last cycles, and a hand that was left without demands."""
+    session = Session.open(folder)
+    assert session.manifest.status == "failed"
+    assert words in session.manifest.problem
+    reader = session.traffic()
+    messages = list(reader.messages())
+    assert not reader.loss
+    (stop,) = [json.loads(message.data) for message in messages if message.topic == schemas.SAFETY_TOPIC]
+    assert words in stop["cause"]
+    assert stop["cycles"]
+    sent = [message.data for message in messages if message.topic == schemas.transmitted_topic("hand")]
+    if "process" not in words:  # a killed process sends nothing more: the motors halt by themselves after 20 ms
+        assert not any(PALMS["0220"].decode_command(sent[-1]).motor_data)
+    replay = Replay(session, build_interpreter(rig_of_session(session)))
+    assert all(isinstance(outcome, Grasp | TareReport) for outcome in replay.outcomes())
+    assert not replay.loss
