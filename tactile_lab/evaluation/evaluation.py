@@ -16,6 +16,14 @@ import trimesh
 from gtsam import Pose3
 
 from tactile_lab.errors import SessionError, ShapeError
+from tactile_lab.evaluation.figures import (
+    LoopFigures,
+    SensingFigures,
+    ShapeFigures,
+    TimeFigures,
+    TruthFigures,
+    UncertaintyFigures,
+)
 from tactile_lab.evaluation.loops import wrong_loops
 from tactile_lab.evaluation.plain import json_text, plain
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM, registration_rms_mm
@@ -34,7 +42,6 @@ from tactile_lab.evaluation.tables import read_contour
 from tactile_lab.evaluation.trajectory import PoseErrors, compared_grasps, estimate_T_truth, pose_errors
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.mesh_io import read_mesh
-from tactile_lab.shape.metrics import ShapeErrors
 
 SCHEMA_VERSION = 1
 DECIMALS = 6
@@ -53,73 +60,6 @@ class Truth:
     world_T_object: tuple[Pose3 | None, ...]
     mesh: trimesh.Trimesh | None = None
     outline_m: Array | None = None
-
-
-@dataclass(frozen=True)
-class ShapeFigures:
-    """Shape errors for people: millimetres, and shares between 0 and 1."""
-
-    hausdorff_mm: float
-    mean_distance_mm: float
-    chamfer_mm: float
-    fscore_5mm: float
-    iou: float
-
-    @classmethod
-    def of(cls, errors: ShapeErrors | None) -> ShapeFigures | None:
-        """The figures of shape errors in metres."""
-        if errors is None:
-            return None
-        return cls(
-            hausdorff_mm=1e3 * errors.hausdorff_m,
-            mean_distance_mm=1e3 * errors.mean_distance_m,
-            chamfer_mm=1e3 * errors.chamfer_m,
-            fscore_5mm=errors.fscore_5mm,
-            iou=errors.iou,
-        )
-
-
-@dataclass(frozen=True)
-class LoopFigures:
-    """Similar grasps: how many were tested, accepted, and of those wrong (None where the truth is not known)."""
-
-    tested: int
-    accepted: int
-    wrong: int | None
-
-
-@dataclass(frozen=True)
-class TimeFigures:
-    """Computing time of the SLAM steps."""
-
-    total_s: float | None
-    step_ms_median: float | None
-    step_ms_p95: float | None
-
-
-@dataclass(frozen=True)
-class SensingFigures:
-    """Distance of the felt contacts from the true surface at the true pose: what the sensing alone gets wrong."""
-
-    median_mm: float
-    p95_mm: float
-
-
-@dataclass(frozen=True)
-class UncertaintyFigures:
-    """What the estimate says of itself: the standard deviation of its contour or surface, over all its points."""
-
-    sigma_mm_median: float
-    sigma_mm_p95: float
-
-
-@dataclass(frozen=True)
-class TruthFigures:
-    """For how many grasps the true pose is known, for how many not, and whether the true shape is."""
-
-    seen: int
-    missing: int
-    mesh: bool
 
 
 @dataclass(frozen=True)

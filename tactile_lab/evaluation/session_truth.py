@@ -6,11 +6,12 @@ recomputed with another detector or calibration.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 import trimesh
 from gtsam import Pose3
 
+from drivers.camera.packet import picture_of
 from drivers.links import Datagram
 from sessions.interpreter import CAMERA_LINK
 from sessions.marks import Mark, MarkKind
@@ -61,7 +62,7 @@ def marked_pictures(messages: Iterable[TrafficMessage]) -> dict[int, Datagram]:
     counter = _GraspCounter()
     for message in messages:
         if message.topic == received_topic(CAMERA_LINK):
-            picture = Datagram(message.data, message.stamp_ns)
+            picture = _better(picture, Datagram(message.data, message.stamp_ns))
         elif message.topic == MARKS_TOPIC:
             mark = Mark.from_bytes(message.data)
             counter.take(mark.kind)
@@ -72,6 +73,18 @@ def marked_pictures(messages: Iterable[TrafficMessage]) -> dict[int, Datagram]:
                 picture = None
     found.pop(-1, None)
     return found
+
+
+def _better(before: Datagram | None, now: Datagram) -> Datagram:
+    """The newest frame with a picture in it; without any, the newest with corners alone."""
+    return now if before is None or picture_of(now.payload) or not picture_of(before.payload) else before
+
+
+def camera_datagrams(messages: Iterable[TrafficMessage]) -> Iterator[Datagram]:
+    """Everything the camera sent."""
+    for message in messages:
+        if message.topic == received_topic(CAMERA_LINK):
+            yield Datagram(message.data, message.stamp_ns)
 
 
 class _GraspCounter:

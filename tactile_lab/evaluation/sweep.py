@@ -8,10 +8,9 @@ from functools import partial
 from itertools import product
 from typing import Any
 
-import numpy as np
-
 from tactile_lab.errors import TactileLabError
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
+from tactile_lab.evaluation.spread import Spread
 
 UNKNOWN = "\u2013"
 
@@ -74,28 +73,6 @@ class SweepRow:
         for key in keys:
             value = value.get(key) if isinstance(value, Mapping) else None
         return None if value is None else float(value)
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Median, ninetieth percentile and maximum of the runs that have the figure."""
-
-    median: float
-    p90: float
-    largest: float
-
-    @classmethod
-    def of(cls, values: Iterable[float | None]) -> Spread | None:
-        """The spread of the known values; None when there are none."""
-        known = np.array([value for value in values if value is not None])
-        if not len(known):
-            return None
-        median, p90 = np.percentile(known, [50, 90])
-        return cls(float(median), float(p90), float(known.max()))
-
-    def text(self, digits: int = 1) -> str:
-        """The three numbers, separated by slashes."""
-        return " / ".join(f"{value:.{digits}f}" for value in (self.median, self.p90, self.largest))
 
 
 COLUMNS = (
@@ -170,7 +147,7 @@ def summaries(rows: Sequence[SweepRow]) -> list[SweepSummary]:
 
 
 def _summary(name: str, dimension: int, rows: list[SweepRow]) -> SweepSummary:
-    spreads = tuple(Spread.of(row.figure(*keys) for row in rows) for _, keys, _ in COLUMNS)
+    spreads = tuple(Spread.of_known(row.figure(*keys) for row in rows) for _, keys, _ in COLUMNS)
     failures = tuple((row.run.seed, row.failure) for row in rows if row.failure)
     return SweepSummary(name, dimension, len(rows), spreads, failures)
 

@@ -12,6 +12,7 @@ from typing import TypeAlias
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.experiments import (
     calibration_runs,
+    camera_runs,
     crash_runs,
     exploration_runs,
     graph_runs,
@@ -390,6 +391,23 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             _ranges("policy", "grasps until 90 % is explored (definition B)", "actions_B", _hand_condition, columns=2),
             pooled=("object",),
             grasps=hand_exploration.GRASPS,
+        ),
+        Experiment(
+            "camera-truth",
+            "The marker camera at 640 x 480 under ten conditions: error of the true pose, flips taken for valid.",
+            lambda grasps: grid(condition=list(camera_runs.CONDITIONS)),
+            camera_runs.see_object,
+            (
+                Column("position, mm: median / p95", "position_mm", 2, kind="pooled"),
+                Column("angle, °: median / p95", "angle_deg", 3, kind="pooled"),
+                Column("frames", "frames", 0, kind="sum"),
+                Column("refused", "refused", 0, kind="sum"),
+                Column("flips", "flips", 0, kind="sum"),
+                Column("free: valid", "free_valid", 0, kind="sum"),
+                Column("free: flips among them", "free_flips", 0, kind="sum"),
+            ),
+            _ranges("condition", "frames refused of five", "refused", lambda cell: "640 x 480 pixels", columns=1),
+            pooled=("condition",),
         ),
         Experiment(
             "graph-stress",

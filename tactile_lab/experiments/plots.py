@@ -13,7 +13,8 @@ from html import escape
 
 import numpy as np
 
-from tactile_lab.experiments.summary import Group, quantile
+from tactile_lab.evaluation.spread import quantile
+from tactile_lab.experiments.summary import Group
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.report.svg import Chart, Frame, tick_label
 

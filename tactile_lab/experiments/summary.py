@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
+from tactile_lab.evaluation.spread import Spread, number, quantile
 from tactile_lab.experiments.cells import Row, Setting, Value
 
 REFERENCE_METHOD = "known-pose"
@@ -38,29 +39,6 @@ class Column:
     digits: int = 1
     kind: Kind = "spread"
     versus: bool = False
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Median, ninetieth percentile and maximum; infinite where too many runs have no figure."""
-
-    median: float
-    p90: float
-    largest: float
-
-    @classmethod
-    def of(cls, values: Sequence[float]) -> Spread:
-        """Of at least one value, infinite ones included."""
-        return cls(quantile(values, 0.5), quantile(values, 0.9), max(values))
-
-    def text(self, digits: int = 1) -> str:
-        """The three numbers, separated by slashes."""
-        return " / ".join(number(value, digits) for value in (self.median, self.p90, self.largest))
-
-    def as_json(self) -> dict[str, float | None]:
-        """Plain data; infinite becomes None."""
-        values = {"median": self.median, "p90": self.p90, "max": self.largest}
-        return {name: value if math.isfinite(value) else None for name, value in values.items()}
 
 
 @dataclass(frozen=True)
@@ -105,14 +83,6 @@ class Group:
     def pooled(self, key: str) -> list[float]:
         """The numbers in all lists of that name."""
         return [value for row in self.rows for value in (row.figures or {}).get(key, [])]
-
-
-def quantile(values: Sequence[float], share: float) -> float:
-    """Linear between the sorted values; infinite as soon as an infinite value takes part."""
-    ordered = sorted(values)
-    place = share * (len(ordered) - 1)
-    low, part = ordered[math.floor(place)], place - math.floor(place)
-    return low if part == 0.0 else low + part * (ordered[math.ceil(place)] - low) if math.isfinite(low) else math.inf
 
 
 def grouped(rows: Sequence[Row], *, over: Sequence[str] = ()) -> list[Group]:
@@ -236,11 +206,6 @@ _SHOWN: Mapping[Kind, Callable[[Group, Column], str]] = {
     "percent": _percent,
     "sum": _sum,
 }
-
-
-def number(value: float, digits: int) -> str:
-    """A number with so many digits behind the point."""
-    return f"{value:.{digits}f}" if math.isfinite(value) else "∞"
 
 
 def markdown(rows: Sequence[Sequence[str]]) -> str:

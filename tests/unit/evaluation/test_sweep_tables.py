@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from tactile_lab.errors import DeviceError
+from tactile_lab.evaluation.spread import Spread
 from tactile_lab.evaluation.sweep import (
-    Spread,
     SweepRow,
     SweepRun,
     markdown_table,
@@ -56,11 +56,11 @@ def test_other_errors_are_not_hidden() -> None:
 
 
 def test_spread_is_median_p90_and_maximum_of_what_is_known() -> None:
-    spread = Spread.of([1.0, None, 2.0, 3.0, 11.0])
+    spread = Spread.of_known([1.0, None, 2.0, 3.0, 11.0])
     assert spread is not None
     assert (spread.median, spread.largest) == (2.5, 11.0)
     assert spread.text() == "2.5 / 8.6 / 11.0"
-    assert Spread.of([None]) is None
+    assert Spread.of_known([None]) is None
 
 
 @pytest.mark.parametrize(

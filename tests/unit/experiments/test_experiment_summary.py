@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 
 from tactile_lab.errors import SessionError
+from tactile_lab.evaluation.spread import Spread, quantile
 from tactile_lab.experiments.catalogue import EXPERIMENTS, experiment
 from tactile_lab.experiments.cells import Cell, Row
 from tactile_lab.experiments.plots import CurvePanel, Series, curves_svg
 from tactile_lab.experiments.reporting import document, insert_section, write_report
 from tactile_lab.experiments.summary import (
     Column,
-    Spread,
     grouped,
     markdown,
-    quantile,
     reasons,
     short_table,
     table,

@@ -1,0 +1,79 @@
+"""Spreads of figures over runs, and confidence intervals of their means."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from scipy.stats import t as student
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Median, ninetieth percentile and maximum; infinite where too many runs have no figure."""
+
+    median: float
+    p90: float
+    largest: float
+
+    @classmethod
+    def of(cls, values: Sequence[float]) -> Spread:
+        """Of at least one value, infinite ones included."""
+        return cls(quantile(values, 0.5), quantile(values, 0.9), max(values))
+
+    @classmethod
+    def of_known(cls, values: Iterable[float | None]) -> Spread | None:
+        """Of those values that are known; None when there are none."""
+        known = [value for value in values if value is not None]
+        return cls.of(known) if known else None
+
+    def text(self, digits: int = 1) -> str:
+        """The three numbers, separated by slashes."""
+        return " / ".join(number(value, digits) for value in (self.median, self.p90, self.largest))
+
+    def as_json(self) -> dict[str, float | None]:
+        """Plain data; infinite becomes None."""
+        values = {"median": self.median, "p90": self.p90, "max": self.largest}
+        return {name: value if math.isfinite(value) else None for name, value in values.items()}
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A mean and its 95 % confidence interval by Student's t; the interval is None for a single value."""
+
+    mean: float
+    low: float | None
+    high: float | None
+
+    @classmethod
+    def of(cls, values: Sequence[float]) -> Interval:
+        """Of at least one value."""
+        count = len(values)
+        mean = math.fsum(values) / count
+        if count < 2:
+            return cls(mean, None, None)
+        deviation = math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (count - 1))
+        half = float(student.ppf((1 + CONFIDENCE) / 2, count - 1)) * deviation / math.sqrt(count)
+        return cls(mean, mean - half, mean + half)
+
+    def text(self, digits: int = 1) -> str:
+        """Mean and interval."""
+        if self.low is None or self.high is None:
+            return number(self.mean, digits)
+        return f"{number(self.mean, digits)} [{number(self.low, digits)}, {number(self.high, digits)}]"
+
+
+def quantile(values: Sequence[float], share: float) -> float:
+    """Linear between the sorted values; infinite as soon as an infinite value takes part."""
+    ordered = sorted(values)
+    place = share * (len(ordered) - 1)
+    low, part = ordered[math.floor(place)], place - math.floor(place)
+    return low if part == 0.0 else low + part * (ordered[math.ceil(place)] - low) if math.isfinite(low) else math.inf
+
+
+def number(value: float, digits: int) -> str:
+    """A number with so many digits behind the point."""
+    return f"{value:.{digits}f}" if math.isfinite(value) else "∞"

@@ -1,0 +1,167 @@
+"""Sessions and their folders of results, judged beside one another, with what the truth and the clocks were worth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sessions.manifest import write_whole
+from sessions.marks import Mark, MarkKind
+from sessions.schemas import MARKS_TOPIC, TRANSFORMS_TOPIC
+from sessions.session import Session
+from tactile_lab.clock import NANOSECONDS
+from tactile_lab.errors import SessionError
+from tactile_lab.evaluation.comparison import Judged, MethodSummary, compare, markdown, rows_csv
+from tactile_lab.evaluation.marker_truth import MarkerTruth, TruthReport, report_json
+from tactile_lab.evaluation.plain import json_text, plain
+from tactile_lab.evaluation.session_truth import camera_datagrams
+from tactile_lab.evaluation.time_alignment import ClockOffset, Track, clock_offset
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.report.comparison_plot import comparison_svg
+from tactile_lab.rigs.description import rig_of_session
+from tactile_lab.workflow.judging import TruthChoice, judge_results, marker_detector
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Everything that was judged.
+
+    Attributes:
+        judged: one a folder of results, in order.
+        truths: what each session's truth was worth, by session; None without a camera.
+        clocks: offset of the camera's clock to the hand's, by session.
+        unread: what of a recording could not be read, by session, in words; empty when all was.
+        summaries: by method.
+    """
+
+    judged: tuple[Judged, ...]
+    truths: dict[str, TruthReport | None]
+    clocks: dict[str, ClockOffset]
+    unread: dict[str, str]
+    summaries: tuple[MethodSummary, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it as plain data."""
+        truths = {name: None if report is None else report_json(report) for name, report in self.truths.items()}
+        return {
+            "evaluations": [
+                {"session": each.session, "results": each.results, **each.evaluation} for each in self.judged
+            ],
+            "truth": truths,
+            "clock_offset": {name: asdict(offset) for name, offset in self.clocks.items()},
+            "unread": self.unread,
+            "summaries": plain(self.summaries),
+        }
+
+
+def compare_sessions(sessions: Sequence[Session], folders: Sequence[str], choice: TruthChoice) -> Comparison:
+    """Judge folders of results of sessions; all that hold results when none is named.
+
+    Raises:
+        SessionError: a session has no such results, or can not be read.
+        ConfigurationError: the chosen calibration can not be used.
+    """
+    judged: list[Judged] = []
+    truths, clocks, unread = dict[str, TruthReport | None](), dict[str, ClockOffset](), dict[str, str]()
+    for session in sessions:
+        for results in result_folders(session, folders):
+            evaluation, truth, lost = judge_results(session, results, choice)
+            judged.append(Judged(session.manifest.name, results.name, evaluation.as_json()))
+            truths[session.manifest.name] = truth
+            if lost:
+                unread[session.manifest.name] = lost
+        clocks[session.manifest.name] = session_clock_offset(session, choice)
+    return Comparison(tuple(judged), truths, clocks, unread, tuple(compare(judged)))
+
+
+def result_folders(session: Session, names: Sequence[str]) -> list[Path]:
+    """Folders of results inside a session, or anywhere else by their path. Raises SessionError."""
+    if not names:
+        found = sorted(path.parent for path in session.folder.glob("*/trajectory.csv"))
+        if not found:
+            raise SessionError("holds no results", where=str(session.folder), hint="Replay the session to get some")
+        return found
+    return [_folder(session, name) for name in names]
+
+
+def _folder(session: Session, name: str) -> Path:
+    for path in (session.folder / name, Path(name)):
+        if (path / "trajectory.csv").is_file():
+            return path
+    hint = "Name folders of results inside the session, or by their path"
+    raise SessionError(f"has no results called {name!r}", where=str(session.folder), hint=hint)
+
+
+def write_comparison(comparison: Comparison, out: Path) -> list[Path]:
+    """Write table, rows, everything, and a plot; the files. Raises SessionError."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SessionError(f"can not be made ({error.strerror})", where=str(out), hint="Choose --out") from error
+    texts = {
+        "comparison.md": markdown(comparison.summaries),
+        "comparison.csv": rows_csv(comparison.judged),
+        "comparison.json": json_text(comparison.as_json()),
+        "comparison.svg": comparison_svg(comparison.summaries),
+    }
+    for name, text in texts.items():
+        write_whole(out / name, text.encode())
+    return [out / name for name in texts]
+
+
+def session_clock_offset(session: Session, choice: TruthChoice) -> ClockOffset:
+    """How far the camera's clock is behind the hand's in one session, from the motion both saw."""
+    detector = marker_detector(session, rig_of_session(session), choice)
+    if detector is None:
+        return ClockOffset(None, None, 0, "the session has no camera")
+    palm, holds_s = _hand_track(session)
+    if palm is None or not holds_s:
+        return ClockOffset(None, None, 0, "the hand held nothing in this session")
+    return clock_offset(palm, *_object_track(session, detector), holds_s)
+
+
+def _object_track(session: Session, detector: MarkerTruth) -> tuple[Array, Array]:
+    rows = []
+    for datagram in camera_datagrams(session.traffic().messages()):
+        pose = detector(datagram)
+        if pose is not None:
+            rows.append((datagram.stamp_ns / NANOSECONDS, pose.x(), pose.y()))
+    table = np.array(rows, float).reshape(-1, 3)
+    return table[:, 0], table[:, 1:]
+
+
+def _hand_track(session: Session) -> tuple[Track | None, list[tuple[float, float]]]:
+    """The palm as the session showed it, and when it held the object; None before it was seen twice."""
+    stamps, places, turns = [], [], []
+    holds: list[tuple[float, float]] = []
+    begun: float | None = None
+    for message in session.traffic().messages():
+        if message.topic == MARKS_TOPIC:
+            mark = Mark.from_bytes(message.data)
+            if mark.kind is MarkKind.HOLD_BEGIN:
+                begun = mark.stamp_ns / NANOSECONDS
+            elif mark.kind is MarkKind.HOLD_END and begun is not None:
+                holds.append((begun, mark.stamp_ns / NANOSECONDS))
+                begun = None
+        elif message.topic == TRANSFORMS_TOPIC and (found := _palm(json.loads(message.data)["transforms"])):
+            stamps.append(message.stamp_ns / NANOSECONDS)
+            places.append(found[0])
+            turns.append(found[1])
+    if len(stamps) < 2:
+        return None, holds
+    from scipy.spatial.transform import Rotation
+
+    return Track(np.array(stamps), np.array(places), Rotation.from_quat(np.array(turns)).as_matrix()), holds
+
+
+def _palm(transforms: Iterable[dict[str, Any]]) -> tuple[list[float], list[float]] | None:
+    for transform in transforms:
+        if transform["child_frame_id"] == "palm":
+            place, turn = transform["translation"], transform["rotation"]
+            return [place[axis] for axis in "xyz"], [turn[axis] for axis in "xyzw"]
+    return None

@@ -1,0 +1,82 @@
+"""Methods beside one another: spreads, confidence intervals, differences session by session, table, CSV and plot."""
+
+from __future__ import annotations
+
+import csv
+import io
+import xml.etree.ElementTree as ElementTree
+from typing import Any
+
+import pytest
+
+from tactile_lab.evaluation.comparison import Judged, compare, markdown, rows_csv, short_table, table
+from tactile_lab.evaluation.spread import Interval, Spread
+from tactile_lab.report.comparison_plot import comparison_svg
+
+
+def judged(session: str, method: str, rmse_mm: float | None, failed: bool = False) -> Judged:
+    content: dict[str, Any] = {
+        "object": "box",
+        "method": method,
+        "dimension": 2,
+        "seed": 1,
+        "grasps": 12,
+        "status": "ok",
+        "failed": failed,
+        "pose": None if rmse_mm is None else {"rmse_mm": rmse_mm, "rmse_deg": 1.0},
+    }
+    return Judged(session, "results", content)
+
+
+EVALUATIONS = [
+    *(judged(name, "joint", value) for name, value in (("a", 1.0), ("b", 2.0), ("c", 6.0))),
+    *(judged(name, "icp", value, True) for name, value in (("a", 1.5), ("b", 2.4), ("c", 6.6))),
+]
+
+
+def test_an_interval_is_students() -> None:
+    interval = Interval.of([1.0, 2.0, 6.0])
+    assert interval.mean == pytest.approx(3.0)
+    assert interval.low == pytest.approx(3.0 - 4.303 * 2.6458 / 3**0.5, abs=1e-3)
+    assert interval.high == pytest.approx(3.0 + 4.303 * 2.6458 / 3**0.5, abs=1e-3)
+    assert Interval.of([4.0]) == Interval(4.0, None, None)
+    assert Interval.of([4.0]).text() == "4.0"
+
+
+def test_methods_are_gathered_and_compared_with_the_first_session_by_session() -> None:
+    joint, icp = compare(EVALUATIONS)
+    assert (joint.method, joint.runs, joint.failed, icp.failed) == ("joint, 2-D", 3, 0, 3)
+    position = joint.figures[2]
+    assert position.spread == Spread.of([1.0, 2.0, 6.0])
+    assert position.against_first is None
+    difference = icp.figures[2].against_first
+    assert difference is not None
+    assert difference.mean == pytest.approx(0.5)
+    assert difference.low is not None
+    assert difference.low > 0.2, "the sessions' own spread is much larger than that of the differences"
+
+
+def test_what_nobody_knows_is_left_out_and_what_some_know_is_counted() -> None:
+    (only,) = compare([judged("a", "joint", None), judged("b", "joint", 2.0)])
+    assert only.figures[2].count == 1
+    assert only.figures[0].spread is None
+    assert all("Hausdorff" not in line[1] for line in table([only])[1:])
+
+
+def test_rows_go_to_csv_one_an_evaluation() -> None:
+    rows = list(csv.DictReader(io.StringIO(rows_csv([*EVALUATIONS, judged("d", "icp", None)]))))
+    assert len(rows) == 7
+    assert rows[0]["pose.rmse_mm"] == "1"
+    assert rows[6]["pose.rmse_mm"] == ""
+    assert rows[3]["method"] == "icp, 2-D"
+
+
+def test_tables_and_plot_name_every_method() -> None:
+    summaries = compare(EVALUATIONS)
+    text = markdown(summaries)
+    assert text.count("joint, 2-D") == 2
+    assert len(short_table(summaries)[0]) == 5
+    svg = comparison_svg(summaries)
+    root = ElementTree.fromstring(svg)
+    assert sum(element.tag.endswith("circle") for element in root.iter()) == 4
+    assert sum(element.get("class") == "bar" for element in root.iter()) == 4
