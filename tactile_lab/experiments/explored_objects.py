@@ -53,7 +53,6 @@ class FixedObject:
     Attributes:
         hand: executes grasps on it.
         grasps: all so far.
-        missed_m: ends of fingers that met nothing where a contact was expected.
     """
 
     hand: PlanarHand

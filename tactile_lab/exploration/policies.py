@@ -9,7 +9,14 @@ from tactile_lab.errors import ConfigurationError
 from tactile_lab.exploration.information.igef import IgefSettings
 from tactile_lab.exploration.information_policy import InformationPolicy, InformationSettings
 from tactile_lab.exploration.policy import Policy
-from tactile_lab.exploration.pose_policies import PoseSwitchPolicy, determinant_gain, information_gain, kl_gain
+from tactile_lab.exploration.pose_policies import (
+    PoseSwitchPolicy,
+    determinant_gain,
+    information_gain,
+    kl_gain,
+    mixture_gain,
+    renyi_gain,
+)
 from tactile_lab.exploration.regions import RegionSettings
 from tactile_lab.exploration.surface_policies import (
     ClustersPolicy,
@@ -54,8 +61,10 @@ POLICIES: Mapping[str, Callable[[], Policy]] = MappingProxyType(
         "igef": _igef,
         "igef-shape": _igef_shape,
         "det": lambda: PoseSwitchPolicy("det", determinant_gain, _variance()),
+        "det-modes": lambda: PoseSwitchPolicy("det-modes", mixture_gain, _variance()),
         "kl": lambda: PoseSwitchPolicy("kl", kl_gain, _variance()),
         "mutual-information": lambda: PoseSwitchPolicy("mutual-information", information_gain, _variance()),
+        "renyi": lambda: PoseSwitchPolicy("renyi", renyi_gain, _variance()),
         "information": InformationPolicy,
         "look-ahead": lambda: InformationPolicy(InformationSettings(look_ahead=_LOOK_AHEAD), "look-ahead"),
     }

@@ -2,7 +2,7 @@
 
 While the determinant of the pose's covariance is above a threshold, every candidate's contacts are imagined where the
 estimate expects them, the particles are weighted by them, and the candidate wins whose weighting tells most:
-det (4.21), KL (4.6), or mutual information (4.5).
+det (4.21), its form for several modes (section 4.6), KL (4.6), mutual information (4.5), or Renyi's entropy (4.4).
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 from pydantic import Field
 
 from tactile_lab.exploration.candidates import Candidate
-from tactile_lab.exploration.information.distributions import kl_divergence, mutual_information
-from tactile_lab.exploration.information.particles import determinant, weighted_covariance
+from tactile_lab.exploration.information.distributions import kl_divergence, mutual_information, renyi_entropy
+from tactile_lab.exploration.information.particles import determinant, mixture_entropy, modes, weighted_covariance
 from tactile_lab.exploration.policy import Belief, Decision, Policy, best_of, nothing_to_choose
 from tactile_lab.exploration.prediction import sampled_poses
 from tactile_lab.exploration.surface_policies import expected_contacts
@@ -27,6 +27,7 @@ from tactile_lab.tracking.measurement import CalibratedMeasurement, CalibratedSe
 from tactile_lab.tracking.motion import pose_row
 
 _SMALLEST = 1e-30
+_RENYI_ORDER = 2.0
 _MARGIN_m = 0.030
 
 
@@ -66,6 +67,11 @@ def determinant_gain(rows: Array, before: Array, after: Array) -> float:
     return float(0.5 * np.log(found[0] / found[1]))
 
 
+def mixture_gain(rows: Array, before: Array, after: Array) -> float:
+    """By how much the entropy shrinks of the particles taken as several Gaussians, nats."""
+    return mixture_entropy(modes(rows, before)) - mixture_entropy(modes(rows, after))
+
+
 def kl_gain(rows: Array, before: Array, after: Array) -> float:
     """Equation 4.6 of the weighted against the present particles: finite where a contact excludes some of them."""
     del rows
@@ -76,6 +82,12 @@ def information_gain(rows: Array, before: Array, after: Array) -> float:
     """Equation 4.5 with the entropy (4.3) of the weights."""
     del rows
     return mutual_information(before, after)
+
+
+def renyi_gain(rows: Array, before: Array, after: Array) -> float:
+    """The same with Renyi's entropy (4.4 by its standard definition) of order 2."""
+    del rows
+    return renyi_entropy(before, _RENYI_ORDER) - renyi_entropy(after, _RENYI_ORDER)
 
 
 @dataclass(frozen=True)

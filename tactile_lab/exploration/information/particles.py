@@ -16,7 +16,7 @@ from tactile_lab.tracking.motion import deviation
 ARM_m = 0.030
 """Length that makes a turn comparable with a shift: about half an object that fits into the hand."""
 
-_MOST_LINKED = 300
+_MOST_LINKED = 150
 _SMALLEST_VARIANCE = 1e-12
 
 
@@ -68,7 +68,7 @@ def gaussian_entropy(covariance: Array) -> float:
 def modes(rows: Array, weights: Array, apart_m: float = 0.020) -> tuple[Mode, ...]:
     """Heaps of particles whose gaps exceed ``apart_m`` (a turn counts with :data:`ARM_m`), the heaviest first.
 
-    Section 4.6 of the thesis asks for this: one Gaussian misjudges a belief with several modes. Up to 300 evenly
+    Section 4.6 of the thesis asks for this: one Gaussian misjudges a belief with several modes. Up to 150 evenly
     chosen particles are linked (single linkage); the others join the nearest of them.
     """
     scaled = np.column_stack([rows[:, :2], ARM_m * np.cos(rows[:, 2]), ARM_m * np.sin(rows[:, 2])])

@@ -113,7 +113,7 @@ def test_policies_for_the_shape_go_where_the_surface_is_unknown(name: str, half_
 
 
 def test_the_switch_acts_for_the_pose_only_while_it_is_uncertain(half_known: Belief) -> None:
-    for name in ("det", "kl", "mutual-information"):
+    for name in ("det", "det-modes", "kl", "mutual-information", "renyi"):
         assert choose(name, half_known).reason.startswith("the pose is uncertain (10 mm, 10 mm, 20 deg)")
         sure = replace(half_known, pose_covariance=np.diag([1e-6, 1e-6, 1e-4]))
         decision = choose(name, sure)
@@ -131,7 +131,7 @@ def test_the_threshold_is_the_determinant_of_a_pose_known_so_well() -> None:
 def test_for_the_pose_a_grasp_all_round_beats_one_finger(half_known: Belief) -> None:
     full = ten()[1]
     one = replace(full, rays=replace(full.rays, lengths_m=np.array([0.24, 0.0, 0.0, 0.0, 0.0])))
-    for name in ("det", "kl", "information"):
+    for name in ("det", "det-modes", "kl", "renyi", "information"):
         assert choose(name, half_known, (one, full)).chosen == 1
 
 
