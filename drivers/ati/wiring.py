@@ -21,6 +21,7 @@ from drivers.hardware.serial_port import SerialLink
 from drivers.hardware.udp import UdpLink
 from drivers.links import Link
 from tactile_lab.clock import Clock
+from tactile_lab.errors import ConfigurationError
 from tactile_lab.strict_yaml import StrictModel
 
 Port = Annotated[int, Field(ge=1, le=65535)]
@@ -108,12 +109,14 @@ class VoltsWiring(StrictModel):
 
     Attributes:
         calibration: the sensor's .cal file, relative to the rig file.
+        serial: of the sensor on the amplifier, from its label; a file of another one is refused. Left out for any.
         host: where the program runs.
         local_port: where it sends to on this computer.
     """
 
     wire: Literal["gauge-volts"]
     calibration: str = Field(min_length=1)
+    serial: str = ""
     host: str = "127.0.0.1"
     local_port: Port
 
@@ -155,7 +158,15 @@ def make_wire(wiring: Wiring, folder: Path) -> ForceWire:
         case CanWiring():
             return CanWire(wiring.base, wiring.slot, wiring.serial)
         case VoltsWiring():
-            return GaugeVoltsWire(cal_file.load(folder / wiring.calibration))
+            return GaugeVoltsWire(_own_calibration(folder / wiring.calibration, wiring.serial))
+
+
+def _own_calibration(path: Path, serial: str) -> cal_file.AtiCalibration:
+    calibration = cal_file.load(path)
+    if serial and calibration.serial != serial:
+        what = f"is the calibration of {calibration.serial}, and the sensor is {serial}"
+        raise ConfigurationError(what, where=str(path), hint="Name the file that came with this sensor")
+    return calibration
 
 
 def open_bus(wiring: CanWiring) -> can.BusABC:

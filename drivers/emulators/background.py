@@ -5,10 +5,11 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from typing import Self
+
+from drivers.emulators.closing import Closing
 
 
-class Background:
+class Background(Closing):
     """Calls ``turn`` again and again until it is closed. A context manager; closing is idempotent and waits.
 
     Args:
@@ -25,12 +26,6 @@ class Background:
         """End the loop and wait for it."""
         self._ending.set()
         self._thread.join()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *ended: object) -> None:
-        self.close()
 
     def _run(self) -> None:
         while not self._ending.is_set():

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 import can
 
 from drivers.emulators.background import Background
+from drivers.emulators.closing import Closing
 from drivers.emulators.unit import Unit
 from drivers.hardware.can_bus import CanFrame, decode_frame, encode_frame
 
 _POLL_s = 0.01
 
 
-class CanServer:
+class CanServer(Closing):
     """One unit on a bus until it is closed; the bus is closed with it. A context manager."""
 
     def __init__(self, unit: Unit, bus: can.BusABC) -> None:
@@ -27,12 +26,6 @@ class CanServer:
             self._closed = True
             self._loop.close()
             self._bus.shutdown()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *ended: object) -> None:
-        self.close()
 
     def _turn(self) -> None:
         message = self._bus.recv(timeout=_POLL_s)

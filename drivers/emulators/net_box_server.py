@@ -9,16 +9,16 @@ import threading
 from collections.abc import Callable
 from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Self
 
 from drivers.ati import rdt_codec
 from drivers.emulators.background import Background, Pace
+from drivers.emulators.closing import Closing
 from drivers.emulators.net_box_unit import NetBoxUnit
 
 _POLL_s = 0.001
 
 
-class NetBoxServer:
+class NetBoxServer(Closing):
     """One box that serves until it is closed. A context manager.
 
     Args:
@@ -63,12 +63,6 @@ class NetBoxServer:
         self._pages.close()
         self._http.server_close()
         self._socket.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *ended: object) -> None:
-        self.close()
 
     def page(self, target: str) -> bytes | None:
         """A page of the box; None where there is none."""

@@ -10,9 +10,9 @@ import pty
 import select
 import struct
 import tty
-from typing import Self
 
 from drivers.emulators.background import Background, Pace
+from drivers.emulators.closing import Closing
 from drivers.emulators.unit import Unit
 
 _TCGETS2 = 0x802C542A
@@ -20,7 +20,7 @@ _SPEED_OFFSET = 40  # of the output speed in struct termios2
 _POLL_s = 0.002
 
 
-class PtyPort:
+class PtyPort(Closing):
     """One unit on a pseudo terminal until it is closed. A context manager.
 
     A pseudo terminal has no parity and no speed of its own, but the speed that the client sets can be read: at
@@ -52,12 +52,6 @@ class PtyPort:
             self._loop.close()
             os.close(self._master)
             os.close(self._slave)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *ended: object) -> None:
-        self.close()
 
     def _turn(self) -> None:
         select.select([self._master], [], [], _POLL_s)

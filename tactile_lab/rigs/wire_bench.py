@@ -161,7 +161,7 @@ class Trial:
 
     def _setup(self, cycle_s: float, watchdog_s: float | None = None, **hand: Any) -> HandSetup:
         settings = EthercatSettings(
-            interface=self._near, watchdog_s=watchdog_s, poll_every=20, master=MasterSettings(answer_s=0.01)
+            interface=self._near, watchdog_s=watchdog_s, poll_every=5, master=MasterSettings(answer_s=0.01)
         )
         return HandSetup(
             ethercat=settings,

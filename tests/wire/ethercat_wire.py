@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from drivers.shadow.hand import ShadowHand
 from tactile_lab import rigs
 
 JOINTS = Path(rigs.__file__).parent / "calibrations" / "simulated-hand" / "joints.yaml"
@@ -35,3 +37,15 @@ def cable(tag: str = "") -> Iterator[tuple[str, str]]:
 
 def _ip(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(["ip", *words], capture_output=True, text=True, check=False)
+
+
+def check_it_moves(hand: ShadowHand) -> None:
+    """Connect a hand, let it turn a joint, and close it."""
+    hand.connect()
+    before = hand.exchange().joints_rad[2]
+    hand.set_targets({"FFJ3": before + 0.3})
+    for _ in range(300):
+        time.sleep(0.002)
+        sample = hand.exchange()
+    assert sample.joints_rad[2] == pytest.approx(before + 0.3, abs=0.05)
+    hand.close()

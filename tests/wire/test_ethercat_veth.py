@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from ethercat_wire import JOINTS, cable
+from ethercat_wire import JOINTS, cable, check_it_moves
 
 from drivers.emulators.ethercat_server import EmulatedHandProcess
 from drivers.emulators.shadow_chain import ChainSettings
@@ -73,15 +73,7 @@ def test_a_bare_hand_reaches_op_and_exchanges_its_image(ends: tuple[str, str], p
 def test_the_hand_driver_moves_a_joint(ends: tuple[str, str]) -> None:
     bench = Bench(ends[0])
     with EmulatedHandProcess(ends[1], JOINTS):
-        hand = bench.hand(soft_start_s=0.0)
-        hand.connect()
-        before = hand.exchange().joints_rad[2]
-        hand.set_targets({"FFJ3": before + 0.3})
-        for _ in range(300):
-            time.sleep(0.002)
-            sample = hand.exchange()
-        assert sample.joints_rad[2] == pytest.approx(before + 0.3, abs=0.05)
-        hand.close()
+        check_it_moves(bench.hand(soft_start_s=0.0))
 
 
 def test_losses_are_counted_as_the_slaves_count_them(ends: tuple[str, str]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from ethercat_wire import JOINTS, cable
+from ethercat_wire import JOINTS, cable, check_it_moves
 
 from drivers.emulators.ethercat_server import EmulatedHandProcess
 from drivers.emulators.shadow_chain import ChainSettings
@@ -74,15 +74,7 @@ def test_the_hand_driver_works_through_soem(ends: tuple[str, str]) -> None:
     clock = MonotonicClock()
     with EmulatedHandProcess(ends[1], JOINTS, ChainSettings(eeprom="mapped")):
         settings = HandSettings(cycle_s=0.002, soft_start_s=0.0)
-        hand = ShadowHand(link(ends[0]), clock, JointCalibration.load(JOINTS), settings)
-        hand.connect()
-        before = hand.exchange().joints_rad[2]
-        hand.set_targets({"FFJ3": before + 0.3})
-        for _ in range(300):
-            time.sleep(0.002)
-            sample = hand.exchange()
-        assert sample.joints_rad[2] == pytest.approx(before + 0.3, abs=0.05)
-        hand.close()
+        check_it_moves(ShadowHand(link(ends[0]), clock, JointCalibration.load(JOINTS), settings))
 
 
 def test_a_bare_eeprom_is_refused_with_the_way_out(ends: tuple[str, str]) -> None:

@@ -1,0 +1,19 @@
+"""What emulators share: they are context managers that close themselves."""
+
+from __future__ import annotations
+
+from typing import Self
+
+
+class Closing:
+    """Closed when its context ends."""
+
+    def close(self) -> None:
+        """End it; idempotent."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *ended: object) -> None:
+        self.close()
