@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from sessions.contact_log import read_contact_log
-from sessions.timed_contacts import FORMAT, ImportSettings, read_timed_contacts
+from sessions.timed_contacts import ImportSettings, read_timed_contacts
+from sessions.timed_table import FORMAT
 from tactile_lab.errors import ConfigurationError, SessionError
 from tactile_lab.workflow.importing import import_contacts
 
