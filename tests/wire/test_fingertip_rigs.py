@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from drivers.fingertip import load_fingertips
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.check import check_rig
 from tactile_lab.rigs.description import load_rig
@@ -144,8 +145,8 @@ def test_two_fingers_on_one_port_are_refused(rig: Path) -> None:
 
 
 def test_a_finger_without_calibration_is_refused(rig: Path) -> None:
-    text = (rig.parent / "tips.yaml").read_text().replace("  MF: *tip\n", "")
-    (rig.parent / "tips.yaml").write_text(text)
+    others = {finger: tip.model_dump(mode="json") for finger, tip in load_fingertips(TIPS).items() if finger != "MF"}
+    (rig.parent / "tips.yaml").write_text(yaml.safe_dump({"fingertips": others}))
     with pytest.raises(ConfigurationError, match=r"tips.yaml does not name MF"):
         load_fingertip_rig(rig)
 
