@@ -1,0 +1,182 @@
+"""The forearm wizard as a person meets it: in a terminal, scripted, with bad input, and ended at every step."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pexpect
+import pytest
+import yaml
+
+from calibration.forearm import load_forearm
+from calibration.recordings import ForearmData, save_data
+from calibration.store import read_record
+from calibration.touch_plan import plan_touches
+from tactile_lab.experiments.calibration_data import TrueRig, touches_of
+from tactile_lab.experiments.calibration_runs import GEOMETRY
+
+SETTINGS = {
+    "wizard": {
+        "needs": {"lever_m": 0.01},
+        "limits": {"held_out_mm": 20, "repeat_mm": 20, "repeat_deg": 10, "region_mm": 20, "region_deg": 10},
+    },
+    "station": {"travel_m_s": 0.5, "turn_rad_s": 2.5, "press_m_s": 0.04, "again_m_s": 0.006, "settle_s": 0.15},
+}
+_PATIENCE_s = 300
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Recorded touches of the simulated rig, by kinematics."""
+    rng = np.random.default_rng(3)
+    rig = TrueRig.drawn(rng)
+    touches = tuple(touches_of(plan_touches(GEOMETRY, per_patch=4), rig, rng))
+    path = tmp_path_factory.mktemp("data") / "touches.json"
+    save_data(path, ForearmData(rig="simulated-hand", touches=touches))
+    return path
+
+
+def terminal(folder: Path, *words: object) -> pexpect.spawn:
+    """The wizard in a terminal of its own, in a folder."""
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "NO_COLOR": "1", "COLUMNS": "200"}
+    arguments = ["-m", "tactile_lab.cli.main", "calibrate", "forearm", *map(str, words)]
+    return pexpect.spawn(
+        sys.executable, arguments, cwd=str(folder), env=environment, timeout=_PATIENCE_s, encoding="utf-8"
+    )
+
+
+def ended(child: pexpect.spawn, code: int) -> str:
+    """What it said until it ended, with that exit code."""
+    child.expect(pexpect.EOF)
+    child.close()
+    text = str(child.before)
+    assert child.exitstatus == code, text
+    assert "Traceback" not in text
+    return text
+
+
+def files(folder: Path) -> list[str]:
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+def test_recorded_poses_are_solved_and_stored_without_asking(inside, data, tmp_path):
+    out = tmp_path / "forearm.yaml"
+    answer = inside(
+        "calibrate", "forearm", "--from", data, "--out", out, "--no-input", "--json", "--notes", "by a test"
+    )
+    assert answer.code == 0, answer.err
+    document = json.loads(answer.out)
+    assert (document["verdict"], document["method"], document["notes"]) == ("PASS", "touch", "by a test")
+    assert len(document["residuals"]["poses"]) == 20
+    assert read_record(out).verdict == "PASS"
+    assert load_forearm(out).covariance().any()
+    again = inside("calibrate", "forearm", "--from", data, "--out", out, "--no-input")
+    assert (again.code, "exists already" in again.err) == (2, True)
+
+
+def test_a_result_outside_its_limits_ends_with_3_and_replaces_nothing(inside, data, tmp_path):
+    settings = tmp_path / "strict.yaml"
+    settings.write_text(yaml.safe_dump({"wizard": {"limits": {"region_mm": 0.001}}}))
+    out = tmp_path / "forearm.yaml"
+    answer = inside("calibrate", "forearm", "--from", data, "--settings", settings, "--out", out, "--no-input")
+    assert answer.code == 3
+    assert "OUTSIDE" in answer.err
+    assert files(tmp_path) == ["forearm.failed.yaml", "strict.yaml"]
+
+
+def test_a_stated_pose_needs_its_uncertainty(inside, tmp_path):
+    out = tmp_path / "forearm.yaml"
+    words = ("calibrate", "forearm", "--method", "manual", "--translation-mm", 10, 20, 30, "--rpy-deg", 0, 0, 90)
+    refused = inside(*words, "--out", out, "--no-input")
+    assert (refused.code, "--sigma-mm and --sigma-deg" in refused.err) == (2, True)
+    assert inside(*words, "--sigma-mm", 2, "--sigma-deg", 0.5, "--out", out, "--no-input").code == 0
+    forearm = load_forearm(out)
+    np.testing.assert_allclose(forearm.world_T_mount.pose().translation(), [0.01, 0.02, 0.03])
+    np.testing.assert_allclose(np.sqrt(np.diag(forearm.covariance()))[3:], 0.002)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"rig": "another"}, "was recorded on rig another, not on simulated-hand"),
+        ({"touches": []}, "needs touches, or views"),
+        ({"colour": "red"}, "colour: unknown key"),
+    ],
+)
+def test_recorded_poses_that_do_not_fit_are_refused(inside, data, tmp_path, change, words):
+    path = tmp_path / "data.json"
+    path.write_text(json.dumps({**json.loads(data.read_text()), **change}))
+    answer = inside("calibrate", "forearm", "--from", path, "--out", tmp_path / "forearm.yaml", "--no-input")
+    assert (answer.code, words in answer.err) == (2, True)
+    assert files(tmp_path) == ["data.json"]
+
+
+def test_too_little_motion_is_refused_before_anything_is_solved(inside, data, tmp_path):
+    content = json.loads(data.read_text())
+    path = tmp_path / "data.json"
+    path.write_text(json.dumps({**content, "touches": content["touches"][:4] * 4}))
+    answer = inside("calibrate", "forearm", "--from", path, "--out", tmp_path / "forearm.yaml", "--no-input")
+    assert answer.code == 2
+    assert "the motion is not enough" in answer.err
+    assert "no or few touches tell the place along" in answer.err
+    assert files(tmp_path) == ["data.json"]
+
+
+def test_ended_at_the_last_question_nothing_is_stored(data, tmp_path):
+    child = terminal(tmp_path, "--from", data, "--out", "forearm.yaml")
+    child.expect(re.escape("Store it as forearm.yaml?"))
+    child.sendline("q")
+    assert "Nothing was stored" in ended(child, 130)
+    assert files(tmp_path) == []
+
+
+def test_without_anybody_to_ask_it_ends_and_says_how_to_script_it(tactile_lab, data, tmp_path):
+    answer = tactile_lab("calibrate", "forearm", "--from", data, "--out", "forearm.yaml", cwd=tmp_path)
+    assert answer.code == 130
+    assert "Give --no-input" in answer.err
+    assert files(tmp_path) == []
+
+
+def test_from_the_first_question_to_the_stored_result_on_the_simulated_rig(tmp_path):
+    (tmp_path / "settings.yaml").write_text(yaml.safe_dump(SETTINGS))
+    child = terminal(tmp_path, "--settings", "settings.yaml", "--touches", 3, "--out", "forearm.yaml", "--replace")
+    child.expect("Is its way clear")
+    child.sendline("y")
+    child.expect("1/15 FF presses table top")
+    child.sendline("")
+    child.expect("2/15 MF")
+    child.sendline("u")  # take it back, and do it again
+    child.expect("1/15 FF")
+    for number in range(1, 16):
+        child.sendline("")
+        child.expect(f"{number}/15 [^:]*: done")
+    child.expect(re.escape("Store it as forearm.yaml?"))
+    child.sendline("y")
+    assert "PASS" in ended(child, 0)
+    assert read_record(tmp_path / "forearm.yaml").details["motion"]["touches"] == 15
+    mount = load_forearm(tmp_path / "forearm.yaml").world_T_mount.pose()
+    assert np.linalg.norm(mount.translation()) < 0.004
+
+
+@pytest.mark.parametrize("step", ["begin", "first touch", "second touch", "ctrl-c"])
+def test_ended_at_any_step_nothing_is_stored(tmp_path, step):
+    (tmp_path / "settings.yaml").write_text(yaml.safe_dump(SETTINGS))
+    child = terminal(tmp_path, "--settings", "settings.yaml", "--out", "forearm.yaml", "--record", "poses.json")
+    child.expect("Is its way clear")
+    if step != "begin":
+        child.sendline("y")
+        child.expect("1/40")
+    if step == "second touch":
+        child.sendline("")
+        child.expect("2/40")
+    if step == "ctrl-c":
+        child.sendintr()
+    else:
+        child.sendline("q")
+    ended(child, 130)
+    assert files(tmp_path) == ["settings.yaml"]
