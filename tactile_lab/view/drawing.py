@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import trimesh
 import viser
 from gtsam import Pose3
 
@@ -22,6 +22,19 @@ _BONE, _IDLE, _TOUCHING, _SILENT = (120, 126, 138), (150, 158, 170), (46, 160, 6
 _NEXT, _POSE, _CONTACT = (214, 90, 160), (31, 111, 235), (200, 40, 40)
 _FORCE_SCALE_m_N = 0.025
 _UP = np.array([0.0, 0.0, 1.0])
+
+
+COLOURS = 12
+"""Steps of the colour map on a surface."""
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A part of a surface with one colour: vertices (n, 3), faces (m, 3), red green blue."""
+
+    vertices_m: Array
+    faces: Any
+    colour: tuple[int, int, int]
 
 
 class Drawing:
@@ -116,14 +129,24 @@ class Drawing:
             )
         ]
         if scene.surface is not None and len(scene.surface.vertices_m):
-            nodes.append(
-                self._scene.add_mesh_trimesh("/object/surface", coloured_mesh(scene.surface), cast_shadow=False)
-            )
+            nodes += [self._patch(number, patch) for number, patch in enumerate(patches(scene.surface))]
         if scene.covariance is not None:
             outline_m = np.column_stack([ellipse(scene.covariance), np.full(48, 0.002)])
             centre_m = pose.translation() * [1.0, 1.0, 0.0]
             nodes.append(self._line("/uncertainty", outline_m + centre_m, _POSE, 0.0015))
         self._replace("object", nodes)
+
+    def _patch(self, number: int, patch: Patch) -> Any:
+        return self._scene.add_mesh_simple(
+            f"/object/surface/{number}",
+            patch.vertices_m,
+            patch.faces,
+            color=patch.colour,
+            side="double",
+            opacity=0.85,
+            flat_shading=True,
+            cast_shadow=False,
+        )
 
     def _grasps(self, scene: Scene) -> None:
         """All contacts in the object frame, the newest ones with their forces."""
@@ -191,17 +214,25 @@ def quaternion(pose: Pose3) -> Array:
     return np.array([rotation["w"], rotation["x"], rotation["y"], rotation["z"]])
 
 
-def coloured_mesh(surface: ShownSurface) -> trimesh.Trimesh:
-    """The surface with its colours: dark where it is well known, yellow where it is not.
+def patches(surface: ShownSurface) -> list[Patch]:
+    """The surface in parts of one colour each: dark where it is well known, yellow where it is not.
 
     An outline is shown as the wall that stands on it, from the table to twice the height of the contacts.
     """
-    vertices, faces, sigma_m = surface.vertices_m, surface.faces, surface.sigma_m
+    vertices_m, faces, sigma_m = surface.vertices_m, surface.faces, surface.sigma_m
     if surface.dimension == 2:
-        vertices, faces, sigma_m = _wall(vertices, surface.origin_height_m, sigma_m)
-    colours = viridis(sigma_m / SIGMA_FULL_m)
-    both = np.vstack([faces, faces[:, ::-1]])  # seen from inside too
-    return trimesh.Trimesh(vertices, both, vertex_colors=colours, process=False)
+        vertices_m, faces, sigma_m = _wall(vertices_m, surface.origin_height_m, sigma_m)
+    shares = np.clip(sigma_m[faces].mean(axis=1) / SIGMA_FULL_m, 0.0, 1.0)
+    steps = np.rint(shares * (COLOURS - 1)).astype(int)
+    colours = viridis(np.linspace(0.0, 1.0, COLOURS))
+    return [_patch_of(vertices_m, faces[steps == step], colours[step]) for step in np.unique(steps)]
+
+
+def _patch_of(vertices_m: Array, faces: Any, colour: Any) -> Patch:
+    """Only the vertices that these faces need."""
+    used, renumbered = np.unique(faces, return_inverse=True)
+    red, green, blue = (int(channel) for channel in colour)
+    return Patch(vertices_m[used], renumbered.reshape(-1, 3), (red, green, blue))
 
 
 def _wall(outline_m: Array, half_height_m: float, sigma_m: Array) -> tuple[Array, Any, Array]:

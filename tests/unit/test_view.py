@@ -25,7 +25,7 @@ from tactile_lab.cli.page_address import PageAddress
 from tactile_lab.errors import ConfigurationError, DeviceError
 from tactile_lab.geometry.contacts import Contact, Grasp
 from tactile_lab.view.controls import history_html, status_html
-from tactile_lab.view.drawing import coloured_mesh
+from tactile_lab.view.drawing import patches
 from tactile_lab.view.feed import QUEUE_LENGTH, ViewFeed
 from tactile_lab.view.gate import Gate, Head, inner_address, is_loopback, new_token, parse_head
 from tactile_lab.view.page import Page
@@ -114,11 +114,14 @@ def test_panel_tells_prompt_pause_pose_and_grasps_and_shows_no_foreign_markup() 
 def test_outline_is_shown_as_a_wall_coloured_by_its_uncertainty() -> None:
     scene = recorded()
     assert scene.surface is not None
-    mesh = coloured_mesh(scene.surface)
-    assert mesh.vertices[:, 2].min() == pytest.approx(-0.02)
-    assert mesh.vertices[:, 2].max() == pytest.approx(0.02)
+    (wall,) = patches(scene.surface)
+    assert len(wall.faces) == 8
+    assert wall.vertices_m[:, 2].min() == pytest.approx(-0.02)
+    assert wall.vertices_m[:, 2].max() == pytest.approx(0.02)
     scene.surface.sigma_m[:] = [0.0, 0.0, 0.02, 0.02]
-    assert len(np.unique(coloured_mesh(scene.surface).visual.vertex_colors, axis=0)) == 2
+    known, between, unknown = patches(scene.surface)
+    assert sum(len(patch.faces) for patch in (known, between, unknown)) == 8
+    assert known.colour[0] < unknown.colour[0]  # from dark violet to yellow
 
 
 def test_ellipse_has_the_axes_of_the_covariance() -> None:

@@ -1,0 +1,113 @@
+"""Keys and words of a guided session, and terminals that are put back as they were."""
+
+from __future__ import annotations
+
+import os
+import pty
+import termios
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from sessions.guided.operator import Ask, Panel, Request, Stage
+from sessions.guided.sight import Sight
+from tactile_lab.cli.guided_keys import BINDINGS, BY_KEY, request_of_line, split_keys
+from tactile_lab.cli.guided_screen import as_lines, as_panel, facts
+from tactile_lab.cli.terminal_input import KeyInput, LineInput
+from tactile_lab.geometry.contacts import FINGERS
+
+GUIDE = Path(__file__).parents[2] / "docs" / "guided-sessions.md"
+
+
+def test_every_key_and_every_word_means_one_thing() -> None:
+    assert len({binding.key for binding in BINDINGS}) == len({binding.word for binding in BINDINGS}) == len(BINDINGS)
+
+
+@pytest.mark.parametrize("key", ["a", "u", "x", "p", "n", "m", "i", "t", "e"])
+def test_the_guide_tells_the_keys(key: str) -> None:
+    assert key in BY_KEY
+    assert f"| `{key}`" in GUIDE.read_text()
+
+
+def test_keys_are_told_apart_in_what_a_terminal_sends() -> None:
+    sent = "g \x1b[A\x1bOD\x1b[6~\r\x1b[15~u\x1b"
+    assert split_keys(sent) == ["g", " ", "up", "left", "page down", "enter", "u", "escape"]
+
+
+@pytest.mark.parametrize("text", ["\x1b[", "\x1bO", "\x1b[1;2;3", "\x00\x07", "\x1b\x1b[A"])
+def test_torn_and_strange_sequences_do_no_harm(text: str) -> None:
+    assert all(key not in ("g", "u", "e", " ") for key in split_keys(text))
+
+
+@pytest.mark.parametrize(
+    ("line", "request_"),
+    [
+        ("next", Request(Ask.NEXT)),
+        ("", Request(Ask.NEXT)),
+        ("u", Request(Ask.UNDO)),
+        ("note  it slipped ", Request(Ask.NOTE, text="it slipped")),
+        ("far 3", Request(Ask.MOVE, x=3)),
+        ("turn-right 2", Request(Ask.MOVE, turn=-2)),
+        ("close 2", Request(Ask.FINGERS, fingers=FINGERS, steps=2)),
+        ("open-th", Request(Ask.FINGERS, fingers=("TH",), steps=-1)),
+        ("far 99", None),
+        ("far -1", None),
+        ("fly", None),
+    ],
+)
+def test_lines_say_the_same_as_keys(line: str, request_: Request | None) -> None:
+    assert request_of_line(line) == request_
+
+
+@pytest.fixture
+def terminal() -> Iterator[tuple[int, int]]:
+    ours, theirs = pty.openpty()
+    yield ours, theirs
+    os.close(theirs)
+    os.close(ours)
+
+
+def _use_and_interrupt(ours: int, theirs: int) -> None:
+    before = termios.tcgetattr(theirs)
+    with KeyInput(theirs) as keys:
+        assert termios.tcgetattr(theirs) != before
+        assert keys.read() == ""
+        os.write(ours, b"g\x1b[A")
+        assert split_keys(keys.read()) == ["g", "up"]
+        raise KeyboardInterrupt
+
+
+def test_terminal_is_put_back_whatever_happens(terminal: tuple[int, int]) -> None:
+    ours, theirs = terminal
+    before = termios.tcgetattr(theirs)
+    with pytest.raises(KeyboardInterrupt):
+        _use_and_interrupt(ours, theirs)
+    assert termios.tcgetattr(theirs) == before
+
+
+def test_lines_come_when_they_are_complete_and_the_end_is_noticed() -> None:
+    reading, writing = os.pipe()
+    lines = LineInput(reading)
+    assert lines.lines() == []
+    os.write(writing, b"next\nno")
+    assert lines.lines() == ["next"]
+    os.write(writing, b"te x\n")
+    assert lines.lines() == ["note x"]
+    os.close(writing)
+    assert lines.lines() == []
+    assert lines.closed
+    os.close(reading)
+
+
+def test_panel_says_prompt_contacts_and_what_is_silent() -> None:
+    sight = Sight({"FF": 0.4, "MF": None}, ("FF",), 0.2, False, 0.31, ("MF",))
+    panel = Panel(0, 2, Stage.HOLD, "Hold still", sight, capture="2 more fingers have to touch", paused="coffee")
+    told = dict(facts(panel))
+    assert told["contacts"] == "1 fingers touch: FF 0.40 N"
+    assert told["silent"] == "MF"
+    assert told["stability"] == "2 more fingers have to touch"
+    assert told["observability"].startswith("0.31")
+    assert as_lines(panel)[0] == "[2 hold] Hold still"
+    assert as_panel(panel) is not None
+    assert panel.content()["stage"] == "hold"
