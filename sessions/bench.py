@@ -167,6 +167,8 @@ class Bench:
                 instrument.connect()
                 self._catch_up()
             self._await_first_samples()
+            if isinstance(self.hand, CyclingInstrument):
+                self.event(Level.INFO, "hand", self.hand.described())
         except BaseException as error:
             for problem in self._close_all():
                 error.add_note(f"while closing again: {problem}")

@@ -155,6 +155,9 @@ class CyclingInstrument(Protocol):
     def catch_up(self) -> None:
         """Show the tap what has come since the last look. Raises DeviceError."""
 
+    def described(self) -> str:
+        """What was found when it was connected, in words."""
+
 
 class CameraInstrument(Instrument, Protocol):
     """The live camera."""

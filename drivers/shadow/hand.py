@@ -14,10 +14,12 @@ from drivers.shadow.hand_samples import HandDecoder, HandSample
 from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motor_configuration import MotorConfiguration, configure_motors, reset_motors
-from drivers.shadow.motor_data import ToMotor
+from drivers.shadow.motor_data import MAX_PWM, ToMotor
+from drivers.shadow.motor_load import LoadWatch
 from drivers.shadow.motor_polling import MotorReadings
 from drivers.shadow.motor_watch import Fault, MotorWatch
 from drivers.shadow.motors import MotorMap
+from drivers.shadow.palm_codec import MOTORS
 from drivers.shadow.palm_dialogue import HandCounters, PalmDialogue
 from drivers.shadow.palm_images import PALMS
 from tactile_lab.clock import NANOSECONDS, Clock
@@ -55,6 +57,7 @@ class ShadowHand:
         self._motors, self._boards = motors or MotorMap.load(), boards
         self._motion = HandMotion(self._motors, self._settings.gains, self._settings.soft_start_s, link.name)
         self._watch = MotorWatch(self._motors, self._settings.heat, link.name)
+        self._load = LoadWatch(self._motors, self._settings.load, self._largest_pwm(), link.name)
         self._decoder = HandDecoder(calibration, PALMS[self._settings.palm])
         self._connected = False
         self._reset()
@@ -186,6 +189,7 @@ class ShadowHand:
         self._fault: Fault | None = None
         self._counters.lost_in_a_row = 0
         self._motion.clear()
+        self._load.restart()
 
     # --- the cycle ---------------------------------------------------------------------------------------------
 
@@ -249,6 +253,7 @@ class ShadowHand:
             if sample is not None:
                 newest = sample
                 self._fault = self._fault or self._watch.fault(sample.status, settling=self._dialogue.settling)
+                self._fault = self._fault or self._load.fault(sample.status)
         return newest
 
     def _demand(self, last: HandSample) -> NDArray[np.int16]:
@@ -256,7 +261,15 @@ class ShadowHand:
             self._motion.pause()
             return NO_DEMAND
         share = self._watch.pwm_share(last.motor.temperature_C)
-        return self._motion.words(last.joints_rad, share, self._clock.now_ns())
+        words = self._motion.words(last.joints_rad, share, now_ns := self._clock.now_ns())
+        self._fault = self._load.stall(words, now_ns)
+        return words
+
+    def _largest_pwm(self) -> NDArray[np.float64]:
+        """Largest duty cycle each motor is told, shape (20,); any where motors are told torques."""
+        if self._settings.demand == "torque":
+            return np.full(MOTORS, float(MAX_PWM))
+        return np.array([self._settings.gains.of(name).max_pwm for name in self._motors.names])
 
     # --- what can go wrong -------------------------------------------------------------------------------------
 

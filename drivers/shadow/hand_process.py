@@ -168,6 +168,10 @@ class HandProcess:
         if told := [error for error in errors if error]:
             raise DeviceError(told[0])
 
+    def described(self) -> str:
+        """Which hand was found, its watchdog as read back, and how its process is scheduled."""
+        return str(self.ready)
+
     def receive(self) -> list[Record]:
         """Traffic and errors that have come since the last call, oldest first; does not wait.
 

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from drivers.shadow.gains import GainTable
 from drivers.shadow.motor_data import MAX_PWM
+from drivers.shadow.motor_load import LoadLimits
 from drivers.shadow.motor_polling import PollingRates
 from drivers.shadow.motor_watch import HeatLimits
 from drivers.shadow.motors import DRIVEN_JOINTS
@@ -31,6 +32,7 @@ class HandSettings(StrictModel):
         soft_start_s: after connecting, a resume or a loss the duty cycle limit rises from zero in this time.
         demand_grace_s: after a pause in the demands motors may report for so long that they had halted.
         heat: temperature limits of the motors.
+        load: limits of torque and duty cycle.
         connect_tries: exchanges until the palm must have answered.
         close_cycles: exchanges with zero demands before the link is closed.
         reset_motors: reset the motor boards when connecting; they then need ``reset_wait_s`` to come back.
@@ -47,6 +49,7 @@ class HandSettings(StrictModel):
     soft_start_s: float = Field(default=0.5, ge=0.0)
     demand_grace_s: float = Field(default=0.3, ge=0.0)
     heat: HeatLimits = HeatLimits()
+    load: LoadLimits = LoadLimits()
     connect_tries: int = Field(default=20, ge=1)
     close_cycles: int = Field(default=5, ge=1)
     reset_motors: bool = False
