@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from gtsam import Pose3, Rot3
 from pydantic import Field
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from calibration.admission import Installation
 from calibration.hand_eye import nearest_rotation
@@ -167,7 +167,7 @@ def _weights(weight: Array, down_sensor: Array) -> Array:
     return np.hstack([forces, np.cross(weight[1:], GRAVITY * down_sensor)])
 
 
-def _shape(loads: Array, sensor_R_distal: Array, place: Array, before: FingertipCalibration) -> least_squares:
+def _shape(loads: Array, sensor_R_distal: Array, place: Array, before: FingertipCalibration) -> OptimizeResult:
     """Centre and semi-axes whose contact points explain the torques, started from the shape before."""
     forces, torques = loads[:, :3] @ sensor_R_distal, loads[:, 3:] @ sensor_R_distal
     outward = -forces / np.linalg.norm(forces, axis=1, keepdims=True)
@@ -201,7 +201,7 @@ def _calibration(
     return before.model_copy(update=changes)
 
 
-def _sigmas(rest: Array, shape: least_squares, count: int) -> dict[str, float]:
+def _sigmas(rest: Array, shape: OptimizeResult, count: int) -> dict[str, float]:
     force, torque = (float(np.sqrt(np.mean(part**2))) for part in (rest[:, :3], rest[:, 3:]))
     spread = np.linalg.pinv(shape.jac.T @ shape.jac) * float(np.mean(np.square(shape.fun)))
     return {
