@@ -56,7 +56,8 @@ class NetBoxProcess:
     """
 
     def __init__(self, hosts: Sequence[str], rate_hz: int, port: int = rdt_codec.PORT) -> None:
-        self._start = {"hosts": list(hosts), "rate_hz": rate_hz, "port": port}
+        self._hosts = list(hosts)
+        self._start = {"hosts": self._hosts, "rate_hz": rate_hz, "port": port}
         self._process: subprocess.Popen[str] | None = None
         self.http_ports: list[int] = []
         self.sent: list[int] = []
@@ -70,7 +71,7 @@ class NetBoxProcess:
         self._process.stdin.flush()
         if not (line := self._process.stdout.readline()):
             self.close()
-            raise DeviceError("the emulated boxes do not start", where=", ".join(self._start["hosts"]), hint=_TAKEN)
+            raise DeviceError("the emulated boxes do not start", where=", ".join(self._hosts), hint=_TAKEN)
         self.http_ports = json.loads(line)["http_ports"]
         return self
 

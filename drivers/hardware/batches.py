@@ -113,7 +113,7 @@ class BatchReceiver:
             header = message.header
             header.name, header.control = names + number * _ADDRESS.itemsize, control + number * _CONTROL
             header.vector, header.vectors = ctypes.addressof(vector), 1
-        self._heads = np.frombuffer(self._messages, _LAYOUT)
+        self._heads = np.frombuffer(memoryview(self._messages).cast("B"), _LAYOUT)
 
     def receive(self) -> Batch:
         """What waits, at most :data:`AT_ONCE` datagrams; never blocks. Raises OSError."""

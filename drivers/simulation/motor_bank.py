@@ -31,7 +31,7 @@ class MotorBank:
     """All motor boards together, vectors by motor number.
 
     PWM and torque demands, configurations, backlash controls and resets are served. The torque loop runs with the
-    commands, not at 5 kHz: the duty cycle that gives the torque at a standstill, and half as much again per torque missing.
+    commands, not at 5 kHz: the duty cycle that gives the torque at a standstill, and half of what is missing besides.
 
     Args:
         plant: whose motors turn.
@@ -145,7 +145,7 @@ class MotorBank:
         """Duty cycles for torque demands in counts of the gauges, within the boards' torque limits."""
         wanted = np.minimum(np.maximum(torques, -self._max_torque), self._max_torque)
         missing = wanted - self._torque_Nm * GAUGE_COUNTS_PER_Nm
-        return np.rint((wanted + 0.5 * missing) / (GAUGE_COUNTS_PER_Nm * self._stall_Nm) * MAX_PWM).astype(int)
+        return np.asarray(np.rint((wanted + 0.5 * missing) / (GAUGE_COUNTS_PER_Nm * self._stall_Nm) * MAX_PWM), int)
 
     def _turn(self, pwm: Array | NDArray[np.int_]) -> None:
         self._pwm = np.where(self._flags & int(MotorFlag.OVER_TEMPERATURE), 0.0, pwm)

@@ -14,7 +14,9 @@ from drivers.ati.force_tip import ForceTip
 from drivers.biotac import units
 from drivers.biotac.biotac import BioTac
 from drivers.biotac.slot_codec import Channel
+from drivers.camera.camera import Camera
 from drivers.fingertip import FingertipSensor
+from drivers.positioner import Positioner
 from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_process import HandProcess
 from drivers.simulation.objects import CATALOGUE
@@ -43,7 +45,7 @@ _NOISY = 6.0
 Figures = dict[str, float | str]
 
 
-def check_rig(name: str, seed: int = 0) -> list[Finding]:
+def check_rig(name: str, seed: int = 0, *, move: bool = False) -> list[Finding]:
     """Findings of all calibrations and devices; a device that does not connect ends the list.
 
     Raises:
@@ -52,17 +54,19 @@ def check_rig(name: str, seed: int = 0) -> list[Finding]:
     if Path(name).suffix in {".yaml", ".yml"} and is_fingertip_rig(Path(name)):
         return check_fingertips(load_fingertip_rig(Path(name)), MonotonicClock())
     if Path(name).suffix in {".yaml", ".yml"} and is_hand_rig(Path(name)):
-        return check_hand(load_hand_rig(Path(name)), MonotonicClock())
+        return check_hand(load_hand_rig(Path(name)), MonotonicClock(), move=move)
     rig = load_rig(name)
     check_calibration(rig)
-    return _calibrations(rig) + _devices(rig, seed)
+    if move and rig.description.kind == "simulated":
+        raise ConfigurationError("has no real motors to move", where=name, hint="Leave --move out")
+    return _calibrations(rig) + _devices(rig, seed, move)
 
 
-def _devices(rig: Rig, seed: int) -> list[Finding]:
+def _devices(rig: Rig, seed: int, move: bool) -> list[Finding]:
     watch = StreamWatch()
     try:
         with open_laboratory(rig, seed, next(iter(CATALOGUE))) as laboratory:
-            bench = laboratory.bench(Recorder(watch))
+            bench = laboratory.bench(Recorder(watch), first_move=move)
             try:
                 bench.connect()
                 bench.run(LISTEN_ns)
@@ -141,7 +145,7 @@ def _motors(hand: ShadowHand) -> Figures:
 def _base(bench: Bench, watch: StreamWatch) -> Finding:
     place = ", ".join(f"{value:.3f}" for value in bench.perception.base_q[:3])
     figures = watch.figures(BASE_LINK)
-    return _finding("base", bench.base.health(), [f"at {place} m", in_words(figures)], figures)
+    return _finding("base", _problems(bench.base), [f"at {place} m", in_words(figures)], figures)
 
 
 def _fingertip(finger: str, tip: FingertipSensor | None, watch: StreamWatch) -> Finding:
@@ -192,8 +196,13 @@ def _biotac(tip: BioTac) -> Figures:
 def _camera(bench: Bench, watch: StreamWatch) -> Finding:
     assert bench.camera is not None
     height, width = bench.camera.capture().image.shape[:2]
-    figures: Figures = {"width_px": float(width), "height_px": float(height)} | dict(watch.figures(CAMERA_LINK))
-    return _finding("camera", bench.camera.health(), [f"{width} x {height} pixels"], figures)
+    figures: Figures = {"width_px": float(width), "height_px": float(height), **watch.figures(CAMERA_LINK)}
+    return _finding("camera", _problems(bench.camera), [f"{width} x {height} pixels"], figures)
+
+
+def _problems(device: object) -> tuple[str, ...]:
+    """What a device that can tell finds wrong with itself."""
+    return device.health() if isinstance(device, Positioner | Camera) else ()
 
 
 def _finding(device: str, problems: tuple[str, ...], words: list[str], figures: Mapping[str, float | str]) -> Finding:

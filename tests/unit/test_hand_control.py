@@ -222,7 +222,7 @@ class Plant:
     def motor_torque_Nm(self) -> np.ndarray:
         from drivers.simulation.geared_motors import motor_class
 
-        return self.duty * np.array([motor_class(joint).stall_Nm for joint in DRIVEN_JOINTS])
+        return np.asarray(self.duty * np.array([motor_class(joint).stall_Nm for joint in DRIVEN_JOINTS]))
 
     def drive(self, duty: np.ndarray) -> None:
         self.duty = np.asarray(duty)
