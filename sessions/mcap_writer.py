@@ -68,7 +68,8 @@ class McapWriter:
         self._chunk = PendingChunk()
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunk_indices: list[ChunkIndex] = []
+        self._chunk_indices = bytearray()  # as records: thousands come, and objects would take ten times as much
+        self._chunk_count, self._span_ns = 0, (0, 0)
         self._metadata_indices: list[MetadataIndex] = []
         self._attachment_indices: list[AttachmentIndex] = []
         self._counts: Counter[int] = Counter()
@@ -165,6 +166,7 @@ class McapWriter:
         self._output.write(summary)
         footer = Footer(summary_start=start, summary_offset_start=offset_start, summary_crc=zlib.crc32(checked))
         self._output.write(_encoded(footer) + MCAP0_MAGIC)
+        self._chunk_indices.clear()
 
     def write_chunk(self, chunk: PendingChunk) -> None:
         """Compress a chunk that was taken, and write it. Chunks must come in the order in which they were taken."""
@@ -180,7 +182,9 @@ class McapWriter:
         self._output.write(_encoded(record))
         offsets, indices = chunk.index(end := self._output.tell())
         self._output.write(indices)
-        self._chunk_indices.append(
+        self._span_ns = (self._span_ns[0] if self._chunk_count else chunk.first_ns, chunk.last_ns)
+        self._chunk_count += 1
+        self._chunk_indices += _encoded(
             ChunkIndex(
                 message_start_time=chunk.first_ns,
                 message_end_time=chunk.last_ns,
@@ -196,17 +200,16 @@ class McapWriter:
 
     def _summary(self, start: int) -> tuple[bytes, list[SummaryOffset]]:
         """The records of the summary, which begins at ``start``, and where each kind of them stands."""
-        groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
-            (Opcode.SCHEMA, self._schemas),
-            (Opcode.CHANNEL, self._channels),
-            (Opcode.STATISTICS, [self._statistics()]),
-            (Opcode.CHUNK_INDEX, self._chunk_indices),
-            (Opcode.ATTACHMENT_INDEX, self._attachment_indices),
-            (Opcode.METADATA_INDEX, self._metadata_indices),
+        groups: list[tuple[Opcode, bytes]] = [
+            (Opcode.SCHEMA, _all_encoded(self._schemas)),
+            (Opcode.CHANNEL, _all_encoded(self._channels)),
+            (Opcode.STATISTICS, _encoded(self._statistics())),
+            (Opcode.CHUNK_INDEX, bytes(self._chunk_indices)),
+            (Opcode.ATTACHMENT_INDEX, _all_encoded(self._attachment_indices)),
+            (Opcode.METADATA_INDEX, _all_encoded(self._metadata_indices)),
         ]
         summary, offsets = bytearray(), []
-        for opcode, records in groups:
-            group = b"".join(map(_encoded, records))
+        for opcode, group in groups:
             offsets.append(SummaryOffset(opcode, group_start=start + len(summary), group_length=len(group)))
             summary += group
         return bytes(summary), offsets
@@ -216,11 +219,11 @@ class McapWriter:
             attachment_count=len(self._attachment_indices),
             channel_count=len(self._channels),
             channel_message_counts=dict(self._counts),
-            chunk_count=len(self._chunk_indices),
+            chunk_count=self._chunk_count,
             message_count=sum(self._counts.values()),
             metadata_count=len(self._metadata_indices),
-            message_start_time=self._chunk_indices[0].message_start_time if self._chunk_indices else 0,
-            message_end_time=self._chunk_indices[-1].message_end_time if self._chunk_indices else 0,
+            message_start_time=self._span_ns[0],
+            message_end_time=self._span_ns[1],
             schema_count=len(self._schemas),
         )
 
@@ -250,6 +253,10 @@ class PendingChunk:
             offsets[channel] = start + len(indices)
             indices += _INDEX.pack(Opcode.MESSAGE_INDEX, _INDEX_BYTES + len(entries), channel, len(entries)) + entries
         return offsets, bytes(indices)
+
+
+def _all_encoded(records: Sequence[McapRecord]) -> bytes:
+    return b"".join(map(_encoded, records))
 
 
 def _encoded(record: McapRecord) -> bytes:

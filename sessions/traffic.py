@@ -47,7 +47,7 @@ class TrafficSettings:
     """How a recording is kept.
 
     Attributes:
-        segment_bytes: size at which the next file is begun.
+        segment_bytes: size at which the next file is begun; it bounds the index that is kept in memory, too.
         queue_bytes: uncompressed bytes that may wait for the disk; at 2 MB/s half a minute.
         when_full: "wait" delays the recording thread, for a rig whose time waits with it; "drop" leaves out whole
             chunks and counts their messages, for real time.
@@ -56,7 +56,7 @@ class TrafficSettings:
         open_file: makes the files; another one than usual tries out what a bad disk does.
     """
 
-    segment_bytes: int = 1 << 30
+    segment_bytes: int = 256 << 20
     queue_bytes: int = 64 << 20
     when_full: Literal["wait", "drop"] = "wait"
     patience_s: float = CLOSE_TIMEOUT_s

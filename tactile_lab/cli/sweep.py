@@ -20,6 +20,9 @@ def sweep(
     rig: RigName = "sim",
     jobs: Annotated[int, typer.Option(min=1, help="Sessions side by side.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the sessions and of table.md.")] = Path("runs/sweep"),
+    check_replay: Annotated[
+        bool, typer.Option("--check-replay", help="Replay every session; one that differs counts as failed.")
+    ] = False,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -44,7 +47,7 @@ def sweep(
     chosen = _numbers(dimensions, "--dimensions", smallest=2, largest=3)
     drawn = _numbers(seeds, "--seeds")
     runs = planned_runs(check_sweep(rig, names, out, method), chosen, drawn)
-    job = partial(run_for_sweep, rig=rig, method=str(method), grasps=grasps, root=out)
+    job = partial(run_for_sweep, rig=rig, method=str(method), grasps=grasps, root=out, check_replay=check_replay)
     with ProcessPoolExecutor(jobs, initializer=_leave_ctrl_c_to_the_parent) as pool:
         rows = sweep(runs, job, lambda row: say(row.line()), pool.map)
     found = summaries(rows)

@@ -8,10 +8,13 @@ from typing import Any
 
 from drivers.simulation.objects import CATALOGUE
 from sessions.progress import NullProgress
+from sessions.session import Session
 from tactile_lab.errors import SessionError
 from tactile_lab.evaluation.sweep import SweepRun
 from tactile_lab.rigs.build import check_calibration, simulated_world
 from tactile_lab.rigs.description import load_rig
+from tactile_lab.workflow.judging import differing_files
+from tactile_lab.workflow.replaying import recorded_seed, recorded_slam, replay_session
 from tactile_lab.workflow.running import SessionRequest, refuse_known_pose, run_session
 
 
@@ -36,10 +39,29 @@ def check_sweep(rig: str, objects: Sequence[str] | None, root: Path, method: str
     return tuple(objects or CATALOGUE)
 
 
-def run_for_sweep(run: SweepRun, *, rig: str, method: str, grasps: int, root: Path) -> dict[str, Any]:
-    """One session of a sweep: the content of its ``evaluation.json``. Raises TactileLabError."""
+def run_for_sweep(
+    run: SweepRun, *, rig: str, method: str, grasps: int, root: Path, check_replay: bool = False
+) -> dict[str, Any]:
+    """One session of a sweep: the content of its ``evaluation.json``.
+
+    Args:
+        check_replay: replay the session from its bytes, too; a run whose replay is not identical counts as failed.
+
+    Raises:
+        TactileLabError: the run failed.
+    """
     request = SessionRequest(rig, run.object_name, root, method, run.dimension, run.seed, grasps)
     finished = run_session(request, NullProgress())
     if finished.evaluation is None:
         raise SessionError(finished.problem, where=str(finished.folder))
+    if check_replay:
+        _check_replay(Session.open(finished.folder))
     return finished.evaluation.as_json()
+
+
+def _check_replay(session: Session) -> None:
+    """Raises SessionError when a replay does not give the session's own results, byte for byte."""
+    out = session.folder / "replay"
+    replay_session(session, recorded_slam(session), recorded_seed(session), out)
+    if differing := differing_files(session.results, out):
+        raise SessionError(f"its replay differs in {', '.join(differing)}", where=str(session.folder))
