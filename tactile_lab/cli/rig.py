@@ -67,12 +67,15 @@ def _list_ports(watch_s: float, as_json: bool) -> None:
 def check(
     rig: Annotated[str, typer.Argument(metavar="RIG", help="Name of a shipped rig, or a rig file.")],
     seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
+    move: Annotated[
+        bool, typer.Option("--move", help="Nudge every motor of a real hand: does it move the joint its map says?")
+    ] = False,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
     """Read a rig file and its calibration, connect every device, and tell what each one says.
 
-    Nothing moves. A rig of force fingertips alone, without a hand, can be checked too.
+    Nothing moves without --move. A rig of force fingertips alone, without a hand, can be checked too.
 
     Exit code 0: all well; 2: the files; 4: a device is not ready.
     """
@@ -80,7 +83,7 @@ def check(
     from tactile_lab.rigs.check import check_rig
 
     del no_input
-    findings = check_rig(rig, seed)
+    findings = check_rig(rig, seed, move=move)
     ready = all(finding.ok for finding in findings)
     if as_json:
         devices = [{"device": f.device, "ok": f.ok, "detail": f.detail, "figures": dict(f.figures)} for f in findings]

@@ -25,7 +25,7 @@ from sessions.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, fingertip_li
 from sessions.recorder import Recorder
 from tactile_lab.calibration_file import is_stored
 from tactile_lab.clock import MonotonicClock
-from tactile_lab.errors import DeviceError
+from tactile_lab.errors import ConfigurationError, DeviceError
 from tactile_lab.geometry.contacts import FINGERS
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.check_fingertips import check_fingertips

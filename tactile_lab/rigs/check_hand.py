@@ -7,6 +7,7 @@ import numpy as np
 from drivers.links import Link
 from drivers.shadow.cycle_statistics import CycleStatistics
 from drivers.shadow.ethercat_link import EthercatLink
+from drivers.shadow.first_move import check_motor_map
 from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_samples import HandSample
 from drivers.shadow.motors import MotorMap
@@ -22,8 +23,13 @@ _COUNTS = range(1, 4095)
 _JOINT_CHANNELS = 26
 
 
-def check_hand(rig: HandRig, clock: Clock) -> list[Finding]:
+def check_hand(rig: HandRig, clock: Clock, *, move: bool = False) -> list[Finding]:
     """Findings of ring, cycle, motors and joint sensors; a hand that does not connect ends the list.
+
+    Args:
+        rig: of a hand alone.
+        clock: the monotonic one.
+        move: nudge every motor as well, to see whether it moves the joint its map says.
 
     Raises:
         ConfigurationError: a file the rig names, or a master that is not installed.
@@ -34,11 +40,23 @@ def check_hand(rig: HandRig, clock: Clock) -> list[Finding]:
     try:
         hand.connect()
         sample, statistics = _listen(hand, clock, round(setup.hand.cycle_s * NANOSECONDS))
-        return [_ring(link), _cycle(hand, link, statistics), _motors(hand, sample, setup.motor_map()), _joints(sample)]
+        motors = setup.motor_map()
+        found = [_ring(link), _cycle(hand, link, statistics), _motors(hand, sample, motors), _joints(sample)]
+        return [*found, _motor_map(hand, motors, clock, setup.hand.cycle_s)] if move else found
     except DeviceError as error:
         return [Finding("hand", False, str(error))]
     finally:
         _close(hand)
+
+
+def _motor_map(hand: ShadowHand, motors: MotorMap, clock: Clock, cycle_s: float) -> Finding:
+    def cycle() -> HandSample:
+        clock.sleep_until_ns(clock.now_ns() + round(cycle_s * NANOSECONDS))
+        return hand.exchange()
+
+    moved = check_motor_map(hand, motors, cycle)
+    wrong = [str(finding) for finding in moved if not finding.ok]
+    return Finding("motor map", not wrong, "; ".join(wrong) or f"each of {len(moved)} motors moves its own joint")
 
 
 def _close(hand: ShadowHand) -> None:

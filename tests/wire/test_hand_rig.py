@@ -44,6 +44,24 @@ def test_a_sound_hand_is_told_part_by_part(tmp_path: Path) -> None:
     assert "without a status" in findings["cycle"].detail
 
 
+def test_a_motor_map_is_checked_by_moving_when_asked(tmp_path: Path) -> None:
+    content = yaml.safe_load(JOINTS.with_name("motors.yaml").read_text())
+    motors = content["motors"]
+    motors["FFJ3"], motors["MFJ3"] = motors["MFJ3"], motors["FFJ3"]
+    wrong = tmp_path / "motors.yaml"
+    wrong.write_text(yaml.safe_dump(content))
+    with cable("r") as (near, far), EmulatedHandProcess(far, JOINTS):
+        file = rig_file(tmp_path, near, calibration={"joints": str(JOINTS), "motors": str(wrong)})
+        findings = {finding.device: finding for finding in check_rig(str(file), move=True)}
+    assert not findings["motor map"].ok
+    assert "is said to pull FFJ3, but moves MFJ3" in findings["motor map"].detail
+
+
+def test_a_simulated_rig_has_no_motors_to_nudge() -> None:
+    with pytest.raises(ConfigurationError, match="sim: has no real motors to move"):
+        check_rig("sim", move=True)
+
+
 def test_a_silent_motor_is_named(tmp_path: Path) -> None:
     with cable("r") as (near, far), EmulatedHandProcess(far, JOINTS) as emulator:
         emulator.order(silent=[5])

@@ -1,0 +1,117 @@
+"""Rig files of kind wired: what they must say, and what is told when stand-ins can not be had."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from gtsam import Pose2, Pose3
+
+from drivers.emulators.wired import virtual_cable as cables
+from drivers.emulators.wired.plant_mirror import PlantMirror
+from drivers.emulators.wired.virtual_cable import virtual_cable
+from tactile_lab.clock import MonotonicClock
+from tactile_lab.errors import ConfigurationError, DeviceError
+from tactile_lab.rigs.build import build_interpreter, check_calibration
+from tactile_lab.rigs.description import load_rig
+from tactile_lab.rigs.wired import hand_setup, stand_in_plan
+from tests.support.wire_rig import wire_rig
+
+
+def changed(folder: Path, **changes: Any) -> str:
+    path = wire_rig(folder)
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | changes))
+    return str(path)
+
+
+def test_the_shipped_rig_is_sound() -> None:
+    rig = load_rig("sim-wire")
+    check_calibration(rig)
+    plan = stand_in_plan(rig, 3, "cube-6")
+    assert sorted(plan.boxes) == ["FF", "LF", "MF", "RF", "TH"]
+    assert (plan.simulation.object, plan.seed) == ("cube-6", 3)
+    assert hand_setup(rig).hand.cycle_s == 0.001
+    assert set(build_interpreter(rig).perception.fingertips) == {"FF", "MF", "RF", "LF", "TH"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"wires": None}, "wires belong to kind wired, and kind wired needs them"),
+        ({"kind": "simulated", "wires": None}, "stand_ins belong to kind wired"),
+        ({"fingertips": "biotac"}, "BioTacs send through the palm"),
+        ({"kind": "usb"}, "kind"),
+    ],
+)
+def test_descriptions_that_contradict_themselves(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(ConfigurationError, match=words):
+        load_rig(changed(tmp_path, **changes))
+
+
+def test_two_fingers_on_one_box(tmp_path: Path) -> None:
+    wires = yaml.safe_load(wire_rig(tmp_path).read_text())["wires"]
+    wires["fingertips"]["MF"]["host"] = wires["fingertips"]["FF"]["host"]
+    with pytest.raises(ConfigurationError, match="FF and MF both name the box at"):
+        load_rig(changed(tmp_path, wires=wires))
+
+
+def test_wires_without_a_stand_in(tmp_path: Path) -> None:
+    wires = yaml.safe_load(wire_rig(tmp_path).read_text())["wires"]
+    volts = {"wire": "controller", "port": "/dev/ttyS9", "counts_per_N": 1.0, "counts_per_Nm": 1.0}
+    other = wires | {"fingertips": wires["fingertips"] | {"FF": volts}}
+    with pytest.raises(ConfigurationError, match="the simulated plant feeds net-ft wires alone"):
+        stand_in_plan(load_rig(changed(tmp_path, wires=other)), 0, "cube-6")
+    local = wires | {"camera": {"wire": "source", "settings": {"source": "0"}}}
+    with pytest.raises(ConfigurationError, match="feeds a camera on tcp alone"):
+        stand_in_plan(load_rig(changed(tmp_path, wires=local)), 0, "cube-6")
+    del wires["hand"]["far_end"]
+    with pytest.raises(ConfigurationError, match="far_end"):
+        stand_in_plan(load_rig(changed(tmp_path, wires=wires)), 0, "cube-6")
+
+
+def test_a_cable_that_may_not_be_made_says_how_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    refused = cables.subprocess.CompletedProcess(["ip"], 2, "", "RTNETLINK answers: Operation not permitted\n")
+    monkeypatch.setattr(cables, "_ip", lambda *words: refused)
+    with pytest.raises(DeviceError) as told, virtual_cable("lab0", "lab1"):
+        pass
+    words = str(told.value)
+    assert "no right to make a virtual network cable (RTNETLINK answers: Operation not permitted)" in words
+    assert "sudo ip link add lab0 type veth peer name lab1" in words
+    assert "unshare -Urn sh -c 'ip link set lo up; tactile-lab ...'" in words
+
+
+def test_interfaces_that_are_there_are_used_and_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cables.socket, "if_nameindex", lambda: [(1, "lo"), (2, "lab0"), (3, "lab1")])
+    monkeypatch.setattr(cables, "_ip", lambda *words: pytest.fail("nothing is to be made or removed"))
+    with virtual_cable("lab0", "lab1"):
+        pass
+
+
+def test_the_plants_memory_carries_state_and_demands_both_ways(tmp_path: Path) -> None:
+    path, clock = tmp_path / "plant", MonotonicClock()
+    plant = PlantMirror.create(path, clock, np.arange(6.0))
+    emulator = PlantMirror(path, clock)
+    assert emulator.demands[1].tolist() == list(range(6))
+    emulator.drive(np.full(20, 0.5))
+    emulator.move_base(np.ones(6))
+    duty, base = plant.demands
+    assert (duty.tolist(), base.tolist()) == ([0.5] * 20, [1.0] * 6)
+    world_T_object = Pose3(Pose2(0.1, 0.2, 0.3))
+    plant.publish(clock.now_ns(), np.arange(24.0), np.arange(20.0), base, np.ones((5, 6)), world_T_object)
+    assert emulator.joints_rad.tolist() == list(range(24))
+    assert emulator.wrenches.shape == (5, 6)
+    assert emulator.world_T_object.equals(world_T_object, 1e-12)
+    plant.count_lost(5)
+    assert emulator.lost_ns == 5
+    assert emulator.age_ns >= 0
+
+
+def test_a_file_that_is_no_plants_memory(tmp_path: Path) -> None:
+    (tmp_path / "other").write_bytes(b"something")
+    with pytest.raises(DeviceError, match="is no plant's memory"):
+        PlantMirror(tmp_path / "other", MonotonicClock())
+    with pytest.raises(DeviceError, match="no plant's memory"):
+        PlantMirror(tmp_path / "none", MonotonicClock())
