@@ -10,7 +10,7 @@ from typing import Literal
 from sessions.guided.operator import Operator, Together
 from sessions.guided.simulated_operator import SimulatedOperator
 from tactile_lab.cli.console import say, warn
-from tactile_lab.cli.guided_terminal import KeyTerminal, LineTerminal, terminal_for
+from tactile_lab.cli.guided_terminal import terminal_for
 from tactile_lab.cli.page_address import PageAddress
 from tactile_lab.view.feed import ViewFeed
 from tactile_lab.workflow.attending import Attendance
@@ -53,7 +53,8 @@ def attendance(way: GuidedWay | None, page: PageAddress | None, title: str) -> I
         if way is not None and way.no_input:
             operators.append(SimulatedOperator())
         elif way is not None:
-            terminal: KeyTerminal | LineTerminal = stack.enter_context(terminal_for(way.pedal))
+            terminal = terminal_for(way.pedal)
+            stack.enter_context(terminal)
             operators.append(terminal)
         yield _attendance(way, Together(*operators) if operators else None, feed)
 
