@@ -17,6 +17,7 @@ from pydantic import Field
 
 from drivers.shadow.posture import TipEllipsoid
 from sessions.bench import Bench
+from sessions.bounding_box import BoundingBox, BoxProber, ProbingSettings
 from sessions.cycle_settings import CycleSettings
 from sessions.decisions import (
     Crew,
@@ -39,6 +40,7 @@ from sessions.progress import GraspReport, NullProgress, Progress
 from sessions.recorder import Level
 from sessions.safety import InterruptGuard, SafetySettings, SafetySupervisor
 from sessions.slam_memory import SlamMemory
+from sessions.touching import Toucher
 from sessions.view_messages import plan_message, surface_message
 from tactile_lab.clock import VirtualClock
 from tactile_lab.errors import TactileLabError
@@ -57,7 +59,7 @@ class ConductorSettings(StrictModel):
         grasps: how many.
         fixed_grasps: how many of them follow the fixed rule before the estimate chooses.
         missed_approaches: this many approaches in a row without a way down to the table end the session.
-        plan, cycle, exploration, safety, guided: see there.
+        plan, cycle, probing, exploration, safety, guided: see there.
     """
 
     grasps: int = Field(default=16, ge=1)
@@ -65,6 +67,7 @@ class ConductorSettings(StrictModel):
     missed_approaches: int = Field(default=3, ge=1)
     plan: PlanSettings = PlanSettings()
     cycle: CycleSettings = CycleSettings()
+    probing: ProbingSettings = ProbingSettings()
     exploration: ExplorationSettings = ExplorationSettings()
     safety: SafetySettings = SafetySettings()
     guided: GuidedSettings = GuidedSettings()
@@ -122,14 +125,24 @@ def autonomous_crew(
     """
     supervisor = SafetySupervisor(bench, settings.safety, bench.cycle_ns)
     tip, window = tip_shape(bench), settings.plan.yaw_window_rad
-    cycle = GraspCycle(Motion(bench, supervisor), settings.cycle, tip, window)
+    motion = Motion(bench, supervisor)
+    cycle = GraspCycle(motion, settings.cycle, tip, window)
     rule = FixedRule(settings.plan, np.random.default_rng(seed), dimension)
     chooser = None
     if policy := settings.exploration.policy:
         limits = settings.plan, settings.exploration, settings.cycle, settings.safety
         chooser = chooser_for(policy, limits, tip, dimension, slam.settings.motion, seed)
     planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension, chooser, settings.grasps)
-    return Crew(supervisor, cycle, PolicyDecisions(planner, recorded_by(bench), approve))
+    decisions = PolicyDecisions(planner, recorded_by(bench), approve)
+    if not settings.probing.enabled:
+        return Crew(supervisor, cycle, decisions)
+    prober = BoxProber(Toucher(motion, settings.cycle, tip), settings.probing, window, settings.plan.start_m)
+
+    def survey(stop: Callable[[], bool]) -> BoundingBox:
+        planner.boxed(box := prober.feel(stop))
+        return box
+
+    return Crew(supervisor, cycle, decisions, survey)
 
 
 class Conductor:
@@ -154,6 +167,7 @@ class Conductor:
         self._bench, self._slam, self._settings = bench, slam, settings
         self._progress = progress or NullProgress()
         self._supervisor, self._cycle, self._decisions = crew.supervisor, crew.performer, crew.decisions
+        self._survey = crew.survey
         self._memory = SlamMemory(slam)
         self._guard = InterruptGuard()
         self._thought_of: int | None = None
@@ -180,7 +194,20 @@ class Conductor:
             self._supervisor.stop(error)
             raise
 
+    def _feel_bounding_box(self) -> tuple[Ending, str] | None:
+        """The phase before the first grasp, where the session has one; why to end when there is no object."""
+        if self._survey is None:
+            return None
+        self._phase("bounding box")
+        box = self._survey(lambda: self._guard.requested)
+        self._tell(Level.INFO, box.in_words())
+        if box.is_found or self._guard.requested:
+            return None
+        return Ending.OBJECT_LOST, f"nothing was felt where the object is expected; {box.in_words()}"
+
     def _grasp_until_done(self) -> tuple[Ending, str]:
+        if ended := self._feel_bounding_box():
+            return ended
         while True:
             if ended := self._reason_to_end():
                 return ended

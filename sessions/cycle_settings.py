@@ -20,6 +20,11 @@ class TouchSettings(StrictModel):
         sink_m: how far the hand itself moves on.
         press_s: time for both.
         capture_s: length of the capture.
+        rake_height_m: height of the fingertips' centres in a rake.
+        rake_m_s: speed of a rake.
+        rake_N: force that fingertips are brought to on a side: all together less than moves the object.
+        row_m: x of the fingertips in the row's own grasp frame.
+        beyond_m: how far beyond the middle a rake goes.
         lowest_m: height of the fingertips over the table where a tap has missed the object.
     """
 
@@ -32,6 +37,11 @@ class TouchSettings(StrictModel):
     sink_m: float = Field(default=0.004, ge=0.0)
     press_s: float = Field(default=0.6, ge=0.0)
     capture_s: float = Field(default=0.2, gt=0.0)
+    rake_height_m: float = Field(default=0.028, gt=0.0)
+    rake_m_s: float = Field(default=0.05, gt=0.0)
+    rake_N: float = Field(default=0.15, gt=0.0)
+    row_m: float = Field(default=0.012, ge=0.0)
+    beyond_m: float = Field(default=0.030, ge=0.0)
     lowest_m: float = Field(default=0.012, ge=0.0)
 
 

@@ -6,11 +6,13 @@ the grasps are done by a performer, which follows the plan by itself or leads a 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 from gtsam import Pose3
 
+from sessions.bounding_box import BoundingBox
 from sessions.explorer import KnownShape
 from sessions.grasp_cycle import GraspPlan
 from sessions.planner import Planner, Reorientation
@@ -132,11 +134,14 @@ class Crew:
         supervisor: looks at every cycle.
         performer: does the grasps.
         decisions: decides about them.
+        survey: feels the object's bounding box before the first grasp; asked in between whether to leave the rest out.
+            None for a session that begins without.
     """
 
     supervisor: SafetySupervisor
     performer: Performer
     decisions: DecisionMaker
+    survey: Callable[[Callable[[], bool]], BoundingBox] | None = None
 
 
 class AutonomousDecisions:

@@ -43,7 +43,7 @@ _OWN_TIME_s = 1.6  # opening, closing and waiting for motors, beside what the se
 OUT_OF_REACH = "the arm does not reach there"
 NO_ROOM = "no room for the open hand"
 TOO_TALL = "the object is as high as the palm"
-LANDED = "the hand has just landed there on the object"
+LANDED = "the hand has just landed there, or the bounding box is in the way"
 
 
 @dataclass(frozen=True)

@@ -119,6 +119,12 @@ class Motion:
             self.set_base(start + smooth(share) * (q - start))
             self.tick()
 
+    def rise(self, height_m: float, speed_m_s: float) -> None:
+        """Straight up from where the positioner was sent last."""
+        q = self._base_q.copy()
+        q[:3] += self.bench.world_T_mount.rotation().unrotate(np.array([0.0, 0.0, height_m]))
+        self.move_base(q, speed_m_s, np.inf)
+
     def probe_base(self, q: Array, speed_m_s: float, met: Callable[[], bool]) -> bool:
         """Even move toward ``q`` that turns back where something is met.
 
@@ -178,12 +184,18 @@ class Motion:
         self._targets_rad = targets
         self.bench.hand.set_targets(targets)
 
-    def blend_fingers(self, closing: Closing, progress: Mapping[str, float], speed_rad_s: float) -> None:
+    def blend_fingers(
+        self,
+        closing: Closing,
+        progress: Mapping[str, float],
+        speed_rad_s: float,
+        aside_rad: Mapping[str, float] | None = None,
+    ) -> None:
         """From the present targets to those at ``progress``, straight in joint space."""
         start = self._present_targets(closing, progress)
-        duration_s = self.finger_time_s(closing, progress, speed_rad_s)
-        self.set_fingers(closing, progress)
+        self.set_fingers(closing, progress, aside_rad)
         end = self._targets_rad
+        duration_s = max(abs(angle - start[name]) for name, angle in end.items()) / speed_rad_s
         for share in self.shares(duration_s):
             self.bench.hand.set_targets({name: (1 - share) * start[name] + share * end[name] for name in end})
             self.tick()

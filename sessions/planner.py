@@ -9,6 +9,7 @@ from gtsam import Pose2, Pose3
 
 from drivers.shadow.closing import Closing, closing
 from drivers.shadow.posture import TipEllipsoid
+from sessions.bounding_box import BoundingBox
 from sessions.explorer import ExplorationSettings, KnownShape, choose_grasp, known_shape
 from sessions.grasp_cycle import GraspPlan
 from sessions.motion import GraspFrame
@@ -69,6 +70,7 @@ class Planner:
         self._chooser, self._grasps = chooser, grasps
         self._here: GraspFrame | None = None
         self._carried = False
+        self._box: BoundingBox | None = None
         self.choice: Choice | None = None
         """The policy's decision about the grasp that comes next; None where the policy was not asked."""
 
@@ -131,6 +133,15 @@ class Planner:
         spread = self._chooser.spread(covariance, self._carried)
         return Knowledge(known, expected, spread, self._slam.surface_grasps, left, self._here)
 
+    def boxed(self, box: BoundingBox) -> None:
+        """Take note of the bounding box: the object is in its middle, and open fingers keep out of it.
+
+        It counts until the estimate takes over: every time the object is carried it slips within the box.
+        """
+        self._box = box
+        if box.is_found:
+            self._rule.centre_m = box.centre_world_m
+
     def landed(self, points_world_m: list[Array]) -> None:
         """Take note of where fingertips stood on the object; it counts until the object has been moved."""
         self._landings_m += points_world_m
@@ -154,12 +165,14 @@ class Planner:
         return None if pose is None or self._slam.is_lost else planar(self._hand_motion * pose)
 
     def _has_room(self, plan: GraspPlan) -> bool:
-        if not self._landings_m:
+        if not self._landings_m and self._box is None:
             return True
         paths = closing(plan.closing, plan.height_m, self._tip).paths
-        open_m = [plan.frame.pose.transformFrom(paths[f].centre_m(paths[f].valid[0])) for f in FINGERS]
-        apart_m = np.array(open_m)[:, None, :2] - np.array(self._landings_m)[None, :, :2]
-        return bool(np.linalg.norm(apart_m, axis=-1).min() >= _LANDING_m)
+        open_m = np.array([plan.frame.pose.transformFrom(paths[f].centre_m(paths[f].valid[0])) for f in FINGERS])
+        if self._box is not None and not self._box.is_clear(open_m[:, :2]):
+            return False
+        apart_m = open_m[:, None, :2] - np.array(self._landings_m).reshape(-1, 3)[None, :, :2]
+        return bool(np.linalg.norm(apart_m, axis=-1).min(initial=np.inf) >= _LANDING_m)
 
     # --- carrying ----------------------------------------------------------------------------------------------
 
@@ -186,6 +199,7 @@ class Planner:
         """Take note that the hand carried the object since the last grasp."""
         self._hand_motion, self._landings_m = hand_motion_world, []
         motion = planar(hand_motion_world)
+        self._box = None if self._box is None else self._box.moved(motion)
         self._carried = not hand_motion_world.equals(Pose3(), 1e-9)
         if self._here is not None:
             pose = motion * Pose2(self._here.x_m, self._here.y_m, self._here.yaw_rad)
@@ -201,6 +215,7 @@ class Planner:
         known, expected = self.known_shape(), self._expected_pose()
         trusted = index + 1 >= self._fixed_grasps and not self._doubted
         if trusted and known is not None and expected is not None:
+            self._box = None
             self._rule.centre_m = np.asarray(expected.transformFrom(known.centre_m))
 
     def known_shape(self) -> KnownShape | None:

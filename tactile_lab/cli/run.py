@@ -63,6 +63,9 @@ def run(
             help="Exploration policy that chooses the grasps (docs/exploration.md).", show_default="the rig's"
         ),
     ] = None,
+    bounding_box: Annotated[
+        bool, typer.Option("--bounding-box", help="Feel the object's bounding box before the first grasp.")
+    ] = False,
     confirm: Annotated[bool, typer.Option("--confirm", help="Ask before every grasp; a veto takes the next best.")] = (
         False
     ),
@@ -91,7 +94,9 @@ def run(
     page = PageAddress(listen, view_port, token) if view else None
     way = GuidedWay(_led_by(led_by), automatic_capture or None, pedal, pace, no_input)
     tell_left_open(out)
-    request = SessionRequest(rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy)
+    request = SessionRequest(
+        rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy, bounding_box
+    )
     title = f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}"
     with (
         LiveProgress(title, live=not (guided or confirm), reasons=policy is not None) as progress,

@@ -42,6 +42,7 @@ class SessionRequest:
         grasps: how many; the rig's own number when None.
         notes: the operator's.
         policy: name of the exploration policy; the rig's own way of choosing when None.
+        bounding_box: feel the object's bounding box before the first grasp.
         allow_uncalibrated: begin though a calibration is missing, expired, failed or foreign; the session records it.
     """
 
@@ -55,6 +56,7 @@ class SessionRequest:
     notes: str = ""
     allow_uncalibrated: bool = False
     policy: str | None = None
+    bounding_box: bool = False
 
 
 def slam_settings(method: str, dimension: int, motion: MotionNoise) -> SlamSettings:
@@ -181,6 +183,8 @@ def _conductor_settings(rig: Rig, request: SessionRequest) -> ConductorSettings:
     changes: dict[str, Any] = {} if request.grasps is None else {"grasps": request.grasps}
     if request.policy is not None:
         changes["exploration"] = settings.exploration.model_copy(update={"policy": request.policy})
+    if request.bounding_box:
+        changes["probing"] = settings.probing.model_copy(update={"enabled": True})
     return settings.model_copy(update=changes)
 
 

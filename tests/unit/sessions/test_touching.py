@@ -47,7 +47,9 @@ def grasp_with_tap(world: DiscWorld) -> Grasp:
 @pytest.mark.parametrize("height_m", [0.03, 0.05, 0.07])
 def test_a_tap_finds_the_top_with_several_fingers(height_m: float) -> None:
     world = DiscWorld(disc(height_m))
-    assert Toucher(motion_on(world), QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0))
+    felt = Toucher(motion_on(world), QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0))
+    assert len(felt) >= 4
+    np.testing.assert_allclose(felt[:, 2], height_m, atol=3e-3)
     grasp = grasp_with_tap(world)
     probed = [contact for contact in grasp.contacts if contact.probed]
     assert {contact.finger for contact in probed} >= {"FF", "MF", "RF", "LF"}
@@ -68,7 +70,7 @@ def test_probed_contacts_stand_behind_those_of_the_closing() -> None:
 def test_a_tap_beside_the_object_meets_nothing_and_the_hand_rises_again() -> None:
     world = DiscWorld(None)
     motion = motion_on(world)
-    assert not Toucher(motion, QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0))
+    assert len(Toucher(motion, QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0))) == 0
     table = closing(TAP.closing, TAP_HEIGHT_m, TIP)
     above = motion.base_joints(GraspFrame(0.0, 0.0, 0.0), table, QUICK.lift_m)
     np.testing.assert_allclose(world.base_q, above, atol=1e-6)
