@@ -139,7 +139,7 @@ class BoxProber:
 
     def _top_m(self) -> float | None:
         """Height of the highest fingertip that met something when they were laid on."""
-        points = self._toucher.tap(GraspFrame(*self._axes.translation(), float(self._axes.theta())))
+        points = self._toucher.tap(GraspFrame(self._axes.x(), self._axes.y(), self._axes.theta()))
         return float(points[:, 2].max()) if len(points) else None
 
     def _by_thumb(self, side: str) -> bool:

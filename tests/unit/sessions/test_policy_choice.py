@@ -289,14 +289,14 @@ class KnownSlam:
 def planner(policy: str = "variance", grasps: int = 10, slam: KnownSlam | None = None) -> Planner:
     rule = FixedRule(PlanSettings(), np.random.default_rng(0))
     return Planner(
-        slam or KnownSlam(),
+        slam or KnownSlam(),  # type: ignore[arg-type]
         rule,
         ExplorationSettings(),
         1,
         TipEllipsoid(),
         2,
         chooser(policy),
-        grasps,  # type: ignore[arg-type]
+        grasps,
     )
 
 
