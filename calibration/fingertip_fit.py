@@ -210,25 +210,3 @@ def _sigmas(rest: Array, shape: OptimizeResult, count: int) -> dict[str, float]:
         "centre_m": float(np.sqrt(spread[:3, :3].trace())),
         "semi_axes_m": float(np.sqrt(spread[3:, 3:].trace())),
     }
-
-
-def faulty_electrodes(untouched: Array, limits: tuple[float, float] = (50.0, 4045.0)) -> dict[int, str]:
-    """What is wrong with a BioTac's electrodes, by index, from untouched counts of shape (samples, electrodes).
-
-    Raises:
-        ConfigurationError: too few samples, or the sensor was touched meanwhile.
-    """
-    if len(untouched) < 20:
-        raise ConfigurationError(f"{len(untouched)} samples, 20 needed", where="BioTac", hint="Record two seconds")
-    drift = np.abs(untouched[: len(untouched) // 2].mean(axis=0) - untouched[len(untouched) // 2 :].mean(axis=0))
-    if np.median(drift) > 30.0:
-        raise ConfigurationError("the sensor was touched, or still warms up", where="BioTac", hint="Leave it alone")
-    found, spread, mean = {}, untouched.std(axis=0), untouched.mean(axis=0)
-    for index in range(untouched.shape[1]):
-        if not limits[0] < mean[index] < limits[1]:
-            found[index] = f"reads {mean[index]:.0f} counts, at the end of its range: open or short"
-        elif spread[index] == 0.0:
-            found[index] = "does not move at all: dead"
-        elif spread[index] > 10.0 * max(float(np.median(spread)), 1.0):
-            found[index] = f"is noisy: {spread[index]:.0f} counts against {np.median(spread):.0f} of the others"
-    return found

@@ -13,7 +13,7 @@ import typer
 from tactile_lab.cli.calibrate_biotac import biotac
 from tactile_lab.cli.calibrate_camera import camera
 from tactile_lab.cli.calibrate_forearm import forearm
-from tactile_lab.cli.calibrate_hand import fingertip, joints
+from tactile_lab.cli.calibrate_hand import electrodes, fingertip, joints
 from tactile_lab.cli.options import Json, NoInput
 
 app = typer.Typer(help="Calibrations: make one, look at one.", no_args_is_help=True)
@@ -21,6 +21,7 @@ app.command("biotac")(biotac)
 app.command("forearm")(forearm)
 app.command("joints")(joints)
 app.command("fingertip")(fingertip)
+app.command("electrodes")(electrodes)
 app.command("camera")(camera)
 
 

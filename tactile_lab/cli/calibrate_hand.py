@@ -125,6 +125,30 @@ def fingertip(
     _store(out or Path("calibrations") / here.rig / "fingertips.yaml", record, replace, no_input, as_json)
 
 
+def electrodes(source: Source, as_json: Json = False, no_input: NoInput = False) -> None:
+    """Look for dead, open and noisy electrodes of a BioTac, in a table of counts recorded untouched.
+
+    A line a sample, a column an electrode. Exit code 0: all well; 2: the table can not be used; 3: some are faulty.
+    """
+    from calibration.electrodes import faulty_electrodes, load_untouched
+    from tactile_lab.cli.console import emit_json, say, show_table
+
+    del no_input
+    counts = load_untouched(source)
+    faults = faulty_electrodes(counts)
+    rows = [
+        [str(index + 1), f"{counts[:, index].mean():.0f}", f"{counts[:, index].std():.1f}", faults.get(index, "")]
+        for index in range(counts.shape[1])
+    ]
+    if as_json:
+        emit_json({"tare": counts.mean(axis=0).tolist(), "faults": {str(i + 1): text for i, text in faults.items()}})
+    else:
+        show_table("Electrodes", ["electrode", "tare", "noise", ""], rows, right=(0, 1, 2))
+        say("all well" if not faults else f"{len(faults)} faulty", "bold red" if faults else "bold green")
+    if faults:
+        raise typer.Exit(3)
+
+
 def _millimetres(values: tuple[float, float, float]) -> str:
     return "  ".join(f"{1e3 * value:.2f}" for value in values) + " mm"
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import sys
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +17,13 @@ import yaml
 
 from calibration.forearm import load_forearm
 from calibration.recordings import ForearmData, save_data
-from calibration.store import read_record
+from calibration.store import read_record, write_record
 from calibration.touch_plan import plan_touches
 from tactile_lab.experiments.calibration_data import TrueRig, touches_of
 from tactile_lab.experiments.calibration_runs import GEOMETRY
+from tactile_lab.strict_yaml import load
+
+RIGS = Path(str(resources.files("tactile_lab.rigs")))
 
 SETTINGS = {
     "wizard": {
@@ -180,3 +185,19 @@ def test_ended_at_any_step_nothing_is_stored(tmp_path, step):
         child.sendline("q")
     ended(child, 130)
     assert files(tmp_path) == ["settings.yaml"]
+
+
+def test_a_session_on_an_expired_calibration_is_refused_or_says_that_it_was_allowed(inside, tmp_path):
+    shutil.copytree(RIGS / "calibrations", tmp_path / "calibrations")
+    rig = Path(shutil.copy(RIGS / "sim.yaml", tmp_path / "mine.yaml"))
+    file = tmp_path / "calibrations" / "simulated-hand" / "forearm.yaml"
+    write_record(file, read_record(file).model_copy(update={"valid_until_utc": "2020-01-01T00:00:00+00:00"}))
+    words = ("run", "--rig", rig, "--grasps", 1, "--out", tmp_path / "runs", "--json")
+    refused = inside(*words)
+    assert (refused.code, "is valid until 2020-01-01" in refused.err) == (2, True)
+    assert not (tmp_path / "runs").exists()
+    allowed = inside(*words, "--allow-uncalibrated")
+    assert "is valid until 2020-01-01T00:00:00+00:00: allowed, and recorded" in allowed.err
+    (session,) = (tmp_path / "runs").iterdir()
+    (overlooked,) = load(session / "session.yaml")["settings"]["uncalibrated"]
+    assert "forearm calibration" in overlooked

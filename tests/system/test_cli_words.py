@@ -28,6 +28,7 @@ COMMANDS = (
     "calibrate forearm",
     "calibrate joints",
     "calibrate fingertip",
+    "calibrate electrodes",
     "session",
     "session list",
     "session show",

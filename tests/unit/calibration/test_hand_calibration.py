@@ -5,7 +5,8 @@ import pytest
 from gtsam import Rot3
 
 from calibration.admission import Installation
-from calibration.fingertip_fit import FingertipData, WrenchPose, faulty_electrodes, fit_fingertip
+from calibration.electrodes import faulty_electrodes, load_untouched
+from calibration.fingertip_fit import FingertipData, WrenchPose, fit_fingertip
 from calibration.fingertip_record import fingertip_record
 from calibration.joints import JointPose, corrected_tables, from_contacts, from_poses, joints_record, load_poses
 from calibration.refinement import JointOffset
@@ -184,3 +185,15 @@ def test_a_touched_biotac_is_refused():
     counts = 2000.0 + np.linspace(0, 400, 200)[:, None] * np.ones(19)
     with pytest.raises(ConfigurationError, match="touched, or still warms up"):
         faulty_electrodes(counts)
+
+
+def test_a_table_of_counts_is_read_and_others_are_refused(tmp_path):
+    path = tmp_path / "counts.csv"
+    path.write_text("1, 2, 3\n4 5 6\n\n")
+    np.testing.assert_array_equal(load_untouched(path), [[1, 2, 3], [4, 5, 6]])
+    for text in ("a b", "1 2\n3\n", "1 nan"):
+        path.write_text(text)
+        with pytest.raises(ConfigurationError, match="is no table of counts"):
+            load_untouched(path)
+    with pytest.raises(ConfigurationError, match="can not be read"):
+        load_untouched(tmp_path / "none.csv")
