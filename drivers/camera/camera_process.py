@@ -20,7 +20,7 @@ from drivers.shadow.hand_records import Record, RecordKind, RecordReader
 from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock
 from tactile_lab.errors import CodecError, DeviceError
 
-_START_s, _REPORT_s, _END_s = 20.0, 5.0, 5.0
+_START_s, _REPORT_s, _END_s = 60.0, 10.0, 5.0
 _READ_BYTES, _LONGEST = 1_048_576, 40_000_000
 
 

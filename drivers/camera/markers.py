@@ -72,7 +72,7 @@ class MarkerSettings(StrictModel):
     ambiguous_ratio: float = Field(default=3.0, gt=1.0)
     moved_px: float = Field(default=1.0, gt=0.0)
     world_marker_fixed: bool = False
-    largest_blur_px: float = Field(default=2.0, gt=0.0)
+    largest_blur_px: float = Field(default=1.6, gt=0.0)
     largest_misfit_m: float = Field(default=0.001, gt=0.0)
 
     @field_validator("dictionary")

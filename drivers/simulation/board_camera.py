@@ -29,7 +29,7 @@ from tactile_lab.geometry.poses import transform_points
 _RAYS = 2  # a pixel and direction
 _MARGIN = 0.06  # white around the board, over its width
 _TEXELS_PER_m = 12_000
-_PICTURES = 12
+_PICTURES = 5
 _GREY, _BLACK, _WHITE = 120.0, 22.0, 232.0
 BOARD_VIEWS = 40
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tactile_lab.cli.options import Json, NoInput
+
+if TYPE_CHECKING:
+    from tactile_lab.evaluation.benchmark import TimingTable
 
 
 class Part(StrEnum):
     """What can be measured by itself."""
 
     PATHS = "paths"
+    CAMERA = "camera"
     ETHERCAT = "ethercat"
     LOAD = "load"
     RECORDER = "recorder"
@@ -23,12 +27,13 @@ def bench(
     only: Annotated[
         Part,
         typer.Option(
-            help="paths: costly parts of a step; ethercat: both masters on the emulated hand, and their recoveries; "
+            help="paths: costly parts of a step; camera: markers found in its own process; "
+            "ethercat: both masters on the emulated hand, and their recoveries; "
             "load: five force sensors at 7 kHz and the hand at 1 kHz; "
             "recorder: hand and five force sensors at 1 kHz and 30 pictures a second, recorded."
         ),
     ] = Part.PATHS,
-    seconds: Annotated[float, typer.Option(min=1.0, help="Duration of ethercat, load and recorder.")] = 30.0,
+    seconds: Annotated[float, typer.Option(min=1.0, help="Duration of camera, ethercat, load and recorder.")] = 30.0,
     with_hand: Annotated[bool, typer.Option("--hand/--no-hand", help="With load: the hand too.")] = True,
     as_json: Json = False,
     no_input: NoInput = False,
@@ -39,6 +44,8 @@ def bench(
     """
     del no_input
     match only:
+        case Part.CAMERA:
+            _camera(seconds, as_json)
         case Part.ETHERCAT:
             _ethercat(seconds, as_json)
         case Part.LOAD:
@@ -50,12 +57,22 @@ def bench(
 
 
 def _paths(as_json: bool) -> None:
-    from tactile_lab.cli.console import emit_json, show_table
     from tactile_lab.evaluation.benchmark import run_benchmarks
     from tactile_lab.experiments.decision_times import decision_table
     from tactile_lab.experiments.step_times import step_table
 
-    tables = [*run_benchmarks(), step_table(), decision_table()]
+    _tell_tables([*run_benchmarks(), step_table(), decision_table()], as_json)
+
+
+def _camera(seconds: float, as_json: bool) -> None:
+    from tactile_lab.evaluation.camera_benchmark import camera_table
+
+    _tell_tables([camera_table(seconds=seconds)], as_json)
+
+
+def _tell_tables(tables: list[TimingTable], as_json: bool) -> None:
+    from tactile_lab.cli.console import emit_json, show_table
+
     if as_json:
         emit_json([result.as_json() for result in tables])
         return

@@ -1,4 +1,4 @@
-"""The marker camera under ten conditions: error of the true pose, and whether a flipped pose is ever taken for valid."""
+"""The marker camera under ten conditions: error of the true pose, and flipped poses that are taken for valid."""
 
 from __future__ import annotations
 
@@ -80,9 +80,10 @@ def _on_table(lens: CameraCalibration, markers: MarkerSettings, frames: list[Fra
     return {
         "position_mm": [1e3 * float(np.linalg.norm(change.translation())) for change in changes],
         "angle_deg": [float(np.degrees(rotation_angle_rad(change))) for change in changes],
+        "worst_mm": max((1e3 * float(np.linalg.norm(change.translation())) for change in changes), default=None),
         "frames": len(frames),
         "refused": len(frames) - len(known),
-        "flips": sum(rotation_angle_rad(change) > FLIP_rad for change in changes),
+        "flips": sum(bool(rotation_angle_rad(change) > FLIP_rad) for change in changes),
     }
 
 
@@ -90,5 +91,5 @@ def _free(lens: CameraCalibration, markers: MarkerSettings, frames: list[Frame],
     """The same with an object that may be anywhere: valid poses, ambiguous ones, and flips among the valid."""
     tracker = ObjectTracker(lens, markers.model_copy(update={"freedom": "spatial"}))
     valid = [seen for frame in frames if (seen := tracker.observe(frame).sighting) is not None]
-    flips = [rotation_angle_rad(truth.between(seen.world_T_object)) > FLIP_rad for seen in valid]
+    flips = [bool(rotation_angle_rad(truth.between(seen.world_T_object)) > FLIP_rad) for seen in valid]
     return {"free_valid": len(valid), "free_flips": sum(flips)}

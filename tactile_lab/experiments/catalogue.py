@@ -406,7 +406,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
                 Column("free: valid", "free_valid", 0, kind="sum"),
                 Column("free: flips among them", "free_flips", 0, kind="sum"),
             ),
-            _ranges("condition", "frames refused of five", "refused", lambda cell: "640 x 480 pixels", columns=1),
+            _ranges("condition", "largest position error, mm", "worst_mm", lambda cell: "640 x 480 pixels", columns=1),
             pooled=("condition",),
         ),
         Experiment(
