@@ -156,8 +156,8 @@ class Watch(NullProgress):
 
     def _in_map_frame(self) -> Array | None:
         """The true points laid over the estimate by the best fit of all contacts; None before there are enough."""
-        placed = [pair for pair in zip(self.grasps, self._slam.trajectory, self._truth, strict=False) if pair[1]]
-        parts = [(_seen(grasp, pose), _seen(grasp, true)) for grasp, pose, true in placed if len(grasp.contacts)]
+        placed = zip(self.grasps, self._slam.trajectory, self._truth, strict=False)
+        parts = [(_seen(grasp, pose), _seen(grasp, true)) for grasp, pose, true in placed if pose and grasp.contacts]
         if sum(len(part[0]) for part in parts) < 3:
             return None
         estimated, true_m = (np.concatenate([part[side] for part in parts]) for side in (0, 1))
