@@ -70,7 +70,7 @@ class InformationSettings(StrictModel):
     detail_m: float = Field(default=0.003, ge=0)
     point_sigma_m: float = Field(default=0.001, gt=0)
     normal_sigma_rad: float = Field(default=float(np.deg2rad(5.0)), gt=0)
-    pose_sigma_m: float = Field(default=0.001, gt=0)
+    pose_sigma_m: float = Field(default=0.003, gt=0)
     pose_weight: float = Field(default=1.0, ge=0)
     look_ahead: int = Field(default=1, ge=1)
     least_gain: float = Field(default=0.0, ge=0)
@@ -250,7 +250,8 @@ def _pose_information(
     points = np.nan_to_num(touches.points_m)
     turn = points[..., 0] * normals[..., 1] - points[..., 1] * normals[..., 0]
     rows = np.stack([normals[..., 0], normals[..., 1], turn], axis=-1)
-    variance = settings.point_sigma_m**2 + surface.sigma_m[touches.vertices] ** 2 + settings.detail_m**2
+    hidden = surface.sigma_m**2 + settings.detail_m**2 * unexplored(surface, belief, settings.reach(belief.dimension))
+    variance = settings.point_sigma_m**2 + hidden[touches.vertices]
     told = np.einsum("csfi,csf,csfj->csij", rows, met / variance, rows)
     told[..., 2, 2] += _told_by_normals(surface, touches, met, settings)
     after = np.linalg.inv(np.linalg.inv(prior + _SMALLEST_VARIANCE * np.eye(3)) + told)
