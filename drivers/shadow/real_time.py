@@ -23,16 +23,17 @@ def request_real_time(priority: int = PRIORITY) -> str:
 
 @contextmanager
 def preferred(priority: int = SESSION_PRIORITY) -> Iterator[str]:
-    """Let a session that computes beside its cycle come first while the context lasts; what came of it, in words.
+    """Let the cycle of a session that also computes come first while the context lasts; what came of it, in words.
 
-    Threads that it starts meanwhile are scheduled alike and take turns with it: one that held the interpreter's lock
-    but never got its turn would hold up the session's cycle. They hand the lock over sooner than usual: a cycle gives
-    it up at each of its many system calls, and would else wait 5 ms each time to have it back.
+    Threads that it starts meanwhile are scheduled as usual: the kernel puts all real-time programs of a core aside
+    for a twentieth of each second when they use it up, and computing would take the hand's process along. They hand
+    the interpreter's lock over sooner than usual: a cycle gives it up at each of its many system calls, and would
+    else wait 5 ms each time to have it back.
     """
     interval_s = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_INTERVAL_s)
     try:
-        yield _take_turns(os.SCHED_RR, priority)
+        yield _take_turns(os.SCHED_RR | os.SCHED_RESET_ON_FORK, priority)
     finally:
         sys.setswitchinterval(interval_s)
         _take_turns(os.SCHED_OTHER, 0)

@@ -31,7 +31,7 @@ class HandWiring(StrictModel):
     master: Master = "own"
     far_end: str | None = None
     first_move: bool = True
-    patience_s: float = Field(default=2.0, gt=0.0, le=10.0)
+    patience_s: float = Field(default=2.0, gt=0.0, le=60.0)
 
 
 class BaseWiring(StrictModel):

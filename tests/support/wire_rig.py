@@ -24,7 +24,7 @@ def wire_rig(folder: Path, **changes: Any) -> Path:
     content["calibration"] = {role: str(SHIPPED / file) for role, file in content["calibration"].items()}
     wires, net = content["wires"], f"127.{1 + os.getpid() % 250}.{os.getpid() // 250 % 250}"
     ethercat = {"interface": f"tln{os.getpid()}", "master": {"answer_s": 0.02, "setup_answer_s": 0.2}}
-    wires["hand"] |= {"ethercat": ethercat, "far_end": f"tlf{os.getpid()}", "first_move": False, "patience_s": 10.0}
+    wires["hand"] |= {"ethercat": ethercat, "far_end": f"tlf{os.getpid()}", "first_move": False, "patience_s": 60.0}
     wires["base"]["host"], wires["camera"]["host"] = f"{net}.20", f"{net}.21"
     for number, wire in enumerate(wires["fingertips"].values()):
         wire["host"] = f"{net}.{11 + number}"
