@@ -230,4 +230,4 @@ def _take(edges: dict[tuple[int, int], list[tuple[int, int]]], start: tuple[int,
 def _without_straight_corners(loop: Array) -> Array:
     before, after = loop - np.roll(loop, 1, axis=0), np.roll(loop, -1, axis=0) - loop
     turns = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    return loop[turns != 0]
+    return np.asarray(loop[turns != 0], float)

@@ -82,12 +82,14 @@ class MarkerTruth:
         try:
             found = self._found(decode_packet(datagram))
         except CodecError as error:
-            return self._refuse(f"the frame can not be read: {error.what}")
+            self._refuse(f"the frame can not be read: {error.what}")
+            return None
         if datagram.stamp_ns not in self._verdicts:
             self._verdicts[datagram.stamp_ns] = self._tracker.take_world(found)
         seen = self._tracker.locate(datagram.stamp_ns, found, self._verdicts[datagram.stamp_ns])
         if seen.sighting is None:
-            return self._refuse(seen.problem)
+            self._refuse(seen.problem)
+            return None
         self.report.note(seen.sighting)
         return seen.sighting
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from tactile_lab.geometry.contacts import Array
@@ -72,14 +73,16 @@ def clock_offset(palm: Track, stamps_s: Array, places_m: Array, holds_s: Sequenc
     return ClockOffset(1e3 * float(offsets[best] - curve[1] / (2 * curve[0])), 1e3 * float(sigma_s), count)
 
 
-def _piece(palm: Track, stamps_s: Array, places_m: Array, hold_s: tuple[float, float]) -> Array:
+def _piece(palm: Track, stamps_s: Array, places_m: Array, hold_s: tuple[float, float]) -> NDArray[np.intp]:
     """Rows of the pictures inside one hold, as far as the palm is known around them."""
     low = max(hold_s[0], palm.stamps_s[0]) + _RANGE_s
     high = min(hold_s[1], palm.stamps_s[-1]) - _RANGE_s
     return np.flatnonzero((stamps_s >= low) & (stamps_s <= high) & np.isfinite(places_m).all(axis=1))
 
 
-def _wandering(palm: Track, stamps_s: Array, places_m: Array, groups: Sequence[Array], offset_s: float) -> float:
+def _wandering(
+    palm: Track, stamps_s: Array, places_m: Array, groups: Sequence[NDArray[np.intp]], offset_s: float
+) -> float:
     """Sum of squared distances of the object from its mean place in the palm's frame, over all holds."""
     total = 0.0
     for rows in groups:
