@@ -74,8 +74,11 @@ class Drawing:
             self._plan(scene)
 
     def _replace(self, group: str, nodes: list[Any]) -> None:
+        """The nodes of a group from now on; those of the same name have taken the place of the old ones already."""
+        names = {node.name for node in nodes}
         for node in self._nodes.get(group, []):
-            node.remove()
+            if node.name not in names:
+                node.remove()
         self._nodes[group] = nodes
 
     # --- the hand ----------------------------------------------------------------------------------------------

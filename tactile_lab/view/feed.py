@@ -62,7 +62,9 @@ class ViewFeed:
     def __enter__(self) -> Self:
         """Start the page and wait until it listens. Raises DeviceError when it does not."""
         command = [sys.executable, "-m", "tactile_lab.view.process"]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True
+        )
         self._queue.put_nowait(json.dumps(self._settings).encode() + b"\n")
         for work in (self._send, self._listen):
             thread = threading.Thread(target=work, name="page", daemon=True)

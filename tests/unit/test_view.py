@@ -12,6 +12,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ from tactile_lab.view.gate import Gate, Head, inner_address, is_loopback, new_to
 from tactile_lab.view.page import Page
 from tactile_lab.view.scene import Scene, ellipse
 
+ROOT = Path(__file__).parents[2]
 SQUARE = [[-0.02, -0.02, 0.0], [0.02, -0.02, 0.0], [0.02, 0.02, 0.0], [-0.02, 0.02, 0.0]]
 
 
@@ -233,6 +235,24 @@ with Page("127.0.0.1", 0, "", "test") as page:
     assert tunnels == "False"
     assert inner.startswith("127.")
     assert inner not in url
+
+
+def test_page_is_drawn_again_and_again_without_a_complaint() -> None:
+    """In a process of its own, as above; what viser warns of counts as an error."""
+    code = """
+from tactile_lab.view.page import Page
+from tests.unit.test_view import recorded
+with Page("127.0.0.1", 0, "", "test") as page:
+    for grasps in (1, 2, 1):
+        page.scene = recorded(grasps)
+        page.draw()
+        page.scene.surface.sigma_m[:] = 0.001 * grasps
+        page.scene.changed.add("object")
+        page.draw()
+"""
+    words = [sys.executable, "-W", "error::UserWarning", "-c", code]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
 
 
 # --- the feed ------------------------------------------------------------------------------------------------------
