@@ -179,16 +179,16 @@ class BoxProber:
         return np.array([self._axes.transformTo(point[:2]) for point in points_m])
 
     def _box(self, found: Mapping[str, Array], missing: Mapping[str, str], top_m: float | None) -> BoundingBox:
-        """From the outermost places felt on each side; a side not found is assumed where objects typically end."""
+        """Around all places felt; toward a side that was not found at least as far as objects typically reach."""
         every = np.vstack(list(found.values())) if found else np.zeros((1, 2))
-        middle = (every.min(axis=0) + every.max(axis=0)) / 2
-        low, high = middle - _ASSUMED_m, middle + _ASSUMED_m
-        for side, (axis, outermost, bound) in {
-            "left": (1, np.max, high),
-            "right": (1, np.min, low),
-            "front": (0, np.max, high),
-            "back": (0, np.min, low),
+        low, high = every.min(axis=0), every.max(axis=0)
+        middle = (low + high) / 2
+        for side, (axis, bound, assumed, outer) in {
+            "left": (1, high, middle + _ASSUMED_m, np.maximum),
+            "right": (1, low, middle - _ASSUMED_m, np.minimum),
+            "front": (0, high, middle + _ASSUMED_m, np.maximum),
+            "back": (0, low, middle - _ASSUMED_m, np.minimum),
         }.items():
-            if side in found:
-                bound[axis] = outermost(found[side][:, axis])
+            if side in missing:
+                bound[axis] = outer(bound[axis], assumed[axis])
         return BoundingBox(self._axes, low, high, self._settings.margin_m, top_m, dict(missing))
