@@ -161,7 +161,7 @@ class SimulatedSource:
         """Draw. Raises ConfigurationError for an unknown scene."""
         scene = self._settings.place().name or "table"
         if scene == "table":
-            self._pictures = [table_picture(self._settings, turn, self._rng) for turn in range(_PICTURES)]
+            self._pictures = table_pictures(self._settings, _PICTURES, self._rng)
         elif scene == "board":
             self._poses = board_poses(self._board, self._lens, BOARD_VIEWS, self._rng)
         else:
@@ -198,12 +198,13 @@ class SimulatedSource:
         return CharucoBoard(dictionary=self._settings.dictionary)
 
 
-def table_picture(settings: CameraSourceSettings, turn: float, rng: np.random.Generator) -> Image:
-    """The world marker and an object's marker as the camera under the table sees them."""
+def table_pictures(settings: CameraSourceSettings, count: int, rng: np.random.Generator) -> list[Image]:
+    """The world marker and an object's, turned from picture to picture, as the camera under the table sees them."""
     markers = MarkerSettings(dictionary=settings.dictionary)
     camera = TableCamera(simulated_lens(settings.size_px), CameraSettings(), rng)
     world = PrintedMarker(settings.dictionary, markers.world_id, markers.world_side_m)
     target = PrintedMarker(settings.dictionary, markers.object_id, markers.object_side_m)
     down = Rot3(np.diag([1.0, -1.0, -1.0]))
-    world_T_target = Pose3(Rot3.Yaw(0.5 * turn) * down, np.array([-0.03, 0.01 * np.cos(turn), 0.0]))
-    return camera.render(((world, Pose3(down, np.array([0.15, 0.0, 0.0]))), (target, world_T_target)), np.zeros((3, 3)))
+    beside = Pose3(down, np.array([0.15, 0.0, 0.0]))
+    places = [Pose3(Rot3.Yaw(0.5 * n) * down, np.array([-0.03, 0.01 * np.cos(n), 0.0])) for n in range(count)]
+    return [camera.render(((world, beside), (target, place)), np.zeros((3, 3))) for place in places]

@@ -10,7 +10,7 @@ from drivers.camera.frames import Frame
 from drivers.camera.markers import detection
 from drivers.camera.packet import encode_packet
 from drivers.camera.source_settings import CameraSourceSettings
-from drivers.simulation.board_camera import table_picture
+from drivers.simulation.board_camera import table_pictures
 from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock
 from tactile_lab.evaluation.benchmark import Timing, TimingTable
 
@@ -32,7 +32,7 @@ def camera_table(clock: Clock | None = None, *, seconds: float = 10.0, repeats: 
 def _frame_timings(clock: Clock, size: tuple[int, int], repeats: int) -> list[Timing]:
     cv2.setNumThreads(1)
     settings = CameraSourceSettings(source="simulated", size_px=size)
-    image = table_picture(settings, 1.0, np.random.default_rng(0))
+    (image,) = table_pictures(settings, 1, np.random.default_rng(0))
     found, encoded = [], []
     for number in range(repeats):
         begin_ns = clock.now_ns()
