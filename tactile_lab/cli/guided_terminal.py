@@ -107,9 +107,7 @@ class LineTerminal:
         self._told_closed = False
 
     def __enter__(self) -> Self:
-        say(
-            "Type a word and ENTER: next, go, undo, give-up, pause, end, note TEXT; docs/guided-sessions.md has all"
-        )
+        say("Type a word and ENTER: next, go, undo, give-up, pause, end, note TEXT; docs/guided-sessions.md has all")
         return self
 
     def __exit__(

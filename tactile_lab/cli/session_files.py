@@ -57,7 +57,7 @@ def export(
     del no_input
     if not any((contacts, csv, hdf5, rosbag, archive)):
         raise typer.BadParameter("name at least one of --contacts, --csv, --hdf5, --rosbag, --archive")
-    found, told = find_session(root, session), {}
+    found, told = find_session(root, session), dict[str, object]()
     if contacts is not None:
         log = exporting.export_contacts(found, contacts, dimension)
         touched = sum(len(grasp.contacts) for grasp in log.grasps)
