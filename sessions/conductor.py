@@ -5,20 +5,11 @@ Who decides about the grasps and who does them is a :class:`~sessions.decisions.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from enum import StrEnum
-from typing import TypeVar
-
 import numpy as np
 from gtsam import Pose3
-from pydantic import Field
 
-from drivers.shadow.posture import TipEllipsoid
 from sessions.bench import Bench
-from sessions.bounding_box import BoundingBox, BoxProber, ProbingSettings
-from sessions.cycle_settings import CycleSettings
+from sessions.conductor_settings import ConductorSettings
 from sessions.decisions import (
     Crew,
     DoGrasp,
@@ -29,120 +20,18 @@ from sessions.decisions import (
     Veto,
     Wait,
 )
-from sessions.explorer import ExplorationSettings
-from sessions.grasp_cycle import GraspCycle, GraspPlan
-from sessions.guided.settings import GuidedSettings
-from sessions.motion import Motion
-from sessions.next_grasp import FixedRule, PlanSettings
-from sessions.planner import Planner, Reorientation
-from sessions.policy_decisions import Approve, PolicyDecisions, chooser_for, everything_approved, recorded_by
+from sessions.estimation import Estimation
+from sessions.grasp_cycle import GraspPlan
+from sessions.planner import Reorientation
 from sessions.progress import GraspReport, NullProgress, Progress
 from sessions.recorder import Level
-from sessions.safety import InterruptGuard, SafetySettings, SafetySupervisor
-from sessions.slam_memory import SlamMemory
-from sessions.touching import Toucher
-from sessions.view_messages import plan_message, surface_message
-from tactile_lab.clock import VirtualClock
+from sessions.safety import InterruptGuard
+from sessions.session_outcome import Ending, SessionOutcome
+from sessions.view_messages import plan_message
 from tactile_lab.errors import TactileLabError
 from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.slam import TactileSlam
 from tactile_lab.slam_result import SlamStep
-from tactile_lab.strict_yaml import StrictModel
-
-Answer = TypeVar("Answer")
-
-
-class ConductorSettings(StrictModel):
-    """A session.
-
-    Attributes:
-        grasps: how many.
-        fixed_grasps: how many of them follow the fixed rule before the estimate chooses.
-        missed_approaches: this many approaches in a row without a way down to the table end the session.
-        plan, cycle, probing, exploration, safety, guided: see there.
-    """
-
-    grasps: int = Field(default=16, ge=1)
-    fixed_grasps: int = Field(default=2, ge=1)
-    missed_approaches: int = Field(default=3, ge=1)
-    plan: PlanSettings = PlanSettings()
-    cycle: CycleSettings = CycleSettings()
-    probing: ProbingSettings = ProbingSettings()
-    exploration: ExplorationSettings = ExplorationSettings()
-    safety: SafetySettings = SafetySettings()
-    guided: GuidedSettings = GuidedSettings()
-
-
-class Ending(StrEnum):
-    """How a session ended."""
-
-    COMPLETE = "complete"
-    OBJECT_LOST = "object lost"
-    INTERRUPTED = "interrupted"
-    LIMIT = "limit reached"
-    STOPPED = "stopped"
-    """A safety limit or a failing device; the outcome carries the error."""
-
-
-@dataclass(frozen=True)
-class SessionOutcome:
-    """What came of a session.
-
-    Attributes:
-        ending: how it ended.
-        reason: the same in words.
-        grasps: everything captured, in order.
-        dropped: how often each reason kept a finger's contact out.
-        error: what stopped it, for an ending of that kind.
-    """
-
-    ending: Ending
-    reason: str
-    grasps: tuple[Grasp, ...]
-    dropped: dict[str, int]
-    error: TactileLabError | None = None
-
-
-def autonomous_crew(
-    bench: Bench,
-    slam: TactileSlam,
-    settings: ConductorSettings,
-    *,
-    seed: int = 0,
-    dimension: int = 2,
-    approve: Approve = everything_approved,
-) -> Crew:
-    """The crew of a session without a person: the hand moves by itself, the planner decides.
-
-    Args:
-        bench, slam, settings: of the session.
-        seed: of what is left to chance.
-        dimension: of the estimation.
-        approve: asked before every grasp; refuses what a person does not want.
-
-    Raises:
-        ConfigurationError: there is no policy of the name in the settings.
-    """
-    supervisor = SafetySupervisor(bench, settings.safety, bench.cycle_ns)
-    tip, window = tip_shape(bench), settings.plan.yaw_window_rad
-    motion = Motion(bench, supervisor)
-    cycle = GraspCycle(motion, settings.cycle, tip, window)
-    rule = FixedRule(settings.plan, np.random.default_rng(seed), dimension)
-    chooser = None
-    if policy := settings.exploration.policy:
-        limits = settings.plan, settings.exploration, settings.cycle, settings.safety
-        chooser = chooser_for(policy, limits, tip, dimension, slam.settings.motion, seed)
-    planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension, chooser, settings.grasps)
-    decisions = PolicyDecisions(planner, recorded_by(bench), approve)
-    if not settings.probing.enabled:
-        return Crew(supervisor, cycle, decisions)
-    prober = BoxProber(Toucher(motion, settings.cycle, tip), settings.probing, window, settings.plan.start_m)
-
-    def survey(stop: Callable[[], bool]) -> BoundingBox:
-        planner.boxed(box := prober.feel(stop))
-        return box
-
-    return Crew(supervisor, cycle, decisions, survey)
 
 
 class Conductor:
@@ -164,11 +53,11 @@ class Conductor:
         crew: Crew,
         progress: Progress | None = None,
     ) -> None:
-        self._bench, self._slam, self._settings = bench, slam, settings
+        self._bench, self._settings = bench, settings
         self._progress = progress or NullProgress()
         self._supervisor, self._cycle, self._decisions = crew.supervisor, crew.performer, crew.decisions
         self._survey = crew.survey
-        self._memory = SlamMemory(slam)
+        self._estimation = Estimation(bench, slam, crew.decisions, crew.performer.idle)
         self._guard = InterruptGuard()
         self._thought_of: int | None = None
         self._paused = False
@@ -237,7 +126,7 @@ class Conductor:
 
     def _consider(self, index: int) -> None:
         if self._thought_of != index:
-            self._think(lambda: self._decisions.think(index))
+            self._estimation.think(lambda: self._decisions.think(index))
             self._thought_of = index
             if plan := self._decisions.suggested:
                 self._bench.recorder.plan(self._bench.clock.now_ns(), plan_message(index, plan))
@@ -306,7 +195,7 @@ class Conductor:
         except TactileLabError as error:
             self._survive(error)
         self._phase("estimate")
-        step = self._estimate(grasp)
+        step = self._estimation.step(grasp)
         self._progress.grasp_done(self._report(grasp, plan, step, missing))
 
     def _measure(self, plan: GraspPlan) -> Grasp | None:
@@ -331,7 +220,7 @@ class Conductor:
             return
         undone = self._bench.undo()
         self._grasps.pop()
-        self._memory.undo()
+        self._estimation.undo()
         self._decisions.undone(self._bench.perception.hand_motion_world)
         self._thought_of = None
         self._tell(Level.INFO, f"grasp {undone.index + 1} is taken back: {reason}")
@@ -363,29 +252,6 @@ class Conductor:
         self._cycle.release()
         self._phase("lift")
         self._cycle.lift()
-
-    # --- estimation --------------------------------------------------------------------------------------------
-
-    def _estimate(self, grasp: Grasp) -> SlamStep:
-        """One step of the estimation."""
-        self._memory.remember()
-        step = self._think(lambda: self._slam.take(grasp))
-        self._think(lambda: self._decisions.estimated(step))
-        state = {"index": step.index, "verdict": step.verdict, "reason": step.reason, "seconds": step.seconds}
-        self._bench.recorder.slam(self._bench.clock.now_ns(), step.world_T_object, state, step.covariance)
-        surface = self._think(lambda: surface_message(self._decisions.known_shape()))
-        self._bench.recorder.surface(self._bench.clock.now_ns(), surface)
-        return step
-
-    def _think(self, question: Callable[[], Answer]) -> Answer:
-        """Compute without starving the devices: simulated time waits, real time is spent in cycles."""
-        if isinstance(self._bench.clock, VirtualClock):
-            return question()
-        with ThreadPoolExecutor(1) as worker:
-            answer = worker.submit(question)
-            while not answer.done():
-                self._cycle.idle()
-            return answer.result()
 
     # --- telling -----------------------------------------------------------------------------------------------
 
@@ -421,10 +287,3 @@ class Conductor:
 def _holds(touching: frozenset[str]) -> bool:
     """Whether these fingers can carry the object: the thumb against another, or both side fingers."""
     return ("TH" in touching and len(touching) > 1) or {"FF", "LF"} <= touching
-
-
-def tip_shape(bench: Bench) -> TipEllipsoid:
-    """The fingertip's shape by calibration; the default one where a rig has none."""
-    for calibration in bench.fingertip_calibrations.values():
-        return TipEllipsoid(calibration.semi_axes_m, calibration.centre_distal_m)
-    return TipEllipsoid()

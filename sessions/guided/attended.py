@@ -4,22 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from sessions.decisions import AutonomousDecisions, Decision, End, Pause, UndoGrasp
+from sessions.decisions import Decision, End, Pause, UndoGrasp
 from sessions.guided.operator import Ask, Operator
 from sessions.planner import Planner
+from sessions.policy_choice import Choice
+from sessions.policy_decisions import Approve, PolicyDecisions
 
 
-class AttendedDecisions(AutonomousDecisions):
-    """The planner's decisions, unless the person asks for something else.
+class AttendedDecisions(PolicyDecisions):
+    """The planner's decisions, recorded and approved as ever, unless the person asks for something else.
 
     Args:
-        planner: it.
+        planner: with or without a policy.
+        tell: told every decision of the policy that is not overtaken by what the person asks for.
+        approve: asked before every grasp.
         operator: the person; is heard between grasps.
         wait: called in every cycle of a pause; makes a simulated rig wait for the person.
     """
 
-    def __init__(self, planner: Planner, operator: Operator, wait: Callable[[], None] = lambda: None) -> None:
-        super().__init__(planner)
+    def __init__(
+        self,
+        planner: Planner,
+        tell: Callable[[Choice], None],
+        approve: Approve,
+        operator: Operator,
+        wait: Callable[[], None] = lambda: None,
+    ) -> None:
+        super().__init__(planner, tell, approve)
         self._operator, self._wait = operator, wait
         self._paused = False
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from sessions.attachments import Attachments
+from sessions.autonomous_crew import tip_shape
 from sessions.bench import Bench
-from sessions.conductor import ConductorSettings, tip_shape
+from sessions.conductor_settings import ConductorSettings
 from sessions.decisions import Crew, Performer
 from sessions.guided.by_hand import GraspByHand
 from sessions.guided.by_keys import GraspByKeys

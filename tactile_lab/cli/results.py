@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from sessions.conductor import Ending, SessionOutcome
+from sessions.session_outcome import Ending, SessionOutcome
 from tactile_lab.cli.console import complain, emit_json, say, warn
 from tactile_lab.cli.evaluation_table import show_evaluation
 from tactile_lab.workflow.judging import FinishedSession

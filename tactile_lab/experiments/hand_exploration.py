@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from drivers.simulation.world import SimulatedWorld
-from sessions.conductor import Conductor, ConductorSettings, Ending, autonomous_crew
+from sessions.autonomous_crew import autonomous_crew
+from sessions.conductor import Conductor
+from sessions.conductor_settings import ConductorSettings
 from sessions.decisions import Decision, End, Veto
 from sessions.grasp_cycle import GraspPlan
 from sessions.planner import Planner, Reorientation
@@ -27,6 +29,7 @@ from sessions.policy_choice import Choice
 from sessions.policy_decisions import PolicyDecisions
 from sessions.progress import GraspReport, NullProgress
 from sessions.recorder import NullRecorder
+from sessions.session_outcome import Ending
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import ShapeError
 from tactile_lab.evaluation.registration import registration_rms_mm

@@ -16,7 +16,7 @@ from drivers.ati.wiring import VoltsWiring
 from drivers.positioner import PositionerSettings
 from drivers.shadow.hand import HandSettings
 from drivers.simulation.settings import SimulationSettings
-from sessions.conductor import ConductorSettings
+from sessions.conductor_settings import ConductorSettings
 from sessions.perception import PerceptionSettings
 from sessions.session import Session
 from tactile_lab.errors import ConfigurationError

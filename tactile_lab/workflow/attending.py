@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from sessions.autonomous_crew import autonomous_crew
 from sessions.bench import Bench
-from sessions.conductor import ConductorSettings, autonomous_crew
+from sessions.conductor_settings import ConductorSettings
 from sessions.decisions import AutonomousDecisions, Crew
 from sessions.guided.attended import AttendedDecisions
 from sessions.guided.crew import guided_crew
 from sessions.guided.operator import Operator
 from sessions.guided.pace import Pace
-from sessions.policy_decisions import Approve, everything_approved
+from sessions.policy_decisions import Approve, everything_approved, recorded_by
 from sessions.recorder import TrafficSink
 from tactile_lab.clock import MonotonicClock, VirtualClock
 from tactile_lab.slam import TactileSlam
@@ -73,8 +74,10 @@ def crew_for(
     if operator is None:
         return crew
     assert isinstance(crew.decisions, AutonomousDecisions)
-    pace = _pace(bench, attendance)
-    decisions = AttendedDecisions(crew.decisions.planner, operator, lambda: pace(bench.clock.now_ns()))
+    pace, planner = _pace(bench, attendance), crew.decisions.planner
+    decisions = AttendedDecisions(
+        planner, recorded_by(bench), attendance.approve, operator, lambda: pace(bench.clock.now_ns())
+    )
     return replace(crew, decisions=decisions)
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from drivers.camera.calibration import load_camera
 from drivers.camera.markers import MarkerSettings
-from sessions.conductor import SessionOutcome
 from sessions.manifest import write_whole
 from sessions.progress import NullProgress, Progress
 from sessions.session import RESULTS, Session
+from sessions.session_outcome import SessionOutcome
 from sessions.traffic_reader import Loss
 from tactile_lab import report
 from tactile_lab.calibration_file import load_parameters

@@ -10,10 +10,12 @@ from typing import Any
 
 from calibration.admission import UNCALIBRATED, admit
 from drivers.simulation.objects import ObjectModel
-from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome
+from sessions.conductor import Conductor
+from sessions.conductor_settings import ConductorSettings
 from sessions.manifest import Status
 from sessions.progress import Progress
 from sessions.session import RunningSession, create_session
+from sessions.session_outcome import Ending, SessionOutcome
 from tactile_lab.errors import ConfigurationError, InterruptionError
 from tactile_lab.exploration.policies import make_policy
 from tactile_lab.rigs.build import check_calibration

@@ -13,13 +13,16 @@ import pytest
 from drivers.shadow.palm_codec import decode_command
 from drivers.simulation.settings import ObjectStart
 from drivers.simulation.world import SimulatedWorld
+from sessions.autonomous_crew import autonomous_crew
 from sessions.bench import Bench
-from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome, autonomous_crew
+from sessions.conductor import Conductor
+from sessions.conductor_settings import ConductorSettings
 from sessions.marks import Mark, MarkKind
 from sessions.progress import GraspReport, NullProgress
 from sessions.recorder import Recorder
 from sessions.safety import SafetySettings
 from sessions.schemas import MARKS_TOPIC, transmitted_topic
+from sessions.session_outcome import Ending, SessionOutcome
 from tactile_lab.geometry.contacts import Array, Contact, Grasp
 from tactile_lab.geometry.poses import transform_points
 from tactile_lab.rigs.build import build_bench

@@ -12,7 +12,9 @@ import pytest
 from gtsam import Pose3, Rot3
 
 from drivers.shadow.closing import closing
-from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome, autonomous_crew
+from sessions.autonomous_crew import autonomous_crew
+from sessions.conductor import Conductor
+from sessions.conductor_settings import ConductorSettings
 from sessions.decisions import AutonomousDecisions, Decision, End, Pause, UndoGrasp, Veto
 from sessions.explorer import closing_rays
 from sessions.grasp_cycle import GraspPlan
@@ -22,6 +24,7 @@ from sessions.next_grasp import FixedRule, PlanSettings, contact_centre
 from sessions.planner import Planner, Reorientation
 from sessions.progress import GraspReport, NullProgress
 from sessions.recorder import Level
+from sessions.session_outcome import Ending, SessionOutcome
 from tactile_lab.errors import ConfigurationError, DeviceError, TactileLabError
 from tactile_lab.geometry.contacts import Contact, Grasp
 from tactile_lab.slam import SlamSettings, TactileSlam

@@ -14,12 +14,12 @@ from drivers.emulators.wired.stand_ins import StandIns
 from drivers.shadow.palm_images import PALMS
 from sessions import schemas
 from sessions.bench import Bench
-from sessions.conductor import Ending, SessionOutcome
 from sessions.perception import TareReport
 from sessions.progress import NullProgress
 from sessions.recorder import Recorder
 from sessions.replay import Replay
 from sessions.session import Session
+from sessions.session_outcome import Ending, SessionOutcome
 from tactile_lab.errors import DeviceError
 from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.rigs.build import build_interpreter

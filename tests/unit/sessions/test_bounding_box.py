@@ -8,14 +8,17 @@ from gtsam import Pose2, Pose3, Rot3
 
 from drivers.shadow.closing import closing
 from drivers.shadow.posture import TipEllipsoid
+from sessions.autonomous_crew import autonomous_crew
 from sessions.bounding_box import SIDES, BoundingBox, BoxProber, ProbingSettings
-from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome, autonomous_crew
+from sessions.conductor import Conductor
+from sessions.conductor_settings import ConductorSettings
 from sessions.cycle_settings import CycleSettings
 from sessions.explorer import ExplorationSettings
 from sessions.motion import Motion
 from sessions.next_grasp import FixedRule, PlanSettings
 from sessions.planner import Planner
 from sessions.safety import SafetySettings, SafetySupervisor
+from sessions.session_outcome import Ending, SessionOutcome
 from sessions.touching import Toucher
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tests.support.disc_world import Disc, DiscWorld, TIP_CENTRE_m

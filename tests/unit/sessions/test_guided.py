@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from gtsam import Pose3
 
-from sessions.conductor import Conductor, ConductorSettings, Ending, SessionOutcome
+from sessions.conductor import Conductor
+from sessions.conductor_settings import ConductorSettings
 from sessions.guided.crew import guided_crew
 from sessions.guided.operator import Ask, Panel, Request, Stage, Together, request_of
 from sessions.guided.simulated_operator import Cue, SimulatedOperator
 from sessions.marks import MarkKind
+from sessions.session_outcome import Ending, SessionOutcome
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.strict_yaml import validate
 from tests.support.disc_world import Disc, DiscWorld

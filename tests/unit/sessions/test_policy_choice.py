@@ -13,15 +13,17 @@ from gtsam import Pose2, Pose3, Rot3
 from drivers.shadow.closing import closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.cycle_settings import CycleSettings
-from sessions.decisions import DoGrasp, End
+from sessions.decisions import DoGrasp, End, Pause
 from sessions.explorer import ExplorationSettings, KnownShape, known_shape
 from sessions.grasp_cycle import GraspPlan
+from sessions.guided.attended import AttendedDecisions
+from sessions.guided.operator import Ask, Panel, Request
 from sessions.hand_candidates import LANDED, NO_ROOM, OUT_OF_REACH, TOO_TALL, HandLimits, grasp_time_s, offer
 from sessions.motion import GraspFrame
 from sessions.next_grasp import FixedRule, PlanSettings
 from sessions.planner import Planner
 from sessions.policy_choice import Choice, Knowledge, PolicyChooser
-from sessions.policy_decisions import PolicyDecisions, Proposal
+from sessions.policy_decisions import PolicyDecisions, Proposal, everything_approved
 from sessions.safety import SafetySettings
 from tactile_lab.exploration.candidates import Candidate, predict_contacts
 from tactile_lab.exploration.policies import POLICIES, make_policy
@@ -370,4 +372,40 @@ def test_a_policy_that_stops_ends_the_session_with_its_reason() -> None:
     decision = who.decide(1)
     assert isinstance(decision, End)
     assert "budget" in decision.reason
+    assert told[0].decision.outcome == "stop"
+
+
+class Presser:
+    """A person at the page, who presses one thing each time he is asked."""
+
+    attended = False
+
+    def __init__(self, *asks: Ask | None) -> None:
+        self._asks = list(asks)
+
+    def requests(self) -> Sequence[Request]:
+        ask = self._asks.pop(0) if self._asks else None
+        return [] if ask is None else [Request(ask)]
+
+    def show(self, panel: Panel) -> None:
+        """Not looked at."""
+
+
+def test_attended_session_records_and_approves_the_policys_decisions_too() -> None:
+    told: list[Choice] = []
+    person = Presser(Ask.PAUSE, None, Ask.PAUSE)
+    who = AttendedDecisions(planner(), told.append, lambda proposal: proposal.vetoed == 1, person)
+    who.think(1)
+    assert isinstance(who.decide(1), Pause)
+    assert isinstance(who.decide(1), Pause)
+    assert told == []
+    assert isinstance(who.decide(1), DoGrasp)
+    assert [(choice.number, len(choice.vetoed)) for choice in told] == [(2, 1)]
+
+
+def test_attended_session_ends_when_its_policy_stops() -> None:
+    told: list[Choice] = []
+    who = AttendedDecisions(planner(grasps=1), told.append, everything_approved, Presser())
+    who.think(1)
+    assert isinstance(who.decide(1), End)
     assert told[0].decision.outcome == "stop"
