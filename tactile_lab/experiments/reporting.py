@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from tactile_lab.errors import SessionError
-from tactile_lab.experiments.catalogue import UNITS, Experiment
 from tactile_lab.experiments.cells import Row
+from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.runner import FORMAT, version
+from tactile_lab.experiments.study_plots import UNITS
 from tactile_lab.experiments.summary import Group, group_json, grouped, markdown, table
 
 JSON_FILE, TABLE_FILE, PLOT_FILE, LINES_FILE = "results.json", "results.md", "plot.svg", "runs.jsonl"

@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 
 from tactile_lab.errors import ConfigurationError
-from tactile_lab.experiments.catalogue import EXPERIMENTS, METHODS, REPORTED_SEEDS, Experiment, experiment
+from tactile_lab.experiments.catalogue import EXPERIMENTS, experiment
+from tactile_lab.experiments.experiment import REPORTED_SEEDS, Experiment
 from tactile_lab.experiments.reporting import write_report
 from tactile_lab.experiments.runner import execute
+from tactile_lab.experiments.studies.planar import METHODS
 
 TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "methods-2d": ({"shape": ["rectangle"], "noise": ["50"], "method": ["known-pose", "odometry", "joint"]}, 4),

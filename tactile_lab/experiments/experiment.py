@@ -1,0 +1,78 @@
+"""One experiment: what is varied, what one run does, and how the outcome is shown.
+
+Seeds: those reported are 1000 to 1029, those for development 0 to 99; nothing is ever tuned on the former.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.experiments.cells import Cell, Row, Setting, Work, planned_cells
+from tactile_lab.experiments.summary import Column
+
+REPORTED_SEEDS = tuple(range(1000, 1030))
+DEVELOPMENT_SEEDS = range(100)
+
+Plot: TypeAlias = Callable[[str, Sequence[Row]], str]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One experiment.
+
+    Attributes:
+        name: on the command line.
+        sentence: what it shows.
+        settings: what is varied; grasps is the number of grasps asked for.
+        work: runs one cell.
+        columns: figures of the tables.
+        plot: draws the outcome as an SVG file, from a title and all rows.
+        pooled: settings over which a second table takes all runs together.
+        grasps: number of grasps of a run; None where there are none.
+        left_out: what can not be run on this machine and why, "" if nothing.
+    """
+
+    name: str
+    sentence: str
+    settings: Callable[[int], list[Setting]]
+    work: Work
+    columns: tuple[Column, ...]
+    plot: Plot
+    pooled: tuple[str, ...] = ()
+    grasps: int | None = None
+    left_out: Callable[[], str] = str
+
+    def cells(
+        self,
+        seeds: Sequence[int] = REPORTED_SEEDS,
+        only: Mapping[str, Sequence[str]] | None = None,
+        grasps: int | None = None,
+    ) -> list[Cell]:
+        """All runs.
+
+        Args:
+            seeds: of every setting.
+            only: values, as texts, that some of the settings are limited to.
+            grasps: number of grasps instead of the experiment's own.
+
+        Raises:
+            ConfigurationError: no such setting, or nothing is left.
+        """
+        settings = self.settings(grasps or self.grasps or 0)
+        for name, values in (only or {}).items():
+            settings = _limited(settings, name, values)
+        return planned_cells(settings, seeds)
+
+
+def _limited(settings: list[Setting], name: str, values: Sequence[str]) -> list[Setting]:
+    if not any(name in dict(setting) for setting in settings):
+        hint = f"Settings are {', '.join(dict(settings[0]))}"
+        raise ConfigurationError(f"nothing called {name!r} is varied", where="--only", hint=hint)
+    known = list(dict.fromkeys(str(dict(setting)[name]) for setting in settings))
+    if unknown := [value for value in values if value not in known]:
+        hint = f"There are {', '.join(known)}"
+        raise ConfigurationError(f"no {name} {', '.join(map(repr, unknown))}", where="--only", hint=hint)
+    return [setting for setting in settings if str(dict(setting)[name]) in values]

@@ -1,0 +1,1 @@
+"""The experiments by topic; :mod:`tactile_lab.experiments.catalogue` has them all by name."""

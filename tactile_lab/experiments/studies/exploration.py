@@ -1,0 +1,68 @@
+"""Which grasp is next: tables of the thesis, and the simulated hand."""
+
+from __future__ import annotations
+
+from tactile_lab.experiments import exploration_runs, hand_exploration
+from tactile_lab.experiments.cells import Cell
+from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.study_columns import (
+    HAUSDORFF,
+    REGISTRATION,
+)
+from tactile_lab.experiments.study_plots import ranges
+from tactile_lab.experiments.summary import Column
+
+EXPLORATION_COLUMNS = (
+    Column("actions by B", "actions_B", 1, kind="estimate"),
+    Column("actions by A", "actions_A", 1, kind="estimate"),
+    Column("by B: median / p90 / max", "actions_B", 0),
+    Column("by A: median / p90 / max", "actions_A", 0),
+    Column("decision, ms: median / p95", "decision_ms", 0, kind="pooled"),
+    Column("correlation of promised and realised share", "promises", 2, kind="correlation"),
+)
+HAND_COLUMNS = (
+    Column("actions by B: median / p90 / max", "actions_B", 0),
+    Column("by A", "actions_A", 0),
+    Column("explored by B at the end", "share_B", 0, kind="percent"),
+    Column("simulated minutes", "minutes", 1),
+    HAUSDORFF,
+    REGISTRATION,
+    Column("correlation of promised and realised share", "promises", 2, kind="correlation"),
+)
+_ACTIONS_LABEL = "actions until 90 % of the contour is explored (definition B)"
+
+
+def _hand_condition(cell: Cell) -> str:
+    return f"{cell['object']}, {cell['dimension']}-D"
+
+
+TABLE_4_2 = Experiment(
+    "table-4.2",
+    "Thesis, table 4.2: actions until 90 % of a fixed rectangle's contour is explored, policies and bounds.",
+    exploration_runs.fixed_settings,
+    exploration_runs.explore_fixed,
+    EXPLORATION_COLUMNS,
+    ranges("policy", _ACTIONS_LABEL, "actions_B", lambda cell: f"{cell['candidates']} candidates", columns=1),
+    grasps=exploration_runs.MOST_GRASPS,
+)
+
+TABLE_4_3 = Experiment(
+    "table-4.3",
+    "Thesis, table 4.3: the same of a rectangle that every grasp pushes aside, at full motion noise.",
+    exploration_runs.moving_settings,
+    exploration_runs.explore_moving,
+    (*EXPLORATION_COLUMNS, REGISTRATION),
+    ranges("policy", _ACTIONS_LABEL, "actions_B", lambda cell: f"followed by {cell['tracking']}", columns=1),
+    grasps=exploration_runs.MOST_GRASPS,
+)
+
+EXPLORATION_HAND = Experiment(
+    "exploration-hand",
+    "The simulated hand's own candidates, 72 and more: actions until 90 % of an object is explored, by policy.",
+    hand_exploration.settings,
+    hand_exploration.explore_by_hand,
+    HAND_COLUMNS,
+    ranges("policy", "grasps until 90 % is explored (definition B)", "actions_B", _hand_condition, columns=2),
+    pooled=("object",),
+    grasps=hand_exploration.GRASPS,
+)

@@ -1,0 +1,79 @@
+"""What the laboratory rests on: camera, pose graph, calibration, recording."""
+
+from __future__ import annotations
+
+from tactile_lab.experiments import calibration_runs, camera_runs, crash_runs, graph_runs
+from tactile_lab.experiments.cells import grid
+from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.graph_stress import stock_solvers
+from tactile_lab.experiments.study_plots import ranges
+from tactile_lab.experiments.summary import Column
+
+CAMERA_TRUTH = Experiment(
+    "camera-truth",
+    "The marker camera at 640 x 480 under ten conditions: error of the true pose, flips taken for valid.",
+    lambda grasps: grid(condition=list(camera_runs.CONDITIONS)),
+    camera_runs.see_object,
+    (
+        Column("position, mm: median / p95", "position_mm", 2, kind="pooled"),
+        Column("angle, °: median / p95", "angle_deg", 3, kind="pooled"),
+        Column("frames", "frames", 0, kind="sum"),
+        Column("refused", "refused", 0, kind="sum"),
+        Column("flips", "flips", 0, kind="sum"),
+        Column("free: valid", "free_valid", 0, kind="sum"),
+        Column("free: flips among them", "free_flips", 0, kind="sum"),
+    ),
+    ranges("condition", "largest position error, mm", "worst_mm", lambda cell: "640 x 480 pixels", columns=1),
+    pooled=("condition",),
+)
+
+GRAPH_STRESS = Experiment(
+    "graph-stress",
+    "Pose graphs of 50 grasps with 20 % wrong loops: gtsam's solvers, ours, and one told which are right.",
+    lambda grasps: grid(solver=[*stock_solvers(), graph_runs.OUR_SOLVER]),
+    graph_runs.solve_stressed_graph,
+    (
+        Column("position, mm", "error_mm"),
+        Column("rotation, °", "error_deg"),
+        Column("time, ms", "ms", 0),
+        Column("wrong loops", "wrong_loops", 0, kind="sum"),
+        Column("of them accepted", "wrong_accepted", 0, kind="sum"),
+        Column("right ones refused", "right_refused", 0, kind="sum"),
+    ),
+    ranges("solver", "position error, mm", "error_mm", lambda cell: "50 grasps, 20 % wrong loops", columns=1),
+)
+
+CALIBRATE_FOREARM = Experiment(
+    "calibrate-forearm",
+    "Forearm to world by touch and by a board on the palm: joint bias 0.6°, contacts 1 mm, corners 0.15 px.",
+    lambda grasps: (
+        grid(method=[calibration_runs.TOUCH], poses=[20, 40]) + grid(method=[calibration_runs.MARKER], poses=[10, 20])
+    ),
+    calibration_runs.calibrate_forearm,
+    (
+        Column("position, mm: median / p95", "errors_mm", 2, kind="pooled"),
+        Column("rotation, °: median / p95", "errors_deg", 2, kind="pooled"),
+        Column("inside the 95 % region", "inside", 1, kind="percent"),
+        Column("noise found, of that stated", "noise", 2, kind="median"),
+    ),
+    ranges("method", "position error, mm", "error_mm", lambda cell: f"{cell['poses']} poses"),
+)
+
+CRASH_RECOVERY = Experiment(
+    "crash-recovery",
+    "Accidents of a recording at full load, at a random instant: what is lost of it.",
+    lambda grasps: grid(fault=crash_runs.faults_here()),
+    crash_runs.crash_and_recover,
+    (
+        Column("messages recovered", "recovered", 0),
+        Column("messages lost", "lost", 0),
+        Column("lost before the end, ms", "lost_ms", 0),
+        Column("of the hand, ms", "hand_ms", 0),
+        Column("of force sensors, ms", "ft_ms", 0),
+        Column("of pictures, ms", "camera_ms", 0),
+        Column("longest write, ms", "write_ms", 1),
+        Column("late messages", "late", 0, kind="median"),
+    ),
+    ranges("fault", "lost at the end, ms", "lost_ms", lambda cell: "full load", columns=1),
+    left_out=crash_runs.needs_root,
+)

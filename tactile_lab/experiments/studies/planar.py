@@ -1,0 +1,49 @@
+"""Tracking and shape in the plane."""
+
+from __future__ import annotations
+
+from tactile_lab.experiments import shape_runs, tracking_runs
+from tactile_lab.experiments.cells import Setting, grid
+from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.study_columns import (
+    SHAPE_COLUMNS,
+    TRACKING_COLUMNS,
+)
+from tactile_lab.experiments.study_plots import HAUSDORFF_LABEL, condition, curves, ranges
+
+METHODS = ("known-pose", "joint", "particle", "icp", "thesis-pf", "thesis-pf-graph", "odometry")
+PLANAR_SHAPES = ("rectangle", "triangle", "ellipse", "L", "hexagon", "trapezoid", "pentagon", "stadium")
+PLANAR_GRASPS = 16
+
+
+def _methods_in_plane(grasps: int) -> list[Setting]:
+    return [
+        setting
+        for noise, outliers in ((100, 0), (50, 0), (100, 10))
+        for setting in grid(noise=[noise], outliers=[outliers], shape=PLANAR_SHAPES, method=METHODS, grasps=[grasps])
+    ]
+
+
+METHODS_2D = Experiment(
+    "methods-2d",
+    "All methods on all planar shapes, at 100 % and 50 % motion noise and with 10 % outliers.",
+    _methods_in_plane,
+    tracking_runs.track_in_plane,
+    TRACKING_COLUMNS,
+    ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", condition),
+    pooled=("shape",),
+    grasps=PLANAR_GRASPS,
+)
+
+RANDOM_CONTACTS = Experiment(
+    "random-contacts",
+    "Shape models on random contacts of planar shapes whose pose is known.",
+    lambda grasps: grid(
+        shape=("rectangle", "square", "ellipse", "hexagon", "L"),
+        model=list(shape_runs.SHAPE_MODELS),
+        contacts=[20, 40, 80],
+    ),
+    shape_runs.contour_of_random_contacts,
+    SHAPE_COLUMNS,
+    curves("contacts", "contacts", "shape", "model"),
+)

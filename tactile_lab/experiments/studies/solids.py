@@ -1,0 +1,68 @@
+"""Tracking and shape of solids, on a table and held free."""
+
+from __future__ import annotations
+
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.experiments import tracking_runs
+from tactile_lab.experiments.cells import Cell, Setting, grid
+from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.solids import YCB_NAMES, YCB_PREFIX, ycb_path
+from tactile_lab.experiments.studies.planar import METHODS
+from tactile_lab.experiments.study_columns import (
+    TRACKING_COLUMNS,
+)
+from tactile_lab.experiments.study_plots import HAUSDORFF_LABEL, ranges
+
+FACETED_SOLIDS = ("box-12x6x6", "triangular-prism", "hexagonal-prism", "l-block")
+CURVED_SOLIDS = ("ellipsoid", "cylinder", "sphere", "mug", "bottle")
+SCANNED_SOLIDS = tuple(YCB_PREFIX + name for name in YCB_NAMES)
+SPATIAL_GRASPS = 24
+
+
+def _scans_left_out() -> str:
+    try:
+        for name in YCB_NAMES:
+            ycb_path(name)
+    except ConfigurationError as error:
+        return f"scanned solids are left out: {error}"
+    return ""
+
+
+def _methods_on_table(grasps: int) -> list[Setting]:
+    scanned = () if _scans_left_out() else SCANNED_SOLIDS
+    solids = (*FACETED_SOLIDS, *CURVED_SOLIDS, *scanned)
+    return grid(noise=[100], shape=solids, method=METHODS, grasps=[grasps])
+
+
+def _methods_in_space(grasps: int) -> list[Setting]:
+    solids = ("box-12x6x6", "triangular-prism", "l-block", "ellipsoid")
+    return grid(noise=[50], shape=solids, method=("known-pose", "joint", "icp", "odometry"), grasps=[grasps])
+
+
+def _kind_of_solid(cell: Cell) -> str:
+    kinds = {"flat faces": FACETED_SOLIDS, "curved": CURVED_SOLIDS, "scanned": SCANNED_SOLIDS}
+    return next(kind for kind, names in kinds.items() if cell["shape"] in names)
+
+
+METHODS_3D = Experiment(
+    "methods-3d",
+    "All methods on solids moved on a table at 100 % motion noise.",
+    _methods_on_table,
+    tracking_runs.track_on_table,
+    TRACKING_COLUMNS,
+    ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", _kind_of_solid),
+    pooled=("shape",),
+    grasps=SPATIAL_GRASPS,
+    left_out=_scans_left_out,
+)
+
+METHODS_6DOF = Experiment(
+    "methods-6dof",
+    "Methods on solids held free in space, six degrees of freedom, at 50 % motion noise.",
+    _methods_in_space,
+    tracking_runs.track_in_space,
+    TRACKING_COLUMNS,
+    ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: str(cell["shape"])),
+    pooled=("shape",),
+    grasps=SPATIAL_GRASPS,
+)
