@@ -28,8 +28,10 @@ FORMAT = "tactile-experiment/1"
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 """What keeps the libraries of a worker to one thread: small matrices are faster so, and sums come out the same."""
 
-_PACKAGE = Path(__file__).resolve().parent.parent
-_PARTS = ("experiments", "evaluation", "shape", "geometry", "tracking", "graph")
+_ROOT = Path(__file__).resolve().parents[2]
+_PARTS = ("tactile_lab", "calibration", "drivers", "sessions")
+_WITHOUT = ("cli", "workflow", "view", "report")
+"""Parts of tactile_lab that show results or take orders, and compute none."""
 
 Finished = Callable[[Row, int, int], None]
 """Told about each finished run, the number of those done, and of all."""
@@ -174,7 +176,13 @@ def _line(document: object) -> str:
 def version() -> str:
     """Hash of the sources that results depend on."""
     digest = hashlib.sha256()
-    files = [path for part in _PARTS for path in sorted((_PACKAGE / part).rglob("*.py"))]
-    for path in [*files, _PACKAGE / "slam.py"]:
-        digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
+    for path in sources():
+        digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def sources() -> list[Path]:
+    """Files that results depend on: programs, and the rigs' descriptions and calibrations."""
+    files = (path for part in _PARTS for path in (_ROOT / part).rglob("*") if path.suffix in {".py", ".yaml"})
+    left_out = [_ROOT / "tactile_lab" / name for name in _WITHOUT]
+    return sorted(path for path in files if not any(path.is_relative_to(folder) for folder in left_out))

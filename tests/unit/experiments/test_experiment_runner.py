@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import grimp
 import pytest
 
 from tactile_lab.errors import SessionError, TrackingError
@@ -14,6 +15,7 @@ from tactile_lab.experiments.cells import Cell, Row, grid, planned_cells
 from tactile_lab.experiments.graph_runs import solve_stressed_graph
 from tactile_lab.experiments.runner import RunnerSettings, execute, run_cells
 
+ROOT = Path(__file__).resolve().parents[3]
 CELLS = planned_cells(grid(shape=["a", "b"], noise=[50, 100]), [3, 4])
 
 
@@ -105,6 +107,36 @@ def test_results_of_another_version_are_only_kept_when_asked_for(
     renewed = Counting()
     run_cells("test", CELLS, renewed, file)
     assert len(renewed.runs) == 8
+
+
+def test_version_covers_every_module_that_experiments_import_but_those_that_draw() -> None:
+    graph = grimp.build_graph("tactile_lab", "calibration", "drivers", "sessions", cache_dir=None)
+    needed = graph.find_upstream_modules("tactile_lab.experiments", as_package=True)
+    needed |= graph.find_descendants("tactile_lab.experiments")
+    computing = {name for name in needed if not name.startswith("tactile_lab.report")}
+    covered = {".".join(file.relative_to(ROOT).with_suffix("").parts) for file in runner.sources()}
+    covered |= {name.removesuffix(".__init__") for name in covered}
+    assert {"sessions.conductor", "calibration.forearm", "drivers.links", "tactile_lab.exploration.policy"} <= computing
+    assert computing - covered == set()
+
+
+def test_version_covers_the_rigs_descriptions_and_calibrations() -> None:
+    names = {file.relative_to(ROOT).as_posix() for file in runner.sources()}
+    assert {
+        "tactile_lab/rigs/sim.yaml",
+        "tactile_lab/rigs/calibrations/simulated-hand/forearm.yaml",
+        "tactile_lab/slam.py",
+    } <= names
+
+
+def test_version_changes_with_any_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "sessions" / "conductor.py"
+    file.parent.mkdir()
+    file.write_text("A = 1\n")
+    monkeypatch.setattr(runner, "_ROOT", tmp_path)
+    before = runner.version.__wrapped__()
+    file.write_text("A = 2\n")
+    assert runner.version.__wrapped__() != before
 
 
 def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
