@@ -55,4 +55,11 @@ AllowUncalibrated = Annotated[
         help="Begin though a calibration is missing, expired, failed or foreign; the session records that.",
     ),
 ]
-NoInput = Annotated[bool, typer.Option("--no-input", help="Never ask (no command does so far).")]
+NoInput = Annotated[
+    bool,
+    typer.Option(
+        "--no-input",
+        help="Never ask: wizards take the usual answers, a file is replaced only with --replace, "
+        "a guided session has a simulated operator.",
+    ),
+]
