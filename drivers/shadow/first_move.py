@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
-from drivers.shadow.hand import LARGEST_NUDGE, HandSample, ShadowHand
+from drivers.shadow.hand import ShadowHand
+from drivers.shadow.hand_motion import LARGEST_NUDGE
+from drivers.shadow.hand_samples import HandSample
 from drivers.shadow.motors import DRIVEN_JOINTS, MotorMap
 from tactile_lab.errors import DeviceError
 from tactile_lab.geometry.contacts import Array

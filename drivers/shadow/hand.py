@@ -9,23 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.links import Datagram, Link
-from drivers.shadow.hand_motion import LARGEST_NUDGE, NO_DEMAND, HandMotion
+from drivers.shadow.hand_guard import HandCounters, HandGuard
+from drivers.shadow.hand_motion import NO_DEMAND, HandMotion
 from drivers.shadow.hand_samples import HandDecoder, HandSample
 from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motor_configuration import MotorConfiguration, configure_motors, reset_motors
-from drivers.shadow.motor_data import MAX_PWM, ToMotor
-from drivers.shadow.motor_load import LoadWatch
+from drivers.shadow.motor_data import ToMotor
 from drivers.shadow.motor_polling import MotorReadings
-from drivers.shadow.motor_watch import Fault, MotorWatch
+from drivers.shadow.motor_watch import Fault
 from drivers.shadow.motors import MotorMap
-from drivers.shadow.palm_codec import MOTORS
-from drivers.shadow.palm_dialogue import HandCounters, PalmDialogue
+from drivers.shadow.palm_dialogue import PalmDialogue
 from drivers.shadow.palm_images import PALMS
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import CodecError, DeviceError
-
-__all__ = ["LARGEST_NUDGE", "HandCounters", "HandDecoder", "HandSample", "HandSettings", "ShadowHand"]
 
 
 class ShadowHand:
@@ -56,8 +53,7 @@ class ShadowHand:
         self._settings = settings or HandSettings()
         self._motors, self._boards = motors or MotorMap.load(), boards
         self._motion = HandMotion(self._motors, self._settings.gains, self._settings.soft_start_s, link.name)
-        self._watch = MotorWatch(self._motors, self._settings.heat, link.name)
-        self._load = LoadWatch(self._motors, self._settings.load, self._largest_pwm(), link.name)
+        self._guard = HandGuard(self._settings, self._motors, link.name)
         self._decoder = HandDecoder(calibration, PALMS[self._settings.palm])
         self._connected = False
         self._reset()
@@ -66,7 +62,7 @@ class ShadowHand:
         """As new: nothing received, nothing sent, no target."""
         self._decoder.restart()
         self._dialogue = PalmDialogue(self._settings, self._clock)
-        self._counters = HandCounters()
+        self._guard.restart()
         self._last: HandSample | None = None
         self._connected_ns = self._clock.now_ns()
         self.resume()
@@ -167,7 +163,8 @@ class ShadowHand:
 
         Args:
             joint: driven joint; the motor its map names.
-            pwm: counts of 1023 towards larger angles, at most :data:`LARGEST_NUDGE`; 0 ends it and nothing moves.
+            pwm: counts of 1023 towards larger angles, at most :data:`~drivers.shadow.hand_motion.LARGEST_NUDGE`;
+                0 ends it and nothing moves.
 
         Raises:
             DeviceError: not a driven joint, or too large.
@@ -186,10 +183,8 @@ class ShadowHand:
     def resume(self) -> None:
         """Take back a stop or a fault. Targets are forgotten, so that nothing moves before new ones are set."""
         self._stopped = False
-        self._fault: Fault | None = None
-        self._counters.lost_in_a_row = 0
+        self._guard.resume()
         self._motion.clear()
-        self._load.restart()
 
     # --- the cycle ---------------------------------------------------------------------------------------------
 
@@ -204,13 +199,15 @@ class ShadowHand:
         """
         if not self._connected or self._last is None:
             raise DeviceError("not connected", where=self._link.name, hint="Connect the hand first")
-        fault = self._fault
+        fault = self._guard.fault
         sample = self._cycle(self._demand(self._last))
         if sample is None:
             self._last = replace(self._last, fresh=False)
-            self._count_loss()
+            self._dialogue.interrupted()
+            self._guard.lost()
         else:
-            self._last, self._counters.lost_in_a_row = sample, 0
+            self._last = sample
+            self._guard.heard()
         if fault is not None:
             raise fault.error()
         return self._last
@@ -230,7 +227,7 @@ class ShadowHand:
         return None if sample is None else sample.motor
 
     def _cycle(self, words: NDArray[np.int16], to_motor: ToMotor | None = None) -> HandSample | None:
-        self._counters.cycles += 1
+        self._guard.counters.cycles += 1
         return self._take(self._transfer(self._dialogue.next(words, to_motor)))
 
     def _transfer(self, payload: bytes) -> list[Datagram]:
@@ -239,7 +236,7 @@ class ShadowHand:
             self._link.send(payload)
             return self._link.receive()
         except DeviceError as error:
-            self._fault = self._fault or Fault(error.what, error.where, error.hint)
+            self._guard.blame(Fault(error.what, error.where, error.hint))
             raise
 
     def _take(self, datagrams: list[Datagram]) -> HandSample | None:
@@ -248,49 +245,28 @@ class ShadowHand:
             try:
                 sample = self.receive(datagram)
             except CodecError:
-                self._counters.malformed += 1  # shown by health(); the cycle counts as lost
+                self._guard.counters.malformed += 1  # shown by health(); the cycle counts as lost
                 continue
             if sample is not None:
                 newest = sample
-                self._fault = self._fault or self._watch.fault(sample.status, settling=self._dialogue.settling)
-                self._fault = self._fault or self._load.fault(sample.status)
+                self._guard.look(sample.status, settling=self._dialogue.settling)
         return newest
 
     def _demand(self, last: HandSample) -> NDArray[np.int16]:
-        if self._stopped or self._fault is not None or self._counters.lost_in_a_row >= self._settings.blind_after:
+        if self._stopped or self._guard.forbids_demands:
             self._motion.pause()
             return NO_DEMAND
-        share = self._watch.pwm_share(last.motor.temperature_C)
+        share = self._guard.pwm_share(last.motor.temperature_C)
         words = self._motion.words(last.joints_rad, share, now_ns := self._clock.now_ns())
-        self._fault = self._load.stall(words, now_ns)
+        self._guard.look_at_demand(words, now_ns)
         return words
-
-    def _largest_pwm(self) -> NDArray[np.float64]:
-        """Largest duty cycle each motor is told, shape (20,); any where motors are told torques."""
-        if self._settings.demand == "torque":
-            return np.full(MOTORS, float(MAX_PWM))
-        return np.array([self._settings.gains.of(name).max_pwm for name in self._motors.names])
-
-    # --- what can go wrong -------------------------------------------------------------------------------------
-
-    def _count_loss(self) -> None:
-        counters = self._counters
-        counters.lost += 1
-        counters.lost_in_a_row += 1
-        self._dialogue.interrupted()
-        if counters.lost_in_a_row >= self._settings.lost_limit and self._fault is None:
-            self._fault = Fault(
-                f"stopped after {counters.lost_in_a_row} cycles in a row without a valid status",
-                self._link.name,
-                "Check the cable and the hand's power, then connect again",
-            )
 
     # --- state for people --------------------------------------------------------------------------------------
 
     @property
     def counters(self) -> HandCounters:
         """A copy of the counters."""
-        return replace(self._counters)
+        return replace(self._guard.counters)
 
     @property
     def newest(self) -> HandSample | None:
@@ -299,15 +275,4 @@ class ShadowHand:
 
     def health(self) -> tuple[str, ...]:
         """What is wrong with the hand, in words; empty when all is well."""
-        problems = []
-        if self._fault is not None:
-            problems.append(str(self._fault.error()))
-        if self._counters.lost:
-            problems.append(f"{self._counters.lost} of {self._counters.cycles} cycles lost")
-        if self._counters.malformed:
-            problems.append(f"{self._counters.malformed} messages were no status of a {self._settings.palm} palm")
-        if self._decoder.counts.stale:
-            problems.append(f"{self._decoder.counts.stale} statuses were repetitions of old ones")
-        if self._last is not None:
-            problems += self._watch.problems(self._last, self._connected_ns)
-        return tuple(problems)
+        return self._guard.problems(self._last, self._decoder.counts, self._connected_ns)

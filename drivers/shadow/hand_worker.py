@@ -17,9 +17,10 @@ from drivers.links import TappedLink
 from drivers.shadow.cycle_statistics import CycleStatistics
 from drivers.shadow.ethercat_link import EthercatLink
 from drivers.shadow.first_move import check_motor_map
-from drivers.shadow.hand import HandSample, ShadowHand
+from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_orders import Order, OrderReader
 from drivers.shadow.hand_records import RecordKind, RecordPipe
+from drivers.shadow.hand_samples import HandSample
 from drivers.shadow.hand_setup import HandSetup
 from drivers.shadow.motors import MotorMap
 from drivers.shadow.pysoem_link import PysoemLink

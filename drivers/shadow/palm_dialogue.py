@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,23 +17,6 @@ MOTOR_PATIENCE_ns = 20_000_000
 """A motor halts itself when it has seen no demand for 20 ms."""
 
 _DEMANDS = (ToMotor.DEMAND_PWM, ToMotor.DEMAND_TORQUE)
-
-
-@dataclass
-class HandCounters:
-    """Cycles since connecting.
-
-    Attributes:
-        cycles: exchanges.
-        lost: exchanges without a valid status.
-        lost_in_a_row: the present run of them.
-        malformed: messages that were no status of this palm.
-    """
-
-    cycles: int = 0
-    lost: int = 0
-    lost_in_a_row: int = 0
-    malformed: int = 0
 
 
 class PalmDialogue:

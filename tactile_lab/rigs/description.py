@@ -14,7 +14,7 @@ from calibration.admission import Installation
 from drivers.ati.nano17 import Nano17Settings
 from drivers.ati.wiring import VoltsWiring
 from drivers.positioner import PositionerSettings
-from drivers.shadow.hand import HandSettings
+from drivers.shadow.hand_settings import HandSettings
 from drivers.simulation.settings import SimulationSettings
 from sessions.conductor_settings import ConductorSettings
 from sessions.perception import PerceptionSettings

@@ -11,8 +11,9 @@ from drivers.camera.camera import Camera
 from drivers.links import ReplayLink, TappedLink
 from drivers.positioner import Positioner, mount_joints, mount_T_forearm
 from drivers.shadow.closing import closing
-from drivers.shadow.hand import HandSettings, ShadowHand
+from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_samples import HandDecoder
+from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.kinematics import JOINTS, forearm_T_palm
 from drivers.simulation.settings import ObjectStart, SimulationSettings
 from drivers.simulation.world import SimulatedWorld

@@ -21,7 +21,8 @@ from drivers.faults import SLAVE_TO_SAFEOP, WORKING_COUNTER_LOW, MessageLayout
 from drivers.links import Datagram, Link, MemoryLink, link_health
 from drivers.shadow.can_bridge import ShadowBridgeBus
 from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings
-from drivers.shadow.hand import HandSettings, ShadowHand
+from drivers.shadow.hand import ShadowHand
+from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.palm_codec import PalmStatus
 from tactile_lab import rigs

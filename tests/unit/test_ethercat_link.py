@@ -14,7 +14,8 @@ from drivers.ethercat.master import EtherCatMaster, MasterSettings, Slave
 from drivers.ethercat.ports import MemoryPort, RawPort
 from drivers.ethercat.registers import AlCode, AlState, Register, SyncManager
 from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings
-from drivers.shadow.hand import HandSettings, ShadowHand
+from drivers.shadow.hand import ShadowHand
+from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.palm_codec import PalmCommand, PalmStatus
 from drivers.shadow.palm_images import PALMS

@@ -11,7 +11,8 @@ from pydantic import ValidationError
 
 from drivers.links import MemoryLink
 from drivers.shadow.gains import GainTable, JointGains, load_gains
-from drivers.shadow.hand import HandSettings, ShadowHand
+from drivers.shadow.hand import ShadowHand
+from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.hand_setup import HandSetup
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.kinematics import JOINT_INDEX, joint_vector

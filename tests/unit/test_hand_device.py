@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from drivers.links import Datagram, MemoryLink, ReplayLink
 from drivers.shadow import palm_codec
 from drivers.shadow.gains import GainTable, JointGains
-from drivers.shadow.hand import HandDecoder, HandSample, HandSettings, ShadowHand
+from drivers.shadow.hand import ShadowHand
+from drivers.shadow.hand_samples import HandDecoder, HandSample
+from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.kinematics import JOINT_INDEX, joint_vector
 from drivers.shadow.motor_data import FromMotor, MotorFlag, ToMotor

@@ -13,7 +13,9 @@ from drivers.emulators.shadow_chain import emulated_hand
 from drivers.ethercat.ports import MemoryPort
 from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings
 from drivers.shadow.first_move import FirstMoveSettings, check_motor_map, require_motor_map
-from drivers.shadow.hand import HandSample, HandSettings, ShadowHand
+from drivers.shadow.hand import ShadowHand
+from drivers.shadow.hand_samples import HandSample
+from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motor_configuration import MotorConfiguration, TorqueLoop, load_configurations
 from drivers.shadow.motor_data import FromMotor, SlowData, config_crc
