@@ -27,6 +27,10 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "figure-3.16": ({"shape": ["rectangle"], "noise": ["50"], "method": ["thesis-pf", "particle, no graph"]}, 3),
     "table-4.2": ({"candidates": ["10"], "policy": ["information", "clairvoyant"]}, 12),
     "table-4.3": ({"tracking": ["joint"], "policy": ["det"]}, 5),
+    "exploration-hand": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
+    "camera-truth": ({"condition": ["sharp"]}, None),
+    "calibrate-forearm": ({"method": ["touch"], "poses": ["20"]}, None),
+    "crash-recovery": ({"fault": ["kill -9"]}, None),
     "graph-stress": ({"solver": ["Cauchy", "ours"]}, None),
 }
 

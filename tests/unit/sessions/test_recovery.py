@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import time
 from datetime import UTC, datetime
 
 import pytest
@@ -16,14 +17,16 @@ START = datetime(2026, 11, 21, 9, 30, 0, tzinfo=UTC)
 COUNT = 2000
 
 
-def record(root, *, calibration=None, segment_bytes=1 << 30):
+def record(root, *, calibration=None, segment_bytes=1 << 30, size=60):
     """A closed session: a hand at 1 kHz, a sensor at 500 Hz, and the calibration it used."""
     files = {"joints": calibration} if calibration else {}
     settings = TrafficSettings(segment_bytes=segment_bytes)
     arguments = {"rig": "sim", "rig_description": {}, "object_name": "box", "started": START}
     with create_session(root, **arguments, calibration_files=files, traffic_settings=settings) as session:
         for number in range(COUNT):
-            session.recorder.received("hand", number.to_bytes(4, "little") + os.urandom(60), number * 1_000_000)
+            session.recorder.received("hand", number.to_bytes(4, "little") + os.urandom(size), number * 1_000_000)
+            if size > 60 and number % 50 == 0:
+                time.sleep(0.005)  # files are ended by the thread that writes them, which has to come to it
             if number % 2:
                 session.recorder.received("ft/FF", number.to_bytes(4, "little"), number * 1_000_000)
     return session.folder
@@ -110,7 +113,7 @@ def test_a_description_that_was_spoilt_comes_back_from_the_recording(tmp_path):
 
 
 def test_several_files_are_recovered_as_one_recording(tmp_path):
-    folder = record(tmp_path, segment_bytes=20_000)
+    folder = record(tmp_path, segment_bytes=100_000, size=600)
     files = sorted(folder.glob("traffic*.mcap"))
     assert len(files) > 3
     last = folder / f"traffic-{len(files)}.mcap"
