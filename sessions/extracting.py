@@ -11,8 +11,9 @@ from sessions import schemas
 from sessions.manifest import write_manifest
 from sessions.session import CALIBRATION, TRAFFIC, Session
 from sessions.session_ids import check_id
-from sessions.traffic import Attached, TrafficSettings, TrafficWriter
+from sessions.traffic import TrafficWriter
 from sessions.traffic_reader import TrafficReader
+from sessions.traffic_settings import Attached, TrafficSettings
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import ConfigurationError, SessionError
 

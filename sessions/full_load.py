@@ -24,8 +24,8 @@ import numpy as np
 from sessions.device_stamps import rdt_stamp
 from sessions.recorder import NullTraffic, Recorder, TrafficSink
 from sessions.session import create_session
-from sessions.traffic import TrafficSettings
 from sessions.traffic_disk import CutBackFile
+from sessions.traffic_settings import TrafficSettings
 from tactile_lab.errors import SessionError
 from tactile_lab.geometry.contacts import FINGERS
 

@@ -17,9 +17,10 @@ from pathlib import Path
 from sessions.manifest import MANIFEST, Manifest, manifest_from, read_manifest, write_manifest, write_whole
 from sessions.session import CALIBRATION, RESULTS, TRAFFIC, new_folder
 from sessions.session_ids import recovered_id
-from sessions.traffic import Attached, TrafficSettings, TrafficWriter
+from sessions.traffic import TrafficWriter
 from sessions.traffic_disk import being_written
 from sessions.traffic_reader import Loss, TrafficMessage, TrafficReader
+from sessions.traffic_settings import Attached, TrafficSettings
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import SessionError
 

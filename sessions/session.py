@@ -33,9 +33,10 @@ from sessions.manifest import (
 from sessions.raw_frames import Stamper
 from sessions.recorder import Recorder
 from sessions.session_ids import LONGEST_ID, slug
-from sessions.traffic import Attached, TrafficSettings, TrafficWriter
+from sessions.traffic import TrafficWriter
 from sessions.traffic_disk import being_written
 from sessions.traffic_reader import TrafficReader
+from sessions.traffic_settings import Attached, TrafficSettings
 from tactile_lab.errors import SessionError
 
 TRAFFIC, CALIBRATION, RESULTS, TRUTH_MESH = "traffic.mcap", "calibration", "results", "truth/object.ply"

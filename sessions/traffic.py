@@ -12,65 +12,30 @@ opened by itself. The last one ends with a record that says what was lost.
 
 from __future__ import annotations
 
-import errno
 import json
 import threading
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Literal
 
 from sessions import foxglove, raw_frames, schemas
 from sessions.mcap_writer import McapWriter, PendingChunk
 from sessions.raw_frames import UNSTAMPED, DeviceStamp, Stamper
 from sessions.stream_counts import StreamCounts
-from sessions.traffic_disk import CutBackFile, DiskThread, Segment, Syncer
+from sessions.traffic_disk import DiskThread, Segment, Syncer
+from sessions.traffic_files import END_RECORD, FORMAT, PROFILE, disk_failure, segment_path
+from sessions.traffic_settings import Attached, TrafficSettings
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import SessionError
 
-PROFILE = "tactile-lab"
-FORMAT = "tactile-traffic/2"
-END_RECORD = "tactile-lab/end"
 CHUNK_BYTES = 64 * 1024
 FLUSH_PERIOD_ns = 80_000_000
 STREAMS_PERIOD_ns = NANOSECONDS
 CLOSE_TIMEOUT_s = 10.0
 
 _SEQUENCE_MASK = 0xFFFFFFFF
-
-
-@dataclass(frozen=True)
-class TrafficSettings:
-    """How a recording is kept.
-
-    Attributes:
-        segment_bytes: size at which the next file is begun; it bounds the index that is kept in memory, too.
-        queue_bytes: uncompressed bytes that may wait for the disk; at 2 MB/s half a minute.
-        when_full: "wait" delays the recording thread, for a rig whose time waits with it; "drop" leaves out whole
-            chunks and counts their messages, for real time.
-        patience_s: how long "wait" waits before the recording ends with an error.
-        tell_streams: whether to write once a second what was lost so far; not for a copy of a recording.
-        open_file: makes the files; another one than usual tries out what a bad disk does.
-    """
-
-    segment_bytes: int = 256 << 20
-    queue_bytes: int = 64 << 20
-    when_full: Literal["wait", "drop"] = "wait"
-    patience_s: float = CLOSE_TIMEOUT_s
-    tell_streams: bool = True
-    open_file: Callable[[Path], CutBackFile] = CutBackFile
-
-
-@dataclass(frozen=True)
-class Attached:
-    """A file to be kept inside the recording."""
-
-    name: str
-    media_type: str
-    content: bytes
 
 
 class TrafficWriter:
@@ -273,7 +238,7 @@ class TrafficWriter:
                 writer.add_attachment(attached.name, attached.media_type, attached.content)
         except OSError as error:
             file.close()
-            raise _failed(path, error, 0) from error
+            raise disk_failure(path, error, 0) from error
         file.keep()
         self._files.append(Segment(path, file, writer))
         return self._files[-1]
@@ -304,7 +269,7 @@ class TrafficWriter:
     def _check_disk(self) -> None:
         error = self._disk.failure or self._syncer.error
         if error is not None:
-            self._failure = _failed(self._disk.failed_segment.path, error, self._disk.failed_segment.file.kept)
+            self._failure = disk_failure(self._disk.failed_segment.path, error, self._disk.failed_segment.file.kept)
             raise self._failure
 
     def _abandon(self) -> None:
@@ -317,17 +282,3 @@ class TrafficWriter:
         hint = f"The {self._segment.file.kept} bytes recorded so far are kept; {advice}"
         self._failure = SessionError(what, where=str(self._segment.path), hint=hint)
         return self._failure
-
-
-def segment_path(path: Path, number: int) -> Path:
-    """The file of a segment: the path itself, then ``traffic-2.mcap`` and so on."""
-    return path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
-
-
-def _failed(path: Path, error: OSError | SessionError, kept: int) -> SessionError:
-    if isinstance(error, SessionError):
-        return error
-    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-    what = "the disk is full" if full else f"can not be written ({error.strerror or error})"
-    advice = "free some space and start a new session" if full else "check the disk"
-    return SessionError(what, where=str(path), hint=f"The {kept} bytes recorded so far are kept; {advice}")

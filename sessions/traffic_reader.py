@@ -28,7 +28,7 @@ from mcap.stream_reader import breakup_chunk
 from sessions import formats, raw_frames, schemas
 from sessions.mcap_frames import Frames
 from sessions.raw_frames import UNSTAMPED, DeviceStamp
-from sessions.traffic import END_RECORD, PROFILE, segment_path
+from sessions.traffic_files import END_RECORD, PROFILE, segment_path
 from tactile_lab.errors import SessionError
 
 _UNREADABLE = (McapError, zstandard.ZstdError, struct.error, ValueError, OverflowError, MemoryError)

@@ -10,7 +10,7 @@ from sessions.device_stamps import positioner_stamp, rdt_stamp
 from sessions.interpreter import BASE_LINK, fingertip_link
 from sessions.raw_frames import Stamper
 from sessions.recorder import Recorder
-from sessions.traffic import TrafficSettings
+from sessions.traffic_settings import TrafficSettings
 from tactile_lab.geometry.contacts import FINGERS
 from tactile_lab.rigs.description import Rig
 

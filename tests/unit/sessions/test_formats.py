@@ -13,8 +13,9 @@ from sessions import formats, raw_frames, schemas
 from sessions.manifest import read_manifest, write_manifest
 from sessions.mcap_writer import McapWriter
 from sessions.raw_frames import DeviceStamp
-from sessions.traffic import PROFILE, TrafficWriter
+from sessions.traffic import TrafficWriter
 from sessions.traffic_disk import CutBackFile
+from sessions.traffic_files import PROFILE
 from sessions.traffic_reader import TrafficReader
 from tactile_lab.errors import SessionError
 

@@ -10,7 +10,7 @@ from sessions.listing import left_open, list_sessions, summarize
 from sessions.manifest import read_manifest
 from sessions.recovery import recover
 from sessions.session import Session, create_session
-from sessions.traffic import TrafficSettings
+from sessions.traffic_settings import TrafficSettings
 from tactile_lab.errors import SessionError
 
 START = datetime(2026, 11, 21, 9, 30, 0, tzinfo=UTC)
