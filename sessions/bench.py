@@ -31,8 +31,9 @@ from sessions.instruments import (
     warmest_C,
 )
 from sessions.interpreter import HAND_LINK, Observer, fingertip_link
+from sessions.mark_outcomes import Outcome, TareReport, TruthFrame, Undone
 from sessions.marks import Mark, MarkKind
-from sessions.perception import Outcome, Perception, TareReport, TruthFrame, Undone
+from sessions.perception import Perception
 from sessions.recorder import Level, Recorder
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import DeviceError, SessionError, TactileLabError

@@ -17,8 +17,9 @@ from typing import Any
 from drivers.camera.packet import picture_of
 from drivers.links import Datagram
 from sessions.instruments import BaseReading, Decoder, FrameReading, HandReading
+from sessions.mark_outcomes import Outcome
 from sessions.marks import Mark
-from sessions.perception import Outcome, Perception
+from sessions.perception import Perception
 from sessions.recorder import Recorder
 from tactile_lab.clock import VirtualClock
 from tactile_lab.errors import CodecError

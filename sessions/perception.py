@@ -8,19 +8,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from gtsam import Pose3
 from pydantic import Field
 
-from drivers.fingertip import FingertipSensor, TipContact
-from drivers.shadow.kinematics import forearm_T_palm_matrix
+from drivers.fingertip import FingertipSensor
+from sessions.carried_motion import CarriedMotion
 from sessions.closing_lines import TipSurface, closing_lines
 from sessions.contact_world import HandGeometry, MountUncertainty
+from sessions.hand_placement import HandPlacement
 from sessions.instruments import BaseReading, FrameReading, HandReading, SlotFingertip, WrenchFingertip
+from sessions.mark_outcomes import Outcome, TareReport, TruthFrame, Undone
 from sessions.marks import Mark, MarkKind
+from sessions.touch_capture import Capture, Measured, Probed, TouchSelection
 from tactile_lab.errors import DeviceError, SessionError
 from tactile_lab.geometry.contacts import FINGERS, Array, ClosingLine, Contact, Grasp
 from tactile_lab.strict_yaml import StrictModel
@@ -36,37 +38,6 @@ class PerceptionSettings(StrictModel):
 
     joint_sigma_rad: float = Field(default=float(np.radians(0.6)), ge=0.0)
     minimum_force_N: float = Field(default=0.1, ge=0.0)
-
-
-@dataclass(frozen=True)
-class TruthFrame:
-    """A camera frame that shows the object at rest.
-
-    Attributes:
-        grasp_index: the grasp whose capture is open, else the last one; None before the first.
-        frame: the picture.
-    """
-
-    grasp_index: int | None
-    frame: FrameReading
-
-
-@dataclass(frozen=True)
-class TareReport:
-    """What came of a tare: the fingers that could not be zeroed, and why."""
-
-    stamp_ns: int
-    refused: Mapping[str, str]
-
-
-@dataclass(frozen=True)
-class Undone:
-    """The grasp with this number was taken back; the next one has its number."""
-
-    index: int
-
-
-Outcome: TypeAlias = Grasp | TruthFrame | TareReport | Undone
 
 
 class Perception:
@@ -97,29 +68,20 @@ class Perception:
         everyone: dict[str, FingertipSensor] = {**self._wrench, **self._slots}
         self.fingertips: dict[str, FingertipSensor] = {f: everyone[f] for f in FINGERS if f in everyone}
         self.world_T_mount, self.settings = world_T_mount, settings or PerceptionSettings()
-        self._mount_T_forearm = mount_T_forearm
+        self._placement = HandPlacement(mount_T_forearm, world_T_mount)
+        self._selection = TouchSelection(self.fingertips, self.settings.minimum_force_N)
         self._mount = (
             None if mount_covariance is None else MountUncertainty(world_T_mount.matrix(), np.asarray(mount_covariance))
         )
         self.hand_stamp_ns: int | None = None
         """Arrival of the newest fresh joint angles; None before the first."""
-        self._joints_rad: Array | None = None
-        self._base_q: Array | None = None
-        self._geometry: HandGeometry | None = None
         self._loads_N: dict[str, float] | None = None
         self._frame: FrameReading | None = None
-        self._capture: _Capture | None = None
+        self._capture: Capture | None = None
         self._tip_surfaces = dict(tip_surfaces or {})
         self._closing_start: HandGeometry | None = None
-        self._probed = _Probed()
-        self._hold_start: Pose3 | None = None
-        self._hand_motion_world = Pose3()
-        self._motions: list[Pose3] = []
-        """``hand_motion_world`` of every grasp that counts."""
-        self.dropped: dict[str, str] = {}
-        """Fingers without a contact in the last grasp, and why; what a sensor says of itself is in problems()."""
-        self.drop_counts: Counter[str] = Counter()
-        """The reasons over the whole session."""
+        self._probed = Probed()
+        self._carried = CarriedMotion()
 
     # --- samples -----------------------------------------------------------------------------------------------
 
@@ -130,17 +92,17 @@ class Perception:
             fingertip.update(sample)
         if not sample.fresh:
             return
-        self._joints_rad, self._geometry = np.asarray(sample.joints_rad, dtype=float), None
+        joints_rad = self._placement.take_joints(sample.joints_rad)
         self.hand_stamp_ns = sample.stamp_ns
         if self._capture is not None:
-            self._capture.joints_rad.append(self._joints_rad)
+            self._capture.joints_rad.append(joints_rad)
 
     def on_base(self, sample: BaseReading) -> None:
         """The positioner's joints."""
         self._loads_N = None
-        self._base_q, self._geometry = np.asarray(sample.q, dtype=float), None
+        base_q = self._placement.take_base(sample.q)
         if self._capture is not None:
-            self._capture.base_q.append(self._base_q)
+            self._capture.base_q.append(base_q)
 
     def on_wrench(self, finger: str, samples: Sequence[Any]) -> None:
         """Samples of one fingertip's own link."""
@@ -156,51 +118,51 @@ class Perception:
     @property
     def ready(self) -> bool:
         """The hand and the positioner have both been heard."""
-        return self._joints_rad is not None and self._base_q is not None
+        return self._placement.ready
 
     @property
     def grasp_count(self) -> int:
         """Grasps made so far."""
-        return len(self._motions)
+        return self._carried.grasp_count
 
     @property
     def is_holding(self) -> bool:
         """A hold has begun and not ended."""
-        return self._hold_start is not None
+        return self._carried.is_holding
 
     @property
     def hand_motion_world(self) -> Pose3:
         """How the hand has carried the object since the last grasp, as far as that is complete."""
-        return self._hand_motion_world
+        return self._carried.motion_world
 
     @property
     def joints_rad(self) -> Array:
         """Newest joint angles, shape (24,), radians. Raises DeviceError before the first."""
-        return self._latest()[0]
+        return self._placement.latest()[0]
 
     @property
     def base_q(self) -> Array:
         """Newest positioner joints, shape (6,), metres and radians. Raises DeviceError before the first."""
-        return self._latest()[1]
+        return self._placement.latest()[1]
 
     @property
     def world_T_palm(self) -> Pose3:
         """The palm, from the newest samples. Raises DeviceError before the first."""
-        return Pose3(self._current().world_T_palm)
+        return Pose3(self._placement.current().world_T_palm)
 
     @property
     def palm_world_m(self) -> Array:
         """Origin of the palm, shape (3,), from the newest samples. Raises DeviceError before the first."""
-        return np.asarray(self._current().world_T_palm[:3, 3])
+        return np.asarray(self._placement.current().world_T_palm[:3, 3])
 
     @property
     def world_T_distal(self) -> dict[str, Pose3]:
         """The distal frame of each finger, from the newest samples. Raises DeviceError before the first."""
-        return {finger: Pose3(self._current().world_T_distal[i]) for i, finger in enumerate(FINGERS)}
+        return {finger: Pose3(self._placement.current().world_T_distal[i]) for i, finger in enumerate(FINGERS)}
 
     def world_R_distal(self, finger: str) -> Array:
         """Orientation of one distal frame, shape (3, 3). Raises DeviceError before the first sample."""
-        return np.asarray(self._current().world_T_distal[FINGERS.index(finger), :3, :3])
+        return np.asarray(self._placement.current().world_T_distal[FINGERS.index(finger), :3, :3])
 
     def load_N(self, finger: str) -> float:
         """Contact force on one fingertip, the tip's own weight taken off, newest sample."""
@@ -209,9 +171,19 @@ class Perception:
     def loads_N(self) -> dict[str, float]:
         """Contact force on each fingertip of the rig; infinite where the newest sample is void."""
         if self._loads_N is None:
-            rotations = dict(zip(FINGERS, self._current().world_T_distal[:, :3, :3], strict=True))
+            rotations = dict(zip(FINGERS, self._placement.current().world_T_distal[:, :3, :3], strict=True))
             self._loads_N = {finger: tip.load_N(rotations[finger]) for finger, tip in self.fingertips.items()}
         return dict(self._loads_N)
+
+    @property
+    def dropped(self) -> dict[str, str]:
+        """Fingers without a contact in the last grasp, and why; what a sensor says of itself is in problems()."""
+        return self._selection.dropped
+
+    @property
+    def drop_counts(self) -> Counter[str]:
+        """The reasons over the whole session."""
+        return self._selection.drop_counts
 
     def problems(self) -> tuple[str, ...]:
         """What is wrong with fingertips, in words, each beginning with the finger's name."""
@@ -230,7 +202,7 @@ class Perception:
             case MarkKind.TARE:
                 return self._tare(mark)
             case MarkKind.CLOSE_BEGIN:
-                self._closing_start = self._current()
+                self._closing_start = self._placement.current()
                 return None
             case MarkKind.CAPTURE_BEGIN:
                 self._begin_capture(mark)
@@ -241,10 +213,11 @@ class Perception:
                 self._probed.add(self._captured(mark))
                 return None
             case MarkKind.HOLD_BEGIN:
-                self._hold_start, self._probed = self.world_T_palm, _Probed()
+                self._carried.begin(self.world_T_palm)
+                self._probed = Probed()
                 return None
             case MarkKind.HOLD_END:
-                self._carry(None)
+                self._carried.end(self.world_T_palm)
                 return None
             case MarkKind.TRUTH_FRAME:
                 return self._truth_frame()
@@ -252,7 +225,7 @@ class Perception:
                 return self._undo()
 
     def _tare(self, mark: Mark) -> TareReport:
-        self._latest()
+        self._placement.latest()
         self._loads_N = None
         refused = {}
         for finger in mark.fingers:
@@ -265,19 +238,15 @@ class Perception:
         return TareReport(mark.stamp_ns, refused)
 
     def _begin_capture(self, mark: Mark) -> None:
-        self._latest()
+        self._placement.latest()
         for fingertip in self.fingertips.values():
             fingertip.begin_capture()
-        self._capture = _Capture(mark.stamp_ns, [], [])
+        self._capture = Capture(mark.stamp_ns)
 
     def _grasp(self, mark: Mark) -> Grasp:
         measured, probed = self._captured(mark), self._probed
-        self._probed = _Probed()
-        if self._hold_start is not None:
-            self._carry(self.world_T_palm)
-        motion, self._hand_motion_world = self._hand_motion_world, Pose3()
-        index = len(self._motions)
-        self._motions.append(motion)
+        self._probed = Probed()
+        index, motion = self.grasp_count, self._carried.take(self.world_T_palm)
         return Grasp(
             index=index,
             stamp_ns=measured.stamp_ns,
@@ -287,18 +256,18 @@ class Perception:
             closing_lines=(*measured.ways, *probed.ways),
         )
 
-    def _captured(self, mark: Mark) -> _Measured:
+    def _captured(self, mark: Mark) -> Measured:
         """What the samples since the capture began say."""
         capture, self._capture = self._capture, None
         if capture is None:
             text = f"{mark.kind.value} without capture_begin"
             raise SessionError(text, where="/marks", hint="The marks are out of order")
-        joints_rad, base_q = self._latest()
-        geometry = self._place(_mean(capture.joints_rad, joints_rad), _mean(capture.base_q, base_q))
-        tips = self._touches(geometry, heard=bool(capture.joints_rad))
+        joints_rad, base_q = self._placement.latest()
+        geometry = self._placement.place(capture.joints(joints_rad), capture.base(base_q))
+        tips = self._selection.touches(geometry, heard=bool(capture.joints_rad))
         contacts = geometry.contacts(tips, self.settings.joint_sigma_rad, self._mount)
         stamp_ns = (capture.stamp_ns + mark.stamp_ns) // 2
-        return _Measured(stamp_ns, geometry.world_T_palm, contacts, self._ways(geometry, contacts))
+        return Measured(stamp_ns, geometry.world_T_palm, contacts, self._ways(geometry, contacts))
 
     def _ways(self, geometry: HandGeometry, contacts: Sequence[Contact]) -> tuple[ClosingLine, ...]:
         """How the fingers came to this grasp; of a second capture after one closing nothing is known."""
@@ -306,29 +275,6 @@ class Perception:
         if begun is None:
             return ()
         return closing_lines(begun.world_T_distal, geometry.world_T_distal, self._tip_surfaces, contacts)
-
-    def _touches(self, geometry: HandGeometry, *, heard: bool) -> dict[str, TipContact]:
-        """The touches that count; the reasons why others do not go to :attr:`dropped`."""
-        tips, self.dropped = {}, {}
-        for finger, fingertip in self.fingertips.items():
-            tip = fingertip.contact(geometry.world_T_distal[FINGERS.index(finger), :3, :3])
-            if tip is None:
-                self.dropped[finger] = "no contact"
-            elif not heard:
-                self.dropped[finger] = "no joint angles during the capture"
-            elif tip.force_N < self.settings.minimum_force_N:
-                self.dropped[finger] = "force below the minimum"
-            else:
-                tips[finger] = tip
-        self.drop_counts.update(self.dropped.values())
-        return tips
-
-    def _carry(self, restart: Pose3 | None) -> None:
-        """Add the palm's motion since the hold began; it goes on from ``restart`` when that is given."""
-        if self._hold_start is None:
-            raise SessionError("hold_end without hold_begin", where="/marks", hint="The marks are out of order")
-        self._hand_motion_world = self.world_T_palm * self._hold_start.inverse() * self._hand_motion_world
-        self._hold_start = restart
 
     def _truth_frame(self) -> TruthFrame | None:
         frame, self._frame = self._frame, None
@@ -338,61 +284,6 @@ class Perception:
         return TruthFrame(current if current >= 0 else None, frame)
 
     def _undo(self) -> Undone:
-        if not self._motions:
-            raise SessionError("undo without a grasp", where="/marks", hint="The marks are out of order")
+        self._carried.undo()
         self._capture = None
-        self._hand_motion_world = self._hand_motion_world * self._motions.pop()
-        return Undone(len(self._motions))
-
-    # --- geometry ----------------------------------------------------------------------------------------------
-
-    def _latest(self) -> tuple[Array, Array]:
-        if self._joints_rad is None:
-            raise DeviceError("no joint angles have arrived yet", where="hand", hint="Check that the palm answers")
-        if self._base_q is None:
-            raise DeviceError("no position has arrived yet", where="base", hint="Check that the positioner answers")
-        return self._joints_rad, self._base_q
-
-    def _current(self) -> HandGeometry:
-        if self._geometry is None:
-            self._geometry = self._place(*self._latest())
-        return self._geometry
-
-    def _place(self, joints_rad: Array, base_q: Array) -> HandGeometry:
-        world_T_forearm = self.world_T_mount * self._mount_T_forearm(base_q)
-        return HandGeometry(joints_rad, world_T_forearm.matrix() @ forearm_T_palm_matrix(joints_rad))
-
-
-@dataclass(frozen=True)
-class _Capture:
-    """What arrived since a capture began."""
-
-    stamp_ns: int
-    joints_rad: list[Array]
-    base_q: list[Array]
-
-
-@dataclass(frozen=True)
-class _Measured:
-    """What one capture tells."""
-
-    stamp_ns: int
-    world_T_palm: Array
-    contacts: tuple[Contact, ...]
-    ways: tuple[ClosingLine, ...]
-
-
-@dataclass
-class _Probed:
-    """Contacts and ways of the probes since the object was last moved; they wait for the next grasp."""
-
-    contacts: list[Contact] = field(default_factory=list)
-    ways: list[ClosingLine] = field(default_factory=list)
-
-    def add(self, measured: _Measured) -> None:
-        self.contacts += [replace(contact, probed=True) for contact in measured.contacts]
-        self.ways += measured.ways
-
-
-def _mean(samples: list[Array], otherwise: Array) -> Array:
-    return np.asarray(np.mean(samples, axis=0)) if samples else otherwise
+        return Undone(self.grasp_count)

@@ -20,9 +20,9 @@ from collections.abc import Iterable, Iterator
 
 from sessions import schemas
 from sessions.interpreter import Interpreter
+from sessions.mark_outcomes import Outcome, Undone
 from sessions.marks import Mark
 from sessions.pacing import AS_FAST_AS_POSSIBLE, paced
-from sessions.perception import Outcome, Undone
 from sessions.session import Session
 from sessions.traffic_reader import Loss, TrafficReader
 from tactile_lab.clock import Clock, MonotonicClock

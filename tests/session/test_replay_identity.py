@@ -20,7 +20,8 @@ from drivers.simulation.world import SimulatedWorld
 from sessions.bench import Bench, SensorStream
 from sessions.closing_lines import TipSurface
 from sessions.interpreter import Interpreter, Observer, fingertip_link
-from sessions.perception import Perception, TruthFrame
+from sessions.mark_outcomes import TruthFrame
+from sessions.perception import Perception
 from sessions.replay import Replay
 from sessions.session import create_session
 from tactile_lab.clock import VirtualClock

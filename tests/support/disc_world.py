@@ -16,8 +16,9 @@ from drivers.fingertip import TipContact
 from drivers.positioner import mount_T_forearm
 from drivers.shadow.kinematics import JOINT_INDEX, JOINTS
 from sessions.black_box import Situation
+from sessions.mark_outcomes import TareReport, Undone
 from sessions.marks import Mark, MarkKind
-from sessions.perception import Perception, TareReport, Undone
+from sessions.perception import Perception
 from sessions.recorder import Level, NullRecorder
 from tactile_lab.clock import VirtualClock
 from tactile_lab.geometry.contacts import FINGERS, Array, Grasp

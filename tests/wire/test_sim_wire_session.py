@@ -14,7 +14,7 @@ from drivers.emulators.wired.stand_ins import StandIns
 from drivers.shadow.palm_images import PALMS
 from sessions import schemas
 from sessions.bench import Bench
-from sessions.perception import TareReport
+from sessions.mark_outcomes import TareReport
 from sessions.progress import NullProgress
 from sessions.recorder import Recorder
 from sessions.replay import Replay

@@ -8,8 +8,9 @@ from session_fakes import FakeBaseSample, FakeFrame, FakeHandSample, make_percep
 from drivers.fingertip import TipContact
 from drivers.shadow.kinematics import JOINTS, forearm_T_palm, palm_T_distal, palm_T_distal_matrices
 from sessions.contact_world import HandGeometry, MountUncertainty
+from sessions.mark_outcomes import TareReport, TruthFrame
 from sessions.marks import Mark, MarkKind
-from sessions.perception import PerceptionSettings, TareReport, TruthFrame
+from sessions.perception import PerceptionSettings
 from tactile_lab.errors import DeviceError, SessionError
 from tactile_lab.geometry.contacts import FINGERS
 

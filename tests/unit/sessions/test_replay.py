@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from session_fakes import make_interpreter, make_rig, play_session, same_grasp
 
-from sessions.perception import TareReport, TruthFrame
+from sessions.mark_outcomes import TareReport, TruthFrame
 from sessions.recorder import Recorder
 from sessions.replay import Replay
 from sessions.session import create_session
