@@ -9,18 +9,15 @@ for their own control.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from gtsam import Pose3
 
 from drivers.fingertip import FingertipCalibration, FingertipSensor
-from drivers.links import Link
-from drivers.shadow.kinematics import JOINTS
 from sessions.black_box import Situation
-from sessions.fingertip_samples import record_fingertips
+from sessions.cycle_timing import CycleCounts, CycleTiming
+from sessions.instrument_set import InstrumentSet
 from sessions.instruments import (
-    AskedInstrument,
     BaseInstrument,
     CameraInstrument,
     CyclingInstrument,
@@ -35,58 +32,13 @@ from sessions.mark_outcomes import Outcome, TareReport, TruthFrame, Undone
 from sessions.marks import Mark, MarkKind
 from sessions.perception import Perception
 from sessions.recorder import Level, Recorder
+from sessions.state_recording import StateRecording, TruthReading
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import DeviceError, SessionError, TactileLabError
 from tactile_lab.geometry.contacts import FINGERS, Contact, Grasp
 
 READY_TIMEOUT_ns = 2 * NANOSECONDS
 """How long the hand and the positioner may take to answer after connecting."""
-
-BASE_JOINTS = ("x_m", "y_m", "z_m", "yaw_rad", "pitch_rad", "roll_rad")
-
-
-class TruthReading(Protocol):
-    """What the truth channel of a simulated rig says."""
-
-    @property
-    def world_T_object(self) -> Pose3: ...
-    @property
-    def contacts(self) -> Iterable[Contact] | None: ...
-
-
-@dataclass
-class CycleCounts:
-    """Cycles run, cycles that ended after their deadline, deadlines left out because of that."""
-
-    cycles: int = 0
-    overruns: int = 0
-    skipped: int = 0
-
-
-class SensorStream:
-    """A device that sends by itself, emptied without decoding: the tap of its link has fed Perception already.
-
-    Args:
-        device: what starts and ends the stream.
-        link: the tapped link it was built on.
-    """
-
-    def __init__(self, device: Instrument, link: Link) -> None:
-        self._device, self._link = device, link
-
-    def connect(self) -> None:
-        """Start the stream. Raises DeviceError."""
-        self._device.connect()
-
-    def close(self) -> None:
-        """End the stream; idempotent."""
-        self._device.close()
-
-    def poll(self) -> None:
-        """Take everything that waits on the link, and ask for more where the device needs it. Raises DeviceError."""
-        self._link.receive()
-        if isinstance(self._device, AskedInstrument):
-            self._device.ask()
 
 
 class Bench:
@@ -121,12 +73,11 @@ class Bench:
         self.hand, self.base, self.camera = hand, base, camera
         self.wrench_devices = dict(wrench_devices or {})
         self.fingertip_calibrations = dict(fingertip_calibrations or {})
-        self.counts = CycleCounts()
+        self._timing = CycleTiming(clock, cycle_ns)
+        self._devices = InstrumentSet(hand, base, self.wrench_devices, camera)
+        self._state = StateRecording(observer, clock, truth)
         self._observer = observer
-        self._truth = truth
         self._force_ranges_N = dict(force_ranges_N or {})
-        self._deadline_ns: int | None = None
-        self._looked_ns = clock.now_ns()
 
     @property
     def perception(self) -> Perception:
@@ -153,6 +104,11 @@ class Bench:
         """Received messages that broke their protocol, by link."""
         return self._observer.interpreter.undecodable
 
+    @property
+    def counts(self) -> CycleCounts:
+        """Cycles so far, and those that were late."""
+        return self._timing.counts
+
     # --- lifecycle ---------------------------------------------------------------------------------------------
 
     def connect(self) -> None:
@@ -164,9 +120,7 @@ class Bench:
             DeviceError: a device could not be connected or stays silent.
         """
         try:
-            for instrument in self._instruments():
-                instrument.connect()
-                self._catch_up()
+            self._devices.connect()
             self._await_first_samples()
             if isinstance(self.hand, CyclingInstrument):
                 self.event(Level.INFO, "hand", self.hand.described())
@@ -200,15 +154,6 @@ class Bench:
         self.hand.resume()
         self.base.resume()
 
-    def _instruments(self) -> list[Instrument]:
-        camera = [] if self.camera is None else [self.camera]
-        return [self.hand, self.base, *self.wrench_devices.values(), *camera]
-
-    def _catch_up(self) -> None:
-        """Record what a hand that cycles by itself has sent while another device connects."""
-        if isinstance(self.hand, CyclingInstrument):
-            self.hand.catch_up()
-
     def _await_first_samples(self) -> None:
         give_up_ns = self.clock.now_ns() + READY_TIMEOUT_ns
         while not self.perception.ready:
@@ -221,31 +166,23 @@ class Bench:
             self.cycle()
 
     def _close_all(self) -> list[TactileLabError]:
-        problems: list[TactileLabError] = []
         self.stop()
-        for instrument in reversed(self._instruments()):
-            try:
-                instrument.close()
-            except TactileLabError as error:
-                problems.append(error)
-        self._deadline_ns = None
-        return problems
+        self._timing.restart()
+        return self._devices.close()
 
     # --- the cycle ---------------------------------------------------------------------------------------------
 
     def cycle(self) -> None:
         """Run one cycle over all devices and wait for the next deadline. Raises DeviceError."""
-        self._looked_ns = self.clock.now_ns()
-        if self._deadline_ns is None:
-            self._deadline_ns = self._looked_ns
+        self._timing.begin()
         self.hand.exchange()
         self.base.exchange()
         for device in self.wrench_devices.values():
             device.poll()
         if isinstance(self.camera, WatchingCamera):
             self.camera.poll()
-        self._record_state()
-        self._wait(self._deadline_ns + self.cycle_ns)
+        self._state.record()
+        self._timing.wait()
 
     def situation(self) -> Situation:
         """What the last cycle looks like to a safety supervisor."""
@@ -253,7 +190,7 @@ class Bench:
         tips = {finger: newest.get(fingertip_link(finger)) for finger in self.wrench_devices}
         hand = newest.get(HAND_LINK)
         return Situation(
-            stamp_ns=self._looked_ns,
+            stamp_ns=self._timing.begun_ns,
             hand_stamp_ns=seen.hand_stamp_ns,
             loads_N=seen.loads_N(),
             palm_world_m=seen.palm_world_m,
@@ -268,33 +205,6 @@ class Bench:
         self.cycle()
         while self.clock.now_ns() < end_ns:
             self.cycle()
-
-    def _wait(self, deadline_ns: int) -> None:
-        late_ns = self.clock.now_ns() - deadline_ns
-        self.counts.cycles += 1
-        if late_ns > 0:
-            missed = -(-late_ns // self.cycle_ns)
-            self.counts.overruns += 1
-            self.counts.skipped += missed
-            deadline_ns += missed * self.cycle_ns
-        self.clock.sleep_until_ns(deadline_ns)
-        self._deadline_ns = deadline_ns
-
-    def _record_state(self) -> None:
-        now_ns, seen = self.clock.now_ns(), self.perception
-        if not (seen.ready and self.recorder.state_due(now_ns)):
-            return
-        joints = dict(zip(JOINTS, seen.joints_rad.tolist(), strict=True))
-        self.recorder.joints(now_ns, joints, dict(zip(BASE_JOINTS, seen.base_q.tolist(), strict=True)))
-        self.recorder.loads(now_ns, seen.loads_N())
-        record_fingertips(self.recorder, now_ns, seen.fingertips)
-        self.recorder.frames(now_ns, {"palm": seen.world_T_palm, **seen.world_T_distal})
-        self._record_truth()
-
-    def _record_truth(self) -> None:
-        if self._truth is not None:
-            reading = self._truth()
-            self.recorder.truth(self.clock.now_ns(), reading.world_T_object, reading.contacts)
 
     # --- marks -------------------------------------------------------------------------------------------------
 
@@ -319,7 +229,7 @@ class Bench:
         grasp = self._mark(MarkKind.CAPTURE_END)
         assert isinstance(grasp, Grasp)
         self.recorder.grasp(self.clock.now_ns(), grasp, self.perception.dropped)
-        self._record_truth()
+        self._state.record_truth()
         return grasp
 
     def end_touch(self) -> None:
@@ -346,7 +256,7 @@ class Bench:
         outcome = self._mark(MarkKind.TRUTH_FRAME)
         if not isinstance(outcome, TruthFrame):
             raise DeviceError("the picture can not be read", where="camera", hint="Check the camera's link")
-        self._record_truth()
+        self._state.record_truth()
         return outcome
 
     def undo(self) -> Undone:
@@ -357,8 +267,7 @@ class Bench:
 
     def report_stop(self, cause: str, cycles: list[dict[str, Any]]) -> None:
         """Record why everything was stopped, with the last cycles. Raises SessionError."""
-        now_ns = self.clock.now_ns()
-        self.recorder.safety_stop(now_ns, cause, cycles)
+        self.recorder.safety_stop(self.clock.now_ns(), cause, cycles)
         self.event(Level.ERROR, "safety", f"stopped: {cause}")
 
     def event(self, level: Level, source: str, message: str) -> None:

@@ -15,10 +15,10 @@ import numpy as np
 
 from drivers.shadow.kinematics import JOINTS
 from sessions import schemas
-from sessions.bench import BASE_JOINTS
 from sessions.fingertip_samples import biotac_counts
 from sessions.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, Interpreter
 from sessions.marks import Mark
+from sessions.state_recording import BASE_JOINTS
 from sessions.traffic_reader import TrafficMessage, TrafficReader
 from tactile_lab.clock import NANOSECONDS
 

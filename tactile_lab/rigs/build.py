@@ -19,11 +19,12 @@ from drivers.shadow.motors import MotorMap
 from drivers.shadow.palm_images import PALMS
 from drivers.shadow.posture import TipEllipsoid
 from drivers.simulation.world import SimulatedWorld
-from sessions.bench import Bench, SensorStream
+from sessions.bench import Bench
 from sessions.closing_lines import TipSurface
 from sessions.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, Interpreter, Observer, fingertip_link
 from sessions.perception import Perception
 from sessions.recorder import Recorder
+from sessions.sensor_stream import SensorStream
 from tactile_lab.clock import NANOSECONDS, Clock, VirtualClock
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import FINGERS

@@ -13,9 +13,11 @@ from drivers.hardware.udp import UdpLink
 from drivers.links import Link, TappedLink
 from drivers.positioner import Positioner
 from drivers.shadow.hand_process import HandProcess
-from sessions.bench import Bench, SensorStream, TruthReading
+from sessions.bench import Bench
 from sessions.interpreter import BASE_LINK, CAMERA_LINK, Observer, fingertip_link
 from sessions.recorder import Recorder
+from sessions.sensor_stream import SensorStream
+from sessions.state_recording import TruthReading
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.rigs.build import build_interpreter, force_ranges_N, force_tips
 from tactile_lab.rigs.description import Rig

@@ -17,12 +17,13 @@ from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.kinematics import JOINTS, forearm_T_palm
 from drivers.simulation.settings import ObjectStart, SimulationSettings
 from drivers.simulation.world import SimulatedWorld
-from sessions.bench import Bench, SensorStream
+from sessions.bench import Bench
 from sessions.closing_lines import TipSurface
 from sessions.interpreter import Interpreter, Observer, fingertip_link
 from sessions.mark_outcomes import TruthFrame
 from sessions.perception import Perception
 from sessions.replay import Replay
+from sessions.sensor_stream import SensorStream
 from sessions.session import create_session
 from tactile_lab.clock import VirtualClock
 from tactile_lab.geometry.contacts import FINGERS, Grasp

@@ -10,10 +10,11 @@ from gtsam import Pose3, Rot3
 from drivers.fingertip import TipContact
 from drivers.links import Datagram, MemoryLink, TappedLink
 from drivers.shadow.kinematics import JOINTS
-from sessions.bench import Bench, SensorStream
+from sessions.bench import Bench
 from sessions.interpreter import Interpreter, Observer, fingertip_link
 from sessions.perception import Perception, PerceptionSettings
 from sessions.recorder import NullRecorder
+from sessions.sensor_stream import SensorStream
 from tactile_lab.clock import VirtualClock
 from tactile_lab.errors import CodecError, DeviceError
 from tactile_lab.geometry.contacts import FINGERS

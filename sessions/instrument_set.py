@@ -1,0 +1,48 @@
+"""All devices of a rig, connected one after the other and closed in the opposite order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from sessions.instruments import CyclingInstrument, Instrument
+from tactile_lab.errors import TactileLabError
+
+
+class InstrumentSet:
+    """The devices.
+
+    Args:
+        hand, base, camera: see :class:`~sessions.bench.Bench`.
+        wrench_devices: of the fingertips' own links, by finger; looked up anew each time.
+    """
+
+    def __init__(
+        self,
+        hand: Instrument,
+        base: Instrument,
+        wrench_devices: Mapping[str, Instrument],
+        camera: Instrument | None,
+    ) -> None:
+        self._hand, self._base, self._camera = hand, base, camera
+        self._wrench_devices = wrench_devices
+
+    def connect(self) -> None:
+        """Connect each. What a hand that cycles by itself sends meanwhile is recorded. Raises DeviceError."""
+        for instrument in self._instruments():
+            instrument.connect()
+            if isinstance(self._hand, CyclingInstrument):
+                self._hand.catch_up()
+
+    def close(self) -> list[TactileLabError]:
+        """Close each, even if another fails; gives what went wrong."""
+        problems: list[TactileLabError] = []
+        for instrument in reversed(self._instruments()):
+            try:
+                instrument.close()
+            except TactileLabError as error:
+                problems.append(error)
+        return problems
+
+    def _instruments(self) -> list[Instrument]:
+        camera = [] if self._camera is None else [self._camera]
+        return [self._hand, self._base, *self._wrench_devices.values(), *camera]

@@ -1,0 +1,32 @@
+"""A sensor that sends by itself, on a link that is tapped."""
+
+from __future__ import annotations
+
+from drivers.links import Link
+from sessions.instruments import AskedInstrument, Instrument
+
+
+class SensorStream:
+    """A device that sends by itself, emptied without decoding: the tap of its link has fed Perception already.
+
+    Args:
+        device: what starts and ends the stream.
+        link: the tapped link it was built on.
+    """
+
+    def __init__(self, device: Instrument, link: Link) -> None:
+        self._device, self._link = device, link
+
+    def connect(self) -> None:
+        """Start the stream. Raises DeviceError."""
+        self._device.connect()
+
+    def close(self) -> None:
+        """End the stream; idempotent."""
+        self._device.close()
+
+    def poll(self) -> None:
+        """Take everything that waits on the link, and ask for more where the device needs it. Raises DeviceError."""
+        self._link.receive()
+        if isinstance(self._device, AskedInstrument):
+            self._device.ask()
