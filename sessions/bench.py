@@ -22,7 +22,6 @@ from sessions.instruments import (
     CameraInstrument,
     CyclingInstrument,
     HandInstrument,
-    Instrument,
     PolledInstrument,
     WatchingCamera,
     warmest_C,
@@ -35,7 +34,7 @@ from sessions.recorder import Level, Recorder
 from sessions.state_recording import StateRecording, TruthReading
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import DeviceError, SessionError, TactileLabError
-from tactile_lab.geometry.contacts import FINGERS, Contact, Grasp
+from tactile_lab.geometry.contacts import FINGERS, Grasp
 
 READY_TIMEOUT_ns = 2 * NANOSECONDS
 """How long the hand and the positioner may take to answer after connecting."""
