@@ -15,6 +15,7 @@ from tactile_lab.evaluation.tables import ContactRows
 from tactile_lab.evaluation.trajectory import estimate_T_truth
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import rotate, transform_points
+from tactile_lab.report.course import Course
 
 Faces = NDArray[np.int64]
 FLAT_m = 1e-7
@@ -98,6 +99,7 @@ class ReportContent:
         contour_sigma_m: standard deviation at each point of the contour, shape (n,).
         truth: what is known of the truth, or None.
         fitted_outline_m: the true outline laid best onto the estimate, shape (n, 2), estimate's object frame, or None.
+        course: decisions and stops of the session.
     """
 
     facts: SessionFacts
@@ -108,6 +110,7 @@ class ReportContent:
     contour_sigma_m: Array = field(default_factory=lambda: np.zeros(0))
     truth: TrueShape | None = None
     fitted_outline_m: Array | None = None
+    course: Course = field(default_factory=Course)
 
     @property
     def estimate_T_truth(self) -> Pose3 | None:

@@ -22,6 +22,7 @@ from tactile_lab.evaluation.trajectory import read_trajectory
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import spatial, transform_points
 from tactile_lab.report.content import ReportContent, SessionFacts, Surface, TrueShape, with_plain_lids
+from tactile_lab.report.course import read_course
 from tactile_lab.shape.alignment import align_contours
 from tactile_lab.shape.mesh_io import read_mesh
 from tactile_lab.shape.sampling import sample_polygon
@@ -38,7 +39,7 @@ def gather(session: Session, folder: Path) -> ReportContent:
         folder: its results, or those of a replay.
 
     Raises:
-        SessionError: there are no results, or a file is not as the program leaves it.
+        SessionError: there are no results, or a file is not as the program leaves it; the recording can not be read.
         ShapeError: a mesh that cannot be read.
     """
     results = read_results(folder)
@@ -54,6 +55,7 @@ def gather(session: Session, folder: Path) -> ReportContent:
         contour_sigma_m=sigma_m,
         truth=truth,
         fitted_outline_m=_fitted(contour_m, truth),
+        course=read_course(session),
     )
 
 

@@ -13,7 +13,8 @@ from viser import Icon, IconName
 
 from sessions.guided.operator import Ask
 from tactile_lab.geometry.contacts import FINGERS
-from tactile_lab.view.scene import Scene
+from tactile_lab.report.colours import hex_colour, viridis
+from tactile_lab.view.scene import Scene, SIGMA_FULL_m
 
 Press = Callable[[Ask, str], None]
 """Called with what was pressed and a text."""
@@ -91,11 +92,13 @@ def status_html(scene: Scene) -> str:
         ("pose", _pose(scene)),
         ("explored", "" if scene.surface is None else f"{scene.surface.explored:.0%} of the surface is known"),
         ("object", str(guide.get("unknown", ""))),
-        ("next", str(guide.get("suggestion", "") or scene.plan.get("reason", ""))),
+        ("next", str(guide.get("suggestion", "") or scene.next_plan.get("reason", ""))),
         ("last", scene.messages[-1] if scene.messages else ""),
         ("left out", f"{scene.dropped} messages: the page was slower than the session" if scene.dropped else ""),
     ]
     parts += [_fact(name, value) for name, value in facts if value]
+    if scene.surface is not None:
+        parts.append(_scale())
     return f'<div style="{_STYLE}">{"".join(parts)}</div>'
 
 
@@ -138,6 +141,16 @@ def history_html(scene: Scene) -> str:
     return f'<div style="{_STYLE}"><table style="width:100%">{head}{"".join(rows)}</table></div>'
 
 
+def _scale() -> str:
+    """What the colours of the surface mean."""
+    colours = ",".join(hex_colour(colour) for colour in viridis(np.linspace(0.0, 1.0, 6)))
+    bar = f'<span style="flex:1;height:8px;border-radius:4px;background:linear-gradient(90deg,{colours})"></span>'
+    return (
+        '<div style="display:flex;align-items:center;gap:6px;color:#57606a;margin-top:0.4em">'
+        f"<span>surface ± 0</span>{bar}<span>{1e3 * SIGMA_FULL_m:.0f} mm or more</span></div>"
+    )
+
+
 def _line(text: str, style: str) -> str:
     return f'<div style="{style}">{html.escape(text)}</div>' if text else ""
 
@@ -148,5 +161,5 @@ def _banner(text: str, colour: str) -> str:
 
 
 def _fact(name: str, value: str) -> str:
-    label = f'<span style="color:#57606a;display:inline-block;min-width:5em">{html.escape(name)}</span>'
-    return f"<div>{label}{html.escape(value)}</div>"
+    label = f'<span style="color:#57606a;flex:none;width:5em">{html.escape(name)}</span>'
+    return f'<div style="display:flex">{label}<span>{html.escape(value)}</span></div>'

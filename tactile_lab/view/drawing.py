@@ -13,13 +13,13 @@ from drivers.shadow.closing import PRESHAPES, closing
 from sessions import foxglove
 from tactile_lab.geometry.contacts import FINGERS, Array
 from tactile_lab.report.colours import viridis
-from tactile_lab.view.scene import Scene, ShownSurface, ellipse
+from tactile_lab.view.scene import Scene, ShownSurface, SIGMA_FULL_m, ellipse
+from tactile_lab.view.skeleton import TIP_CENTRE_m, bones
 
-TIP_CENTRE_m, TIP_RADIUS_m = np.array([0.0, 0.0, 0.019]), 0.0085
-SIGMA_FULL_m = 0.010
-"""Standard deviation at which a surface counts as unknown: the far end of the colour map."""
+TIP_RADIUS_m = 0.0085
 _BONE, _IDLE, _TOUCHING, _SILENT = (120, 126, 138), (150, 158, 170), (46, 160, 67), (240, 170, 30)
 _NEXT, _POSE, _CONTACT = (214, 90, 160), (31, 111, 235), (200, 40, 40)
+_PALM_m, _PALM_CENTRE_m = (0.085, 0.022, 0.088), np.array([0.0, 0.0, 0.048])
 _FORCE_SCALE_m_N = 0.025
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -59,8 +59,9 @@ class Drawing:
             section_color=(190, 197, 206),
         )
         server.scene.add_frame("/world", axes_length=0.04, axes_radius=0.0012)
-        server.initial_camera.position = np.array([-0.21, -0.19, 0.20])
-        server.initial_camera.look_at = np.array([0.0, 0.0, 0.03])
+        server.initial_camera.position = np.array([-0.28, -0.37, 0.31])
+        server.initial_camera.look_at = np.array([0.045, -0.03, 0.075])  # the panel covers the right of the page
+        server.initial_camera.fov = np.radians(42.0)
 
     def draw(self, scene: Scene) -> None:
         """Bring the page up to date."""
@@ -70,7 +71,7 @@ class Drawing:
         if changed & {"object", "grasps"}:
             self._object(scene)
             self._grasps(scene)
-        if "plan" in changed:
+        if changed & {"plan", "grasps"}:
             self._plan(scene)
 
     def _replace(self, group: str, nodes: list[Any]) -> None:
@@ -87,26 +88,22 @@ class Drawing:
         if scene.world_T_palm is None:
             return
         nodes: list[Any] = [self._palm(scene.world_T_palm)]
-        bones = []
-        for finger in FINGERS:
-            pose = scene.world_T_distal.get(finger)
-            if pose is None:
-                continue
+        for finger, pose in scene.world_T_distal.items():
             tip_m = np.asarray(pose.transformFrom(TIP_CENTRE_m))
             nodes.append(self._tip(finger, tip_m, scene.loads_N.get(finger, 0.0)))
-            bones += [[scene.world_T_palm.translation(), pose.translation()], [pose.translation(), tip_m]]
-        if bones:
-            nodes.append(self._scene.add_line_segments("/hand/bones", np.array(bones), _BONE, thickness=0.005))
+        lines_m = bones(scene.world_T_palm, scene.world_T_distal)
+        if len(lines_m):
+            nodes.append(self._scene.add_line_segments("/hand/bones", lines_m, _BONE, thickness=0.006))
         self._replace("hand", nodes)
 
     def _palm(self, pose: Pose3) -> Any:
         return self._scene.add_box(
             "/hand/palm",
             color=_BONE,
-            dimensions=(0.08, 0.02, 0.09),
+            dimensions=_PALM_m,
             opacity=0.35,
             wxyz=quaternion(pose),
-            position=pose.translation(),
+            position=pose.transformFrom(_PALM_CENTRE_m),
         )
 
     def _tip(self, finger: str, centre_m: Array, load_N: float | None) -> Any:
@@ -161,7 +158,7 @@ class Drawing:
             ages = np.concatenate([np.full(len(points_m), len(known) - n - 1) for n, points_m in enumerate(known)])
             nodes.append(
                 self._scene.add_point_cloud(
-                    "/contacts", world_m, fading(ages), point_size=0.005, point_shape="circle", precision="float32"
+                    "/contacts", world_m, fading(ages), point_size=0.0035, point_shape="circle", precision="float32"
                 )
             )
             nodes += self._forces(scene)
@@ -182,7 +179,7 @@ class Drawing:
     # --- the next grasp ----------------------------------------------------------------------------------------
 
     def _plan(self, scene: Scene) -> None:
-        plan = scene.plan
+        plan = scene.next_plan
         if plan.get("closing") not in PRESHAPES:
             self._replace("plan", [])
             return

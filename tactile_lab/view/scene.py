@@ -16,6 +16,8 @@ from tactile_lab.geometry.contacts import Array
 PALM = "palm"
 MESSAGES = 6
 """So many of the last events are shown."""
+SIGMA_FULL_m = 0.010
+"""Standard deviation at which a surface counts as unknown: the far end of the colour map."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,12 @@ class Scene:
     stamp_ns: int = 0
     dropped: int = 0
     changed: set[str] = field(default_factory=set)
+
+    @property
+    def next_plan(self) -> dict[str, Any]:
+        """The plan, unless its grasp has been measured already."""
+        measured = self.grasps[-1].index if self.grasps else -1
+        return self.plan if self.plan.get("index", 0) > measured else {}
 
     def take(self, topic: str, data: bytes, stamp_ns: int) -> None:
         """Take one message; topics that are not shown change nothing. Raises ValueError for content of another form."""

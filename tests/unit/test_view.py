@@ -19,9 +19,11 @@ import numpy as np
 import pytest
 from gtsam import Pose3, Rot3
 
+from drivers.shadow.kinematics import joint_vector, palm_T_distal
 from sessions import schemas
 from sessions.guided.operator import Ask
 from sessions.recorder import Level, Recorder
+from sessions.session import create_session
 from tactile_lab.cli.page_address import PageAddress
 from tactile_lab.errors import ConfigurationError, DeviceError
 from tactile_lab.geometry.contacts import Contact, Grasp
@@ -31,6 +33,7 @@ from tactile_lab.view.feed import QUEUE_LENGTH, ViewFeed
 from tactile_lab.view.gate import Gate, Head, inner_address, is_loopback, new_token, parse_head
 from tactile_lab.view.page import Page
 from tactile_lab.view.scene import Scene, ellipse
+from tactile_lab.view.skeleton import bones
 
 ROOT = Path(__file__).parents[2]
 SQUARE = [[-0.02, -0.02, 0.0], [0.02, -0.02, 0.0], [0.02, 0.02, 0.0], [-0.02, 0.02, 0.0]]
@@ -129,6 +132,20 @@ def test_outline_is_shown_as_a_wall_coloured_by_its_uncertainty() -> None:
 def test_ellipse_has_the_axes_of_the_covariance() -> None:
     outline_m = ellipse(np.diag([1e-6, 4e-6, 1.0]))
     np.testing.assert_allclose(np.abs(outline_m).max(axis=0), [0.002, 0.004], rtol=1e-2)
+
+
+def test_plan_is_shown_until_its_grasp_is_measured() -> None:
+    assert recorded(grasps=2).next_plan["closing"] == "radial"
+    assert recorded(grasps=3).next_plan == {}
+
+
+def test_fingers_bend_where_their_bones_meet() -> None:
+    joints_rad = joint_vector({"FFJ3": 0.4, "FFJ2": 0.7, "FFJ1": 0.3, "MFJ2": 0.2})
+    lines_m = bones(Pose3(), palm_T_distal(joints_rad))
+    assert lines_m.shape == (15, 2, 3)
+    knuckle_m, elbow_m = lines_m[0]
+    np.testing.assert_allclose(elbow_m - knuckle_m, [0.0, -0.045 * np.sin(0.4), 0.045 * np.cos(0.4)], atol=1e-6)
+    assert bones(Pose3(), {}).shape == (0, 2, 3)
 
 
 # --- the door ------------------------------------------------------------------------------------------------------
@@ -291,6 +308,22 @@ def test_killed_page_costs_messages_and_nothing_else() -> None:
         assert feed.requests() == []
         assert feed.dropped > 0
     assert not alive(pid)
+
+
+def test_recording_is_whole_when_its_page_is_killed(tmp_path: Path) -> None:
+    session = create_session(tmp_path, rig="sim", rig_description={}, object_name="box")
+    with session, ViewFeed("127.0.0.1", 0, "", "test") as feed:
+        session.recorder.watched_by(feed)
+        for stamp in range(3 * QUEUE_LENGTH):
+            if stamp == 5:
+                assert feed.pid is not None
+                os.kill(feed.pid, signal.SIGKILL)
+            session.recorder.event(stamp, Level.INFO, "test", "x" * 2000)
+        assert feed.dropped > 0
+    assert session.manifest.status == "closed"
+    traffic = session.traffic()
+    assert sum(message.topic == schemas.EVENTS_TOPIC for message in traffic.messages()) == 3 * QUEUE_LENGTH
+    assert not traffic.loss
 
 
 def test_page_says_what_is_pressed_and_nothing_that_it_must_not() -> None:

@@ -14,7 +14,8 @@ import pytest
 import trimesh
 from synthetic_grasps import SIZE_m, box_grasps
 
-from sessions.session import create_session
+from sessions.session import Session, create_session
+from sessions.traffic_summary import may_hold
 from tactile_lab import report
 from tactile_lab.errors import SessionError
 from tactile_lab.evaluation.evaluation import Truth, evaluate
@@ -22,6 +23,8 @@ from tactile_lab.evaluation.result_files import write_results
 from tactile_lab.evaluation.session_truth import TRUTH_TRAJECTORY
 from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
 from tactile_lab.report.colours import UNKNOWN, hex_colour, viridis
+from tactile_lab.report.course import Course, Stop, read_course
+from tactile_lab.report.course_listings import decisions_card, stops_card
 from tactile_lab.report.rendering import VIEWS, render
 from tactile_lab.report.svg import Chart, Frame, Scale, tick_label
 from tactile_lab.slam import SlamSettings, TactileSlam
@@ -180,6 +183,68 @@ def test_session_that_ended_without_a_shape_still_has_a_page(tmp_path: Path) -> 
     page = Page(report.write(folder).read_text(encoding="utf-8"))
     assert not page.of("canvas")
     assert page.open == []
+
+
+def decided(number: int, **changes: object) -> dict[str, object]:
+    place = {"x_m": 0.012, "y_m": -0.03, "yaw_rad": 0.5, "closing": "pinch", "score": 1234.5}
+    other = {**place, "closing": "radial", "score": None}
+    content = {"number": number, "policy": "information", "outcome": "grasp", "chosen": 1, "promised_gain": 0.5}
+    told = {"reason": f"the best <for> grasp {number}", "vetoed": [0], "ruled_out": {"no room": 3}}
+    return {**content, **told, "candidates": [other, place], **changes}
+
+
+def record(root: Path, *, stop: bool = False, decisions: tuple[dict[str, object], ...] = ()) -> Session:
+    session = create_session(root, rig="sim", rig_description={}, object_name="box")
+    for number, content in enumerate(decisions):
+        session.recorder.decision(number, content)
+    if stop:
+        session.recorder.safety_stop(2_500_000_000, "force of 9 N at FF", [])
+    session.close()
+    return session
+
+
+def test_course_of_a_session_comes_from_its_recording(tmp_path: Path) -> None:
+    ended = decided(3, outcome="stop", chosen=None, promised_gain=None)
+    again = decided(2, reason="second thoughts")  # grasp 2 was taken back and decided about anew
+    course = read_course(record(tmp_path, stop=True, decisions=(decided(2), decided(3), again, ended)))
+    assert [decision.number for decision in course.decisions] == [2, 3]
+    assert course.decisions[0].reason == "second thoughts"
+    assert course.stops == (Stop(2.5, "force of 9 N at FF"),)
+    words = Page(decisions_card(course) + stops_card(course)).texts
+    row = words[words.index("2") : words.index("3")]
+    assert row == ["2", "pinch", "12", "-30", "29", "1.23e+03", "0.5", "2 of 5", "1", "second thoughts"]
+    assert {"ended the session", "at 2.5 s", "  force of 9 N at FF"} <= set(words)
+
+
+def test_session_without_decisions_and_stops_shows_none(tmp_path: Path) -> None:
+    course = read_course(record(tmp_path))
+    assert course == Course()
+    assert decisions_card(course) == stops_card(course) == ""
+
+
+def test_decisions_and_stops_are_on_the_page(tmp_path: Path) -> None:
+    folder = make_session(tmp_path / "with", 2)
+    course = record(tmp_path / "course", stop=True, decisions=(decided(4),))
+    (course.folder / "traffic.mcap").replace(folder / "traffic.mcap")
+    page = Page(report.write(folder).read_text(encoding="utf-8"))
+    assert "Why these grasps" in page.texts
+    assert "the best <for> grasp 4" in page.texts
+    assert "at 2.5 s" in page.texts
+    (folder / "traffic.mcap").unlink()
+    assert "Why these grasps" not in Page(report.write(folder).read_text(encoding="utf-8")).texts
+
+
+def test_torn_recording_still_tells_its_decisions(tmp_path: Path) -> None:
+    session = record(tmp_path, decisions=(decided(2),))
+    path = session.folder / "traffic.mcap"
+    path.write_bytes(path.read_bytes()[:-40])
+    assert may_hold(path, ("/decision",))
+    assert len(read_course(session).decisions) == 1
+
+
+def test_decision_of_another_form_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SessionError, match="/decision is of another form"):
+        read_course(record(tmp_path, decisions=(decided(2, chosen=7),)))
 
 
 def test_report_without_results_is_a_session_error_with_a_hint(tmp_path: Path) -> None:
