@@ -21,6 +21,7 @@ from sessions.instruments import (
     BaseInstrument,
     CameraInstrument,
     CyclingInstrument,
+    FrameReading,
     HandInstrument,
     PolledInstrument,
     WatchingCamera,
@@ -243,15 +244,34 @@ class Bench:
         """From here on the object stays where it is."""
         self._mark(MarkKind.HOLD_END)
 
-    def truth_frame(self) -> TruthFrame | None:
+    def picture(self, cycle: Callable[[], None] | None = None) -> FrameReading:
+        """A new picture; the cycles go on while it is on its way.
+
+        Args:
+            cycle: runs one, for who looks at each; :meth:`cycle` unless given.
+
+        Raises:
+            DeviceError: there is no camera, or it gave no picture.
+        """
+        if self.camera is None:
+            raise DeviceError("the rig has no camera", where="camera")
+        self.camera.ask()
+        while (frame := self.camera.taken()) is None:
+            (cycle or self.cycle)()
+        return frame
+
+    def truth_frame(self, cycle: Callable[[], None] | None = None) -> TruthFrame | None:
         """Take a picture that shows the object of the current grasp at rest; None without a camera.
+
+        Args:
+            cycle: see :meth:`picture`.
 
         Raises:
             DeviceError: the camera gave no picture.
         """
         if self.camera is None:
             return None
-        self.camera.capture()
+        self.picture(cycle)
         outcome = self._mark(MarkKind.TRUTH_FRAME)
         if not isinstance(outcome, TruthFrame):
             raise DeviceError("the picture can not be read", where="camera", hint="Check the camera's link")

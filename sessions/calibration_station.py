@@ -6,7 +6,8 @@ hand to the camera. Every cycle is looked at by the safety supervisor.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import TypeVar
 
 import numpy as np
 from gtsam import Pose3
@@ -28,6 +29,7 @@ from tactile_lab.errors import DeviceError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.strict_yaml import StrictModel
 
+ObservedT = TypeVar("ObservedT")
 Board = SingleMarker | GridBoard | CharucoBoard
 
 
@@ -65,16 +67,14 @@ class StationSettings(StrictModel):
     safety: SafetySettings = SafetySettings(palm_minimum_height_m=0.05, workspace_radius_m=1.1)
 
 
-class CalibrationStation:
-    """A connected bench that makes planned touches and pictures.
+class PressingHand:
+    """A connected bench whose hand is carried about and presses faces; what all calibration stations share.
 
     Args:
         bench: connected.
         world_T_mount: roughly where the mount stands.
         tips: shape of each finger's tip.
         settings: see there.
-        board: on the hand, for pictures; None for touches.
-        markers: the world marker, for pictures.
     """
 
     def __init__(
@@ -83,31 +83,18 @@ class CalibrationStation:
         world_T_mount: Pose3,
         tips: Mapping[str, TipEllipsoid],
         settings: StationSettings | None = None,
-        board: Board | None = None,
-        markers: MarkerSettings | None = None,
     ) -> None:
         self.bench, self.settings = bench, settings or StationSettings()
         self.supervisor = SafetySupervisor(bench, self.settings.safety, bench.cycle_ns)
         self._motion = Motion(bench, self.supervisor)
         self._world_T_mount, self._tips = world_T_mount, dict(tips)
-        self._board, self._markers = board, markers
         self._targets_rad: dict[str, float] = {}
         self._q = bench.perception.base_q.copy()
 
-    def measure(self, planned: Planned) -> Observation:
-        """Make one planned touch or picture.
+    # --- pressing ----------------------------------------------------------------------------------------------
 
-        Raises:
-            DeviceError: nothing was met, no contact was felt, or the board is not in the picture.
-            SafetyError: a limit was passed; the rig was stopped.
-        """
-        observation = self._touch(planned) if isinstance(planned, PlannedTouch) else self._view(planned)
-        self.supervisor.approached()
-        return observation
-
-    # --- touches -----------------------------------------------------------------------------------------------
-
-    def _touch(self, planned: PlannedTouch) -> Touch:
+    def _pressed(self, planned: PlannedTouch, captured: Callable[[PlannedTouch], ObservedT]) -> ObservedT:
+        """Press what is planned, observe, and go back before the face."""
         tip, joints = self._tips[planned.finger], pointing_vector(planned.finger)
         before = planned.base_q(self._world_T_mount, joints, tip, self.settings.stand_off_m)
         behind = planned.base_q(self._world_T_mount, joints, tip, -self.settings.beyond_m)
@@ -117,7 +104,7 @@ class CalibrationStation:
         self._tare(planned.finger)
         try:
             self._press(planned, before, behind)
-            return self._captured(planned)
+            return captured(planned)
         finally:
             self._move(before, self.settings.travel_m_s)
 
@@ -138,25 +125,6 @@ class CalibrationStation:
         hint = "Check that it is where the geometry says, and the guess of the mount's place"
         raise DeviceError(f"{planned.finger} met nothing at {planned.patch.target.name}", where="touch", hint=hint)
 
-    def _captured(self, planned: PlannedTouch) -> Touch:
-        seen, finger = self.bench.perception, planned.finger
-        sensor = seen.fingertips[finger]
-        sensor.begin_capture()
-        pose = self._mean_pose(self.settings.capture_s)
-        contact = sensor.contact(seen.world_R_distal(finger))
-        if contact is None:
-            hint = "Press again, elsewhere; see tactile-lab rig check"
-            raise DeviceError(f"{finger} felt no valid contact", where="touch", hint=hint)
-        return Touch(
-            finger=finger,
-            pose=pose,
-            point_distal_m=contact.point_distal_m,
-            normal_distal=contact.normal_distal,
-            point_covariance_m2=contact.point_covariance_m2,
-            target=planned.patch.target,
-            force_N=contact.force_N,
-        )
-
     def _tare(self, finger: str) -> None:
         for _ in range(self.settings.tares):
             self._motion.wait(self.settings.settle_s)
@@ -166,23 +134,6 @@ class CalibrationStation:
         raise DeviceError(
             f"can not be zeroed: {report.refused[finger]}", where=finger, hint="See tactile-lab rig check"
         )
-
-    # --- pictures ----------------------------------------------------------------------------------------------
-
-    def _view(self, planned: PlannedView) -> View:
-        camera, board, markers = self.bench.camera, self._board, self._markers
-        if camera is None or board is None or markers is None:
-            raise DeviceError("pictures need a camera, its markers and a board on the hand", where="marker method")
-        self._take_posture(planned.joints_rad)
-        self._move(planned.base_q(self._world_T_mount), self.settings.travel_m_s)
-        self._motion.wait(self.settings.settle_s)
-        pose = self._mean_pose(self.settings.capture_s)
-        image = camera.capture().image
-        board_m, board_px = board.matched(image)
-        if len(board_m) < 4:
-            hint = "Move it into the picture, and see that nothing hides it"
-            raise DeviceError("the board on the hand is not in the picture", where="camera", hint=hint)
-        return View(pose, board_m, board_px, detect(image, markers.dictionary).get(markers.world_id))
 
     # --- motion ------------------------------------------------------------------------------------------------
 
@@ -221,11 +172,85 @@ class CalibrationStation:
                 self._motion.tick()
         self._targets_rad = wanted
 
-    def _mean_pose(self, duration_s: float) -> HandPose:
-        """Where hand and positioner stand, mean over a time."""
+    def _mean_pose(self, duration_s: float, each: Callable[[], object] = lambda: None) -> HandPose:
+        """Where hand and positioner stand, mean over a time; ``each`` is called every cycle of it."""
         seen, joints, base = self.bench.perception, [], []
         for _ in range(self._motion.cycles(duration_s)):
             self._motion.tick()
             joints.append(seen.joints_rad)
             base.append(seen.base_q)
+            each()
         return HandPose(np.mean(base, axis=0), np.mean(joints, axis=0))
+
+
+class CalibrationStation(PressingHand):
+    """A rig that makes planned touches and pictures.
+
+    Args:
+        bench, world_T_mount, tips, settings: see :class:`PressingHand`.
+        board: on the hand, for pictures; None for touches.
+        markers: the world marker, for pictures.
+    """
+
+    def __init__(
+        self,
+        bench: Bench,
+        world_T_mount: Pose3,
+        tips: Mapping[str, TipEllipsoid],
+        settings: StationSettings | None = None,
+        board: Board | None = None,
+        markers: MarkerSettings | None = None,
+    ) -> None:
+        super().__init__(bench, world_T_mount, tips, settings)
+        self._board, self._markers = board, markers
+
+    def measure(self, planned: Planned) -> Observation:
+        """Make one planned touch or picture.
+
+        Raises:
+            DeviceError: nothing was met, no contact was felt, or the board is not in the picture.
+            SafetyError: a limit was passed; the rig was stopped.
+        """
+        observation = (
+            self._pressed(planned, self._captured) if isinstance(planned, PlannedTouch) else self._view(planned)
+        )
+        self.supervisor.approached()
+        return observation
+
+    # --- touches -----------------------------------------------------------------------------------------------
+
+    def _captured(self, planned: PlannedTouch) -> Touch:
+        seen, finger = self.bench.perception, planned.finger
+        sensor = seen.fingertips[finger]
+        sensor.begin_capture()
+        pose = self._mean_pose(self.settings.capture_s)
+        contact = sensor.contact(seen.world_R_distal(finger))
+        if contact is None:
+            hint = "Press again, elsewhere; see tactile-lab rig check"
+            raise DeviceError(f"{finger} felt no valid contact", where="touch", hint=hint)
+        return Touch(
+            finger=finger,
+            pose=pose,
+            point_distal_m=contact.point_distal_m,
+            normal_distal=contact.normal_distal,
+            point_covariance_m2=contact.point_covariance_m2,
+            target=planned.patch.target,
+            force_N=contact.force_N,
+        )
+
+    # --- pictures ----------------------------------------------------------------------------------------------
+
+    def _view(self, planned: PlannedView) -> View:
+        board, markers = self._board, self._markers
+        if self.bench.camera is None or board is None or markers is None:
+            raise DeviceError("pictures need a camera, its markers and a board on the hand", where="marker method")
+        self._take_posture(planned.joints_rad)
+        self._move(planned.base_q(self._world_T_mount), self.settings.travel_m_s)
+        self._motion.wait(self.settings.settle_s)
+        pose = self._mean_pose(self.settings.capture_s)
+        image = self.bench.picture(self._motion.tick).image
+        board_m, board_px = board.matched(image)
+        if len(board_m) < 4:
+            hint = "Move it into the picture, and see that nothing hides it"
+            raise DeviceError("the board on the hand is not in the picture", where="camera", hint=hint)
+        return View(pose, board_m, board_px, detect(image, markers.dictionary).get(markers.world_id))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 
+from drivers.camera.packet import counter_of
 from sessions.raw_frames import UNSTAMPED, DeviceStamp
 
 RDT_RECORD_BYTES = 36
@@ -21,6 +22,11 @@ def rdt_stamp(payload: bytes) -> DeviceStamp:
         return UNSTAMPED
     sent, measured = _RDT_HEAD.unpack_from(payload)
     return DeviceStamp(sent, measured * RDT_CLOCK_ns, len(payload) // RDT_RECORD_BYTES)
+
+
+def camera_stamp(payload: bytes) -> DeviceStamp:
+    """A packet of the camera: the number of its frame, which counts those it lost too; a bare picture has none."""
+    return DeviceStamp(counter_of(payload))
 
 
 def positioner_stamp(payload: bytes) -> DeviceStamp:

@@ -174,7 +174,7 @@ class GraspCycle:
         bench.begin_capture()
         self._motion.wait(self.settings.capture_s)
         grasp = bench.end_capture()
-        bench.truth_frame()
+        bench.truth_frame(self._motion.tick)
         return grasp
 
     # --- carry -------------------------------------------------------------------------------------------------

@@ -162,8 +162,11 @@ class CyclingInstrument(Protocol):
 class CameraInstrument(Instrument, Protocol):
     """The live camera."""
 
-    def capture(self) -> FrameReading:
-        """Take one picture. Raises DeviceError."""
+    def ask(self) -> None:
+        """Trigger; the picture comes with :meth:`taken`. Raises DeviceError."""
+
+    def taken(self) -> FrameReading | None:
+        """The picture asked for; None while it is on its way. Raises DeviceError when it stays away."""
 
 
 @runtime_checkable

@@ -32,6 +32,8 @@ from tactile_lab.geometry.poses import rotate, transform_points
 
 FACE_DOWN = Pose3(Rot3(np.diag([1.0, -1.0, -1.0])), np.zeros(3))
 """A marker seen from below: its z points down."""
+_SPARE = 2
+"""A square's corners are eight numbers, a pose six."""
 _MEAN_FLOOR_px = 0.02
 """What averaging does not remove from the world marker's corners."""
 
@@ -178,7 +180,7 @@ class ObjectTracker:
             position_sigma_m=position_sigma_m,
             yaw_sigma_rad=yaw_sigma_rad,
             fit_rms_m=rms,
-            ambiguous=is_ambiguous(alone, self._settings.ambiguous_ratio, self._settings.corner_sigma_px),
+            ambiguous=is_ambiguous(alone, self._settings.corner_sigma_px, self._settings.ambiguous_sigmas),
             unconstrained=free,
             reprojection_px=tuple(each.reprojection_px for each in alone),
             object_corners_px=corners_px,
@@ -242,15 +244,25 @@ def fit_in_plane(model: Array, seen: Array) -> tuple[Array, float, float]:
     return seen.mean(axis=0) - turn @ model.mean(axis=0), angle, misfit
 
 
-def is_ambiguous(poses: tuple[MarkerPose, ...], ratio: float, corner_sigma_px: float = 0.0) -> bool:
-    """Whether the second pose of a square explains its corners nearly as well as the first.
+def is_ambiguous(poses: tuple[MarkerPose, ...], corner_sigma_px: float, sigmas: float) -> bool:
+    """Whether the corners' noise could make the wrong one of a square's two poses look the better one.
 
-    An error below the corners' own noise says nothing, however small it is beside the other.
+    The logarithm of the ratio of their likelihoods is the difference of their sums of squared errors over twice the
+    corners' variance. Where the poses' corners lie d apart, the difference for the true pose is normally distributed
+    about d^2 with a standard deviation of 2 d times the corners'. So it is wrong by more than (sigmas * corners'
+    deviation)^2 at most as often as a normal variable lies ``sigmas`` deviations off, whatever d is. That holds for two
+    given poses; as both are fitted to the corners, it happens a few times as often.
+
+    Args:
+        poses: better one first.
+        corner_sigma_px: error of a corner per axis; taken larger where the better pose leaves more over.
+        sigmas: how sure it has to be.
     """
     if len(poses) < 2:
         return False
-    floor_px = max(poses[0].reprojection_px, float(np.sqrt(2.0)) * corner_sigma_px)
-    return poses[1].reprojection_px < ratio * floor_px
+    better, other = (4 * pose.reprojection_px**2 for pose in poses[:2])
+    variance_px2 = max(corner_sigma_px**2, better / _SPARE)
+    return other - better < sigmas**2 * variance_px2
 
 
 def _sigmas(covariance: Array) -> tuple[float, float]:

@@ -27,6 +27,8 @@ class Camera:
     def __init__(self, link: Link, clock: Clock, settings: CameraDeviceSettings | None = None) -> None:
         self._link, self._clock, self._settings = link, clock, settings or CameraDeviceSettings()
         self._connected = False
+        self._asked_ns: int | None = None
+        self._arrived: list[Datagram] = []
 
     def connect(self) -> None:
         """Open the link; repeatable. Raises DeviceError."""
@@ -42,31 +44,49 @@ class Camera:
 
     def poll(self) -> None:
         """Take what the camera has sent by itself, so that it is recorded in time. Raises DeviceError."""
-        self._link.receive()
+        arrived = self._link.receive()
+        if self._asked_ns is not None:
+            self._arrived += arrived
 
-    def capture(self) -> Frame:
-        """Trigger and wait for the picture; one that was still on its way from before is left out.
+    def ask(self) -> None:
+        """Trigger; the picture comes with :meth:`taken`. One that was still on its way from before is left out.
 
         Raises:
-            DeviceError: no picture within the time-out, or the link failed.
-            CodecError: the picture can not be decoded.
+            DeviceError: the link failed.
         """
         self._link.receive()
         self._link.send(TRIGGER)
-        deadline_ns = self._clock.now_ns() + round(1e6 * self._settings.timeout_ms)
-        while (frame := self._newest_picture()) is None:
-            if self._clock.now_ns() >= deadline_ns:
-                raise DeviceError(
-                    f"no picture within {self._settings.timeout_ms:.0f} ms",
-                    where=self._link.name,
-                    hint="Check the camera's power, cable and trigger",
-                )
-            self._clock.sleep_until_ns(self._clock.now_ns() + round(1e6 * self._settings.look_every_ms))
+        self._asked_ns, self._arrived = self._clock.now_ns(), []
+
+    def taken(self) -> Frame | None:
+        """The picture asked for, once; None while it is on its way. Never waits.
+
+        Raises:
+            DeviceError: nothing was asked for, no picture came within the time-out, or the link failed.
+            CodecError: the picture can not be decoded.
+        """
+        if self._asked_ns is None:
+            raise DeviceError("no picture was asked for", where=self._link.name, hint="Ask first")
+        self.poll()
+        arrived, self._arrived = self._arrived, []
+        frames = [self.receive(datagram) for datagram in arrived]
+        frame = next((frame for frame in reversed(frames) if frame.image is not None), None)
+        if frame is None and self._clock.now_ns() - self._asked_ns >= 1e6 * self._settings.timeout_ms:
+            raise DeviceError(
+                f"no picture within {self._settings.timeout_ms:.0f} ms",
+                where=self._link.name,
+                hint="Check the camera's power, cable and trigger",
+            )
+        if frame is not None:
+            self._asked_ns = None
         return frame
 
-    def _newest_picture(self) -> Frame | None:
-        frames = [self.receive(datagram) for datagram in self._link.receive()]
-        return next((frame for frame in reversed(frames) if frame.image is not None), None)
+    def capture(self) -> Frame:
+        """Trigger and wait for the picture, doing nothing else; see :meth:`ask` and :meth:`taken`."""
+        self.ask()
+        while (frame := self.taken()) is None:
+            self._clock.sleep_until_ns(self._clock.now_ns() + round(1e6 * self._settings.look_every_ms))
+        return frame
 
     def receive(self, datagram: Datagram) -> Frame:
         """Decode what the camera sent; changes nothing. Raises CodecError."""

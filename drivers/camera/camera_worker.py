@@ -20,9 +20,11 @@ from drivers.camera.packet import encode_packet
 from drivers.camera.source_settings import CameraSourceSettings
 from drivers.camera.sources import Picture, Source, open_source
 from drivers.shadow.hand_records import RecordKind, RecordPipe
-from tactile_lab.clock import MonotonicClock
+from tactile_lab.clock import NANOSECONDS, MonotonicClock
 from tactile_lab.errors import DeviceError, TactileLabError
 from tactile_lab.strict_yaml import validate
+
+_FILES = ("folder", "video")
 
 
 class CameraWorker:
@@ -37,18 +39,36 @@ class CameraWorker:
     def __init__(self, source: Source, settings: CameraSourceSettings, pipe: RecordPipe) -> None:
         self._source, self._settings, self._pipe = source, settings, pipe
         self._clock = MonotonicClock()
-        self._wanted = self._frames = self._markers = 0
+        self._wanted = self._frames = self._markers = self._frames_before = 0
+        self._began_ns = self._clock.now_ns()
         self._ended = False
 
     def run(self) -> None:
         """Take frames until the orders end. Raises DeviceError, also when the source has ended."""
         while not self._ended:
+            self._wait_for_its_time()
             picture = self._source.read()
             if picture is None:
-                raise DeviceError("the video or folder has ended", where="camera")
+                self._begin_again()
+                continue
             self._hand_on(picture)
             while not self._ended and select.select([sys.stdin], [], [], 0)[0]:
                 self._obey(sys.stdin.readline())
+
+    def _wait_for_its_time(self) -> None:
+        """Files can be read at any speed; they come as fast as a camera would send them."""
+        if self._settings.place().kind in _FILES:
+            due_ns = self._began_ns + round(self._frames * NANOSECONDS / self._settings.rate_hz)
+            self._clock.sleep_until_ns(due_ns)
+
+    def _begin_again(self) -> None:
+        if not self._settings.repeat or self._frames == self._frames_before:
+            raise DeviceError(
+                "the video or folder has ended", where="camera", hint="Say repeat: true to begin it again"
+            )
+        self._frames_before = self._frames
+        self._source.close()
+        self._source.open()
 
     def _hand_on(self, picture: Picture) -> None:
         found = detection(picture.image, self._settings.dictionary)

@@ -46,8 +46,8 @@ class MarkerSettings(StrictModel):
         table_sigma_m, table_sigma_rad: error that stays however sharp the picture is (markers are glued on by hand).
         freedom: planar: the object stands on the table, whatever its marker alone would say; spatial: it may be
             anywhere, and pictures that allow two poses are refused.
-        ambiguous_ratio: two poses of a single marker whose reprojection errors differ by less than this factor can
-            not be told apart.
+        ambiguous_sigmas: how sure it has to be which of a single marker's two poses is the right one, in standard
+            deviations of the corners' noise.
         moved_px: a world marker that far from its mean is not where it was.
         world_marker_fixed: the world marker can not move (it is part of the table): where it seems to, the camera
             did, and its mean begins anew. Otherwise truth ends there, as nobody knows which of them was bumped.
@@ -69,7 +69,7 @@ class MarkerSettings(StrictModel):
     table_sigma_m: float = Field(default=0.0003, ge=0.0)
     table_sigma_rad: float = Field(default=0.001, ge=0.0)
     freedom: Literal["planar", "spatial"] = "planar"
-    ambiguous_ratio: float = Field(default=3.0, gt=1.0)
+    ambiguous_sigmas: float = Field(default=5.0, gt=0.0)
     moved_px: float = Field(default=1.0, gt=0.0)
     world_marker_fixed: bool = False
     largest_blur_px: float = Field(default=1.6, gt=0.0)

@@ -24,6 +24,7 @@ from tactile_lab.errors import CodecError
 
 MAGIC, VERSION = b"TLCP", 1
 _HEAD = struct.Struct("<4sBBHHHIII")
+_COUNTER = 5  # among the numbers of the head
 _MARKER = np.dtype([("number", "<u2"), ("blur_px", "<f4"), ("corners_px", "<f4", (4, 2))])
 
 
@@ -76,6 +77,11 @@ def picture_of(payload: bytes) -> bytes:
     if not payload.startswith(MAGIC):
         return payload
     return payload[len(payload) - _head(payload)[-1] :] if len(payload) >= _HEAD.size else b""
+
+
+def counter_of(payload: bytes) -> int | None:
+    """The camera's own number of the frame; None in a bare picture, or in what is no packet. Never raises."""
+    return _head(payload)[_COUNTER] if payload.startswith(MAGIC) and len(payload) >= _HEAD.size else None
 
 
 def _head(payload: bytes) -> tuple[int, ...]:

@@ -35,6 +35,7 @@ class CameraSourceSettings(StrictModel):
             automatic focus is switched off all the same, as each of its moves changes the lens.
         pixel_format: four letters that the camera knows; MJPG for most USB cameras above 640 x 480.
         jpeg_quality: of the pictures handed on.
+        repeat: in a session, begin a folder or video again at its end instead of ending the session.
     """
 
     source: str = "0"
@@ -46,6 +47,7 @@ class CameraSourceSettings(StrictModel):
     focus: float | None = None
     pixel_format: str = Field(default="MJPG", min_length=4, max_length=4)
     jpeg_quality: int = Field(default=90, ge=1, le=100)
+    repeat: bool = False
 
     @field_validator("dictionary")
     @classmethod
@@ -55,6 +57,13 @@ class CameraSourceSettings(StrictModel):
     def place(self) -> Place:
         """What ``source`` means. Raises ConfigurationError when it is nothing that is there."""
         return place_of(self.source)
+
+
+def source_beside(source: str, folder: Path) -> str:
+    """A source as a file in ``folder`` means it: relative paths of pictures begin there."""
+    if source.isdigit() or source.partition(":")[0] in ("gstreamer", "simulated"):
+        return source
+    return str((folder / source).resolve())
 
 
 def place_of(source: str) -> Place:

@@ -158,7 +158,7 @@ class FolderSource:
     def __init__(self, settings: CameraSourceSettings, clock: Clock) -> None:
         self._settings, self._clock = settings, clock
         self._files: list[Path] = []
-        self._next = 0
+        self._next = self._counter = 0
         self._size: tuple[int, ...] | None = None
 
     def open(self) -> None:
@@ -168,6 +168,7 @@ class FolderSource:
         if not self._files:
             hint = f"Pictures end in {', '.join(PICTURES)}"
             raise ConfigurationError("no picture in the folder", where=str(folder), hint=hint)
+        self._next = 0
 
     def read(self) -> Picture | None:
         """The next picture. Raises DeviceError for one that can not be read, or of another size."""
@@ -175,6 +176,7 @@ class FolderSource:
             return None
         file = self._files[self._next]
         self._next += 1
+        self._counter += 1
         image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
         if image is None:
             raise DeviceError("is no picture that can be read", where=str(file), hint="Take it out of the folder")
@@ -183,7 +185,7 @@ class FolderSource:
             shown = [f"{width} x {height}" for height, width in (image.shape, self._size)]
             what = f"has {shown[0]} pixels, the pictures before it {shown[1]}"
             raise DeviceError(what, where=str(file), hint="Keep to pictures of one camera at one resolution")
-        return Picture(self._clock.now_ns(), self._next, 0, np.asarray(image, np.uint8))
+        return Picture(self._clock.now_ns(), self._counter, 0, np.asarray(image, np.uint8))
 
     def close(self) -> None:
         """Nothing to let go of."""

@@ -79,6 +79,8 @@ class CameraSettings(StrictModel):
         blur_px: sharpness, one standard deviation.
         noise_levels: noise of a pixel of 255.
         jpeg_quality: of the pictures it sends.
+        stream_hz: frames a second whose markers it sends by itself; None for a camera that waits for triggers.
+        late_ms: how long after it was taken a frame arrives, and is stamped.
     """
 
     world_T_camera: RigidTransform = RigidTransform(translation_m=(-0.005, -0.04, -0.58), rpy_rad=(-0.07, 0.05, 0.0))
@@ -87,6 +89,8 @@ class CameraSettings(StrictModel):
     blur_px: float = Field(default=0.8, gt=0.0)
     noise_levels: float = Field(default=3.0, ge=0.0)
     jpeg_quality: int = Field(default=90, ge=1, le=100)
+    stream_hz: float | None = Field(default=None, gt=0.0, le=100.0)
+    late_ms: float = Field(default=0.0, ge=0.0, le=500.0)
 
 
 class HandBoard(StrictModel):

@@ -120,7 +120,9 @@ class SimulatedWorld:
         self._peers["base"] = PositionerEmulator(self._plant)
         if settings.fingertips == "nano17":
             self._add_force_sensors()
-        self._peers["camera"] = self.build_camera(self._plant, self._markers_on_hand)
+        camera = self.build_camera(self._plant, self._markers_on_hand)
+        self._peers["camera"] = camera
+        self._devices.append(camera)
         self._plugs = {name: _Plug(peer) for name, peer in self._peers.items()}
         self.clock = SimulatedClock(self)
 
@@ -231,7 +233,7 @@ class SimulatedWorld:
             self.object_model,
             (table, markers.world_T_worldmarker.pose()),
             (glued, markers.object_T_objectmarker.pose()),
-            self.settings.camera.jpeg_quality,
+            self.settings.camera,
             carried,
         )
 

@@ -77,7 +77,7 @@ class GraspByHand:
         bench.begin_capture()
         self._motion.wait(self.settings.capture_s)
         grasp = bench.end_capture()
-        bench.truth_frame()
+        bench.truth_frame(self._motion.tick)
         return grasp
 
     def squeeze(self, touching: frozenset[str]) -> None:

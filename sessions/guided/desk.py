@@ -262,7 +262,7 @@ class Desk:
             return
         self._photos += 1
         try:
-            name = self._attachments.picture(f"photo-{self._photos:03d}.png", self._bench.camera.capture().image)
+            name = self._attachments.picture(f"photo-{self._photos:03d}.png", self._bench.picture().image)
         except TactileLabError as error:
             self.tell(str(error), Level.WARNING)
         else:

@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from tactile_lab.geometry.contacts import Array
 
-_RANGE_s, _STEP_s = 0.3, 0.005
+_RANGES_s, _STEP_s = (0.3, 0.15), 0.005
+"""How far offsets are looked for, larger first: pictures so near to the ends of a hold have to be left out."""
 _FEWEST, _LEAST_MOTION_m = 8, 0.005
 
 
@@ -54,18 +55,21 @@ def clock_offset(palm: Track, stamps_s: Array, places_m: Array, holds_s: Sequenc
         stamps_s, places_m: the object as the camera saw it, shapes (n,) and (n, 2): x and y in the world.
         holds_s: begin and end of each stretch in which the hand held the object.
     """
-    pieces = [_piece(palm, stamps_s, places_m, hold) for hold in holds_s]
-    groups = [rows for rows in pieces if len(rows) >= 3]
-    count = sum(map(len, groups))
+    groups, count = list[NDArray[np.intp]](), 0
+    for range_s in _RANGES_s:
+        pieces = [_piece(palm, stamps_s, places_m, hold, range_s) for hold in holds_s]
+        groups = [rows for rows in pieces if len(rows) >= 3]
+        if (count := sum(map(len, groups))) >= _FEWEST:
+            break
     if count < _FEWEST:
         return ClockOffset(None, None, count, f"the camera saw the moving object in {count} pictures, not {_FEWEST}")
     if max(float(np.ptp(places_m[rows], axis=0).max()) for rows in groups) < _LEAST_MOTION_m:
         return ClockOffset(None, None, count, "the object hardly moved while it was held")
-    offsets = np.arange(-_RANGE_s, _RANGE_s + _STEP_s / 2, _STEP_s)
+    offsets = np.arange(-range_s, range_s + _STEP_s / 2, _STEP_s)
     costs = np.array([_wandering(palm, stamps_s, places_m, groups, offset) for offset in offsets])
     best = int(np.argmin(costs))
     if best in (0, len(offsets) - 1):
-        reason = f"no offset within {1e3 * _RANGE_s:.0f} ms makes camera and hand agree"
+        reason = f"no offset within {1e3 * range_s:.0f} ms makes camera and hand agree"
         return ClockOffset(None, None, count, reason)
     curve = np.polyfit(offsets[best - 1 : best + 2] - offsets[best], costs[best - 1 : best + 2], 2)
     variance_m2 = costs[best] / max(2 * count - 2 * len(groups) - 1, 1)
@@ -73,10 +77,12 @@ def clock_offset(palm: Track, stamps_s: Array, places_m: Array, holds_s: Sequenc
     return ClockOffset(1e3 * float(offsets[best] - curve[1] / (2 * curve[0])), 1e3 * float(sigma_s), count)
 
 
-def _piece(palm: Track, stamps_s: Array, places_m: Array, hold_s: tuple[float, float]) -> NDArray[np.intp]:
+def _piece(
+    palm: Track, stamps_s: Array, places_m: Array, hold_s: tuple[float, float], range_s: float
+) -> NDArray[np.intp]:
     """Rows of the pictures inside one hold, as far as the palm is known around them."""
-    low = max(hold_s[0], palm.stamps_s[0]) + _RANGE_s
-    high = min(hold_s[1], palm.stamps_s[-1]) - _RANGE_s
+    low = max(hold_s[0], palm.stamps_s[0]) + range_s
+    high = min(hold_s[1], palm.stamps_s[-1]) - range_s
     return np.flatnonzero((stamps_s >= low) & (stamps_s <= high) & np.isfinite(places_m).all(axis=1))
 
 

@@ -29,7 +29,8 @@ from tactile_lab.clock import NANOSECONDS, Clock, VirtualClock
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import FINGERS
 from tactile_lab.rigs.description import Rig
-from tactile_lab.rigs.wired import force_wire, hand_setup
+from tactile_lab.rigs.wired import camera_source, force_wire, hand_setup
+from tactile_lab.rigs.wires import LocalCamera
 from tactile_lab.strict_yaml import load_model
 
 
@@ -46,6 +47,8 @@ def check_calibration(rig: Rig) -> None:
     if "camera" in rig.files:
         load_camera(rig.files["camera"])
         load_model(rig.files["markers"], MarkerSettings)
+        if rig.description.wires is not None and isinstance(camera := rig.description.wires.camera, LocalCamera):
+            camera_source(rig, camera)
 
 
 def simulated_world(rig: Rig, seed: int, object_name: str) -> SimulatedWorld:

@@ -195,7 +195,7 @@ def _biotac(tip: BioTac) -> Figures:
 
 def _camera(bench: Bench, watch: StreamWatch) -> Finding:
     assert bench.camera is not None
-    height, width = bench.camera.capture().image.shape[:2]
+    height, width = bench.picture().image.shape[:2]
     figures: Figures = {"width_px": float(width), "height_px": float(height), **watch.figures(CAMERA_LINK)}
     return _finding("camera", _problems(bench.camera), [f"{width} x {height} pixels"], figures)
 

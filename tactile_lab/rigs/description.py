@@ -110,6 +110,8 @@ class RigDescription(StrictModel):
             raise ValueError("stand_ins belong to kind wired: a simulated rig needs none")
         if self.wires is not None and bool(self.wires.fingertips) != (self.fingertips == "nano17"):
             raise ValueError("wires.fingertips belong to nano17 fingertips; BioTacs send through the palm")
+        if self.wires is not None and self.wires.camera is not None and self.calibration.camera is None:
+            raise ValueError("wires.camera needs calibration.camera and calibration.markers")
         return self
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from drivers.ati.wiring import NetBoxWiring
 from drivers.camera.calibration import load_camera
-from sessions.device_stamps import positioner_stamp, rdt_stamp
-from sessions.interpreter import BASE_LINK, fingertip_link
+from sessions.device_stamps import camera_stamp, positioner_stamp, rdt_stamp
+from sessions.interpreter import BASE_LINK, CAMERA_LINK, fingertip_link
 from sessions.raw_frames import Stamper
 from sessions.recorder import Recorder
 from sessions.traffic_settings import TrafficSettings
@@ -16,13 +16,14 @@ from tactile_lab.rigs.description import Rig
 
 
 def stampers(rig: Rig) -> Mapping[str, Stamper]:
-    """By link, what reads a device's own counter and clock out of its messages; the palm and the camera have none."""
+    """By link, what reads a device's own counter and clock out of its messages; the palm has none."""
     description = rig.description
+    always: dict[str, Stamper] = {BASE_LINK: positioner_stamp, CAMERA_LINK: camera_stamp}
     if description.fingertips != "nano17":
-        return {BASE_LINK: positioner_stamp}
+        return always
     wires = description.wires.fingertips if description.wires else {}
     boxes = [finger for finger in FINGERS if isinstance(wires.get(finger), NetBoxWiring) or not description.wires]
-    return {BASE_LINK: positioner_stamp, **{fingertip_link(finger): rdt_stamp for finger in boxes}}
+    return {**always, **{fingertip_link(finger): rdt_stamp for finger in boxes}}
 
 
 def traffic_settings(rig: Rig) -> TrafficSettings:

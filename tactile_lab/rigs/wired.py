@@ -6,12 +6,16 @@ from pathlib import Path
 
 from drivers.ati.wire import ForceWire
 from drivers.ati.wiring import NetBoxWiring, VoltsWiring, Wiring, make_wire
+from drivers.camera.calibration import load_camera
+from drivers.camera.markers import MarkerSettings
+from drivers.camera.source_settings import CameraSourceSettings, source_beside
 from drivers.emulators.wired.stand_ins import SERIAL, HandPlace, Place, StandInPlan
 from drivers.shadow.hand_setup import HandSetup
 from sessions.interpreter import HAND_LINK
 from tactile_lab.errors import CodecError, ConfigurationError
 from tactile_lab.rigs.description import Rig, gauge_role
-from tactile_lab.rigs.wires import RemoteCamera, Wires
+from tactile_lab.rigs.wires import LocalCamera, RemoteCamera, Wires
+from tactile_lab.strict_yaml import load_model
 
 
 def wires_of(rig: Rig) -> Wires:
@@ -53,6 +57,29 @@ def force_wire(rig: Rig, finger: str) -> ForceWire:
         raise ConfigurationError(error.what, where=where, hint=error.hint) from error
 
 
+def camera_source(rig: Rig, wiring: LocalCamera) -> CameraSourceSettings:
+    """A camera of this computer; what its lens and markers say need not be said again.
+
+    Raises:
+        ConfigurationError: no such camera, folder or file, or one that contradicts the lens or the markers.
+    """
+    settings, where = wiring.settings, f"{rig.source}: wires.camera"
+    lens, markers = load_camera(rig.files["camera"]), load_model(rig.files["markers"], MarkerSettings)
+    given = settings.model_fields_set
+    if "dictionary" in given and settings.dictionary != markers.dictionary:
+        what = f"looks for {settings.dictionary}, the markers are of {markers.dictionary}"
+        raise ConfigurationError(what, where=where, hint="Leave dictionary out: the marker file says it")
+    size_px = lens.size_px or settings.size_px
+    if "size_px" in given and settings.size_px != size_px:
+        stated, made = (" x ".join(map(str, size)) for size in (settings.size_px, size_px))
+        what = f"takes pictures of {stated} pixels, the lens was calibrated with {made}"
+        raise ConfigurationError(what, where=where, hint="Calibrate the camera for this size, or leave size_px out")
+    source = source_beside(settings.source, Path(rig.source).parent)
+    known = settings.model_copy(update={"source": source, "dictionary": markers.dictionary, "size_px": size_px})
+    known.place()
+    return known
+
+
 def stand_in_plan(rig: Rig, seed: int, object_name: str) -> StandInPlan:
     """What has to be emulated for a rig with stand-ins.
 
@@ -87,10 +114,12 @@ def _hand_place(rig: Rig) -> HandPlace:
 
 
 def _camera_place(rig: Rig) -> Place | None:
-    camera = wires_of(rig).camera
-    if camera is not None and not isinstance(camera, RemoteCamera):
-        raise ConfigurationError("the simulated plant feeds a camera on tcp alone", where=f"{rig.source}: wires.camera")
-    return None if camera is None else (camera.host, camera.port)
+    """Where the plant's camera is served; a camera of this computer is used as it is, and sees what it sees."""
+    camera, eye = wires_of(rig).camera, rig.description.simulation.camera
+    if isinstance(camera, RemoteCamera) and (eye.stream_hz is not None or eye.late_ms):
+        what, hint = "the stand-in camera waits for triggers, and answers at once", "Leave stream_hz and late_ms out"
+        raise ConfigurationError(what, where=f"{rig.source}: simulation.camera", hint=hint)
+    return (camera.host, camera.port) if isinstance(camera, RemoteCamera) else None
 
 
 def _box(rig: Rig, finger: str, wiring: Wiring) -> NetBoxWiring:

@@ -21,7 +21,7 @@ from sessions.state_recording import TruthReading
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.rigs.build import build_interpreter, force_ranges_N, force_tips
 from tactile_lab.rigs.description import Rig
-from tactile_lab.rigs.wired import force_wire, hand_setup, wires_of
+from tactile_lab.rigs.wired import camera_source, force_wire, hand_setup, wires_of
 from tactile_lab.rigs.wires import RemoteCamera
 
 
@@ -70,11 +70,11 @@ def _stream(rig: Rig, finger: str, observer: Observer, clock: Clock) -> SensorSt
 
 
 def _camera(rig: Rig, observer: Observer, clock: Clock) -> Camera | None:
-    if (wiring := wires_of(rig).camera) is None or "camera" not in rig.files:
+    if (wiring := wires_of(rig).camera) is None:
         return None
     link: Link
     if isinstance(wiring, RemoteCamera):
         link = TcpLink(CAMERA_LINK, wiring.host, wiring.port, clock)
     else:
-        link = CameraProcess(CAMERA_LINK, wiring.settings, clock)
+        link = CameraProcess(CAMERA_LINK, camera_source(rig, wiring), clock)
     return Camera(TappedLink(link, observer, clock), clock)

@@ -64,9 +64,9 @@ def test_wires_without_a_stand_in(tmp_path: Path) -> None:
     other = wires | {"fingertips": wires["fingertips"] | {"FF": volts}}
     with pytest.raises(ConfigurationError, match="the simulated plant feeds net-ft wires alone"):
         stand_in_plan(load_rig(changed(tmp_path, wires=other)), 0, "cube-6")
-    local = wires | {"camera": {"wire": "source", "settings": {"source": "0"}}}
-    with pytest.raises(ConfigurationError, match="feeds a camera on tcp alone"):
-        stand_in_plan(load_rig(changed(tmp_path, wires=local)), 0, "cube-6")
+    streaming = {"camera": {"stream_hz": 30.0}}
+    with pytest.raises(ConfigurationError, match="the stand-in camera waits for triggers"):
+        stand_in_plan(load_rig(changed(tmp_path, simulation=streaming)), 0, "cube-6")
     del wires["hand"]["far_end"]
     with pytest.raises(ConfigurationError, match="far_end"):
         stand_in_plan(load_rig(changed(tmp_path, wires=wires)), 0, "cube-6")

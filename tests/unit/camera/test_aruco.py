@@ -149,11 +149,31 @@ def test_a_second_pose_is_ruled_out_only_above_the_corners_noise() -> None:
     def poses(*errors_px: float) -> tuple[MarkerPose, ...]:
         return tuple(MarkerPose(Pose3(), error) for error in errors_px)
 
-    assert not is_ambiguous(poses(0.2), 3.0)
-    assert not is_ambiguous(poses(0.2, 0.7), 3.0, 0.1)
-    assert is_ambiguous(poses(0.2, 0.5), 3.0, 0.1)
-    assert is_ambiguous(poses(0.01, 0.2), 3.0, 0.1)
-    assert not is_ambiguous(poses(0.01, 0.2), 3.0)
+    assert not is_ambiguous(poses(0.2), 0.1, 4.0)
+    assert is_ambiguous(poses(0.01, 0.19), 0.1, 4.0)
+    assert not is_ambiguous(poses(0.01, 0.22), 0.1, 4.0)
+    assert is_ambiguous(poses(0.01, 0.22), 0.1, 5.0)
+    assert is_ambiguous(poses(0.2, 0.5), 0.1, 4.0)  # the better pose leaves more over than the noise would
+    assert not is_ambiguous(poses(0.2, 0.7), 0.1, 4.0)
+
+
+def test_noise_does_not_make_the_wrong_pose_the_clearly_better_one() -> None:
+    """At the worst tilts, nearly face-on: the surer it has to be the fewer are wrong, and of the clear ones none."""
+    rng, wrong, clear = np.random.default_rng(5), {2.0: 0, 5.0: 0}, {2.0: 0, 5.0: 0}
+    for _ in range(1500):
+        tilt = np.radians(rng.uniform(2.0, 8.0))
+        truth = Pose3(Rot3.RzRyRx(np.pi + tilt, 0.0, rng.uniform(-3, 3)), np.array([0.0, 0.0, 0.5]))
+        exact = CAMERA.project(transform_points(truth, marker_corners(0.035)))
+        found = marker_poses(exact + 0.1 * rng.standard_normal((4, 2)), 0.035, CAMERA)
+        errors_rad = [rotation_angle_rad(truth.between(each.camera_T_marker)) for each in found]
+        for sigmas in clear:
+            if not is_ambiguous(found, 0.1, sigmas):
+                clear[sigmas] += 1
+                wrong[sigmas] += errors_rad[0] > errors_rad[1]
+    assert clear[2.0] > 500
+    assert clear[5.0] > 20
+    assert 0 < wrong[2.0] < 0.05 * 1500
+    assert wrong[5.0] == 0
 
 
 def test_a_free_object_is_told_only_where_its_marker_allows_one_pose() -> None:

@@ -39,6 +39,23 @@ def test_a_trigger_brings_a_picture(kind: str) -> None:
         np.testing.assert_array_equal(frame.image, PICTURE)
 
 
+def test_a_picture_is_waited_for_from_look_to_look_and_polling_does_not_lose_it() -> None:
+    link = ReplayLink("camera", [[], [], [], [Datagram(encoded(".png"), 5)], [], []])
+    camera = Camera(link, VirtualClock())
+    with pytest.raises(DeviceError, match="no picture was asked for"):
+        camera.taken()
+    camera.ask()
+    assert camera.taken() is None
+    camera.poll()
+    camera.poll()
+    frame = camera.taken()
+    assert frame is not None
+    assert frame.stamp_ns == 5
+    camera.poll()
+    with pytest.raises(DeviceError, match="no picture was asked for"):
+        camera.taken()
+
+
 def test_a_late_picture_of_an_earlier_trigger_is_left_out() -> None:
     link = ReplayLink("camera", [[Datagram(encoded(".jpg"), 1)], [Datagram(encoded(".png"), 2)]])
     assert Camera(link, VirtualClock()).capture().stamp_ns == 2

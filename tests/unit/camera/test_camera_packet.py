@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -11,6 +13,9 @@ from hypothesis import strategies as st
 from drivers.camera.frames import Detection, Frame, SeenMarker
 from drivers.camera.packet import decode_packet, encode_packet, picture_of
 from drivers.links import Datagram
+from sessions.device_stamps import camera_stamp
+from sessions.raw_frames import UNSTAMPED, DeviceStamp
+from sessions.stream_counts import StreamCounts
 from tactile_lab.errors import CodecError
 
 PICTURE = cv2.imencode(".png", np.arange(48 * 64, dtype=np.int64).reshape(48, 64).astype(np.uint8))[1].tobytes()
@@ -85,3 +90,14 @@ def test_bytes_overwritten_anywhere_decode_or_raise_a_codec_error(at: int, damag
 def test_a_frame_nobody_has_looked_at_makes_no_packet() -> None:
     with pytest.raises(ValueError, match="what was detected"):
         encode_packet(Frame(0, None))
+
+
+def test_the_number_of_a_frame_is_read_without_decoding_the_rest() -> None:
+    frame = Frame(0, None, 41, 3, Detection("DICT_4X4_50", (64, 48), {}))
+    packet = encode_packet(frame)
+    assert camera_stamp(packet) == DeviceStamp(41)
+    assert camera_stamp(packet[:10]) == camera_stamp(b"\xff\xd8\xff") == camera_stamp(b"") == UNSTAMPED
+    counts = StreamCounts()
+    for counter in (41, 42, 45):
+        counts.take("/link/camera/rx", 0, camera_stamp(encode_packet(replace(frame, counter=counter))))
+    assert counts.gaps["/link/camera/rx"] == 2

@@ -181,9 +181,11 @@ class FakeDevice:
             self.clock.sleep_until_ns(self.clock.now_ns() + self.work_ns)
         return self.link.receive()[-1:]
 
-    def capture(self):
+    def ask(self):
         self.link.send(b"TRIGGER")
-        return self.link.receive()[-1]
+
+    def taken(self):
+        return (self.link.receive() or [None])[-1]
 
     def stop(self):
         self.calls.append(f"stop {self.name}")

@@ -209,6 +209,24 @@ def test_unknown_fingers_are_refused_before_anything_is_recorded():
     assert memory.messages == []
 
 
+def test_the_cycles_go_on_while_a_picture_is_on_its_way(monkeypatch):
+    rig = make_rig()
+    rig.bench.connect()
+    peer = rig.peers["camera"]
+    answers = iter([list, list, list, list, peer.read])
+    monkeypatch.setattr(peer, "read", lambda: next(answers)())
+    before, looked = rig.bench.counts.cycles, []
+
+    def cycle():
+        looked.append(rig.bench.clock.now_ns())
+        rig.bench.cycle()
+
+    assert rig.bench.truth_frame(cycle) is not None
+    assert rig.bench.counts.cycles - before == len(looked) == 4
+    assert rig.bench.counts.overruns == 0
+    rig.bench.close()
+
+
 def test_without_a_camera_there_is_no_truth_frame():
     rig = make_rig()
     rig.bench.connect()
