@@ -1,60 +1,37 @@
 """What a force fingertip is like: its sensor's mounting, its weight, its shape, from wrenches in known orientations.
 
 * Untouched, the hand turned: what the weight does gives mass and centre of mass, and the bias.
-* Pressed on a level plate: the force points up, which gives the sensor's mounting angle and the sign of its readings.
-* Pressed and rolled on a plate: the torque tells where the force acts, which gives the ellipsoid.
+* Pressed on a level plate: the force points about up, which gives the sign of the readings and, roughly, the sensor's
+  mounting angle; roughly, because of friction.
+* Pressed and rolled on a plate: the torque tells where the force acts, which gives mounting and ellipsoid.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from gtsam import Pose3, Rot3
-from pydantic import Field
 from scipy.optimize import OptimizeResult, least_squares
 
-from calibration.admission import Installation
+from calibration.fingertip_data import FingertipData, WrenchPose
 from calibration.hand_eye import nearest_rotation
-from drivers.fingertip import GRAVITY, FingertipCalibration, RigidTransform, Vector3
+from calibration.motion_check import Check, MotionReport
+from drivers.fingertip import GRAVITY, FingertipCalibration, RigidTransform
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.strict_yaml import StrictModel, load, validate
 
 LEAST_ORIENTATIONS, LEAST_PRESSES = 6, 6
 LEAST_SPREAD = 0.05
 """Smallest mean squared share of directions along any axis: below it a direction was never turned to."""
 
-PRESS_N = 0.5
-LARGEST_TILT_rad = float(np.radians(20.0))
+PRESS_N = 0.3
+LARGEST_TILT_rad = float(np.radians(40.0))
+"""Of the forces from the plate's normal: friction allows some, and a finger gives way along itself."""
 
-Square3 = tuple[Vector3, Vector3, Vector3]
-Six = tuple[float, float, float, float, float, float]
-
-
-class WrenchPose(StrictModel):
-    """A mean wrench, N and N m, sensor frame, in a known orientation of the distal frame in the world (z up)."""
-
-    world_R_distal: Square3
-    wrench: Six
-
-
-class FingertipData(StrictModel):
-    """A file of wrenches of one finger.
-
-    Attributes:
-        free: untouched, in several orientations.
-        presses: on a level plate from above, force upwards, in several orientations (rolled about).
-    """
-
-    format: Literal["tactile-fingertip-data/1"] = "tactile-fingertip-data/1"
-    rig: str = Field(min_length=1)
-    finger: Literal["FF", "MF", "RF", "LF", "TH"]
-    serial: str = ""
-    free: tuple[WrenchPose, ...]
-    presses: tuple[WrenchPose, ...]
+_LEVER_m, _WEIGHT_N, _FRICTION_rad, _SHAPE_m = 3e-4, 0.008, 0.3, 1e-3
+"""Errors of a press's lever, of an untouched force with its drift, of a force's direction, and of the shape before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,23 +42,17 @@ class FingertipFit:
         calibration: the new one.
         turned_rad: by how much the mounting differs from the one before.
         sigmas: standard deviations: mass (kg), centre of mass (m), mounting (rad), ellipsoid's centre and axes (m).
-        rms_force_N, rms_torque_Nm: what is left of the untouched wrenches, and of the presses' torques.
+        rms_force_N: what is left of the untouched forces, per axis.
+        rms_lever_m: what is left of the presses' torques, per newton and axis.
+        tilt_rad: root mean square angle between the presses' forces and the plate's normal.
     """
 
     calibration: FingertipCalibration
     turned_rad: float
     sigmas: dict[str, float]
     rms_force_N: float
-    rms_torque_Nm: float
-
-
-def load_fingertip_data(path: Path, here: Installation) -> FingertipData:
-    """Read wrenches of this rig. Raises ConfigurationError."""
-    data = validate(load(path), FingertipData, where=str(path))
-    if data.rig != here.rig:
-        hint = "Name the rig they are of with --rig"
-        raise ConfigurationError(f"was recorded on rig {data.rig}, not on {here.rig}", where=str(path), hint=hint)
-    return data
+    rms_lever_m: float
+    tilt_rad: float
 
 
 def fit_fingertip(data: FingertipData, before: FingertipCalibration) -> FingertipFit:
@@ -91,35 +62,69 @@ def fit_fingertip(data: FingertipData, before: FingertipCalibration) -> Fingerti
         ConfigurationError: too few or too similar orientations, soft presses, or readings of the opposite sign.
     """
     where = f"fingertip {data.finger}"
-    down = np.array([-np.array(pose.world_R_distal)[2] for pose in data.free])
+    down, up = -_up(data.free), _up(data.presses)
     _check_spread(down, LEAST_ORIENTATIONS, "untouched wrenches", where)
     free, pressed = (np.array([pose.wrench for pose in part]) for part in (data.free, data.presses))
-    up = np.array([np.array(pose.world_R_distal)[2] for pose in data.presses])
     _check_spread(up, LEAST_PRESSES, "presses", where, rank=2)
     bias = _bias(free, down)
-    sensor_R_distal = _mounting(pressed[:, :3] - bias[:3], up, where)
-    weight = _weight(free - bias, down @ sensor_R_distal.T)
+    start = _mounting(pressed[:, :3] - bias[:3], up, free[:, :3] - bias[:3], down, where)
+    found = _refined(start, free - bias, down, pressed - bias, up, before)
+    sensor_R_distal, shape = start @ Rot3.Expmap(found.x[:3]).matrix(), found.x[3:]
     place = np.array(before.distal_T_sensor.translation_m)
+    weight = _weight(free - bias, down @ sensor_R_distal.T)
     loads = pressed - bias - _weights(weight, -up @ sensor_R_distal.T)
-    shape = _shape(loads, sensor_R_distal, place, before)
     rest = free - bias - _weights(weight, down @ sensor_R_distal.T)
+    forces, torques = loads[:, :3] @ sensor_R_distal, loads[:, 3:] @ sensor_R_distal
     turned = Rot3(before.distal_T_sensor.pose().rotation().matrix() @ sensor_R_distal)
     return FingertipFit(
-        calibration=_calibration(before, sensor_R_distal, weight, shape.x, place),
+        calibration=_calibration(before, sensor_R_distal, weight, shape, place),
         turned_rad=float(np.linalg.norm(Rot3.Logmap(turned))),
-        sigmas=_sigmas(rest, shape, len(data.free)),
-        rms_force_N=float(np.sqrt(np.mean(rest[:, :3] ** 2))),
-        rms_torque_Nm=float(np.sqrt(np.mean(np.square(shape.fun)))),
+        sigmas=_sigmas(rest, found, weight[0]),
+        rms_force_N=_rms(rest[:, :3]),
+        rms_lever_m=_rms(_levers(shape, forces, torques, up, place)),
+        tilt_rad=_rms(_angles(forces, up)),
     )
+
+
+def wrench_motion(data: FingertipData) -> MotionReport:
+    """Whether the orientations in some data are enough, and what is missing."""
+    turn = "turn the hand so that the fingertip points down, level, sideways and up"
+    return MotionReport(
+        (
+            Check("untouched wrenches", len(data.free), LEAST_ORIENTATIONS, "", "take more"),
+            Check("spread of their orientations", _spread(_up(data.free), 3), LEAST_SPREAD, "of 0.33", turn),
+            Check("presses", len(data.presses), LEAST_PRESSES, "", "press more"),
+            Check("spread of their orientations", _spread(_up(data.presses), 2), LEAST_SPREAD, "of 0.5", "roll more"),
+        )
+    )
+
+
+def _up(poses: Sequence[WrenchPose]) -> Array:
+    """The world's z axis in each distal frame, shape (n, 3)."""
+    return np.array([pose.world_R_distal[2] for pose in poses]).reshape(-1, 3)
+
+
+def _spread(directions: Array, rank: int) -> float:
+    """Mean squared share of the directions along the weakest of so many axes."""
+    return float(np.linalg.eigvalsh(directions.T @ directions / max(1, len(directions)))[3 - rank])
 
 
 def _check_spread(directions: Array, least: int, what: str, where: str, rank: int = 3) -> None:
     if len(directions) < least:
         raise ConfigurationError(f"{len(directions)} {what}, {least} needed", where=where, hint="Record more")
-    spread = np.linalg.eigvalsh(directions.T @ directions / len(directions))
-    if spread[3 - rank] < LEAST_SPREAD:
+    if _spread(directions, rank) < LEAST_SPREAD:
         hint = "Turn the hand so that the fingertip points down, level and sideways"
         raise ConfigurationError(f"the {what} are all in nearly the same orientation", where=where, hint=hint)
+
+
+def _angles(forces: Array, normals: Array) -> Array:
+    """Angles between forces and unit normals, shape (n,)."""
+    cosines = np.sum(forces * normals, axis=1) / np.linalg.norm(forces, axis=1)
+    return np.asarray(np.arccos(np.clip(cosines, -1.0, 1.0)))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _bias(free: Array, down: Array) -> Array:
@@ -128,19 +133,22 @@ def _bias(free: Array, down: Array) -> Array:
     return np.asarray(np.linalg.lstsq(columns, free, rcond=None)[0][0])
 
 
-def _mounting(forces: Array, up: Array, where: str) -> Array:
-    """Rotation from the distal frame into the sensor's, from forces that point up. Raises ConfigurationError."""
+def _mounting(forces: Array, up: Array, weights: Array, down: Array, where: str) -> Array:
+    """Rotation from the distal frame into the sensor's, from presses about upwards and weights downwards.
+
+    Raises:
+        ConfigurationError: soft presses, the opposite sign, or forces that fit no mounting.
+    """
     size = np.linalg.norm(forces, axis=1)
     if size.min() < PRESS_N:
         hint = f"Press with {PRESS_N:g} N or more"
         raise ConfigurationError(f"a press of only {size.min():.2f} N", where=where, hint=hint)
     directions = forces / size[:, None]
-    rotation = nearest_rotation(directions.T @ up)
-    angles = np.arccos(np.clip(np.sum(directions * (up @ rotation.T), axis=1), -1.0, 1.0))
-    opposite = np.arccos(
-        np.clip(-np.sum(directions * (up @ nearest_rotation(-directions.T @ up).T), axis=1), -1.0, 1.0)
-    )
-    if opposite.mean() < 0.5 * angles.mean():
+    pulled = weights.T @ down / max(_rms(weights), 1e-9)
+    aligned = directions.T @ up + pulled
+    rotation, mirrored = nearest_rotation(aligned), nearest_rotation(-aligned)
+    angles, opposite = _angles(forces, up @ rotation.T), _angles(-forces, up @ mirrored.T)
+    if np.linalg.det(aligned) < 0.0 and opposite.mean() < angles.mean():  # no rotation turns all directions over
         hint = "The sensor reports what the tip does to the finger: set its tool transformation, or swap the sign"
         raise ConfigurationError("forces have the opposite sign", where=where, hint=hint)
     if angles.mean() > LARGEST_TILT_rad:
@@ -167,21 +175,44 @@ def _weights(weight: Array, down_sensor: Array) -> Array:
     return np.hstack([forces, np.cross(weight[1:], GRAVITY * down_sensor)])
 
 
-def _shape(loads: Array, sensor_R_distal: Array, place: Array, before: FingertipCalibration) -> OptimizeResult:
-    """Centre and semi-axes whose contact points explain the torques, started from the shape before."""
-    forces, torques = loads[:, :3] @ sensor_R_distal, loads[:, 3:] @ sensor_R_distal
-    outward = -forces / np.linalg.norm(forces, axis=1, keepdims=True)
+def _levers(shape: Array, forces: Array, torques: Array, up: Array, place: Array) -> Array:
+    """What the contact points of a shape on a level plate leave of the torques, per newton, shape (n, 3), metres."""
+    centre, axes = shape[:3], shape[3:]
+    points = centre - axes**2 * up / np.linalg.norm(axes * up, axis=1, keepdims=True)
     size = np.linalg.norm(forces, axis=1, keepdims=True)
-    start = np.array([*before.centre_distal_m, *before.semi_axes_m])
+    return np.asarray((torques - np.cross(points - place, forces)) / size)
 
-    def misfit(shape: Array) -> Array:
-        centre, axes = shape[:3], shape[3:]
-        scaled = axes * outward
-        points = centre + axes * scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
-        sensed = (torques - np.cross(points - place, forces)) / size  # metres of lever
-        return np.asarray(np.concatenate([sensed.ravel(), 0.05 * (shape - start)]))
 
-    return least_squares(misfit, start, bounds=([-0.05] * 3 + [0.002] * 3, [0.05] * 3 + [0.03] * 3))
+def _refined(
+    start: Array, free: Array, down: Array, pressed: Array, up: Array, before: FingertipCalibration
+) -> OptimizeResult:
+    """A turn from the mounting to start with, centre and semi-axes that explain weights, levers and directions.
+
+    The levers tell the mounting whatever the friction; the shape stays near the one before where nothing tells it.
+    """
+    place, shape = np.array(before.distal_T_sensor.translation_m), _shape_before(before)
+
+    def misfit(unknowns: Array) -> Array:
+        rotation = start @ Rot3.Expmap(unknowns[:3]).matrix()
+        weight = _weight(free, down @ rotation.T)
+        loads = pressed - _weights(weight, -up @ rotation.T)
+        forces, torques = loads[:, :3] @ rotation, loads[:, 3:] @ rotation
+        weights = free[:, :3] - weight[0] * GRAVITY * down @ rotation.T
+        directions = forces / np.linalg.norm(forces, axis=1, keepdims=True) - up
+        parts = (
+            _levers(unknowns[3:], forces, torques, up, place) / _LEVER_m,
+            weights / _WEIGHT_N,
+            directions / _FRICTION_rad,
+            (unknowns[3:] - shape) / _SHAPE_m,
+        )
+        return np.concatenate([part.ravel() for part in parts])
+
+    scale = np.repeat([0.1, 1e-3], [3, 6])
+    return least_squares(misfit, np.concatenate([np.zeros(3), shape]), x_scale=scale)
+
+
+def _shape_before(before: FingertipCalibration) -> Array:
+    return np.array([*before.centre_distal_m, *before.semi_axes_m])
 
 
 def _calibration(
@@ -201,12 +232,15 @@ def _calibration(
     return before.model_copy(update=changes)
 
 
-def _sigmas(rest: Array, shape: OptimizeResult, count: int) -> dict[str, float]:
-    force, torque = (float(np.sqrt(np.mean(part**2))) for part in (rest[:, :3], rest[:, 3:]))
-    spread = np.linalg.pinv(shape.jac.T @ shape.jac) * float(np.mean(np.square(shape.fun)))
+def _sigmas(rest: Array, found: OptimizeResult, mass_kg: float) -> dict[str, float]:
+    force, torque = _rms(rest[:, :3]), _rms(rest[:, 3:])
+    weight_N = max(GRAVITY * mass_kg, 1e-9) * float(np.sqrt(len(rest)))
+    spread = np.linalg.pinv(found.jac.T @ found.jac) * max(1.0, float(np.mean(np.square(found.fun))))
+    variances = np.diag(spread)
     return {
-        "mass_kg": force / GRAVITY / np.sqrt(max(1, count)),
-        "com_m": torque / max(force, 1e-9) / np.sqrt(max(1, count)) if force else 0.0,
-        "centre_m": float(np.sqrt(spread[:3, :3].trace())),
-        "semi_axes_m": float(np.sqrt(spread[3:, 3:].trace())),
+        "mass_kg": force / GRAVITY / float(np.sqrt(len(rest))),
+        "com_m": float(torque / weight_N),
+        "mounting_rad": float(np.sqrt(variances[:3].sum())),
+        "centre_m": float(np.sqrt(variances[3:6].sum())),
+        "semi_axes_m": float(np.sqrt(variances[6:].sum())),
     }

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, TypeAlias
 
 from pydantic import Field
 
 from calibration.board_problem import BoardNoise, BoardProblem
+from calibration.guided_steps import GuidedSteps
 from calibration.motion_check import MotionNeeds, MotionReport, check_pairs, check_touches, check_views
 from calibration.observations import Touch, View
 from calibration.pair_problem import PairProblem
@@ -53,29 +54,6 @@ class WizardSettings(StrictModel):
         return QualityLimits.model_validate({**VIEW_LIMITS, **self.limits.model_dump(exclude_unset=True)})
 
 
-class Station(Protocol):
-    """Where observations are made: a rig, or a person with one."""
-
-    def measure(self, planned: Planned) -> Observation:
-        """Make one planned touch or picture. Raises TactileLabError when it did not come off."""
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step to show.
-
-    Attributes:
-        number, count: of the planned ones, from 1.
-        instruction: what is to be done, in words.
-        planned: the touch or picture.
-    """
-
-    number: int
-    count: int
-    instruction: str
-    planned: Planned
-
-
 @dataclass(frozen=True, eq=False)
 class ForearmResult:
     """A solved calibration.
@@ -96,7 +74,7 @@ class ForearmResult:
 
 
 @dataclass
-class ForearmWizard:
+class ForearmWizard(GuidedSteps[Planned, Observation]):
     """One run through the wizard.
 
     Attributes:
@@ -112,28 +90,10 @@ class ForearmWizard:
     settings: WizardSettings = field(default_factory=WizardSettings)
     _taken: list[tuple[int, Observation]] = field(default_factory=list)
 
-    # --- measuring ---------------------------------------------------------------------------------------------
-
-    def steps(self) -> tuple[Step, ...]:
-        """All planned steps."""
-        count = len(self.plan)
-        return tuple(Step(n + 1, count, planned.instruction, planned) for n, planned in enumerate(self.plan))
-
-    def measure(self, step: Step, station: Station) -> Observation:
-        """Do one step; a step that is done again replaces its observation. Raises TactileLabError."""
-        observation = station.measure(step.planned)
-        self._taken = [(number, old) for number, old in self._taken if number != step.number]
-        self._taken.append((step.number, observation))
-        return observation
-
-    def undo(self) -> int | None:
-        """Take the last observation back; gives its step's number, None when there is none."""
-        return self._taken.pop()[0] if self._taken else None
-
     @property
     def measured(self) -> ForearmData:
         """The data with everything measured so far."""
-        found = [observation for _, observation in sorted(self._taken, key=lambda item: item[0])]
+        found = [observation for _, observation in self.observed()]
         touches = tuple(item for item in found if isinstance(item, Touch))
         views = tuple(item for item in found if isinstance(item, View))
         return replace(self.data, touches=touches, views=views)

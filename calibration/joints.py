@@ -6,7 +6,7 @@ each point is replaced, so that reading them gives the corrected angle exactly.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -27,6 +27,20 @@ GAIN_SPREAD_deg = 20.0
 
 LARGEST_deg, LARGEST_GAIN = 15.0, 0.2
 """A correction beyond these is no calibration: a wrong joint, a wrong pose or a wrong table."""
+
+
+class JointLimits(StrictModel):
+    """What the corrections must keep to, to pass.
+
+    Attributes:
+        left_deg: what is left of a joint's poses, root mean square.
+        sigma_deg: standard deviation of a joint's shift.
+        poses: the least of each joint: what a single pose says nothing checks.
+    """
+
+    left_deg: float = Field(default=1.0, gt=0.0)
+    sigma_deg: float = Field(default=0.6, gt=0.0)
+    poses: int = Field(default=2, ge=1)
 
 
 class JointPose(StrictModel):
@@ -136,10 +150,47 @@ def corrected_tables(path: Path, corrections: Mapping[str, JointCorrection]) -> 
     return {"sr_calibrations": plain, "sr_calibrations_coupled": coupled}
 
 
+def judge_joints(
+    corrections: Mapping[str, JointCorrection], limits: JointLimits | None = None
+) -> dict[str, tuple[str, ...]]:
+    """What is outside its limit, in words, by joint; empty where all is well."""
+    limits = limits or JointLimits()
+    return {joint: tuple(_faults(found, limits)) for joint, found in corrections.items()}
+
+
+def _faults(found: JointCorrection, limits: JointLimits) -> Iterator[str]:
+    if 0 < found.poses < limits.poses:
+        yield f"{found.poses} pose, {limits.poses} needed"
+    if not found.rms_deg <= limits.left_deg:
+        yield f"{found.rms_deg:.2f} deg left, limit {limits.left_deg:.2f}"
+    if not found.sigma_deg <= limits.sigma_deg:
+        yield f"sigma {found.sigma_deg:.2f} deg, limit {limits.sigma_deg:.2f}"
+
+
 def joints_record(
-    path: Path, corrections: Mapping[str, JointCorrection], method: str, here: Installation, notes: str = ""
+    path: Path,
+    corrections: Mapping[str, JointCorrection],
+    method: str,
+    here: Installation,
+    notes: str = "",
+    *,
+    trusted: bool = True,
+    limits: JointLimits | None = None,
 ) -> CalibrationRecord:
-    """The record of corrected tables. Raises ConfigurationError."""
+    """The record of corrected tables; it fails when a joint is outside its limits.
+
+    Args:
+        path: the hand's tables so far.
+        corrections: by joint.
+        method, here, notes: for the record.
+        trusted: whether what the corrections were found from kept to its own limits.
+        limits: of the joints.
+
+    Raises:
+        ConfigurationError: the tables can not be used, or a correction is too large to be one.
+    """
+    limits = limits or JointLimits()
+    passed = trusted and not any(judge_joints(corrections, limits).values())
     return new_record(
         "joints",
         rig=here.rig,
@@ -156,8 +207,8 @@ def joints_record(
             }
             for joint, found in corrections.items()
         },
-        limits={"shift_deg": LARGEST_deg, "gain": LARGEST_GAIN},
-        verdict="PASS",
+        limits={"shift_deg": LARGEST_deg, "gain": LARGEST_GAIN, **limits.model_dump()},
+        verdict="PASS" if passed else "FAIL",
         notes=notes,
     )
 

@@ -12,8 +12,9 @@ import typer
 
 from tactile_lab.cli.calibrate_biotac import biotac
 from tactile_lab.cli.calibrate_camera import camera
+from tactile_lab.cli.calibrate_fingertip import fingertip
 from tactile_lab.cli.calibrate_forearm import forearm
-from tactile_lab.cli.calibrate_hand import electrodes, fingertip, joints
+from tactile_lab.cli.calibrate_hand import electrodes, joints
 from tactile_lab.cli.options import Json, NoInput
 
 app = typer.Typer(help="Calibrations: make one, look at one.", no_args_is_help=True)

@@ -11,8 +11,7 @@ import typer
 from tactile_lab.cli.options import Json, NoInput, RigName
 
 if TYPE_CHECKING:
-    from calibration.forearm_wizard import ForearmResult, ForearmWizard, Station, Step
-    from calibration.motion_check import MotionReport
+    from calibration.forearm_wizard import ForearmResult, ForearmWizard
     from calibration.recordings import ForearmData
     from calibration.store import CalibrationRecord
     from tactile_lab.cli.wizard import Asker
@@ -145,6 +144,7 @@ def _measured(
     touches: int,
     pictures: int | None,
 ) -> ForearmData:
+    from tactile_lab.cli.calibrate_steps import measure_all
     from tactile_lab.workflow.calibrating import ForearmRequest, forearm_wizard
 
     request = ForearmRequest(rig, method.value, seed, geometry, board, fingers, touches, pictures, settings)
@@ -160,58 +160,6 @@ def _tell_plan(rig: str, wizard: ForearmWizard) -> None:
 
     what = "touches of known geometry" if wizard.method == "touch" else "pictures of the board on the hand"
     say(f"Forearm to world on rig {rig}: {len(wizard.plan)} {what}", "bold")
-
-
-def measure_all(wizard: ForearmWizard, station: Station, asker: Asker) -> None:
-    """Go through the steps; when all are done, tell what is missing, and let a person add or give up.
-
-    Raises:
-        InterruptionError: the person quits.
-        SafetyError: a limit was passed.
-    """
-    steps, index = wizard.steps(), 0
-    while index < len(steps):
-        index = _one_step(wizard, steps, index, station, asker)
-    _tell_motion(wizard.motion())
-
-
-def _one_step(wizard: ForearmWizard, steps: tuple[Step, ...], index: int, station: Station, asker: Asker) -> int:
-    """Do, skip or take back a step; gives the number of the next one."""
-    step = steps[index]
-    answers = {"": "measure", "s": "skip", "u": "undo the last", "d": "done measuring"}
-    answer = asker.choose(f"{step.number}/{step.count} {step.instruction}", answers, "")
-    if answer == "d":
-        return len(steps)
-    if answer == "u":
-        undone = wizard.undo()
-        return index if undone is None else undone - 1
-    if answer == "" and not _measure(wizard, step, station, asker):
-        return index
-    return index + 1
-
-
-def _measure(wizard: ForearmWizard, step: Step, station: Station, asker: Asker) -> bool:
-    """Measure one step; False to ask for it again."""
-    from tactile_lab.cli.console import say, warn
-    from tactile_lab.errors import DeviceError
-
-    try:
-        wizard.measure(step, station)
-    except DeviceError as error:
-        warn(str(error))
-        return asker.choose("Not measured. Again, or skip it?", {"s": "skip", "a": "again"}, "s") == "s"
-    say(f"{step.number}/{step.count} {step.instruction}: done", "dim")
-    return True
-
-
-def _tell_motion(report: MotionReport) -> None:
-    from tactile_lab.cli.console import show_table
-
-    rows = [
-        [check.name, f"{check.value:.4g} {check.unit}", f"{check.needed:.4g}", "enough" if check.ok else check.advice]
-        for check in report.checks
-    ]
-    show_table("Motion", ["", "is", "needed", ""], rows, right=(1, 2))
 
 
 def _solved(data: ForearmData, settings: CalibrationSettings) -> ForearmResult:

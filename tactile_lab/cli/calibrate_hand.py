@@ -1,4 +1,4 @@
-"""``tactile-lab calibrate joints`` and ``calibrate fingertip``: from recorded poses, contacts and wrenches."""
+"""``tactile-lab calibrate joints`` and ``calibrate electrodes``: from recorded poses, contacts and counts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from tactile_lab.cli.options import Json, NoInput, RigName
 
 if TYPE_CHECKING:
     from calibration.joints import JointCorrection
-    from calibration.store import CalibrationRecord
 
 Source = Annotated[Path, typer.Option("--from", help="Recorded data.")]
 Replace = Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")]
@@ -35,26 +34,36 @@ def joints(
     body with several fingers (tactile-forearm-data/1, as calibrate forearm --record writes them): then those joints
     are corrected whose offset the contacts tell.
 
-    Exit code 0: done; 2: the data can not be used.
+    Exit code 0: PASS; 2: the data can not be used; 3: FAIL, outside a limit (kept as NAME.failed.yaml, which sessions
+    refuse).
     """
-    from calibration.joints import joints_record
-    from tactile_lab.cli.console import show_table
+    from calibration.joints import joints_record, judge_joints
+    from tactile_lab.cli.calibrate_steps import store_result
+    from tactile_lab.cli.console import say, show_table
+    from tactile_lab.cli.wizard import Asker
     from tactile_lab.rigs.description import load_rig
 
     described = load_rig(rig)
-    method, corrections = _corrections(source, rig)
-    rows = [
-        [joint, f"{c.shift_deg:+.2f}", f"{c.sigma_deg:.2f}", f"{c.gain:.3f}", f"{c.rms_deg:.2f}", str(c.poses or "")]
-        for joint, c in corrections.items()
-    ]
-    show_table("Joints", ["joint", "shift, deg", "sigma", "gain", "left, deg", "poses"], rows, right=(1, 2, 3, 4, 5))
+    method, corrections, trusted = _corrections(source, rig)
+    faults = judge_joints(corrections)
+    rows = [_joint_row(joint, found, faults[joint]) for joint, found in corrections.items()]
+    columns = ["joint", "shift, deg", "sigma", "gain", "left, deg", "poses", ""]
+    show_table("Joints", columns, rows, right=(1, 2, 3, 4, 5))
+    if not trusted:
+        say("the contacts are outside their limits: see tactile-lab calibrate forearm", "bold red")
     here = described.installation
-    record = joints_record(described.files["joints"], corrections, method, here, notes)
-    _store(out or Path("calibrations") / here.rig / "joints.yaml", record, replace, no_input, as_json)
+    record = joints_record(described.files["joints"], corrections, method, here, notes, trusted=trusted)
+    asker = Asker(no_input, "calibrate joints")
+    store_result(out or Path("calibrations") / here.rig / "joints.yaml", record, replace, asker, no_input, as_json)
 
 
-def _corrections(source: Path, rig: str) -> tuple[str, dict[str, JointCorrection]]:
-    """Corrections and their method, from either kind of data. Raises ConfigurationError."""
+def _joint_row(joint: str, found: JointCorrection, faults: tuple[str, ...]) -> list[str]:
+    figures = [f"{found.shift_deg:+.2f}", f"{found.sigma_deg:.2f}", f"{found.gain:.3f}", f"{found.rms_deg:.2f}"]
+    return [joint, *figures, str(found.poses or ""), "OUTSIDE: " + "; ".join(faults) if faults else "ok"]
+
+
+def _corrections(source: Path, rig: str) -> tuple[str, dict[str, JointCorrection], bool]:
+    """Method, corrections, and whether their data kept to their limits. Raises ConfigurationError."""
     from calibration.forearm_record import check_origin
     from calibration.forearm_wizard import solve_forearm
     from calibration.joints import from_contacts, from_poses, load_poses
@@ -65,64 +74,14 @@ def _corrections(source: Path, rig: str) -> tuple[str, dict[str, JointCorrection
 
     here, content = load_rig(rig).installation, load(source)
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        return "known poses", from_poses(load_poses(source, here).poses)
+        return "known poses", from_poses(load_poses(source, here).poses), True
     data = load_data(source)
     check_origin(data, here, str(source))
     if not data.touches:
         hint = "Record touches: tactile-lab calibrate forearm --method touch --record FILE"
         raise ConfigurationError("holds pictures, which tell no finger's joints", where=str(source), hint=hint)
-    return "contacts", from_contacts(solve_forearm(data).solution.offsets)
-
-
-def fingertip(
-    source: Source,
-    rig: RigName = "sim",
-    out: Annotated[
-        Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/fingertips.yaml")
-    ] = None,
-    replace: Replace = False,
-    notes: Notes = "",
-    as_json: Json = False,
-    no_input: NoInput = False,
-) -> None:
-    """Find a force fingertip's mounting, sign, weight and shape from wrenches in known orientations.
-
-    The data (tactile-fingertip-data/1) are mean wrenches: untouched in several orientations of the hand, and pressed
-    and rolled on a level plate. The other fingers keep what the rig's file says.
-
-    Exit code 0: done; 2: the data can not be used.
-    """
-    from math import degrees
-
-    from calibration.fingertip_fit import fit_fingertip, load_fingertip_data
-    from calibration.fingertip_record import fingertip_record
-    from drivers.fingertip import load_fingertips
-    from tactile_lab.cli.console import show_facts
-    from tactile_lab.errors import ConfigurationError
-    from tactile_lab.rigs.description import load_rig
-
-    described = load_rig(rig)
-    if described.description.fingertips != "nano17":
-        hint = "See calibrate biotac for BioTacs"
-        raise ConfigurationError("has no force fingertips", where=described.source, hint=hint)
-    here = described.installation
-    data, tips = load_fingertip_data(source, here), load_fingertips(described.files["fingertips"])
-    if data.finger not in tips:
-        hint = "Add its nominal values to the file first"
-        raise ConfigurationError(f"does not name {data.finger}", where=str(described.files["fingertips"]), hint=hint)
-    fit = fit_fingertip(data, tips[data.finger])
-    new = fit.calibration
-    facts = [
-        ("mounting turned by", f"{degrees(fit.turned_rad):.2f} deg"),
-        ("mass", f"{1e3 * new.mass_kg:.2f} +- {1e3 * fit.sigmas['mass_kg']:.2f} g"),
-        ("centre of mass", _millimetres(new.com_distal_m)),
-        ("ellipsoid's centre", _millimetres(new.centre_distal_m)),
-        ("semi-axes", _millimetres(new.semi_axes_m)),
-        ("left of the forces", f"{1e3 * fit.rms_force_N:.1f} mN"),
-    ]
-    show_facts(f"Fingertip {data.finger}", facts)
-    record = fingertip_record(data, fit, tips, here, notes)
-    _store(out or Path("calibrations") / here.rig / "fingertips.yaml", record, replace, no_input, as_json)
+    result = solve_forearm(data)
+    return "contacts", from_contacts(result.solution.offsets), result.quality.passed
 
 
 def electrodes(source: Source, as_json: Json = False, no_input: NoInput = False) -> None:
@@ -147,27 +106,3 @@ def electrodes(source: Source, as_json: Json = False, no_input: NoInput = False)
         say("all well" if not faults else f"{len(faults)} faulty", "bold red" if faults else "bold green")
     if faults:
         raise typer.Exit(3)
-
-
-def _millimetres(values: tuple[float, float, float]) -> str:
-    return "  ".join(f"{1e3 * value:.2f}" for value in values) + " mm"
-
-
-def _store(file: Path, record: CalibrationRecord, replace: bool, no_input: bool, as_json: bool) -> None:
-    """Ask, write, and tell."""
-    from calibration.store import write_record
-    from tactile_lab.calibration_file import plain
-    from tactile_lab.cli.calibration_tables import tell_verdict
-    from tactile_lab.cli.console import emit_json, say
-    from tactile_lab.cli.wizard import Asker, may_write
-
-    asker = Asker(no_input, f"calibrate {record.kind}")
-    may_write(file, replace, asker, no_input)
-    if not asker.agree(f"Store it as {file}?"):
-        raise asker.ended()
-    write_record(file, record)
-    if as_json:
-        emit_json({"file": str(file), **plain(record)})
-    tell_verdict(record)
-    say(f"stored  {file}")
-    say(f"To use it, name it in the rig file: calibration.{record.kind}: {file}")

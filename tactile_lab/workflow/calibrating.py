@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -164,12 +164,17 @@ def _data(rig: Rig, method: str) -> ForearmData:
 
 def _prepared(rig: Rig, request: ForearmRequest) -> Rig:
     """A simulated rig with its object out of the way, and with a board glued on a little askew."""
-    changes: dict[str, object] = {"start": _ASIDE}
+    changes: dict[str, object] = {}
     if request.method == "marker" and rig.description.simulation.hand_board is None:
         board = hand_board(rig, request)
         if isinstance(board, GridBoard):
             changes["hand_board"] = HandBoard(board=board, palm_T_board=_askew(request.seed))
-    simulation = rig.description.simulation.model_copy(update=changes)
+    return cleared(rig, changes)
+
+
+def cleared(rig: Rig, changes: Mapping[str, object] | None = None) -> Rig:
+    """A simulated rig with its object out of the way, and with further changes of the simulation."""
+    simulation = rig.description.simulation.model_copy(update={"start": _ASIDE, **(changes or {})})
     return replace(rig, description=rig.description.model_copy(update={"simulation": simulation}))
 
 

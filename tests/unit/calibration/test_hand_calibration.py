@@ -6,7 +6,8 @@ from gtsam import Rot3
 
 from calibration.admission import Installation
 from calibration.electrodes import faulty_electrodes, load_untouched
-from calibration.fingertip_fit import FingertipData, WrenchPose, fit_fingertip
+from calibration.fingertip_data import FingertipData, WrenchPose
+from calibration.fingertip_fit import fit_fingertip
 from calibration.fingertip_record import fingertip_record
 from calibration.joints import JointPose, corrected_tables, from_contacts, from_poses, joints_record, load_poses
 from calibration.refinement import JointOffset

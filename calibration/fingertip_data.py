@@ -1,0 +1,72 @@
+"""Mean wrenches of a force fingertip in known orientations, and their files."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Literal
+
+import yaml
+from pydantic import Field
+
+from calibration.admission import Installation
+from drivers.fingertip import Vector3
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.strict_yaml import StrictModel, load, validate
+
+Square3 = tuple[Vector3, Vector3, Vector3]
+Six = tuple[float, float, float, float, float, float]
+
+
+class WrenchPose(StrictModel):
+    """A mean wrench, N and N m, sensor frame, in a known orientation of the distal frame in the world (z up)."""
+
+    world_R_distal: Square3
+    wrench: Six
+
+
+def wrench_pose(world_R_distal: Array, wrench: Array) -> WrenchPose:
+    """From arrays, shapes (3, 3) and (6,)."""
+    rows = [[float(value) for value in row] for row in world_R_distal]
+    return WrenchPose.model_validate({"world_R_distal": rows, "wrench": [float(value) for value in wrench]})
+
+
+class FingertipData(StrictModel):
+    """A file of wrenches of one finger.
+
+    Attributes:
+        free: untouched, in several orientations.
+        presses: on a level plate from above, force upwards, in several orientations (rolled about).
+    """
+
+    format: Literal["tactile-fingertip-data/1"] = "tactile-fingertip-data/1"
+    rig: str = Field(min_length=1)
+    finger: Literal["FF", "MF", "RF", "LF", "TH"]
+    serial: str = ""
+    free: tuple[WrenchPose, ...]
+    presses: tuple[WrenchPose, ...]
+
+
+def load_fingertip_data(path: Path, here: Installation) -> FingertipData:
+    """Read wrenches of this rig. Raises ConfigurationError."""
+    data = validate(load(path), FingertipData, where=str(path))
+    if data.rig != here.rig:
+        hint = "Name the rig they are of with --rig"
+        raise ConfigurationError(f"was recorded on rig {data.rig}, not on {here.rig}", where=str(path), hint=hint)
+    return data
+
+
+def save_fingertip_data(path: Path, data: FingertipData) -> None:
+    """Write wrenches as :func:`load_fingertip_data` reads them, whole or not at all. Raises ConfigurationError."""
+    partial = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_text(yaml.safe_dump(data.model_dump(mode="json"), sort_keys=False), encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        hint = "Choose another file"
+        raise ConfigurationError(f"can not be written ({error.strerror})", where=str(path), hint=hint) from error
+    finally:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)

@@ -1,0 +1,101 @@
+"""A rig as the place where a force fingertip's wrenches are measured: free in many orientations, and pressed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from calibration.fingertip_data import WrenchPose, wrench_pose
+from calibration.fingertip_plan import PlannedFree, PlannedWrench
+from calibration.hand_chain import mount_T_link
+from calibration.touch_plan import PlannedTouch, pointing_vector
+from drivers.ati.force_tip import ForceTip
+from sessions.calibration_station import PressingHand, StationSettings
+from tactile_lab.errors import DeviceError
+from tactile_lab.geometry.contacts import Array
+
+LEAST_READINGS = 10
+_HELD = 0.7
+
+
+class FingertipStationSettings(StationSettings):
+    """As :class:`StationSettings`, with a firmer press, as the lever of its force is wanted.
+
+    Attributes:
+        holds: how often the hand follows a finger that gives way under the press.
+    """
+
+    lift_m: float = Field(default=0.12, gt=0.0)
+    press_N: float = Field(default=1.0, gt=0.0)
+    again_m_s: float = Field(default=0.006, gt=0.0)
+    capture_s: float = Field(default=0.4, gt=0.0)
+    holds: int = Field(default=4, ge=0)
+
+
+class FingertipStation(PressingHand):
+    """A rig that takes planned mean wrenches."""
+
+    settings: FingertipStationSettings
+
+    def measure(self, planned: PlannedWrench) -> WrenchPose:
+        """Take one mean wrench.
+
+        Raises:
+            DeviceError: the sensor gives no usable readings, or nothing was met.
+            SafetyError: a limit was passed; the rig was stopped.
+        """
+        wrench = self._free(planned) if isinstance(planned, PlannedFree) else self._pressed(planned, self._felt)
+        self.supervisor.approached()
+        return wrench
+
+    def _free(self, planned: PlannedFree) -> WrenchPose:
+        joints = pointing_vector(planned.finger)
+        target = planned.base_q(self._world_T_mount, joints)
+        if self._q[2] < target[2]:
+            self._move(np.array([*self._q[:2], target[2], *self._q[3:]]), self.settings.travel_m_s)
+        self._take_posture(joints)
+        self._move(target, self.settings.travel_m_s)
+        self._motion.wait(self.settings.settle_s)
+        return self._felt(planned)
+
+    def _press(self, planned: PlannedTouch, before: Array, behind: Array) -> None:
+        """As for a touch; then down again while the finger gives way and the force falls."""
+        super()._press(planned, before, behind)
+        for _ in range(self.settings.holds):
+            if self._motion.loads_N()[planned.finger] >= _HELD * self.settings.press_N:
+                return
+            self._search(planned, behind, self.settings.again_m_s)
+            self._motion.wait(self.settings.settle_s)
+
+    def _felt(self, planned: PlannedFree | PlannedTouch) -> WrenchPose:
+        """Mean wrench as the sensor gives it, bias and weight included, and the orientation of the distal frame."""
+        sensor = self.bench.perception.fingertips[planned.finger]
+        if not isinstance(sensor, ForceTip):
+            raise DeviceError("has no force sensor", where=planned.finger, hint="BioTacs: tactile-lab calibrate biotac")
+        readings = _Readings(sensor)
+        pose = self._mean_pose(self.settings.capture_s, lambda: readings.take(self._motion.loads_N()[planned.finger]))
+        rotation = self._world_T_mount.rotation().matrix() @ mount_T_link(pose, planned.finger)[:3, :3]
+        return wrench_pose(rotation, readings.mean())
+
+
+class _Readings:
+    """Readings of one sensor while a pose is held."""
+
+    def __init__(self, sensor: ForceTip) -> None:
+        self._sensor = sensor
+        self._found: dict[int, Array] = {}
+
+    def take(self, load_N: float) -> None:
+        """The newest reading, unless it is void (an infinite load) or known already."""
+        newest = self._sensor.newest
+        if newest is not None and math.isfinite(load_N):
+            self._found[newest.stamp_ns] = newest.wrench
+
+    def mean(self) -> Array:
+        """Their mean, shape (6,). Raises DeviceError when they are too few."""
+        if len(self._found) < LEAST_READINGS:
+            what = f"{len(self._found)} usable readings, {LEAST_READINGS} needed"
+            raise DeviceError(what, where=f"force sensor {self._sensor.finger}", hint="See tactile-lab rig check")
+        return np.asarray(np.mean(list(self._found.values()), axis=0))

@@ -1,0 +1,116 @@
+"""``tactile-lab calibrate fingertip``: a force fingertip's mounting, sign, weight and shape."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactile_lab.cli.calibrate_biotac import Finger
+from tactile_lab.cli.options import Json, NoInput, RigName
+
+if TYPE_CHECKING:
+    from calibration.fingertip_data import FingertipData
+    from calibration.fingertip_fit import FingertipFit
+    from calibration.fingertip_record import FingertipLimits
+    from tactile_lab.cli.wizard import Asker
+    from tactile_lab.workflow.calibrating_fingertip import FingertipRequest, FingertipSettings
+
+
+def fingertip(
+    rig: RigName = "sim",
+    finger: Annotated[Finger, typer.Option(help="Long finger to measure on the rig.")] = Finger.FF,
+    source: Annotated[
+        Path | None, typer.Option("--from", help="Solve recorded wrenches instead of measuring (any finger).")
+    ] = None,
+    record: Annotated[Path | None, typer.Option(help="Keep the measured wrenches in this file too.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/fingertips.yaml")
+    ] = None,
+    settings: Annotated[Path | None, typer.Option(help="Settings: limits, speeds, force.")] = None,
+    presses: Annotated[int, typer.Option(min=6, help="Presses on the table.")] = 10,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
+    notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
+    as_json: Json = False,
+    no_input: NoInput = False,
+) -> None:
+    """Find a force fingertip's mounting, sign, weight and shape, step by step.
+
+    The hand is turned with free fingers, then presses the table and rolls about. The other fingers keep what the
+    rig's file says. Ctrl+C or q at any step stores nothing.
+
+    Exit code 0: PASS; 2: the input, or too few orientations; 3: FAIL, outside a limit (kept as NAME.failed.yaml,
+    which sessions refuse); 4: a device; 130: ended by the operator.
+    """
+    from calibration.fingertip_data import load_fingertip_data, save_fingertip_data
+    from calibration.fingertip_fit import fit_fingertip
+    from calibration.fingertip_record import fingertip_record
+    from tactile_lab.cli.calibrate_steps import store_result
+    from tactile_lab.cli.wizard import Asker, may_write
+    from tactile_lab.rigs.description import load_rig
+    from tactile_lab.workflow.calibrating_fingertip import FingertipRequest, force_fingertips
+
+    described, asker, wanted = load_rig(rig), Asker(no_input, "calibrate fingertip"), _settings(settings)
+    here = described.installation
+    file = out or Path("calibrations") / here.rig / "fingertips.yaml"
+    may_write(file, replace, asker, no_input)
+    if source is not None:
+        data = load_fingertip_data(source, here)
+    else:
+        data = _measured(FingertipRequest(rig, finger.value, seed, presses, wanted), asker)
+        if record is not None:
+            save_fingertip_data(record, data)
+    tips = force_fingertips(described, data.finger)
+    fit = fit_fingertip(data, tips[data.finger])
+    _show(data, fit, wanted.limits)
+    found = fingertip_record(data, fit, tips, here, notes, wanted.limits)
+    store_result(file, found, True, asker, no_input, as_json)
+
+
+def _settings(path: Path | None) -> FingertipSettings:
+    from tactile_lab.strict_yaml import load_model
+    from tactile_lab.workflow.calibrating_fingertip import FingertipSettings
+
+    return FingertipSettings() if path is None else load_model(path, FingertipSettings)
+
+
+def _measured(request: FingertipRequest, asker: Asker) -> FingertipData:
+    from tactile_lab.cli.calibrate_steps import measure_all
+    from tactile_lab.cli.console import say
+    from tactile_lab.workflow.calibrating_fingertip import fingertip_wizard
+
+    with fingertip_wizard(request) as (wizard, station):
+        say(f"Fingertip {request.finger} on rig {request.rig}: {len(wizard.plan)} wrenches, free and pressed", "bold")
+        asker.choose("The hand will move, and turn. Is its way clear?", {"y": "begin"}, "y")
+        measure_all(wizard, station, asker)
+        return wizard.measured
+
+
+def _show(data: FingertipData, fit: FingertipFit, limits: FingertipLimits) -> None:
+    """What was found, and the figures against their limits."""
+    from math import degrees
+
+    from calibration.fingertip_record import judge_fingertip
+    from tactile_lab.cli.console import show_facts, show_table
+
+    new = fit.calibration
+    facts = [
+        ("mounting", "  ".join(f"{degrees(angle):.2f}" for angle in new.distal_T_sensor.rpy_rad) + " deg"),
+        ("turned by", f"{degrees(fit.turned_rad):.2f} deg"),
+        ("mass", f"{1e3 * new.mass_kg:.2f} g"),
+        ("centre of mass", _millimetres(new.com_distal_m)),
+        ("ellipsoid's centre", _millimetres(new.centre_distal_m)),
+        ("semi-axes", _millimetres(new.semi_axes_m)),
+    ]
+    show_facts(f"Fingertip {data.finger}", facts)
+    rows = [
+        [j.name, f"{j.value:.2f} {j.unit}", f"{j.limit:.2f}", "ok" if j.ok else "OUTSIDE"]
+        for j in judge_fingertip(fit, limits)
+    ]
+    show_table("Quality", ["", "is", "limit", ""], rows, right=(1, 2))
+
+
+def _millimetres(values: tuple[float, float, float]) -> str:
+    return "  ".join(f"{1e3 * value:.2f}" for value in values) + " mm"

@@ -1,0 +1,114 @@
+"""What calibration wizards share in a terminal: steps to measure, skip and undo, enough motion or not, the verdict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import typer
+
+from calibration.guided_steps import Instructed, Station, Step
+
+if TYPE_CHECKING:
+    from calibration.motion_check import MotionReport
+    from calibration.store import CalibrationRecord
+    from tactile_lab.cli.wizard import Asker
+
+OUTSIDE = 3
+
+P = TypeVar("P", bound=Instructed)
+T = TypeVar("T")
+
+
+class Guided(Protocol[P, T]):
+    """A wizard with steps to measure."""
+
+    def steps(self) -> tuple[Step[P], ...]: ...
+    def measure(self, step: Step[P], station: Station[P, T]) -> T: ...
+    def undo(self) -> int | None: ...
+    def motion(self) -> MotionReport: ...
+
+
+def measure_all(wizard: Guided[P, T], station: Station[P, T], asker: Asker) -> None:
+    """Go through the steps; when all are done, tell what is missing, and let a person add or give up.
+
+    Raises:
+        InterruptionError: the person quits.
+        SafetyError: a limit was passed.
+    """
+    steps, index = wizard.steps(), 0
+    while index < len(steps):
+        index = _one_step(wizard, steps, index, station, asker)
+    _tell_motion(wizard.motion())
+
+
+def _one_step(
+    wizard: Guided[P, T], steps: tuple[Step[P], ...], index: int, station: Station[P, T], asker: Asker
+) -> int:
+    """Do, skip or take back a step; gives the number of the next one."""
+    step = steps[index]
+    answers = {"": "measure", "s": "skip", "u": "undo the last", "d": "done measuring"}
+    answer = asker.choose(f"{step.number}/{step.count} {step.instruction}", answers, "")
+    if answer == "d":
+        return len(steps)
+    if answer == "u":
+        undone = wizard.undo()
+        return index if undone is None else undone - 1
+    if answer == "" and not _measure(wizard, step, station, asker):
+        return index
+    return index + 1
+
+
+def _measure(wizard: Guided[P, T], step: Step[P], station: Station[P, T], asker: Asker) -> bool:
+    """Measure one step; False to ask for it again."""
+    from tactile_lab.cli.console import say, warn
+    from tactile_lab.errors import DeviceError
+
+    try:
+        wizard.measure(step, station)
+    except DeviceError as error:
+        warn(str(error))
+        return asker.choose("Not measured. Again, or skip it?", {"s": "skip", "a": "again"}, "s") == "s"
+    say(f"{step.number}/{step.count} {step.instruction}: done", "dim")
+    return True
+
+
+def _tell_motion(report: MotionReport) -> None:
+    from tactile_lab.cli.console import show_table
+
+    rows = [
+        [check.name, f"{check.value:.4g} {check.unit}", f"{check.needed:.4g}", "enough" if check.ok else check.advice]
+        for check in report.checks
+    ]
+    show_table("Motion", ["", "is", "needed", ""], rows, right=(1, 2))
+
+
+def store_result(
+    file: Path, record: CalibrationRecord, replace: bool, asker: Asker, no_input: bool, as_json: bool
+) -> None:
+    """Ask, write (a failed result beside the file), tell the verdict.
+
+    Raises:
+        Exit: code 3, the result failed.
+        InterruptionError: the person does not want it stored.
+    """
+    from calibration.forearm_record import target_file
+    from calibration.store import write_record
+    from tactile_lab.calibration_file import plain
+    from tactile_lab.cli.calibration_tables import tell_verdict
+    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.cli.wizard import may_write
+
+    target = target_file(file, record)
+    if target == file:
+        may_write(file, replace, asker, no_input)
+    if not asker.agree(f"Store it as {target}?"):
+        raise asker.ended()
+    write_record(target, record)
+    if as_json:
+        emit_json({"file": str(target), **plain(record)})
+    tell_verdict(record)
+    say(f"stored  {target}")
+    if record.verdict == "FAIL":
+        raise typer.Exit(OUTSIDE)
+    say(f"To use it, name it in the rig file: calibration.{record.kind}: {file}")

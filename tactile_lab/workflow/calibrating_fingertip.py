@@ -1,0 +1,101 @@
+"""A force fingertip's calibration on a rig: the wizard's plan and the station that measures it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from calibration.fingertip_data import FingertipData
+from calibration.fingertip_plan import plan_wrenches
+from calibration.fingertip_record import FingertipLimits
+from calibration.fingertip_wizard import FingertipWizard
+from calibration.forearm import load_forearm
+from drivers.fingertip import FingertipCalibration, load_fingertips
+from drivers.shadow.posture import LONG_FINGERS
+from sessions.fingertip_station import FingertipStation, FingertipStationSettings
+from sessions.recorder import NullTraffic, Recorder
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.rigs.build import check_calibration
+from tactile_lab.rigs.description import Rig, load_rig
+from tactile_lab.rigs.laboratory import open_laboratory
+from tactile_lab.strict_yaml import StrictModel
+from tactile_lab.workflow.calibrating import cleared, tip_shapes
+
+
+class FingertipSettings(StrictModel):
+    """A file of settings for ``calibrate fingertip``.
+
+    Attributes:
+        limits: what a result must keep to.
+        station: how the hand moves.
+    """
+
+    limits: FingertipLimits = FingertipLimits()
+    station: FingertipStationSettings = FingertipStationSettings()
+
+
+@dataclass(frozen=True)
+class FingertipRequest:
+    """What a person asks for.
+
+    Attributes:
+        rig: name of a shipped rig, or a rig file.
+        finger: a long finger.
+        seed: of a simulated rig.
+        presses: on the table.
+        settings: see there.
+    """
+
+    rig: str
+    finger: str
+    seed: int = 0
+    presses: int = 10
+    settings: FingertipSettings = field(default_factory=FingertipSettings)
+
+
+@contextmanager
+def fingertip_wizard(request: FingertipRequest) -> Iterator[tuple[FingertipWizard, FingertipStation]]:
+    """A wizard with a connected station; the hand is lifted off and everything closed in the end.
+
+    Raises:
+        ConfigurationError: the rig lacks what is needed, or the finger can not be stretched alone.
+        DeviceError: the rig is not ready.
+    """
+    rig = load_rig(request.rig)
+    check_calibration(rig)
+    before = force_fingertips(rig, request.finger)[request.finger]
+    if request.finger not in LONG_FINGERS:
+        hint = "Record its wrenches by hand, and give them with --from"
+        raise ConfigurationError(f"{request.finger} can not be stretched alone", where="--finger", hint=hint)
+    world_T_mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
+    wizard = FingertipWizard(plan_wrenches(request.finger, request.presses), _data(rig, request.finger), before)
+    with open_laboratory(cleared(rig), request.seed, "box-10x6x4") as laboratory:
+        bench = laboratory.bench(Recorder(NullTraffic()))
+        bench.connect()
+        try:
+            station = FingertipStation(bench, world_T_mount, tip_shapes(rig), request.settings.station)
+            yield wizard, station
+            station.close()
+        finally:
+            bench.close()
+
+
+def force_fingertips(rig: Rig, finger: str) -> dict[str, FingertipCalibration]:
+    """The rig's force fingertips. Raises ConfigurationError when it has none, or not this one."""
+    if rig.description.fingertips != "nano17":
+        hint = "See calibrate biotac for BioTacs"
+        raise ConfigurationError("has no force fingertips", where=rig.source, hint=hint)
+    tips = load_fingertips(rig.files["fingertips"])
+    if finger not in tips:
+        hint = "Add its nominal values to the file first"
+        raise ConfigurationError(f"does not name {finger}", where=str(rig.files["fingertips"]), hint=hint)
+    return tips
+
+
+def _data(rig: Rig, finger: str) -> FingertipData:
+    here = rig.installation
+    serial = here.devices.get(f"ft/{finger}", "")
+    return FingertipData.model_validate(
+        {"rig": here.rig, "finger": finger, "serial": serial, "free": (), "presses": ()}
+    )
