@@ -241,14 +241,14 @@ class CalibrationStation(PressingHand):
     # --- pictures ----------------------------------------------------------------------------------------------
 
     def _view(self, planned: PlannedView) -> View:
-        camera, board, markers = self.bench.camera, self._board, self._markers
-        if camera is None or board is None or markers is None:
+        board, markers = self._board, self._markers
+        if self.bench.camera is None or board is None or markers is None:
             raise DeviceError("pictures need a camera, its markers and a board on the hand", where="marker method")
         self._take_posture(planned.joints_rad)
         self._move(planned.base_q(self._world_T_mount), self.settings.travel_m_s)
         self._motion.wait(self.settings.settle_s)
         pose = self._mean_pose(self.settings.capture_s)
-        image = camera.capture().image
+        image = self.bench.picture(self._motion.tick).image
         board_m, board_px = board.matched(image)
         if len(board_m) < 4:
             hint = "Move it into the picture, and see that nothing hides it"
