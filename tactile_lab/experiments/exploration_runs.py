@@ -53,9 +53,9 @@ def fixed_settings(grasps: int) -> list[Setting]:
 
 
 def moving_settings(grasps: int) -> list[Setting]:
-    """Table 4.3: the thesis's filter with its policies, then all with the default method."""
+    """Table 4.3: the thesis's filter with its policies, then all with the default method, and ours told the outline."""
     shape = ("random", "variance", "clusters", "entropy", "igef")
-    everyone = (*shape, "det", "det-modes", "kl", "mutual-information", "renyi", "information")
+    everyone = (*shape, "det", "det-modes", "kl", "mutual-information", "renyi", "information", INFORMED)
     return [
         *grid(tracking=["thesis-pf"], policy=["random", "det", "kl"], grasps=[grasps]),
         *grid(tracking=["joint"], policy=everyone, grasps=[grasps]),

@@ -157,6 +157,7 @@ def test_the_tables_hold_every_policy_and_the_bounds() -> None:
     assert {"random", "variance", "clusters", "entropy", "igef", "information", INFORMED, CLAIRVOYANT} <= fixed
     moving = {(dict(setting)["tracking"], dict(setting)["policy"]) for setting in moving_settings(80)}
     assert {("thesis-pf", "det"), ("thesis-pf", "random"), ("joint", "det"), ("joint", "kl")} <= moving
+    assert ("joint", INFORMED) in moving
 
 
 def test_promises_are_correlated_over_all_runs_and_means_have_their_error() -> None:
