@@ -8,6 +8,7 @@ import re
 from datetime import UTC, datetime
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -64,7 +65,7 @@ class Page(HTMLParser):
         return [attributes for name, attributes in self.elements if name == tag]
 
 
-def make_session(root: Path, dimension: int, *, with_truth: bool = True) -> Path:
+def make_session(root: Path, dimension: Literal[2, 3], *, with_truth: bool = True) -> Path:
     recorded = box_grasps(GRASPS, seed=1, motion_noise=0.1)
     mesh = trimesh.creation.box(SIZE_m)
     session = create_session(
