@@ -227,7 +227,7 @@ class DiscWorld:
         self._mark(MarkKind.HOLD_END)
         self._held_from = None
 
-    def truth_frame(self) -> None:
+    def truth_frame(self, cycle: Callable[[], None] | None = None) -> None:
         self._mark(MarkKind.TRUTH_FRAME)
 
     def undo(self) -> Undone:
