@@ -144,6 +144,11 @@ class ContactMap:
         fuller = replace(self.placed[grasp], left_out=self.placed[grasp].left_out - {contact})
         return replace(self, placed=(*self.placed[:grasp], fuller, *self.placed[grasp + 1 :]))
 
+    def with_all_contacts(self) -> ContactMap:
+        """The map with every contact of the grasps that are used made part of the shape again."""
+        fuller = [replace(grasp, left_out=frozenset()) if grasp.used else grasp for grasp in self.placed]
+        return replace(self, placed=tuple(fuller))
+
     def seen_by(self, index: int) -> ContactSet:
         """Contacts of one grasp, object frame."""
         return self.placed[index].contacts_world.in_object_frame(self.placed[index].row, self.space)

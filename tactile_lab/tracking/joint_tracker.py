@@ -175,7 +175,7 @@ class JointTracker:
             smoothed = [self._judge.smoothed(one.map, iterations) for one in self._hypotheses]
             self._hypotheses = self._likeliest(different(smoothed), self._settings.hypotheses)
             self._share_best_kernel()
-        self._hypotheses = [self._placed_late(one) for one in self._hypotheses]
+        self._hypotheses = [self._placed_late(self._readmitted(one)) for one in self._hypotheses]
         faceted = self._faceted()
         faceted[0] = replace(faceted[0], map=self._judge.with_covariances(faceted[0].map))
         self._hypotheses = [replace(one, map=unfolded(one.map)) for one in faceted]
@@ -191,6 +191,13 @@ class JointTracker:
         limit = self._judge.rated(best.map).cost
         others = [one for one in different(self._regrouped(best)) if one.cost < limit]
         return sorted(found + [sharp.better(one.map) for one in others], key=cost)
+
+    def _readmitted(self, hypothesis: Hypothesis) -> Hypothesis:
+        """With a second look at all contacts: some were left out when little was known of the object."""
+        looked, _ = self._judge.cleaned(hypothesis.map.with_all_contacts())
+        if looked.left_out_count == hypothesis.map.left_out_count:
+            return hypothesis
+        return min(self._judge.smoothed(looked, self._settings.final_iterations), hypothesis, key=cost)
 
     def _placed_late(self, hypothesis: Hypothesis) -> Hypothesis:
         return placed_late(hypothesis, self._noise, self._settings.proposals, self._relocate, self._judge)

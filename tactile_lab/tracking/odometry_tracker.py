@@ -7,6 +7,7 @@ touch, and known poses show what the shape model makes of perfect tracking.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from gtsam import Pose3
@@ -21,6 +22,7 @@ from tactile_lab.tracking.proposals import UNEXPLAINED_COST
 from tactile_lab.tracking.sharp_judge import SharpJudge
 
 _STEP = 1e-6
+_LOOKS = 3
 _KERNEL_EVERY = 4
 """Kernel parameters are estimated anew after so many grasps."""
 
@@ -108,5 +110,14 @@ class KnownPoseTracker(OdometryTracker):
             self._map = self._map.with_best_kernel()
 
     def finish(self) -> None:
-        """Look at all contacts once more, when the shape is known best."""
-        self._map = SharpJudge(self._judge, self._noise).without_errors(self._map.with_best_kernel())
+        """Look at all contacts anew, now that the shape is known best; what is left out changes the kernel.
+
+        The kernel to begin with is that of the contacts that were trusted: wrong ones would shorten it to explain all.
+        """
+        kernel = self._map.with_best_kernel().settings
+        self._map, _ = self._judge.cleaned(replace(self._map.with_all_contacts(), settings=kernel))
+        for _ in range(_LOOKS):
+            seen = self._map.left_out_count
+            self._map = SharpJudge(self._judge, self._noise).without_errors(self._map.with_best_kernel())
+            if self._map.left_out_count == seen:
+                break
