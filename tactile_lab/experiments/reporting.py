@@ -40,8 +40,9 @@ def section(study: Experiment, rows: Sequence[Row], jobs: int) -> str:
     seeds = seeds_of(rows)
     text = f"{study.sentence}\n\n```\ntactile-lab experiment {study.name}\n```\n\n"
     text += f"Seeds {_ranges(seeds)}; {len(rows)} runs, {jobs} at a time on {os.cpu_count()} cores. "
-    text += "Cells give median / p90 / maximum"
-    text += ", Hausdorff distances at the best fit; a run without a shape counts as infinitely wrong.\n\n"
+    text += "Where a heading says nothing else, three figures are median / p90 / maximum.\n\n"
+    if any(column.key == "hausdorff_mm" for column in study.columns):
+        text += "Hausdorff distances are at the best fit; a run without a shape counts as infinitely wrong.\n\n"
     if study.left_out():
         text += f"Not run: {study.left_out()}.\n\n"
     pooled = pooled_groups(study, rows)
