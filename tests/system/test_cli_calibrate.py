@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import sys
 from importlib import resources
 from pathlib import Path
@@ -51,8 +52,19 @@ def terminal(folder: Path, *words: object) -> pexpect.spawn:
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "NO_COLOR": "1", "COLUMNS": "200"}
     arguments = ["-m", "tactile_lab.cli.main", "calibrate", "forearm", *map(str, words)]
     return pexpect.spawn(
-        sys.executable, arguments, cwd=str(folder), env=environment, timeout=_PATIENCE_s, encoding="utf-8"
+        sys.executable,
+        arguments,
+        cwd=str(folder),
+        env=environment,
+        timeout=_PATIENCE_s,
+        encoding="utf-8",
+        preexec_fn=_interruptible,
     )
+
+
+def _interruptible() -> None:
+    """Ctrl+C reaches the program even if the tests were started in the background, where it is ignored."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def ended(child: pexpect.spawn, code: int) -> str:
