@@ -17,6 +17,7 @@ WIRE_ORDER = (0, 2, 4, 1, 3, 5)
 _GAUGE_PLACE = np.argsort(WIRE_ORDER)
 _STATUS_ERROR = 0x80
 _SURE = 6  # samples in a row that must hold before a new alignment is believed
+_RUNS = np.arange(SIZE + 1)[:, None] + SIZE * np.arange(_SURE)  # where the samples of each alignment would begin
 
 
 def encode_sample(gauges: tuple[int, ...], status_error: bool = False) -> bytes:
@@ -51,13 +52,13 @@ class GaugeStream:
         """
         self._buffer += piece
         taken: list[NDArray[Any]] = []
-        skipped = 0
+        skipped_before = self.skipped_bytes
         while True:
             if not self._aligned:
                 start = self._find()
                 if start is None:
                     break
-                skipped += self._skip(start)
+                self._skip(start)
                 self._aligned = True
             rows = self._rows(self._buffer)
             good = _valid(rows)
@@ -69,13 +70,13 @@ class GaugeStream:
             if count == len(rows):
                 break
             self._aligned, self.resyncs = False, self.resyncs + 1
-        self.skipped_bytes += skipped
+        skipped = self.skipped_bytes - skipped_before
         rows = np.concatenate(taken) if taken else np.zeros((0, SIZE), np.uint8)
         return _gauges(rows), (rows[:, -1] & _STATUS_ERROR).astype(bool), -(-skipped // SIZE)
 
-    def _skip(self, count: int) -> int:
+    def _skip(self, count: int) -> None:
         self._buffer = self._buffer[count:]
-        return count
+        self.skipped_bytes += count
 
     def _find(self) -> int | None:
         """Where the next run of valid samples begins; None while the bytes do not suffice.
@@ -86,11 +87,10 @@ class GaugeStream:
         needed = (_SURE + 1) * SIZE
         while len(self._buffer) >= needed + SIZE:
             window = self._buffer[: needed + SIZE]
-            starts = [s for s in range(SIZE + 1) if _valid(self._rows(window[s : s + _SURE * SIZE])).all()]
+            starts = np.flatnonzero(_sample_at(window)[_RUNS].all(axis=1)).tolist()
             if starts:
                 return min(starts, key=lambda start: self._distance(window, start))
-            self._buffer = self._buffer[SIZE:]
-            self.skipped_bytes += SIZE
+            self._skip(SIZE)
         return None
 
     def _distance(self, window: bytes, start: int) -> float:
@@ -106,6 +106,14 @@ class GaugeStream:
 
 def _valid(rows: NDArray[Any]) -> NDArray[np.bool_]:
     return np.asarray((rows[:, :-1].sum(axis=1, dtype=np.int64) & 0x7F) == (rows[:, -1] & 0x7F))
+
+
+def _sample_at(window: bytes) -> NDArray[np.bool_]:
+    """Whether a sample could begin at each byte, as far as the check byte tells; shape (bytes - 12,)."""
+    values = np.frombuffer(window, np.uint8)
+    totals = np.concatenate(([0], np.cumsum(values, dtype=np.int64)))
+    sums = totals[SIZE - 1 : -1] - totals[:-SIZE]
+    return np.asarray((sums & 0x7F) == (values[SIZE - 1 :] & 0x7F))
 
 
 def _gauges(rows: NDArray[Any]) -> Array:

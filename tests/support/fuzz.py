@@ -2,8 +2,8 @@
 
     python -m tests.support.fuzz --count 1000000 --seed 1 --into docs/results.md
 
-Half of the inputs are random, half are valid messages with bytes changed, cut, added or repeated. A codec is added by a
-line in :data:`CODECS`.
+Half of the inputs are random, every other one of these as long as a valid message; half are valid messages with bytes
+changed, cut, added or repeated. A codec is added by a line in :data:`CODECS`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from drivers import positioner_codec
@@ -23,12 +24,20 @@ from drivers.ati.gauge_stream import GaugeStream
 from drivers.ati.net_box import parse_page
 from drivers.biotac import cheetah_log, slot_codec
 from drivers.biotac.slot_codec import Slot
+from drivers.camera.frames import Detection, Frame, SeenMarker
+from drivers.camera.packet import MAGIC, decode_packet, encode_packet
 from drivers.emulators import slcan_unit
 from drivers.emulators.ati_sensor import emulated_calibration
 from drivers.emulators.net_box_unit import NetBoxUnit
 from drivers.ethercat import frames as ethercat
+from drivers.ethercat.registers import AlStatus
 from drivers.hardware.can_bus import CanFrame, decode_frame, encode_frame
+from drivers.hardware.tcp import MessageReader, framed
+from drivers.links import Datagram
 from drivers.positioner_codec import PositionerCommand, PositionerStatus
+from drivers.shadow.hand_records import Record as HandRecord
+from drivers.shadow.hand_records import RecordKind, RecordReader, encode_record
+from drivers.shadow.motor_can import MotorAnswer, MotorIdentifier
 from drivers.shadow.palm_codec import PalmCommand
 from drivers.shadow.palm_images import PALMS
 from tactile_lab.errors import CodecError
@@ -43,6 +52,8 @@ _TELEGRAMS = (
     ethercat.Telegram(ethercat.Command.LRW, 0x10000, bytes(302)),
     ethercat.Telegram(ethercat.Command.BRD, ethercat.physical(0, 0x130), bytes(2)),
 )
+_PICTURE = bytes(cv2.imencode(".png", np.full((8, 8), 200, np.uint8))[1])
+_SEEN = Detection("DICT_4X4_50", (8, 8), {0: SeenMarker(np.arange(8.0).reshape(4, 2), 0.5)})
 _LOG = "Sensor: BT1\n\nBegin File\n0.000000 1 1 17 2602 0 2713 0\n0.000227 1 1 0 2040 0 2041 1\n"
 
 
@@ -74,7 +85,7 @@ CODECS: dict[str, Codec] = {
     ),
     "gauge stream": (
         lambda payload: GaugeStream().feed(payload),
-        b"".join(gauge_stream.encode_sample((n, -n, 300, -400, 500, -600)) for n in range(12)),
+        b"".join(gauge_stream.encode_sample((n, -n, 300, -400, 500, -600)) for n in range(9)),
     ),
     "controller record": (controller_codec.decode_binary, controller_codec.encode_binary(_RECORD)),
     "controller lines": (lambda payload: AsciiLines().feed(payload), controller_codec.encode_ascii(_RECORD)),
@@ -86,6 +97,18 @@ CODECS: dict[str, Codec] = {
     "can gauges": (can_codec.decode_first, can_codec.encode_gauges(0, (1, 2, 3, 4, 5, 6))[0].data),
     "slcan line": (slcan_unit.decode_line, slcan_unit.encode_line(CanFrame(0x200, b"\x01"))[:-1]),
     "gauge volts": (gauge_volts.decode_volts, gauge_volts.encode_volts(1, (0.1, 0.2, 0.3, 0.4, 0.5, 0.6))),
+    "motor identifier": (lambda payload: str(MotorIdentifier.of(int.from_bytes(payload, "big"))), b"\x04\xa3"),
+    "motor answer": (MotorAnswer.decode, MotorAnswer(-3, 0x1900).encode()),
+    "AL status": (lambda payload: str(AlStatus.decode(payload)), AlStatus(4, True, 0x1B).encode()),
+    "hand records": (
+        lambda payload: RecordReader().feed(payload),
+        b"".join(encode_record(HandRecord(kind, 7, b"\x01\x02")) for kind in RecordKind),
+    ),
+    "tcp messages": (lambda payload: MessageReader().feed(payload), framed(b"TRIGGER") + framed(b"")),
+    "camera packet": (
+        lambda payload: decode_packet(Datagram(MAGIC + payload, 0)),  # anything else goes to OpenCV as a picture
+        encode_packet(Frame(0, None, 5, 0, _SEEN), _PICTURE).removeprefix(MAGIC),
+    ),
     "ethercat frame": (ethercat.decode_frame, ethercat.encode_frame(_TELEGRAMS, bytes(6))),
     **_palm_statuses(),
     "biotac slot": (lambda payload: slot_codec.decode_slot(payload, 1), _SLOT),
@@ -123,7 +146,8 @@ def fuzz(codec: Codec, count: int, seed: int) -> tuple[int, int]:
     decode, valid = codec
     rng, decoded = random.Random(seed), 0
     for number in range(count):
-        payload = damaged(valid, rng) if number % 2 else rng.randbytes(rng.randint(0, len(valid) + 4))
+        size = len(valid) if number % 4 else rng.randint(0, len(valid) + 4)
+        payload = damaged(valid, rng) if number % 2 else rng.randbytes(size)
         try:
             decode(payload)
             decoded += 1
@@ -137,8 +161,9 @@ def fuzz(codec: Codec, count: int, seed: int) -> tuple[int, int]:
 
 HEAD = """## Codecs against random and damaged bytes
 
-`python -m tests.support.fuzz --count {count} --seed {seed} --into docs/results.md`: half of the inputs are random, half
-are valid messages with bytes changed, cut, added or repeated. Each decoded or raised our error; nothing else came.
+`python -m tests.support.fuzz --count {count} --seed {seed} --into docs/results.md`: half of the inputs are random,
+every other one of these as long as a valid message; half are valid messages with bytes changed, cut, added or repeated. Each
+decoded or raised our error; nothing else came.
 
 | Codec | Inputs | Seed | Decoded | Refused | Time, s |
 |---|---:|---:|---:|---:|---:|
