@@ -14,11 +14,11 @@ from __future__ import annotations
 import dataclasses
 import json
 import select
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+from drivers.child_process import ChildProcess, errors_said, say
 from drivers.emulators.motor_can import MotorCanBuses
 from drivers.emulators.shadow_chain import ChainSettings, EmulatedHand, emulated_hand
 from drivers.ethercat.ports import Port, RawPort
@@ -27,7 +27,6 @@ from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.palm_codec import CanFrame
 from drivers.shadow.real_time import request_real_time
 from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock
-from tactile_lab.errors import DeviceError, TactileLabError
 
 _IDLE_s = 0.02
 _START_s, _ANSWER_s = 30.0, 5.0
@@ -50,7 +49,7 @@ class HandServer:
             if select.select([sys.stdin], [], [], 0)[0]:
                 if not (line := sys.stdin.readline()):
                     return
-                _say(self._obey(json.loads(line)))
+                say(self._obey(json.loads(line)))
 
     def _patience_s(self) -> float:
         due_ns = self._hand.ring.due_ns
@@ -82,27 +81,19 @@ class HandServer:
         return counts | {"served": hand.palm.served, "state": str(hand.palm_slave.al_status)}
 
 
-def _say(answer: dict[str, Any]) -> None:
-    sys.stdout.write(json.dumps(answer) + "\n")
-    sys.stdout.flush()
-
-
 def main() -> None:
     """Read the first line, make the hand, serve it."""
     start = json.loads(sys.stdin.readline())
     clock = MonotonicClock()
-    try:
+    with errors_said():
         calibration = JointCalibration.load(Path(start["joints"]))
         can = MotorCanBuses()
         hand = emulated_hand(clock, calibration, ChainSettings(**start["settings"]), can=can)
         port = RawPort(start["interface"])
         port.open()
-        _say({"ready": True})
+        say({"ready": True})
         request_real_time()
         HandServer(hand, port, can, clock).run()
-    except TactileLabError as error:
-        _say({"error": str(error)})
-        sys.exit(error.exit_code)
 
 
 class EmulatedHandProcess:
@@ -120,7 +111,7 @@ class EmulatedHandProcess:
             "joints": str(joints),
             "settings": dataclasses.asdict(settings or ChainSettings()),
         }
-        self._process: subprocess.Popen[str] | None = None
+        self._child = ChildProcess("drivers.emulators.ethercat_server", "emulated hand")
 
     def __enter__(self) -> EmulatedHandProcess:
         self.start()
@@ -135,12 +126,8 @@ class EmulatedHandProcess:
         Raises:
             DeviceError: it does not come up, with its own words.
         """
-        command = [sys.executable, "-m", "drivers.emulators.ethercat_server"]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        answer = self._exchange(self._start, _START_s)
-        if "error" in answer:
-            self.close()
-            raise DeviceError(answer["error"], where="emulated hand")
+        self._child.start(self._start)
+        self._child.ready(_START_s)
 
     def order(self, **order: Any) -> dict[str, Any]:
         """Give an order (see the module); the counts after it.
@@ -148,38 +135,16 @@ class EmulatedHandProcess:
         Raises:
             DeviceError: the process is gone.
         """
-        return self._exchange(order, _ANSWER_s)
+        self._child.give(order)
+        return self._child.answer(_ANSWER_s)
 
     def kill(self) -> None:
         """End it at once, as a power cut would."""
-        if self._process is not None:
-            self._process.kill()
-        self.close()
+        self._child.kill()
 
     def close(self) -> None:
         """End it; idempotent."""
-        if self._process is None:
-            return
-        process, self._process = self._process, None
-        try:
-            process.communicate(timeout=_ANSWER_s)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.communicate()
-
-    def _exchange(self, message: dict[str, Any], patience_s: float) -> dict[str, Any]:
-        process = self._process
-        if process is None or process.stdin is None or process.stdout is None:
-            raise DeviceError("is not running", where="emulated hand", hint="Start it first")
-        try:
-            process.stdin.write(json.dumps(message) + "\n")
-            process.stdin.flush()
-        except BrokenPipeError:
-            raise DeviceError("has ended by itself", where="emulated hand") from None
-        if not select.select([process.stdout], [], [], patience_s)[0] or not (line := process.stdout.readline()):
-            raise DeviceError("does not answer", where="emulated hand", hint="See its messages above")
-        answer: dict[str, Any] = json.loads(line)
-        return answer
+        self._child.close()
 
 
 if __name__ == "__main__":

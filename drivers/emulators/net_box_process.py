@@ -7,19 +7,19 @@ standard input ends. Then it says how many records each box has sent.
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Any, Self
 
 from drivers.ati import rdt_codec
+from drivers.child_process import ChildProcess, say
 from drivers.emulators.ati_sensor import EmulatedSensor
 from drivers.emulators.net_box_server import NetBoxServer
 from drivers.emulators.net_box_unit import NetBoxUnit
 from tactile_lab.errors import DeviceError
 
-_END_s = 10.0
+_START_s, _END_s = 30.0, 10.0
 
 
 def main() -> None:
@@ -32,14 +32,9 @@ def main() -> None:
             )
             for seed, host in enumerate(start["hosts"])
         ]
-        _say({"http_ports": [box.http_port for box in boxes]})
+        say({"http_ports": [box.http_port for box in boxes]})
         sys.stdin.read()
-    _say({"sent": [box.unit.sent for box in boxes]})
-
-
-def _say(answer: dict[str, Any]) -> None:
-    sys.stdout.write(json.dumps(answer) + "\n")
-    sys.stdout.flush()
+    say({"sent": [box.unit.sent for box in boxes]})
 
 
 class NetBoxProcess:
@@ -56,23 +51,18 @@ class NetBoxProcess:
     """
 
     def __init__(self, hosts: Sequence[str], rate_hz: int, port: int = rdt_codec.PORT) -> None:
-        self._hosts = list(hosts)
-        self._start = {"hosts": self._hosts, "rate_hz": rate_hz, "port": port}
-        self._process: subprocess.Popen[str] | None = None
+        self._start: dict[str, Any] = {"hosts": list(hosts), "rate_hz": rate_hz, "port": port}
+        self._child = ChildProcess("drivers.emulators.net_box_process", ", ".join(hosts))
         self.http_ports: list[int] = []
         self.sent: list[int] = []
 
     def __enter__(self) -> Self:
-        command = [sys.executable, "-m", "drivers.emulators.net_box_process"]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(json.dumps(self._start) + "\n")
-        self._process.stdin.flush()
-        if not (line := self._process.stdout.readline()):
-            self.close()
-            raise DeviceError("the emulated boxes do not start", where=", ".join(self._hosts), hint=_TAKEN)
-        self.http_ports = json.loads(line)["http_ports"]
+        self._child.start(self._start)
+        try:
+            self.http_ports = self._child.ready(_START_s)["http_ports"]
+        except DeviceError as error:
+            where = ", ".join(self._start["hosts"])
+            raise DeviceError("the emulated boxes do not start", where=where, hint=_TAKEN) from error
         return self
 
     def __exit__(self, *ended: object) -> None:
@@ -81,21 +71,12 @@ class NetBoxProcess:
     @property
     def process_id(self) -> int:
         """Of the running process."""
-        assert self._process is not None
-        return self._process.pid
+        return self._child.process_id
 
     def close(self) -> None:
         """End it; idempotent."""
-        if self._process is None:
-            return
-        process, self._process = self._process, None
-        try:
-            out, _ = process.communicate(timeout=_END_s)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            out, _ = process.communicate()
-        told: dict[str, Any] = json.loads(out) if out.strip() else {}
-        self.sent = told.get("sent", [])
+        if said := self._child.close(_END_s).strip():
+            self.sent = json.loads(said)["sent"]
 
 
 _TAKEN = "Another program may hold their addresses; end it"

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from drivers.links import Tap
+from drivers.orders import Order, OrderWriter
 from drivers.shadow.first_move import MoveFinding, require_motor_map
-from drivers.shadow.hand_orders import Order, OrderWriter
 from drivers.shadow.hand_records import Record, RecordKind, RecordReader
 from drivers.shadow.hand_setup import HandSetup
 from drivers.shadow.motors import DRIVEN_JOINTS

@@ -11,9 +11,9 @@ import json
 import sys
 from typing import Any, Protocol
 
+from drivers.child_process import errors_said, say
 from drivers.shadow.real_time import request_real_time
 from tactile_lab.clock import MonotonicClock
-from tactile_lab.errors import TactileLabError
 
 ROLES = ("plant", "hand", "box", "base", "camera")
 PRIORITY = 60
@@ -27,23 +27,14 @@ class Station(Protocol):
         """Serve until standard input ends. Raises DeviceError when its wire goes."""
 
 
-def say(answer: dict[str, Any]) -> None:
-    """Tell the laboratory something."""
-    sys.stdout.write(json.dumps(answer) + "\n")
-    sys.stdout.flush()
-
-
 def main() -> None:
     """Read what to be, be it, and serve."""
     start: dict[str, Any] = json.loads(sys.stdin.readline())
     request_real_time(PRIORITY)
-    try:
+    with errors_said():
         station = _made(start.pop("role"), start)
         say({"ready": True})
         station.serve()
-    except TactileLabError as error:
-        say({"error": str(error)})
-        sys.exit(error.exit_code)
 
 
 def _made(role: str, start: dict[str, Any]) -> Station:

@@ -1,4 +1,4 @@
-"""Orders to the hand's own process: lines of JSON through a pipe, none of whose ends ever waits for the other."""
+"""Orders to a process of its own: lines of JSON through a pipe, none of whose ends ever waits for the other."""
 
 from __future__ import annotations
 
