@@ -99,6 +99,7 @@ class EthercatLink:
         self._master = EtherCatMaster(port or RawPort(settings.interface), clock, settings.master)
         self._ring = HandRing(self._master, settings.palm, settings.serial, settings.watchdog_s)
         self._hand: HandIdentity | None = None
+        self._known: HandIdentity | None = None
         self._failure: DeviceError | None = None
         self._counts = EthercatCounts()
         self._until_poll, self._polled = 0, False
@@ -109,7 +110,8 @@ class EthercatLink:
         """Bring the ring to OP; again, when it has failed since. All or nothing.
 
         Raises:
-            DeviceError: what is missing or wrong, and what to do.
+            DeviceError: what is missing or wrong, and what to do; also when the cable has been put into another hand
+                since the link was first opened.
         """
         if self._hand is not None and self._failure is None:
             return
@@ -117,7 +119,7 @@ class EthercatLink:
         self.close()
         self._master.open()
         try:
-            self._hand = self._ring.bring_up()
+            self._hand = self._known = self._same(self._ring.bring_up())
         except BaseException:
             self._master.close()
             raise
@@ -147,6 +149,15 @@ class EthercatLink:
         if self._hand is None:
             raise DeviceError("link is not open", where=self.name, hint="Connect the device first")
         return self._hand
+
+    def _same(self, found: HandIdentity) -> HandIdentity:
+        """The hand that was found, when it is the one that was there before: its calibration is in use."""
+        known = self._known or found
+        if (known.bridge, known.palm) != (found.bridge, found.palm):
+            what = f"hand {found.serial}, palm {found.image.name}, answers where hand {known.serial} did before"
+            hint = "Put the cable back, or start again with the rig file of this hand"
+            raise DeviceError(what, where=self.name, hint=hint)
+        return found
 
     # --- the cycle ---------------------------------------------------------------------------------------------
 

@@ -21,7 +21,10 @@ from drivers.shadow.palm_images import (
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import DeviceError
 
-_VENDOR, _PRODUCT, _REVISION, _SERIAL = 0x08, 0x0A, 0x0C, 0x0E
+SERIAL_WORD = 0x0E
+"""Where in a board's EEPROM its serial number stands, in words of 16 bits."""
+
+_VENDOR, _PRODUCT, _REVISION = 0x08, 0x0A, 0x0C
 _ALL_REGISTERS = bytes(256)
 _FIRST_EXCHANGES = 20
 _LOOP_CONTROL_MASK = 0x3FFF
@@ -111,7 +114,7 @@ class HandRing:
 
     def _identify(self, position: int) -> BoardIdentity:
         slave = Slave(position)
-        words = [self._master.read_eeprom(slave, word) for word in (_PRODUCT, _REVISION, _SERIAL, _VENDOR)]
+        words = [self._master.read_eeprom(slave, word) for word in (_PRODUCT, _REVISION, SERIAL_WORD, _VENDOR)]
         product, revision, serial, vendor = words
         return BoardIdentity(vendor, product, revision, serial)
 

@@ -21,7 +21,8 @@ from typing import Any
 from drivers.ethercat.registers import AL_ERROR, AL_STATE_MASK, AlState, AlStatus
 from drivers.links import Datagram
 from drivers.shadow.ethercat_link import EthercatCounts, EthercatSettings
-from drivers.shadow.palm_images import SHADOW_VENDOR, PalmImage, describe_product, palm_of_product
+from drivers.shadow.ethercat_ring import SERIAL_WORD
+from drivers.shadow.palm_images import BRIDGE_PRODUCT, SHADOW_VENDOR, PalmImage, describe_product, palm_of_product
 from tactile_lab.clock import Clock
 from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
 
@@ -151,17 +152,28 @@ class PysoemLink:
         count = master.config_init()
         if count != 2:
             raise self._wrong(f"{max(count, 0)} EtherCAT slaves instead of 2", "Check the hand's cable and power")
-        palm = master.slaves[1]
+        bridge, palm = master.slaves
+        image = self._checked_image(bridge, palm)
+        master.config_map()
+        if (len(palm.output), len(palm.input)) != (image.command_bytes, image.status_bytes):
+            what = f"its EEPROM describes {len(palm.output)} + {len(palm.input)} bytes of process data"
+            raise self._wrong(what, "Use our own master, which knows the palm's process image")
+        return image
+
+    def _checked_image(self, bridge: Any, palm: Any) -> PalmImage:
         image = palm_of_product(palm.id)
+        if bridge.man != SHADOW_VENDOR or bridge.id != BRIDGE_PRODUCT:
+            what = f"the first slave, of vendor 0x{bridge.man:X}, product {bridge.id:#x}, is not the hand's bridge"
+            raise self._wrong(what, "Plug the cable into the input of the hand's bridge")
         if palm.man != SHADOW_VENDOR or image is None:
             what = f"the second slave is {describe_product(palm.id)} of vendor 0x{palm.man:X}"
             raise self._wrong(what, "Palms 0220, 0230 and 0240 can be driven")
         if self._settings.palm is not None and image.name != self._settings.palm:
             raise self._wrong(f"a {image.name} palm, not a {self._settings.palm}", f'Set hand.palm to "{image.name}"')
-        master.config_map()
-        if (len(palm.output), len(palm.input)) != (image.command_bytes, image.status_bytes):
-            what = f"its EEPROM describes {len(palm.output)} + {len(palm.input)} bytes of process data"
-            raise self._wrong(what, "Use our own master, which knows the palm's process image")
+        serial = int.from_bytes(palm.eeprom_read(SERIAL_WORD)[:4], "little")
+        if self._settings.serial not in (None, serial):
+            hint = "Use the rig file and the calibration of the hand that is plugged in"
+            raise self._wrong(f"hand {serial}, not hand {self._settings.serial}", hint)
         return image
 
     def _operate(self, master: Any) -> None:

@@ -162,8 +162,8 @@ def fuzz(codec: Codec, count: int, seed: int) -> tuple[int, int]:
 HEAD = """## Codecs against random and damaged bytes
 
 `python -m tests.support.fuzz --count {count} --seed {seed} --into docs/results.md`: half of the inputs are random,
-every other one of these as long as a valid message; half are valid messages with bytes changed, cut, added or repeated. Each
-decoded or raised our error; nothing else came.
+every other one of these as long as a valid message; half are valid messages with bytes changed, cut, added or
+repeated. Each decoded or raised our error; nothing else came.
 
 | Codec | Inputs | Seed | Decoded | Refused | Time, s |
 |---|---:|---:|---:|---:|---:|

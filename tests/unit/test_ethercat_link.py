@@ -202,6 +202,28 @@ def test_a_slave_that_vanishes_from_the_ring_is_noticed_at_once() -> None:
         wire.cycles(3)
 
 
+def test_a_slave_more_on_the_ring_is_noticed_at_the_next_poll() -> None:
+    wire = Wire(poll_every=10).open()
+    wire.hand.ring.slaves += (emulated_hand(wire.clock, CALIBRATION).palm_slave,)
+    with pytest.raises(DeviceError, match="3 EtherCAT slaves answer instead of 2"):
+        wire.cycles(12)
+
+
+def test_another_hand_on_the_cable_ends_the_link_and_is_not_taken_for_the_first() -> None:
+    wire = Wire(ChainSettings(serial=634), poll_every=1000).open()
+    first = wire.hand.ring.slaves
+    wire.hand.ring.slaves = emulated_hand(wire.clock, CALIBRATION, ChainSettings(serial=12)).ring.slaves
+    with pytest.raises(DeviceError, match="the palm has left operation: it is in INIT"):
+        wire.cycles(3)
+    with pytest.raises(DeviceError, match=r"hand 12, palm 0220, answers where hand 634 did before.*the cable back"):
+        wire.link.open()
+    with pytest.raises(DeviceError, match="not open"):
+        wire.link.send(bytes(70))
+    wire.hand.ring.slaves = first
+    wire.open()
+    assert wire.link.hand.serial == 634
+
+
 def test_after_a_power_cut_the_hand_reconnects() -> None:
     wire = Wire()
     hand = ShadowHand(wire.link, wire.clock, CALIBRATION, HandSettings(cycle_s=0.001))

@@ -119,6 +119,20 @@ def test_a_hand_that_dies_is_told_once_and_the_process_goes_on(ends: tuple[str, 
     process.close()
 
 
+def test_a_palm_that_is_cut_off_from_the_ring_ends_the_session(ends: tuple[str, str]) -> None:
+    tap = Tap()
+    with EmulatedHandProcess(ends[1], JOINTS) as emulator:
+        process = hand(ends[0], tap)
+        process.connect()
+        process.set_targets({"FFJ3": 1.5})
+        exchanged(process, lambda: any(tap.demands()))
+        emulator.order(cable={"connected": 1})
+        with pytest.raises(DeviceError, match="1 EtherCAT slaves answer instead of 2"):
+            exchanged(process, lambda: False)
+        process.close()
+        assert not any(tap.demands()[-5:])
+
+
 def test_a_hand_that_is_not_there_is_told_in_the_drivers_words(ends: tuple[str, str]) -> None:
     process = hand(ends[0])
     with pytest.raises(DeviceError, match="no EtherCAT frame comes back"):

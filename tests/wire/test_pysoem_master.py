@@ -93,6 +93,29 @@ def test_a_palm_that_falls_back_is_told(ends: tuple[str, str]) -> None:
         hand.close()
 
 
+def test_a_palm_that_is_cut_off_while_running_is_told(ends: tuple[str, str]) -> None:
+    hand = link(ends[0], poll_every=2)
+    with EmulatedHandProcess(ends[1], JOINTS, ChainSettings(eeprom="mapped")) as emulator:
+        hand.open()
+        emulator.order(cable={"connected": 1})
+        with pytest.raises(DeviceError, match="palm has left operation"):
+            cycle(hand, 4)
+        hand.close()
+
+
+@pytest.mark.parametrize(
+    ("chain", "settings", "words"),
+    [
+        (ChainSettings(vendor=0x2), {}, "first slave, of vendor 0x2, product 0x0, is not the hand's bridge"),
+        (ChainSettings(product=77), {}, "second slave is .* of vendor 0x530"),
+        (ChainSettings(serial=3), {"serial": 4}, "hand 3, not hand 4"),
+    ],
+)
+def test_a_wrong_device_is_named(ends: tuple[str, str], chain: ChainSettings, settings: Any, words: str) -> None:
+    with EmulatedHandProcess(ends[1], JOINTS, chain), pytest.raises(DeviceError, match=words):
+        link(ends[0], **settings).open()
+
+
 def test_wrong_interface_and_missing_slaves_are_named(ends: tuple[str, str]) -> None:
     with pytest.raises(DeviceError, match="no network interface nosuch0"):
         link("nosuch0").open()
