@@ -75,7 +75,7 @@ class Bench:
         self.fingertip_calibrations = dict(fingertip_calibrations or {})
         self._timing = CycleTiming(clock, cycle_ns)
         self._devices = InstrumentSet(hand, base, self.wrench_devices, camera)
-        self._state = StateRecording(observer, clock, truth)
+        self._state = StateRecording(observer, clock, truth, self._devices)
         self._observer = observer
         self._force_ranges_N = dict(force_ranges_N or {})
 
@@ -109,15 +109,16 @@ class Bench:
         """Cycles so far, and those that were late."""
         return self._timing.counts
 
+    def tell_problems_to(self, listener: Callable[[str], None]) -> None:
+        """Whatever goes wrong with a device is recorded, and told to ``listener`` too, once each."""
+        self._state.watch.listener = listener
+
     # --- lifecycle ---------------------------------------------------------------------------------------------
 
     def connect(self) -> None:
         """Connect every device and run cycles until the hand and the positioner have answered.
 
-        All or nothing: when anything fails, everything is closed again.
-
-        Raises:
-            DeviceError: a device could not be connected or stays silent.
+        All or nothing: when anything fails, everything is closed again. Raises DeviceError.
         """
         try:
             self._devices.connect()
@@ -130,12 +131,13 @@ class Bench:
             raise
 
     def close(self) -> None:
-        """Stop and close every device, each even if another fails; idempotent.
-
-        Raises:
-            TactileLabError: of the first device that did not close.
-        """
-        if problems := self._close_all():
+        """Stop and close every device, each even if another fails; idempotent. Raises the first one's error."""
+        self.stop()
+        try:
+            self._state.conclude()
+        finally:
+            problems = self._close_all()
+        if problems:
             raise problems[0]
 
     def stop(self) -> None:
@@ -158,11 +160,8 @@ class Bench:
         give_up_ns = self.clock.now_ns() + READY_TIMEOUT_ns
         while not self.perception.ready:
             if self.clock.now_ns() > give_up_ns:
-                raise DeviceError(
-                    f"no sample from the hand or the positioner within {READY_TIMEOUT_ns / NANOSECONDS:g} s",
-                    where="bench",
-                    hint="Check power and cables, then try again",
-                )
+                what = f"no sample from the hand or the positioner within {READY_TIMEOUT_ns / NANOSECONDS:g} s"
+                raise DeviceError(what, where="bench", hint="Check power and cables, then try again")
             self.cycle()
 
     def _close_all(self) -> list[TactileLabError]:

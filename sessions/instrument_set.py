@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 
-from sessions.instruments import CyclingInstrument, Instrument
-from tactile_lab.errors import TactileLabError
+from sessions.instruments import CyclingInstrument, Instrument, WatchedInstrument
+from tactile_lab.errors import DeviceError, TactileLabError
 
 
 class InstrumentSet:
@@ -42,6 +43,22 @@ class InstrumentSet:
             except TactileLabError as error:
                 problems.append(error)
         return problems
+
+    def problems(self, *, ask: bool = False) -> list[str]:
+        """What is wrong with them, in words, each beginning with the device's name.
+
+        Args:
+            ask: ask a hand that cycles by itself, too, which may take as long as its process does.
+        """
+        named = {"hand": self._hand, "base": self._base, **self._wrench_devices, "camera": self._camera}
+        if isinstance(self._hand, CyclingInstrument) and not ask:
+            del named["hand"]
+        found = []
+        for name, device in named.items():
+            if isinstance(device, WatchedInstrument):
+                with suppress(DeviceError):  # one that is gone has said so
+                    found += [f"{name}: {words.removeprefix(f'{name}: ')}" for words in device.health()]
+        return found
 
     def _instruments(self) -> list[Instrument]:
         camera = [] if self._camera is None else [self._camera]

@@ -133,6 +133,14 @@ class BaseInstrument(Instrument, Protocol):
         """Take back a stop or a fault; the target is where it stands."""
 
 
+@runtime_checkable
+class WatchedInstrument(Protocol):
+    """A device that knows what is wrong with itself."""
+
+    def health(self) -> tuple[str, ...]:
+        """In words; empty when all is well."""
+
+
 class PolledInstrument(Instrument, Protocol):
     """A device that sends by itself and is emptied once a cycle."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drivers.links import Link
+from drivers.links import Link, link_health
 from sessions.instruments import AskedInstrument, Instrument
 
 
@@ -30,3 +30,7 @@ class SensorStream:
         self._link.receive()
         if isinstance(self._device, AskedInstrument):
             self._device.ask()
+
+    def health(self) -> tuple[str, ...]:
+        """What the link knows to be wrong; of the readings, the decoder that Perception has knows."""
+        return link_health(self._link)

@@ -9,7 +9,10 @@ from gtsam import Pose3
 
 from drivers.shadow.kinematics import JOINTS
 from sessions.fingertip_samples import record_fingertips
+from sessions.health_watch import HealthWatch
+from sessions.instrument_set import InstrumentSet
 from sessions.interpreter import Observer
+from sessions.recorder import Level
 from tactile_lab.clock import Clock
 from tactile_lab.geometry.contacts import Contact
 
@@ -32,10 +35,21 @@ class StateRecording:
         observer: has the recorder, and what is known.
         clock: the session's.
         truth: the truth channel of a simulated rig.
+        devices: know what is wrong with them.
+
+    Attributes:
+        watch: tells what goes wrong with devices and fingertips.
     """
 
-    def __init__(self, observer: Observer, clock: Clock, truth: Callable[[], TruthReading] | None) -> None:
-        self._observer, self._clock, self._truth = observer, clock, truth
+    def __init__(
+        self,
+        observer: Observer,
+        clock: Clock,
+        truth: Callable[[], TruthReading] | None,
+        devices: InstrumentSet,
+    ) -> None:
+        self._observer, self._clock, self._truth, self._devices = observer, clock, truth, devices
+        self.watch = HealthWatch(self._warn)
 
     def record(self) -> None:
         """Everything, where it is due. Raises SessionError."""
@@ -48,9 +62,19 @@ class StateRecording:
         record_fingertips(recorder, now_ns, seen.fingertips)
         recorder.frames(now_ns, {"palm": seen.world_T_palm, **seen.world_T_distal})
         self.record_truth()
+        self.watch.look([*self._devices.problems(), *seen.problems()])
 
     def record_truth(self) -> None:
         """Where the object really is, on a simulated rig. Raises SessionError."""
         if self._truth is not None:
             reading = self._truth()
             self._observer.recorder.truth(self._clock.now_ns(), reading.world_T_object, reading.contacts)
+
+    def conclude(self) -> None:
+        """What went wrong with the devices, with its last figures. Raises SessionError."""
+        if not self._observer.recorder.broken:
+            tips = self._observer.interpreter.perception.problems()
+            self.watch.conclude([*self._devices.problems(ask=True), *tips])
+
+    def _warn(self, device: str, words: str) -> None:
+        self._observer.recorder.event(self._clock.now_ns(), Level.WARNING, device, words)
