@@ -19,7 +19,7 @@ from drivers.camera.markers import detection
 from drivers.camera.packet import encode_packet
 from drivers.camera.source_settings import CameraSourceSettings
 from drivers.camera.sources import Picture, Source, open_source
-from drivers.shadow.hand_records import RecordKind, RecordPipe
+from drivers.records import RecordKind, RecordPipe
 from tactile_lab.clock import NANOSECONDS, MonotonicClock
 from tactile_lab.errors import DeviceError, TactileLabError
 from tactile_lab.strict_yaml import validate

@@ -7,29 +7,22 @@ stamped bytes, for the recorder and for :class:`~drivers.shadow.hand_samples.Han
 from __future__ import annotations
 
 import contextlib
-import json
-import os
-import select
-import subprocess
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from drivers.links import Tap
-from drivers.orders import Order, OrderWriter
+from drivers.record_process import RecordProcess
+from drivers.records import Record, RecordKind
 from drivers.shadow.first_move import MoveFinding, require_motor_map
-from drivers.shadow.hand_records import Record, RecordKind, RecordReader
 from drivers.shadow.hand_setup import HandSetup
 from drivers.shadow.motors import DRIVEN_JOINTS
-from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock
 from tactile_lab.errors import DeviceError
 
 PATIENCE_s = 1.0
 """So long the hand's process goes on without any order before it takes the demands away."""
 
 _START_s, _REPORT_s, _MOVES_s, _END_s = 30.0, 5.0, 120.0, 10.0
-_READ_BYTES = 1_048_576
 
 
 @dataclass(frozen=True)
@@ -60,7 +53,6 @@ class HandProcess:
     Args:
         setup: the hand.
         tap: sees all traffic, in :meth:`exchange`; without one :meth:`receive` gives it.
-        clock: for waiting on the process; it stamps with the monotonic clock.
         patience_s: see :data:`PATIENCE_s`.
         check_map: when connecting, nudge each motor to see that it moves the joint its map says.
     """
@@ -69,18 +61,16 @@ class HandProcess:
         self,
         setup: HandSetup,
         tap: Tap | None = None,
-        clock: Clock | None = None,
         *,
         patience_s: float = PATIENCE_s,
         check_map: bool = False,
     ) -> None:
-        self.name, self._clock, self._tap = setup.name, clock or MonotonicClock(), tap
+        self.name, self._tap = setup.name, tap
         self._check_map = check_map
         self._start = {"setup": setup.model_dump(mode="json"), "patience_s": patience_s}
-        self._process: subprocess.Popen[bytes] | None = None
-        self._orders: OrderWriter | None = None
+        self._child = RecordProcess("drivers.shadow.hand_worker", setup.name)
         self._targets_rad: dict[str, float] = {}
-        self._reader, self._kept = RecordReader(), list[Record]()
+        self._kept: list[Record] = []
         self.ready = HandReady("")
 
     # --- lifecycle ---------------------------------------------------------------------------------------------
@@ -91,18 +81,12 @@ class HandProcess:
         Raises:
             DeviceError: the hand does not connect, in the driver's own words, or its motor map is wrong.
         """
-        if self._process is not None:
+        if self._child.started:
             return
-        command = [sys.executable, "-m", "drivers.shadow.hand_worker"]
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0
-        )  # a group of its own: Ctrl+C is for the session, which may want to open the hand first
-        assert self._process.stdin is not None
-        self._orders = OrderWriter(self._process.stdin.fileno(), self.name)
-        self._reader, self._kept, self._targets_rad = RecordReader(), [], {}
+        self._kept, self._targets_rad = [], {}
+        self._child.start(self._start)
         try:
-            self._order(self._start)
-            self.ready = HandReady(**json.loads(self._wait_for(RecordKind.READY, _START_s).payload))
+            self.ready = HandReady(**self._await(RecordKind.READY, _START_s))
             if self._check_map:
                 require_motor_map(self.first_move(), self.name)
         except BaseException:
@@ -111,15 +95,8 @@ class HandProcess:
 
     def close(self) -> None:
         """End the process: the hand gets zero demands, which the tap sees, and is disconnected. Idempotent."""
-        if self._process is None:
-            return
-        process, self._process = self._process, None
-        try:
-            rest, _ = process.communicate(timeout=_END_s)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            rest, _ = process.communicate()
-        for record in [*self._kept, *self._reader.feed(rest or b"")]:
+        kept, self._kept = self._kept, []
+        for record in [*kept, *self._child.last_records(_END_s)]:
             self._show(record)
 
     # --- motion ------------------------------------------------------------------------------------------------
@@ -132,11 +109,11 @@ class HandProcess:
         """Zero demands from the process's next cycle on, until :meth:`resume`. Never raises."""
         self._targets_rad = {}
         with contextlib.suppress(DeviceError):  # a process that is gone has taken the demands with it
-            self._order({"stop": True})
+            self._child.give({"stop": True})
 
     def resume(self) -> None:
         """Take back a stop or a fault; nothing moves before new targets are set."""
-        self._order({"resume": True})
+        self._child.give({"resume": True})
 
     def first_move(self, joints: Sequence[str] = DRIVEN_JOINTS) -> list[MoveFinding]:
         """Nudge motor after motor, as :func:`drivers.shadow.first_move.check_motor_map`.
@@ -144,8 +121,8 @@ class HandProcess:
         Raises:
             DeviceError: the hand stopped itself, or its process is gone.
         """
-        self._order({"first_move": list(joints)})
-        answer = json.loads(self._wait_for(RecordKind.MOVES, _MOVES_s).payload)
+        self._child.give({"first_move": list(joints)})
+        answer = self._await(RecordKind.MOVES, _MOVES_s)
         if "error" in answer:
             raise DeviceError(answer["error"])
         return [MoveFinding(**finding) for finding in answer["moved"]]
@@ -159,7 +136,7 @@ class HandProcess:
             DeviceError: the hand has stopped itself, in its own words, or its process is gone.
         """
         targets_rad, self._targets_rad = self._targets_rad, {}
-        self._order({"targets": targets_rad} if targets_rad else {"alive": True})
+        self._child.give({"targets": targets_rad} if targets_rad else {"alive": True})
         self.catch_up()
 
     def catch_up(self) -> None:
@@ -180,7 +157,7 @@ class HandProcess:
         """
         records, self._kept = self._kept, []
         try:
-            while (more := self._read(0.0)) is not None:
+            while (more := self._child.read_records()) is not None:
                 records += more
         except DeviceError:
             if not records:  # its last words come first
@@ -193,9 +170,8 @@ class HandProcess:
         Raises:
             DeviceError: the process is gone or does not answer.
         """
-        self._order({"report": True})
-        answer: dict[str, Any] = json.loads(self._wait_for(RecordKind.REPORT, _REPORT_s).payload)
-        return answer
+        self._child.give({"report": True})
+        return self._await(RecordKind.REPORT, _REPORT_s)
 
     def health(self) -> tuple[str, ...]:
         """What is wrong with hand and wire, in words. Raises DeviceError when the process is gone."""
@@ -211,40 +187,17 @@ class HandProcess:
             self._tap.received(self.name, record.payload, record.stamp_ns)
         return ""
 
-    def _order(self, order: Order) -> None:
-        self._running()
-        assert self._orders is not None
-        self._orders.give(order)
-
-    def _wait_for(self, kind: RecordKind, patience_s: float) -> Record:
+    def _await(self, kind: RecordKind, patience_s: float) -> dict[str, Any]:
         """The next record of a kind; traffic goes to the tap, errors are kept. An error while starting is raised."""
-        until_ns = self._clock.now_ns() + round(patience_s * NANOSECONDS)
-        wanted: Record | None = None
-        while wanted is None and (left_ns := until_ns - self._clock.now_ns()) > 0:
-            for record in self._read(left_ns / NANOSECONDS) or []:
-                if record.kind is RecordKind.ERROR and kind is RecordKind.READY:
-                    raise DeviceError(record.payload.decode())
-                if record.kind is kind and wanted is None:
-                    wanted = record
-                elif self._tap is None or record.kind is RecordKind.ERROR:
-                    self._kept.append(record)
-                else:
-                    self._show(record)
-        if wanted is None:
-            raise DeviceError("its process does not answer", where=self.name, hint="Connect again")
-        return wanted
+        return self._child.await_record(kind, patience_s, self._raise if kind is RecordKind.READY else self._set_aside)
 
-    def _read(self, patience_s: float) -> list[Record] | None:
-        """Records that arrive in this time; None when nothing does."""
-        process = self._running()
-        assert process.stdout is not None
-        if not select.select([process.stdout], [], [], max(patience_s, 0.0))[0]:
-            return None
-        if not (data := os.read(process.stdout.fileno(), _READ_BYTES)):
-            raise DeviceError("its process has ended", where=self.name, hint="See its last error, and connect again")
-        return self._reader.feed(data)
+    def _raise(self, record: Record) -> None:
+        if record.kind is RecordKind.ERROR:
+            raise DeviceError(record.payload.decode())
+        self._set_aside(record)
 
-    def _running(self) -> subprocess.Popen[bytes]:
-        if self._process is None:
-            raise DeviceError("not connected", where=self.name, hint="Connect the hand first")
-        return self._process
+    def _set_aside(self, record: Record) -> None:
+        if self._tap is None or record.kind is RecordKind.ERROR:
+            self._kept.append(record)
+        else:
+            self._show(record)

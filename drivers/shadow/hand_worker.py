@@ -1,7 +1,7 @@
 """The hand's cycle in a process of its own: ``python -m drivers.shadow.hand_worker``, started by ``HandProcess``.
 
 Takes orders on standard input (see :mod:`~drivers.orders`), first what to drive and how. Gives records on
-standard output (see :mod:`~drivers.shadow.hand_records`), some cycles at a time, without ever waiting for the reader.
+standard output (see :mod:`~drivers.records`), some cycles at a time, without ever waiting for the reader.
 When its standard input ends, the program that started it is gone: the hand gets zero demands and the process ends.
 When orders only stop coming, that program hangs: the demands are taken away as well.
 """
@@ -15,11 +15,11 @@ import sys
 
 from drivers.links import TappedLink
 from drivers.orders import Order, OrderReader
+from drivers.records import RecordKind, RecordPipe
 from drivers.shadow.cycle_statistics import CycleStatistics
 from drivers.shadow.ethercat_link import EthercatLink
 from drivers.shadow.first_move import check_motor_map
 from drivers.shadow.hand import ShadowHand
-from drivers.shadow.hand_records import RecordKind, RecordPipe
 from drivers.shadow.hand_samples import HandSample
 from drivers.shadow.hand_setup import HandSetup
 from drivers.shadow.motors import MotorMap

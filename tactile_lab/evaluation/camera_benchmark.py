@@ -52,7 +52,7 @@ def _frame_timings(clock: Clock, size: tuple[int, int], repeats: int) -> list[Ti
 
 def _kept_rate(clock: Clock, seconds: float) -> Timing:
     """Mean time between the packets of a 30 Hz camera in its process; 33.3 ms when it keeps up."""
-    link = CameraProcess("camera", CameraSourceSettings(source="simulated", size_px=SIZES[-1], rate_hz=RATE_hz), clock)
+    link = CameraProcess("camera", CameraSourceSettings(source="simulated", size_px=SIZES[-1], rate_hz=RATE_hz))
     link.open()
     try:
         link.receive()

@@ -97,7 +97,7 @@ def measure_load(seconds: float, *, with_hand: bool = True) -> LoadResult:
     near, far = f"tld{os.getpid()}", f"tle{os.getpid()}"
     chain = ChainSettings(eeprom="mapped")
     with virtual_cable(near, far), EmulatedHandProcess(far, CALIBRATION / "joints.yaml", chain):
-        process = HandProcess(_hand(near), clock=clock)
+        process = HandProcess(_hand(near))
         process.connect()
         try:
             with preferred():

@@ -90,7 +90,7 @@ class Trial:
     def steady(self, seconds: float) -> WireRow:
         """Hold 1 kHz in a process of its own, with zero demands."""
         with self._emulator("mapped") as emulator:
-            process = HandProcess(self._setup(CYCLE_s), clock=self._clock)
+            process = HandProcess(self._setup(CYCLE_s))
             began_ns = self._clock.now_ns()
             process.connect()
             took_ms = self._since_ms(began_ns)

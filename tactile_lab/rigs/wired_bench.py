@@ -48,7 +48,7 @@ def build_wired_bench(
     return Bench(
         clock=clock,
         cycle_ns=round(description.cycle_s * NANOSECONDS),
-        hand=HandProcess(hand_setup(rig), observer, clock, patience_s=wires.hand.patience_s, check_map=check),
+        hand=HandProcess(hand_setup(rig), observer, patience_s=wires.hand.patience_s, check_map=check),
         base=Positioner(
             TappedLink(UdpLink(BASE_LINK, wires.base.host, wires.base.port, clock), observer, clock),
             clock,
@@ -76,5 +76,5 @@ def _camera(rig: Rig, observer: Observer, clock: Clock) -> Camera | None:
     if isinstance(wiring, RemoteCamera):
         link = TcpLink(CAMERA_LINK, wiring.host, wiring.port, clock)
     else:
-        link = CameraProcess(CAMERA_LINK, camera_source(rig, wiring), clock)
+        link = CameraProcess(CAMERA_LINK, camera_source(rig, wiring))
     return Camera(TappedLink(link, observer, clock), clock)

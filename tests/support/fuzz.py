@@ -35,8 +35,8 @@ from drivers.hardware.can_bus import CanFrame, decode_frame, encode_frame
 from drivers.hardware.tcp import MessageReader, framed
 from drivers.links import Datagram
 from drivers.positioner_codec import PositionerCommand, PositionerStatus
-from drivers.shadow.hand_records import Record as HandRecord
-from drivers.shadow.hand_records import RecordKind, RecordReader, encode_record
+from drivers.records import Record as HandRecord
+from drivers.records import RecordKind, RecordReader, encode_record
 from drivers.shadow.motor_can import MotorAnswer, MotorIdentifier
 from drivers.shadow.palm_codec import PalmCommand
 from drivers.shadow.palm_images import PALMS

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import signal
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -132,7 +134,7 @@ def test_a_hand_process_that_dies_ends_the_session_in_order(
         return benches[-1]
 
     def kill() -> None:
-        benches[0].hand._process.kill()  # type: ignore[attr-defined]
+        os.kill(benches[0].hand._child.process_id, signal.SIGKILL)  # type: ignore[attr-defined]
 
     made = WiredLaboratory.bench
     monkeypatch.setattr(WiredLaboratory, "bench", kept)

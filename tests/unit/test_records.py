@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivers.records import Record, RecordKind, RecordPipe, RecordReader, encode_record
 from drivers.shadow.cycle_statistics import CycleStatistics
-from drivers.shadow.hand_records import Record, RecordKind, RecordPipe, RecordReader, encode_record
 from tactile_lab.errors import CodecError
 
 records = st.builds(

@@ -1,4 +1,4 @@
-"""Records that the hand's own process hands to the session: traffic with its stamps, errors, reports.
+"""Records that a device's own process hands to the session: traffic with its stamps, errors, reports.
 
 Each is a head of kind, length and stamp, and a payload; whole blocks of them go through a pipe. The writer never waits:
 what a full pipe does not take is kept up to a limit, further blocks are dropped and counted.
@@ -16,7 +16,8 @@ from tactile_lab.errors import CodecError
 
 _HEAD = struct.Struct("<BIq")
 _BACKLOG_BYTES, _PIPE_BYTES = 4_000_000, 1_048_576
-_LONGEST = 65_536
+LONGEST = 65_536
+"""Payloads of more bytes are damage, where nothing else is said."""
 
 
 class RecordKind(IntEnum):
@@ -52,7 +53,7 @@ class RecordReader:
         where: the process they come from, for errors.
     """
 
-    def __init__(self, longest: int = _LONGEST, where: str = "hand process") -> None:
+    def __init__(self, longest: int = LONGEST, where: str = "records") -> None:
         self._rest, self._longest, self._where = b"", longest, where
 
     def feed(self, data: bytes) -> list[Record]:
@@ -77,7 +78,7 @@ class RecordReader:
 
 
 class RecordPipe:
-    """The writing end; a tap for the hand's link.
+    """The writing end; a tap for the device's link.
 
     Args:
         descriptor: of the pipe.
@@ -92,11 +93,11 @@ class RecordPipe:
         fcntl.fcntl(descriptor, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
 
     def transmitted(self, link: str, payload: bytes, stamp_ns: int) -> None:
-        """The hand was sent ``payload``."""
+        """The device was sent ``payload``."""
         self.put(RecordKind.TRANSMITTED, stamp_ns, payload)
 
     def received(self, link: str, payload: bytes, stamp_ns: int) -> None:
-        """The hand sent ``payload``."""
+        """The device sent ``payload``."""
         self.put(RecordKind.RECEIVED, stamp_ns, payload)
 
     def put(self, kind: RecordKind, stamp_ns: int, payload: bytes) -> None:
