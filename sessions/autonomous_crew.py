@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from drivers.shadow.posture import TipEllipsoid
 from sessions.bench import Bench
-from sessions.bounding_box import BoundingBox, BoxProber
+from sessions.bounding_box import BoxProber
 from sessions.conductor_settings import ConductorSettings
 from sessions.decisions import Crew
 from sessions.grasp_cycle import GraspCycle
@@ -17,6 +15,8 @@ from sessions.next_grasp import FixedRule
 from sessions.planner import Planner
 from sessions.policy_decisions import Approve, PolicyDecisions, chooser_for, everything_approved, recorded_by
 from sessions.safety import SafetySupervisor
+from sessions.thinker import Thinker
+from sessions.thinker_process import thinking_for
 from sessions.touching import Toucher
 from tactile_lab.slam import TactileSlam
 
@@ -45,22 +45,29 @@ def autonomous_crew(
     tip, window = tip_shape(bench), settings.plan.yaw_window_rad
     motion = Motion(bench, supervisor)
     cycle = GraspCycle(motion, settings.cycle, tip, window)
+    planner = planner_for(slam, settings, tip, seed, dimension)
+    thinking = thinking_for(bench.clock, Thinker(slam, planner), cycle.idle)
+    decisions = PolicyDecisions(thinking, recorded_by(bench), approve)
+    if not settings.probing.enabled:
+        return Crew(supervisor, cycle, decisions, thinking)
+    prober = BoxProber(Toucher(motion, settings.cycle, tip), settings.probing, window, settings.plan.start_m)
+    return Crew(supervisor, cycle, decisions, thinking, prober.feel)
+
+
+def planner_for(
+    slam: TactileSlam, settings: ConductorSettings, tip: TipEllipsoid, seed: int, dimension: int
+) -> Planner:
+    """What chooses the grasps of a session, with the policy of its settings.
+
+    Raises:
+        ConfigurationError: there is no policy of that name.
+    """
     rule = FixedRule(settings.plan, np.random.default_rng(seed), dimension)
     chooser = None
     if policy := settings.exploration.policy:
         limits = settings.plan, settings.exploration, settings.cycle, settings.safety
         chooser = chooser_for(policy, limits, tip, dimension, slam.settings.motion, seed)
-    planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension, chooser, settings.grasps)
-    decisions = PolicyDecisions(planner, recorded_by(bench), approve)
-    if not settings.probing.enabled:
-        return Crew(supervisor, cycle, decisions)
-    prober = BoxProber(Toucher(motion, settings.cycle, tip), settings.probing, window, settings.plan.start_m)
-
-    def survey(stop: Callable[[], bool]) -> BoundingBox:
-        planner.boxed(box := prober.feel(stop))
-        return box
-
-    return Crew(supervisor, cycle, decisions, survey)
+    return Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension, chooser, settings.grasps)
 
 
 def tip_shape(bench: Bench) -> TipEllipsoid:

@@ -27,11 +27,10 @@ from sessions.progress import GraspReport, NullProgress, Progress
 from sessions.recorder import Level
 from sessions.safety import InterruptGuard
 from sessions.session_outcome import Ending, SessionOutcome
+from sessions.thinker import Estimate
 from sessions.view_messages import plan_message
 from tactile_lab.errors import TactileLabError
 from tactile_lab.geometry.contacts import Grasp
-from tactile_lab.slam import TactileSlam
-from tactile_lab.slam_result import SlamStep
 
 
 class Conductor:
@@ -39,16 +38,14 @@ class Conductor:
 
     Args:
         bench: connected; the caller closes it.
-        slam: fresh; the caller finishes it.
         settings: of the session.
-        crew: who decides about the grasps and does them.
+        crew: who decides about the grasps and does them; the caller opens its thinking.
         progress: is told what happens.
     """
 
     def __init__(
         self,
         bench: Bench,
-        slam: TactileSlam,
         settings: ConductorSettings,
         crew: Crew,
         progress: Progress | None = None,
@@ -57,7 +54,7 @@ class Conductor:
         self._progress = progress or NullProgress()
         self._supervisor, self._cycle, self._decisions = crew.supervisor, crew.performer, crew.decisions
         self._survey = crew.survey
-        self._estimation = Estimation(bench, slam, crew.decisions, crew.performer.idle)
+        self._estimation = Estimation(bench, crew.thinking)
         self._guard = InterruptGuard()
         self._thought_of: int | None = None
         self._paused = False
@@ -89,6 +86,7 @@ class Conductor:
             return None
         self._phase("bounding box")
         box = self._survey(lambda: self._guard.requested)
+        self._decisions.boxed(box)
         self._tell(Level.INFO, box.in_words())
         if box.is_found or self._guard.requested:
             return None
@@ -126,7 +124,7 @@ class Conductor:
 
     def _consider(self, index: int) -> None:
         if self._thought_of != index:
-            self._estimation.think(lambda: self._decisions.think(index))
+            self._decisions.think(index)
             self._thought_of = index
             if plan := self._decisions.suggested:
                 self._bench.recorder.plan(self._bench.clock.now_ns(), plan_message(index, plan))
@@ -167,6 +165,8 @@ class Conductor:
         problems = self._supervisor.stop(error)
         text = "; ".join([reason, *(f"while stopping: {problem}" for problem in problems)])
         self._bench.event(Level.ERROR if error else Level.INFO, "conductor", f"{ending}: {text}")
+        for note in getattr(error, "__notes__", ()):
+            self._bench.event(Level.ERROR, "conductor", note)
         return SessionOutcome(ending, text, tuple(self._grasps), dict(self._bench.perception.drop_counts), error)
 
     # --- one grasp ---------------------------------------------------------------------------------------------
@@ -182,7 +182,7 @@ class Conductor:
         if grasp is None:
             return
         missing = dict(self._bench.perception.dropped)
-        wanted = self._decisions.captured(grasp, self._cycle.plan)
+        wanted = self._wanted(grasp)
         if isinstance(wanted, Veto):
             self._bench.undo()
             self._tell(Level.INFO, f"grasp {self._number} does not count: {wanted.reason}")
@@ -190,13 +190,23 @@ class Conductor:
             return
         self._grasps.append(grasp)
         try:
-            self._carry(grasp, wanted)
-            self._let_go()
+            if wanted is not None:
+                self._carry(grasp, wanted)
+                self._let_go()
         except TactileLabError as error:
             self._survive(error)
         self._phase("estimate")
-        step = self._estimation.step(grasp)
-        self._progress.grasp_done(self._report(grasp, plan, step, missing))
+        estimate = self._estimation.step(grasp)
+        self._decisions.estimated(estimate.step)
+        self._progress.grasp_done(self._report(grasp, plan, estimate, missing))
+
+    def _wanted(self, grasp: Grasp) -> Reorientation | Veto | None:
+        """What is to become of a captured grasp; None where something failed meanwhile and the session goes on."""
+        try:
+            return self._decisions.captured(grasp, self._cycle.plan)
+        except TactileLabError as error:
+            self._survive(error)
+            return None
 
     def _measure(self, plan: GraspPlan) -> Grasp | None:
         """Down to the captured grasp; None when the hand did not get there, or is not to go on."""
@@ -220,8 +230,8 @@ class Conductor:
             return
         undone = self._bench.undo()
         self._grasps.pop()
-        self._estimation.undo()
-        self._decisions.undone(self._bench.perception.hand_motion_world)
+        self._estimation.undo(self._bench.perception.hand_motion_world)
+        self._decisions.undone()
         self._thought_of = None
         self._tell(Level.INFO, f"grasp {undone.index + 1} is taken back: {reason}")
 
@@ -240,7 +250,7 @@ class Conductor:
         self._supervisor.count_contacts(len(touching))
         hand_motion = Pose3()
         last = len(self._grasps) >= self._settings.grasps or self._guard.requested
-        if _holds(touching) and not last:
+        if holds(touching) and not last:
             self._phase("squeeze")
             cycle.squeeze(touching)
             self._phase("re-orient")
@@ -255,9 +265,8 @@ class Conductor:
 
     # --- telling -----------------------------------------------------------------------------------------------
 
-    def _report(self, grasp: Grasp, plan: GraspPlan, step: SlamStep, missing: dict[str, str]) -> GraspReport:
-        covariance = step.covariance
-        known = self._decisions.known_shape()
+    def _report(self, grasp: Grasp, plan: GraspPlan, estimate: Estimate, missing: dict[str, str]) -> GraspReport:
+        step, covariance = estimate.step, estimate.step.covariance
         return GraspReport(
             number=len(self._grasps),
             planned=self._settings.grasps,
@@ -268,7 +277,7 @@ class Conductor:
             landings=len(self._cycle.landings_world_m),
             position_sigma_m=None if covariance is None else float(np.sqrt(np.trace(covariance[:2, :2]) / 2)),
             yaw_sigma_rad=None if covariance is None else float(np.sqrt(covariance[2, 2])),
-            explored=None if known is None else known.explored,
+            explored=estimate.explored,
             verdict=f"{step.verdict}: {step.reason}",
             stamp_ns=grasp.stamp_ns,
         )
@@ -284,6 +293,6 @@ class Conductor:
         self._progress.told(message)
 
 
-def _holds(touching: frozenset[str]) -> bool:
+def holds(touching: frozenset[str]) -> bool:
     """Whether these fingers can carry the object: the thumb against another, or both side fingers."""
     return ("TH" in touching and len(touching) > 1) or {"FF", "LF"} <= touching

@@ -13,10 +13,11 @@ from typing import Protocol, TypeAlias
 from gtsam import Pose3
 
 from sessions.bounding_box import BoundingBox
-from sessions.explorer import KnownShape
 from sessions.grasp_cycle import GraspPlan
-from sessions.planner import Planner, Reorientation
+from sessions.planner import Reorientation
 from sessions.safety import SafetySupervisor
+from sessions.thinker import Thinker, Thought
+from sessions.thinking import Thinking
 from tactile_lab.errors import TactileLabError
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.slam_result import SlamStep
@@ -81,10 +82,13 @@ class DecisionMaker(Protocol):
         """The grasp that comes next, as far as it has been thought of."""
 
     def think(self, index: int) -> None:
-        """Prepare the decision about grasp ``index``; may take its time, in another thread."""
+        """Prepare the decision about grasp ``index``; may take its time while cycles run."""
 
     def decide(self, index: int) -> Decision:
         """What to do now that grasp ``index`` is next; at once."""
+
+    def boxed(self, box: BoundingBox) -> None:
+        """The object's bounding box was felt."""
 
     def arrived(self, landings_world_m: list[Array]) -> None:
         """The approach has ended; fingertips stood on the object at these places, (3,) each."""
@@ -98,14 +102,11 @@ class DecisionMaker(Protocol):
     def estimated(self, step: SlamStep) -> None:
         """The estimation has taken the grasp."""
 
-    def undone(self, hand_motion_world: Pose3) -> None:
-        """The last grasp was taken back; the hand carried the object so far since the one before it."""
+    def undone(self) -> None:
+        """The last grasp was taken back."""
 
     def failed(self, error: TactileLabError) -> bool:
         """A device failed or a limit was passed, and everything stops: whether the session waits and goes on."""
-
-    def known_shape(self) -> KnownShape | None:
-        """The shape as estimated now; None before there is one."""
 
 
 class Performer(Protocol):
@@ -134,6 +135,7 @@ class Crew:
         supervisor: looks at every cycle.
         performer: does the grasps.
         decisions: decides about them.
+        thinking: where estimation and planner are asked; open while the session runs.
         survey: feels the object's bounding box before the first grasp; asked in between whether to leave the rest out.
             None for a session that begins without.
     """
@@ -141,6 +143,7 @@ class Crew:
     supervisor: SafetySupervisor
     performer: Performer
     decisions: DecisionMaker
+    thinking: Thinking
     survey: Callable[[Callable[[], bool]], BoundingBox] | None = None
 
 
@@ -148,44 +151,51 @@ class AutonomousDecisions:
     """The planner decides, and every grasp counts.
 
     Attributes:
-        planner: it.
+        thinking: where the planner is asked.
     """
 
-    def __init__(self, planner: Planner) -> None:
-        self.planner = planner
-        self._plan: GraspPlan | None = None
+    def __init__(self, thinking: Thinking) -> None:
+        self.thinking = thinking
+        self._thought: Thought | None = None
+        self._centre_m: Array | None = None
+        """As the planner said it; None when it has heard something since."""
 
     @property
     def centre_m(self) -> Array:
-        return self.planner.centre_m
+        if self._centre_m is None:
+            self._centre_m = self.thinking.ask(Thinker.centre_m)
+        return self._centre_m
 
     @property
     def suggested(self) -> GraspPlan | None:
-        return self._plan
+        return None if self._thought is None else self._thought.plan
 
     def think(self, index: int) -> None:
-        self._plan = self.planner.plan(index)
+        self._thought = self.thinking.ask(Thinker.plan, index)
 
     def decide(self, index: int) -> Decision:
-        return Wait() if self._plan is None else DoGrasp(self._plan)
+        return Wait() if self._thought is None else DoGrasp(self._thought.plan)
+
+    def boxed(self, box: BoundingBox) -> None:
+        self._centre_m = None
+        self.thinking.ask(Thinker.boxed, box)
 
     def arrived(self, landings_world_m: list[Array]) -> None:
-        self.planner.landed(landings_world_m)
+        self.thinking.ask(Thinker.landed, landings_world_m)
 
     def captured(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
-        return self.planner.grasped(grasp, plan)
+        self._centre_m = None
+        return self.thinking.ask(Thinker.grasped, grasp, plan)
 
     def carried(self, hand_motion_world: Pose3) -> None:
-        self.planner.carried(hand_motion_world)
+        self._centre_m = None
+        self.thinking.ask(Thinker.carried, hand_motion_world)
 
     def estimated(self, step: SlamStep) -> None:
-        self.planner.estimated(step.index)
+        self._centre_m = None
 
-    def undone(self, hand_motion_world: Pose3) -> None:
-        self.planner.undone(hand_motion_world)
+    def undone(self) -> None:
+        self._centre_m = None
 
     def failed(self, error: TactileLabError) -> bool:
         return False
-
-    def known_shape(self) -> KnownShape | None:
-        return self.planner.known_shape()

@@ -1,58 +1,43 @@
-"""The estimation beside a running session: a step for each grasp, recorded, without starving the devices."""
+"""The estimation beside a running session: a step for each grasp, recorded."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from gtsam import Pose3
 
 from sessions.bench import Bench
-from sessions.decisions import DecisionMaker
-from sessions.slam_memory import SlamMemory
-from sessions.view_messages import surface_message
-from tactile_lab.clock import VirtualClock
+from sessions.thinker import Estimate, Thinker
+from sessions.thinking import Thinking
 from tactile_lab.geometry.contacts import Grasp
-from tactile_lab.slam import TactileSlam
-from tactile_lab.slam_result import SlamStep
-
-Answer = TypeVar("Answer")
 
 
 class Estimation:
-    """Takes grasps one after the other, tells whoever decides, and records each step.
+    """Has grasps estimated one after the other, and records each step.
 
     Args:
         bench: of the session.
-        slam: fresh.
-        decisions: is told about each step.
-        idle: runs one cycle of the devices.
+        thinking: where it is estimated.
     """
 
-    def __init__(self, bench: Bench, slam: TactileSlam, decisions: DecisionMaker, idle: Callable[[], None]) -> None:
-        self._bench, self._slam, self._decisions, self._idle = bench, slam, decisions, idle
-        self._memory = SlamMemory(slam)
+    def __init__(self, bench: Bench, thinking: Thinking) -> None:
+        self._bench, self._thinking = bench, thinking
+        self._known = 0
+        """Estimates that are recorded and have not been taken back."""
 
-    def step(self, grasp: Grasp) -> SlamStep:
+    def step(self, grasp: Grasp) -> Estimate:
         """One step of the estimation."""
-        self._memory.remember()
-        step = self.think(lambda: self._slam.take(grasp))
-        self.think(lambda: self._decisions.estimated(step))
+        estimates = self._thinking.ask(Thinker.estimate, grasp, self._known)
+        for estimate in estimates:
+            self._record(estimate)
+        self._known += len(estimates)
+        return estimates[-1]
+
+    def undo(self, hand_motion_world: Pose3) -> None:
+        """Back to before the last step; the hand carried the object so far since the grasp before it."""
+        self._thinking.ask(Thinker.undo, hand_motion_world)
+        self._known -= 1
+
+    def _record(self, estimate: Estimate) -> None:
+        recorder, now_ns, step = self._bench.recorder, self._bench.clock.now_ns(), estimate.step
         state = {"index": step.index, "verdict": step.verdict, "reason": step.reason, "seconds": step.seconds}
-        self._bench.recorder.slam(self._bench.clock.now_ns(), step.world_T_object, state, step.covariance)
-        surface = self.think(lambda: surface_message(self._decisions.known_shape()))
-        self._bench.recorder.surface(self._bench.clock.now_ns(), surface)
-        return step
-
-    def undo(self) -> None:
-        """Back to before the last step."""
-        self._memory.undo()
-
-    def think(self, question: Callable[[], Answer]) -> Answer:
-        """Compute without starving the devices: simulated time waits, real time is spent in cycles."""
-        if isinstance(self._bench.clock, VirtualClock):
-            return question()
-        with ThreadPoolExecutor(1) as worker:
-            answer = worker.submit(question)
-            while not answer.done():
-                self._idle()
-            return answer.result()
+        recorder.slam(now_ns, step.world_T_object, state, step.covariance)
+        recorder.surface(now_ns, estimate.surface)

@@ -15,10 +15,11 @@ from sessions.explorer import ExplorationSettings
 from sessions.grasp_cycle import GraspPlan
 from sessions.hand_candidates import HandLimits
 from sessions.next_grasp import PlanSettings
-from sessions.planner import Planner
 from sessions.policy_choice import Choice, PolicyChooser
 from sessions.recorder import Level
 from sessions.safety import SafetySettings
+from sessions.thinker import Thinker
+from sessions.thinking import Thinking
 from tactile_lab.exploration.policies import make_policy
 from tactile_lab.tracking.motion import MotionNoise
 
@@ -51,40 +52,49 @@ class PolicyDecisions(AutonomousDecisions):
     """The planner's policy decides.
 
     Args:
-        planner: with or without a policy.
-        tell: told every decision of the policy once, from the session's own thread.
+        thinking: where a planner with or without a policy is asked.
+        tell: told every decision of the policy once.
         approve: asked before every grasp; what it refuses is replaced by the next best.
     """
 
     def __init__(
-        self, planner: Planner, tell: Callable[[Choice], None], approve: Approve = everything_approved
+        self, thinking: Thinking, tell: Callable[[Choice], None], approve: Approve = everything_approved
     ) -> None:
-        super().__init__(planner)
+        super().__init__(thinking)
         self._tell, self._approve = tell, approve
         self._untold: Choice | None = None
 
     def think(self, index: int) -> None:
         super().think(index)
         vetoed = 0
-        while not self._is_over and self._plan is not None:
-            if self._approve(Proposal(index + 1, self._plan, vetoed)):
-                break
-            self._plan, vetoed = self.planner.vetoed(index), vetoed + 1
-        self._untold = self.planner.choice
+        while not self._is_over and not self._is_approved(index, vetoed):
+            self._thought, vetoed = self.thinking.ask(Thinker.vetoed, index), vetoed + 1
+        self._untold = self._choice
+
+    def _is_approved(self, index: int, vetoed: int) -> bool:
+        """Whether a person, where one is asked, lets the grasp be done that has been thought of."""
+        if self._thought is None or self._approve is everything_approved:
+            return True
+        proposal = Proposal(index + 1, self._thought.plan, vetoed)
+        return self.thinking.beside(lambda: self._approve(proposal))
 
     def decide(self, index: int) -> Decision:
         if (choice := self._untold) is not None:
             self._untold = None
             self._tell(choice)
-        if self._is_over and self.planner.choice is not None:
-            return End(self.planner.choice.decision.reason)
+        if self._is_over and self._choice is not None:
+            return End(self._choice.decision.reason)
         return super().decide(index)
+
+    @property
+    def _choice(self) -> Choice | None:
+        """The policy's, about the grasp that comes next."""
+        return None if self._thought is None else self._thought.choice
 
     @property
     def _is_over(self) -> bool:
         """Whether the policy has nothing more to gain."""
-        choice = self.planner.choice
-        return choice is not None and choice.decision.outcome == "stop"
+        return self._choice is not None and self._choice.decision.outcome == "stop"
 
 
 def recorded_by(bench: Bench) -> Callable[[Choice], None]:

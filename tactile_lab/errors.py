@@ -6,6 +6,7 @@ TactileLabError                exit 1
  |   `- CodecError                      bytes that are not what the protocol says
  |- SafetyError                exit 1   a limit of the hand or the workspace was passed: the rig has stopped
  |- SessionError               exit 1   a session folder or its traffic file
+ |   `- EstimationError                 the program itself failed while it estimated or planned
  |- ShapeError                 exit 1   a mesh, contour or model that cannot be used
  |- TrackingError              exit 1   the object can not be followed any further
  `- InterruptionError          exit 130 a person ended the work before it was done
@@ -60,6 +61,10 @@ class SafetyError(TactileLabError):
 
 class SessionError(TactileLabError):
     """A session folder or traffic file that can not be read or written."""
+
+
+class EstimationError(SessionError):
+    """The estimation or the planning of a running session failed for a reason nobody foresaw; its notes say where."""
 
 
 class ShapeError(TactileLabError):

@@ -6,16 +6,16 @@ from collections.abc import Callable
 
 from sessions.decisions import Decision, End, Pause, UndoGrasp
 from sessions.guided.operator import Ask, Operator
-from sessions.planner import Planner
 from sessions.policy_choice import Choice
 from sessions.policy_decisions import Approve, PolicyDecisions
+from sessions.thinking import Thinking
 
 
 class AttendedDecisions(PolicyDecisions):
     """The planner's decisions, recorded and approved as ever, unless the person asks for something else.
 
     Args:
-        planner: with or without a policy.
+        thinking: where a planner with or without a policy is asked.
         tell: told every decision of the policy that is not overtaken by what the person asks for.
         approve: asked before every grasp.
         operator: the person; is heard between grasps.
@@ -24,13 +24,13 @@ class AttendedDecisions(PolicyDecisions):
 
     def __init__(
         self,
-        planner: Planner,
+        thinking: Thinking,
         tell: Callable[[Choice], None],
         approve: Approve,
         operator: Operator,
         wait: Callable[[], None] = lambda: None,
     ) -> None:
-        super().__init__(planner, tell, approve)
+        super().__init__(thinking, tell, approve)
         self._operator, self._wait = operator, wait
         self._paused = False
 

@@ -21,6 +21,8 @@ from sessions.guided.operator import Operator
 from sessions.next_grasp import FixedRule
 from sessions.planner import Planner
 from sessions.safety import SafetySupervisor
+from sessions.thinker import Thinker
+from sessions.thinker_process import thinking_for
 from tactile_lab.slam import TactileSlam
 
 
@@ -58,4 +60,5 @@ def guided_crew(
     )
     rule = FixedRule(settings.plan, np.random.default_rng(seed), dimension)
     planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension)
-    return Crew(supervisor, performer, GuidedDecisions(planner, desk))
+    thinking = thinking_for(bench.clock, Thinker(slam, planner), performer.idle)
+    return Crew(supervisor, performer, GuidedDecisions(thinking, desk), thinking)

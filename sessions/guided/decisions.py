@@ -9,7 +9,9 @@ from sessions.grasp_cycle import GraspPlan
 from sessions.guided.desk import Desk
 from sessions.guided.operator import Ask, Stage
 from sessions.guided.words import plan_in_words, unknown_in_words
-from sessions.planner import Planner, Reorientation
+from sessions.planner import Reorientation
+from sessions.thinker import Thinker
+from sessions.thinking import Thinking
 from tactile_lab.errors import DeviceError, SafetyError, TactileLabError
 from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.geometry.poses import planar
@@ -24,19 +26,19 @@ class GuidedDecisions(AutonomousDecisions):
     """What the person asks for at the desk.
 
     Args:
-        planner: suggests.
+        thinking: where the planner is asked, which suggests.
         desk: where the person sits.
     """
 
-    def __init__(self, planner: Planner, desk: Desk) -> None:
-        super().__init__(planner)
+    def __init__(self, thinking: Thinking, desk: Desk) -> None:
+        super().__init__(thinking)
         self._desk = desk
         self._entered: int | None = None
 
     def think(self, index: int) -> None:
         super().think(index)
-        assert self._plan is not None
-        self._desk.suggestion = plan_in_words(self._plan)
+        assert self.suggested is not None
+        self._desk.suggestion = plan_in_words(self.suggested)
         self._entered = None
 
     def decide(self, index: int) -> Decision:
@@ -69,19 +71,22 @@ class GuidedDecisions(AutonomousDecisions):
 
     def captured(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
         self._desk.tell(_in_words(grasp))
+        self._desk.enter(Stage.ROTATE, "Considering how to turn the object")  # it can not be given up any more
         return super().captured(grasp, plan)
 
     def estimated(self, step: SlamStep) -> None:
         super().estimated(step)
-        self._tell_unknown(step.world_T_object)
+        self._desk.unknown = self.thinking.ask(_unknown, step.world_T_object)
         self._desk.tell(f"grasp {step.index + 1} {step.verdict}: {step.reason}")
-
-    def _tell_unknown(self, world_T_object: Pose3 | None) -> None:
-        pose = None if world_T_object is None else planar(world_T_object)
-        self._desk.unknown = unknown_in_words(self.known_shape(), pose)
 
     def failed(self, error: TactileLabError) -> bool:
         return isinstance(error, (SafetyError, DeviceError)) and self._desk.fail(str(error))
+
+
+def _unknown(thinker: Thinker, world_T_object: Pose3 | None) -> str:
+    """Which part of an object at this pose is still unknown."""
+    pose = None if world_T_object is None else planar(world_T_object)
+    return unknown_in_words(thinker.known_shape(), pose)
 
 
 def _in_words(grasp: Grasp) -> str:

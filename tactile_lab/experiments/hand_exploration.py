@@ -24,12 +24,13 @@ from sessions.conductor import Conductor
 from sessions.conductor_settings import ConductorSettings
 from sessions.decisions import Decision, End, Veto
 from sessions.grasp_cycle import GraspPlan
-from sessions.planner import Planner, Reorientation
+from sessions.planner import Reorientation
 from sessions.policy_choice import Choice
 from sessions.policy_decisions import PolicyDecisions
 from sessions.progress import GraspReport, NullProgress
 from sessions.recorder import NullRecorder
 from sessions.session_outcome import Ending
+from sessions.thinking import Thinking
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import ShapeError
 from tactile_lab.evaluation.registration import registration_rms_mm
@@ -84,9 +85,8 @@ def explore_by_hand(cell: Cell) -> dict[str, Any]:
     bench.connect()
     try:
         crew = autonomous_crew(bench, slam, conductor, seed=cell.seed, dimension=dimension)
-        assert isinstance(crew.decisions, PolicyDecisions)
-        crew = replace(crew, decisions=UntilExplored(crew.decisions.planner, watch))
-        outcome = Conductor(bench, slam, conductor, crew, watch).run()
+        crew = replace(crew, decisions=UntilExplored(crew.thinking, watch))
+        outcome = Conductor(bench, conductor, crew, watch).run()
     finally:
         bench.close()
     return {**watch.figures(outcome.grasps, slam.finish()), "status": _status(outcome.ending, watch)}
@@ -210,12 +210,12 @@ class UntilExplored(PolicyDecisions):
     """Follows the policy until the watch says that all is explored.
 
     Args:
-        planner: with the policy.
+        thinking: where the planner with the policy is asked.
         watch: what judges.
     """
 
-    def __init__(self, planner: Planner, watch: Watch) -> None:
-        super().__init__(planner, watch.keep)
+    def __init__(self, thinking: Thinking, watch: Watch) -> None:
+        super().__init__(thinking, watch.keep)
         self._watch = watch
 
     def captured(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:

@@ -10,7 +10,7 @@ from typing import Literal
 from sessions.autonomous_crew import autonomous_crew
 from sessions.bench import Bench
 from sessions.conductor_settings import ConductorSettings
-from sessions.decisions import AutonomousDecisions, Crew
+from sessions.decisions import Crew
 from sessions.guided.attended import AttendedDecisions
 from sessions.guided.crew import guided_crew
 from sessions.guided.operator import Operator
@@ -73,10 +73,9 @@ def crew_for(
     crew = autonomous_crew(bench, slam, settings, seed=seed, dimension=dimension, approve=attendance.approve)
     if operator is None:
         return crew
-    assert isinstance(crew.decisions, AutonomousDecisions)
-    pace, planner = _pace(bench, attendance), crew.decisions.planner
+    pace = _pace(bench, attendance)
     decisions = AttendedDecisions(
-        planner, recorded_by(bench), attendance.approve, operator, lambda: pace(bench.clock.now_ns())
+        crew.thinking, recorded_by(bench), attendance.approve, operator, lambda: pace(bench.clock.now_ns())
     )
     return replace(crew, decisions=decisions)
 

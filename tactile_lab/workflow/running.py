@@ -16,7 +16,7 @@ from sessions.manifest import Status
 from sessions.progress import Progress
 from sessions.session import RunningSession, create_session
 from sessions.session_outcome import Ending, SessionOutcome
-from tactile_lab.errors import ConfigurationError, InterruptionError
+from tactile_lab.errors import ConfigurationError, EstimationError, InterruptionError
 from tactile_lab.exploration.policies import make_policy
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
@@ -102,9 +102,16 @@ def run_session(request: SessionRequest, progress: Progress, attendance: Attenda
             outcome = _record(session, rig, laboratory, slam, request, progress, attendance)
     with _kept_when_interrupted(session):
         progress.phase(len(outcome.grasps), "model and evaluation")
-        estimate_rest(slam, outcome.grasps)
-        finished = judge(session, rig, slam, outcome.grasps, session.results)
+        finished = _judged(session, rig, slam, outcome)
     return replace(finished, outcome=outcome, data_loss=session.manifest.data_loss, overlooked=overlooked)
+
+
+def _judged(session: RunningSession, rig: Rig, slam: TactileSlam, outcome: SessionOutcome) -> FinishedSession:
+    """The results, of all grasps; none where the estimation has failed, as it would fail on them again."""
+    if isinstance(outcome.error, EstimationError):
+        return FinishedSession(session.folder, session.results, problem=str(outcome.error))
+    estimate_rest(slam, outcome.grasps)
+    return judge(session, rig, slam, outcome.grasps, session.results)
 
 
 @contextmanager
@@ -131,15 +138,17 @@ def _record(
         if attendance.onlooker is not None:
             session.recorder.watched_by(attendance.onlooker)
         bench = laboratory.bench(session.recorder)
-        bench.connect()
-        record_camera(rig, session.recorder, bench.clock.now_ns())
+        bench.tell_problems_to(progress.told)
         settings = settings_for(_conductor_settings(rig, request), attendance)
         seed, dimension = request.seed, request.dimension
-        try:
-            crew = crew_for(attendance, bench, slam, settings, session.folder, seed=seed, dimension=dimension)
-            outcome = Conductor(bench, slam, settings, crew, progress).run()
-        finally:
-            bench.close()
+        crew = crew_for(attendance, bench, slam, settings, session.folder, seed=seed, dimension=dimension)
+        with crew.thinking:
+            bench.connect()
+            record_camera(rig, session.recorder, bench.clock.now_ns())
+            try:
+                outcome = Conductor(bench, settings, crew, progress).run()
+            finally:
+                bench.close()
         _close(session, outcome, bench.counts.overruns, bench.undecodable)
     return outcome
 

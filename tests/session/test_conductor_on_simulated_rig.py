@@ -93,7 +93,7 @@ def run(
     bench.connect()
     try:
         slam = TactileSlam(SlamSettings(), SEED)
-        conductor = Conductor(bench, slam, settings, autonomous_crew(bench, slam, settings, seed=SEED), watcher)
+        conductor = Conductor(bench, settings, autonomous_crew(bench, slam, settings, seed=SEED), watcher)
         outcome = conductor.run()
     finally:
         bench.close()

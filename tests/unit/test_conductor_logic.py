@@ -21,10 +21,11 @@ from sessions.grasp_cycle import GraspPlan
 from sessions.marks import MarkKind
 from sessions.motion import GraspFrame
 from sessions.next_grasp import FixedRule, PlanSettings, contact_centre
-from sessions.planner import Planner, Reorientation
+from sessions.planner import Reorientation
 from sessions.progress import GraspReport, NullProgress
 from sessions.recorder import Level
 from sessions.session_outcome import Ending, SessionOutcome
+from sessions.thinking import Thinking
 from tactile_lab.errors import ConfigurationError, DeviceError, TactileLabError
 from tactile_lab.geometry.contacts import Contact, Grasp
 from tactile_lab.slam import SlamSettings, TactileSlam
@@ -60,7 +61,7 @@ def run(world: DiscWorld, grasps: int = 2, watcher: Watcher | None = None, **ove
     slam = TactileSlam(SlamSettings(particles=200), seed=1)
     wanted = settings(grasps, **overrides)
     crew = autonomous_crew(world, slam, wanted, seed=3)  # type: ignore[arg-type]
-    return Conductor(world, slam, wanted, crew, watcher or Watcher()).run()  # type: ignore[arg-type]
+    return Conductor(world, wanted, crew, watcher or Watcher()).run()  # type: ignore[arg-type]
 
 
 def disc(x: float = 0.005, y: float = -0.004, **shape: float) -> Disc:
@@ -398,8 +399,8 @@ def test_senseless_plans_are_refused(content: dict[str, Any]) -> None:
 class Scripted(AutonomousDecisions):
     """The planner's decisions with others put in between; keeps what it is told."""
 
-    def __init__(self, planner: Planner, script: list[Decision | None], vetoes: set[int] | None = None) -> None:
-        super().__init__(planner)
+    def __init__(self, thinking: Thinking, script: list[Decision | None], vetoes: set[int] | None = None) -> None:
+        super().__init__(thinking)
         self.script, self.vetoes, self.undos = script, vetoes or set(), 0
         self.errors: list[str] = []
 
@@ -413,9 +414,9 @@ class Scripted(AutonomousDecisions):
             return Veto("too few fingers")
         return wanted
 
-    def undone(self, hand_motion_world: Pose3) -> None:
+    def undone(self) -> None:
         self.undos += 1
-        super().undone(hand_motion_world)
+        super().undone()
 
     def failed(self, error: TactileLabError) -> bool:
         self.errors.append(str(error))
@@ -427,10 +428,9 @@ def scripted(
 ) -> tuple[SessionOutcome, Scripted, TactileSlam]:
     slam, wanted = TactileSlam(SlamSettings(particles=200), seed=1), settings(grasps)
     crew = autonomous_crew(world, slam, wanted, seed=3)  # type: ignore[arg-type]
-    assert isinstance(crew.decisions, AutonomousDecisions)
-    decisions = Scripted(crew.decisions.planner, script, vetoes)
+    decisions = Scripted(crew.thinking, script, vetoes)
     crew = replace(crew, decisions=decisions)
-    return Conductor(world, slam, wanted, crew).run(), decisions, slam  # type: ignore[arg-type]
+    return Conductor(world, wanted, crew).run(), decisions, slam  # type: ignore[arg-type]
 
 
 def test_grasp_taken_back_is_forgotten_by_session_and_estimate() -> None:

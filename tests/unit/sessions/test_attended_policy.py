@@ -54,6 +54,6 @@ def test_decisions_of_an_attended_session_are_recorded(tmp_path: Path) -> None:
     present = Attendance(Onlooker(), pace=0.0)
     crew = crew_for(present, world, slam, settings, tmp_path, seed=3, dimension=2)  # type: ignore[arg-type]
     assert isinstance(crew.decisions, AttendedDecisions)
-    outcome = Conductor(world, slam, settings, crew, NullProgress()).run()  # type: ignore[arg-type]
+    outcome = Conductor(world, settings, crew, NullProgress()).run()  # type: ignore[arg-type]
     assert len(outcome.grasps) == 2
     assert sink.numbers[0] == 2

@@ -127,7 +127,7 @@ def run(world: DiscWorld, grasps: int = 1) -> SessionOutcome:
     )
     slam = TactileSlam(SlamSettings(), seed=1)
     crew = autonomous_crew(world, slam, settings, seed=3)  # type: ignore[arg-type]
-    return Conductor(world, slam, settings, crew).run()  # type: ignore[arg-type]
+    return Conductor(world, settings, crew).run()  # type: ignore[arg-type]
 
 
 def test_a_session_begins_with_the_box_and_the_first_grasp_has_its_contacts() -> None:

@@ -40,7 +40,7 @@ class Run:
         self.world, self.operator, self.folder = world, operator, folder
         self.slam, wanted = TactileSlam(SlamSettings(particles=200), seed=1), settings(grasps, **guided)
         crew = guided_crew(world, self.slam, wanted, operator, folder, seed=3)  # type: ignore[arg-type]
-        self.outcome: SessionOutcome = Conductor(world, self.slam, wanted, crew).run()  # type: ignore[arg-type]
+        self.outcome: SessionOutcome = Conductor(world, wanted, crew).run()  # type: ignore[arg-type]
 
     @property
     def told(self) -> list[str]:

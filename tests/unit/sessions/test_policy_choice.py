@@ -25,6 +25,8 @@ from sessions.planner import Planner
 from sessions.policy_choice import Choice, Knowledge, PolicyChooser
 from sessions.policy_decisions import PolicyDecisions, Proposal, everything_approved
 from sessions.safety import SafetySettings
+from sessions.thinker import Thinker
+from sessions.thinking import ThinkingHere
 from tactile_lab.exploration.candidates import Candidate, predict_contacts
 from tactile_lab.exploration.policies import POLICIES, make_policy
 from tactile_lab.exploration.policy import Belief, Decision, best_of, nothing_to_choose
@@ -302,11 +304,15 @@ def planner(policy: str = "variance", grasps: int = 10, slam: KnownSlam | None =
     )
 
 
+def thinking(made: Planner) -> ThinkingHere:
+    return ThinkingHere(Thinker(KnownSlam(), made))  # type: ignore[arg-type]
+
+
 def decisions(made: Planner, approve: object = None) -> tuple[PolicyDecisions, list[Choice]]:
     told: list[Choice] = []
     if approve is None:
-        return PolicyDecisions(made, told.append), told
-    return PolicyDecisions(made, told.append, approve), told  # type: ignore[arg-type]
+        return PolicyDecisions(thinking(made), told.append), told
+    return PolicyDecisions(thinking(made), told.append, approve), told  # type: ignore[arg-type]
 
 
 def test_the_policy_is_asked_after_the_fixed_grasps_and_its_decision_is_told_once() -> None:
@@ -394,7 +400,7 @@ class Presser:
 def test_attended_session_records_and_approves_the_policys_decisions_too() -> None:
     told: list[Choice] = []
     person = Presser(Ask.PAUSE, None, Ask.PAUSE)
-    who = AttendedDecisions(planner(), told.append, lambda proposal: proposal.vetoed == 1, person)
+    who = AttendedDecisions(thinking(planner()), told.append, lambda proposal: proposal.vetoed == 1, person)
     who.think(1)
     assert isinstance(who.decide(1), Pause)
     assert isinstance(who.decide(1), Pause)
@@ -405,7 +411,7 @@ def test_attended_session_records_and_approves_the_policys_decisions_too() -> No
 
 def test_attended_session_ends_when_its_policy_stops() -> None:
     told: list[Choice] = []
-    who = AttendedDecisions(planner(grasps=1), told.append, everything_approved, Presser())
+    who = AttendedDecisions(thinking(planner(grasps=1)), told.append, everything_approved, Presser())
     who.think(1)
     assert isinstance(who.decide(1), End)
     assert told[0].decision.outcome == "stop"
