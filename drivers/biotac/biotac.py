@@ -17,7 +17,7 @@ from drivers.biotac.electrodes import electrode_layout
 from drivers.biotac.estimator import contact_from_electrodes, squeezed
 from drivers.biotac.learned_normal import LearnedNormals
 from drivers.biotac.settings import BioTacCalibration, BioTacSettings, EllipsoidSkinSettings, load_biotacs
-from drivers.biotac.slot_codec import SLOT_BYTES, SLOTS, Channel, Slot, decode_slot, electrode_channel
+from drivers.biotac.slot_codec import PALM_SLOT_BYTES, SLOT_BYTES, SLOTS, Channel, Slot, decode_slot, electrode_channel
 from drivers.fingertip import TipContact
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
@@ -85,9 +85,10 @@ class BioTac:
         """
         if not sample.tactile_valid >> self._slot & 1:
             return
-        if len(sample.tactile) != SLOTS * SLOT_BYTES:
+        stride, odd = divmod(len(sample.tactile), SLOTS)
+        if odd or stride not in PALM_SLOT_BYTES:
             raise CodecError(f"{len(sample.tactile)} bytes of tactile data where {SLOTS * SLOT_BYTES} belong")
-        start = self._slot * SLOT_BYTES
+        start = self._slot * stride
         self.take(decode_slot(sample.tactile[start : start + SLOT_BYTES], sample.tactile_type), sample.stamp_ns)
 
     def take(self, slot: Slot, stamp_ns: int) -> None:

@@ -15,6 +15,8 @@ from tactile_lab.errors import CodecError
 
 SLOT_BYTES = 16
 SLOTS = 5
+PALM_SLOT_BYTES = (16, 32)
+"""Room that palms give each fingertip: a 0230 twice as much, with the BioTac's data at the beginning of it."""
 LARGEST_COUNT = 4095
 """Every channel is read by a 12-bit converter."""
 

@@ -18,7 +18,7 @@ from drivers.shadow.motors import MotorMap
 from drivers.shadow.palm_images import BRIDGE_PRODUCT, CAN_BYTES, PALMS, SHADOW_VENDOR, PalmImage, PalmName
 from drivers.simulation.hand_plant import HandPlant
 from drivers.simulation.motor_bank import MotorBank
-from drivers.simulation.palm_emulator import CanBuses, JointSensors, NoTactile, PalmEmulator
+from drivers.simulation.palm_emulator import CanBuses, JointSensors, NoTactile, PalmEmulator, TactileSection
 from drivers.simulation.settings import JointSensorSettings
 from tactile_lab.clock import Clock
 
@@ -122,6 +122,7 @@ def emulated_hand(
     can: CanBuses | None = None,
     plant: HandPlant | None = None,
     sensors: JointSensorSettings | None = None,
+    tactile: TactileSection | None = None,
 ) -> EmulatedHand:
     """A hand on a ring.
 
@@ -133,13 +134,14 @@ def emulated_hand(
         can: the motors' buses.
         plant: what its motors move; a hand in free air unless given.
         sensors: errors of its joint sensors.
+        tactile: fingertips that send through the palm; none unless given.
     """
     settings, plant = settings or ChainSettings(), plant or FreeHand(clock)
     image = PALMS[settings.palm]
     rng = np.random.default_rng(settings.seed)
     joints = JointSensors(calibration, sensors or JointSensorSettings(), rng)
     motors = MotorBank(plant, motor_map or MotorMap.load(), rng)
-    palm = PalmEmulator(plant, joints, motors, NoTactile(), rng, image, can)
+    palm = PalmEmulator(plant, joints, motors, tactile or NoTactile(), rng, image, can)
     application = PalmApplication(palm, motors, image, clock, settings.service_ns)
     return EmulatedHand(_ring(application, image, clock, settings), application, plant)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from drivers.biotac.biotac import BioTacCalibration
 from drivers.biotac.electrodes import electrode_layout
 from drivers.biotac.slot_codec import LARGEST_COUNT, SLOT_BYTES, Channel, Slot, electrode_channel, encode_slot
-from drivers.simulation.plant import Plant, TrueContact
+from drivers.simulation.hand_plant import TouchedPlant, TrueContact
 from drivers.simulation.settings import BiotacSettings
 from tactile_lab.geometry.contacts import FINGERS, Array
 
@@ -103,8 +103,19 @@ class BiotacSection:
         skins: the sensors, by finger.
     """
 
-    def __init__(self, plant: Plant, skins: Mapping[str, BiotacSkin]) -> None:
+    def __init__(self, plant: TouchedPlant, skins: Mapping[str, BiotacSkin]) -> None:
         self._plant, self._skins = plant, skins
+
+    @classmethod
+    def fitted(
+        cls,
+        plant: TouchedPlant,
+        calibrations: Mapping[str, BioTacCalibration],
+        settings: BiotacSettings,
+        rng: np.random.Generator,
+    ) -> BiotacSection:
+        """A section whose sensors are as they were calibrated, one for each finger."""
+        return cls(plant, {finger: BiotacSkin(calibrations[finger], settings, rng) for finger in FINGERS})
 
     def answer(self, data_type: int) -> tuple[int, NDArray[np.uint8]]:
         """All five sensors answer every request they know; to others none is valid."""

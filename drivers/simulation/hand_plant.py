@@ -2,11 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Literal, Protocol
 
 from gtsam import Pose3
 
 from tactile_lab.geometry.contacts import Array
+
+
+@dataclass(frozen=True)
+class TrueContact:
+    """One touch of a fingertip in the physics.
+
+    Attributes:
+        finger: whose tip.
+        touched: what it touches.
+        point_world_m: point, shape (3,).
+        normal_world: unit normal out of what is touched, shape (3,).
+        force_on_tip_world_N: force on the fingertip, shape (3,).
+    """
+
+    finger: str
+    touched: Literal["object", "table"]
+    point_world_m: Array
+    normal_world: Array
+    force_on_tip_world_N: Array
 
 
 class HandPlant(Protocol):
@@ -49,6 +69,16 @@ class LoadedPlant(Protocol):
     @property
     def wrenches(self) -> Array:
         """Load on the five fingertips, shape (5, 6), sensor frames."""
+
+
+class TouchedPlant(Protocol):
+    """Fingertips whose every touch is known."""
+
+    def contacts(self) -> tuple[TrueContact, ...]:
+        """Every touch of a fingertip now; one touch may be several points."""
+
+    def world_T_distal(self, finger: str) -> Pose3:
+        """True pose of a finger's distal frame."""
 
 
 class SeenPlant(Protocol):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 import mujoco
 import numpy as np
@@ -13,6 +11,7 @@ from numpy.typing import NDArray
 
 from drivers.shadow.kinematics import JOINTS, joint_vector
 from drivers.shadow.motors import DRIVEN_JOINTS
+from drivers.simulation.hand_plant import TrueContact
 from drivers.simulation.model import BASE_JOINTS, BASE_LIMITS, TIMESTEP_s
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.geometry.contacts import FINGERS, Array
@@ -23,25 +22,6 @@ START_BASE = np.array([-0.32, 0.0, 0.36, 0.0, 0.0, 0.0])
 
 _BASE_LOWEST, _BASE_HIGHEST = BASE_LIMITS.T
 _START_HAND_rad = {"THJ5": 0.9, "THJ4": 1.0}  # thumb turned to the palm's side, fingers straight
-
-
-@dataclass(frozen=True)
-class TrueContact:
-    """One touch of a fingertip in the physics.
-
-    Attributes:
-        finger: whose tip.
-        touched: what it touches.
-        point_world_m: point, shape (3,).
-        normal_world: unit normal out of what is touched, shape (3,).
-        force_on_tip_world_N: force on the fingertip, shape (3,).
-    """
-
-    finger: str
-    touched: Literal["object", "table"]
-    point_world_m: Array
-    normal_world: Array
-    force_on_tip_world_N: Array
 
 
 class Plant:

@@ -7,7 +7,7 @@ commands give the same bytes again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -17,7 +17,7 @@ from gtsam import Pose2, Pose3, Rot3
 from drivers.camera.markers import MarkerSettings
 from drivers.fingertip import RigidTransform
 from drivers.links import Datagram, Link, MemoryLink, Peer
-from drivers.simulation.biotac_emulator import BiotacSection, BiotacSkin
+from drivers.simulation.biotac_emulator import BiotacSection
 from drivers.simulation.calibration import SimulatedCalibration
 from drivers.simulation.camera_emulator import CameraEmulator
 from drivers.simulation.camera_renderer import Placed, PrintedMarker, TableCamera
@@ -215,11 +215,8 @@ class SimulatedWorld:
     def _build_tactile(self) -> TactileSection:
         if self.settings.fingertips == "nano17":
             return NoTactile()
-        biotacs: Mapping[str, BiotacSkin] = {
-            finger: BiotacSkin(self.calibration.biotacs[finger], self.settings.biotac, self._random["tactile"])
-            for finger in FINGERS
-        }
-        return BiotacSection(self._plant, biotacs)
+        biotacs, random = self.calibration.biotacs, self._random["tactile"]
+        return BiotacSection.fitted(self._plant, biotacs, self.settings.biotac, random)
 
     def build_camera(self, plant: SeenPlant, carried: Callable[[], tuple[Placed, ...]] = tuple) -> CameraEmulator:
         """This rig's camera over a plant, which sees what is carried too."""

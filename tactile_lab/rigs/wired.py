@@ -100,9 +100,9 @@ def stand_in_plan(rig: Rig, seed: int, object_name: str) -> StandInPlan:
 
 def _hand_place(rig: Rig) -> HandPlace:
     wiring = wires_of(rig).hand
-    if rig.description.fingertips != "nano17" or wiring.far_end is None:
-        what = "stand-ins need nano17 fingertips and wires.hand.far_end"
-        raise ConfigurationError(what, where=rig.source, hint="See the shipped sim-wire rig")
+    if wiring.far_end is None:
+        hint = "Name the other end of the virtual cable, as the shipped sim-wire rig does"
+        raise ConfigurationError("stand-ins need wires.hand.far_end", where=rig.source, hint=hint)
     return HandPlace(
         near=wiring.ethercat.interface,
         far=wiring.far_end,
@@ -110,6 +110,7 @@ def _hand_place(rig: Rig) -> HandPlace:
         motors=rig.files["motors"].resolve(),
         palm=rig.description.hand.palm,
         serial=SERIAL if wiring.ethercat.serial is None else wiring.ethercat.serial,
+        biotacs=rig.files["fingertips"].resolve() if rig.description.fingertips == "biotac" else None,
     )
 
 

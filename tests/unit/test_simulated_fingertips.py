@@ -17,8 +17,8 @@ from drivers.biotac.slot_codec import decode_slot, electrode_channel
 from drivers.shadow.palm_codec import decode_status as decode_palm
 from drivers.simulation.biotac_emulator import BiotacSkin
 from drivers.simulation.calibration import SimulatedCalibration
+from drivers.simulation.hand_plant import TrueContact
 from drivers.simulation.nano_sensors import RESOLUTION
-from drivers.simulation.plant import TrueContact
 from drivers.simulation.settings import (
     BiotacSettings,
     SimulationSettings,

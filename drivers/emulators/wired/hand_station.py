@@ -5,6 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from drivers.biotac.biotac import load_biotacs
 from drivers.emulators.ethercat_server import HandServer
 from drivers.emulators.motor_can import MotorCanBuses
 from drivers.emulators.shadow_chain import ChainSettings, EmulatedHand, emulated_hand
@@ -13,8 +16,10 @@ from drivers.ethercat.ports import RawPort
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motors import MotorMap
 from drivers.shadow.real_time import request_real_time
-from drivers.simulation.settings import JointSensorSettings
+from drivers.simulation.biotac_emulator import BiotacSection
+from drivers.simulation.settings import BiotacSettings, JointSensorSettings
 from tactile_lab.clock import Clock
+from tactile_lab.geometry.contacts import FINGERS
 
 
 class HandStation:
@@ -32,20 +37,28 @@ class HandStation:
 
 
 def make(start: dict[str, Any], clock: Clock) -> HandStation:
-    """The hand at the interface ``far_end``, with the joint and motor tables of the files named.
+    """The hand at the interface ``far_end``, with the joint and motor tables, and BioTacs, of the files named.
 
     Raises:
         DeviceError: the interface can not be used.
         ConfigurationError: a file that can not be used.
     """
-    can = MotorCanBuses()
+    can, mirror = MotorCanBuses(), PlantMirror(Path(start["mirror"]), clock)
     hand = emulated_hand(
         clock,
         JointCalibration.load(Path(start["joints"])),
         ChainSettings(palm=start["palm"], eeprom="mapped", serial=start["serial"], seed=start["seed"]),
         MotorMap.load(Path(start["motors"])),
         can,
-        PlantMirror(Path(start["mirror"]), clock),
+        mirror,
         JointSensorSettings.model_validate(start["joint_sensors"]),
+        _tactile(start, mirror),
     )
     return HandStation(hand, start["far_end"], can, clock)
+
+
+def _tactile(start: dict[str, Any], mirror: PlantMirror) -> BiotacSection | None:
+    if start["biotacs"] is None:
+        return None
+    settings, rng = BiotacSettings.model_validate(start["biotac"]), np.random.default_rng([start["seed"], len(FINGERS)])
+    return BiotacSection.fitted(mirror, load_biotacs(Path(start["biotacs"])), settings, rng)

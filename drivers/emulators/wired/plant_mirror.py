@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import mmap
 import os
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from gtsam import Pose3
 from numpy.typing import NDArray
 
+from drivers.simulation.hand_plant import TrueContact
 from tactile_lab.clock import Clock
 from tactile_lab.errors import DeviceError
-from tactile_lab.geometry.contacts import Array
+from tactile_lab.geometry.contacts import FINGERS, Array
 
 _STATE = np.dtype(
     [
@@ -27,12 +30,21 @@ _STATE = np.dtype(
         ("world_T_object", "<f8", (4, 4)),
     ]
 )
+_MOST_CONTACTS = 64
+_TOUCHED = ("object", "table")
+_CONTACT = np.dtype(
+    [("finger", "u1"), ("touched", "u1"), ("point_m", "<f8", 3), ("normal", "<f8", 3), ("force_N", "<f8", 3)]
+)
+_TOUCHES = np.dtype(
+    [("world_T_distal", "<f8", (len(FINGERS), 4, 4)), ("count", "<i4"), ("contact", _CONTACT, _MOST_CONTACTS)]
+)
 _MEMORY = np.dtype(
     [
-        ("beat", "<u8"),  # odd while the state is being written
+        ("beat", "<u8"),  # odd while the state or the touches are being written
         ("stamp_ns", "<i8"),
         ("lost_ns", "<i8"),
         ("state", _STATE),
+        ("touches", _TOUCHES),
         ("duty", "<f8", 20),
         ("base_target", "<f8", 6),
     ]
@@ -101,6 +113,15 @@ class PlantMirror:
         """True pose of the object."""
         return Pose3(np.asarray(self._state()["world_T_object"]))
 
+    def contacts(self) -> tuple[TrueContact, ...]:
+        """Every touch of a fingertip; none where the plant does not show them."""
+        touches = self._read("touches")
+        return tuple(map(_contact, touches["contact"][: int(touches["count"])]))
+
+    def world_T_distal(self, finger: str) -> Pose3:
+        """True pose of a finger's distal frame, where the plant shows touches."""
+        return Pose3(np.asarray(self._read("touches")["world_T_distal"][FINGERS.index(finger)]))
+
     def drive(self, duty: Array) -> None:
         """Duty cycles from now on, shape (20,), -1 to 1."""
         self._memory["duty"][0] = duty
@@ -126,6 +147,17 @@ class PlantMirror:
         memory["stamp_ns"] = stamp_ns
         memory["beat"] += 1
 
+    def publish_touches(self, contacts: Sequence[TrueContact], world_T_distal: Sequence[Pose3]) -> None:
+        """Show the fingertips' touches, of many the first, and the distal frames of all fingers."""
+        rows = [_row(contact) for contact in contacts[:_MOST_CONTACTS]]
+        memory = self._memory
+        memory["beat"] += 1
+        touches = memory["touches"][0]
+        touches["world_T_distal"] = [pose.matrix() for pose in world_T_distal]
+        touches["contact"][: len(rows)] = rows
+        touches["count"] = len(rows)
+        memory["beat"] += 1
+
     def count_lost(self, lost_ns: int) -> None:
         """The plant was so late that this time is left out of it."""
         self._memory["lost_ns"] += lost_ns
@@ -143,11 +175,24 @@ class PlantMirror:
         return self._clock.now_ns() - int(self._memory["stamp_ns"][0])
 
     def _state(self) -> NDArray[np.void]:
-        """A state that was not being written while it was read; the newest look after too many tries."""
+        return self._read("state")
+
+    def _read(self, part: str) -> NDArray[np.void]:
+        """A part that was not being written while it was read; the newest look after too many tries."""
         memory = self._memory
         for _ in range(_TRIES):
             before = int(memory["beat"][0])
-            state: NDArray[np.void] = memory["state"][0].copy()
+            content: NDArray[np.void] = memory[part][0].copy()
             if not before & 1 and int(memory["beat"][0]) == before:
                 break
-        return state
+        return content
+
+
+def _row(contact: TrueContact) -> tuple[object, ...]:
+    finger, touched = FINGERS.index(contact.finger), _TOUCHED.index(contact.touched)
+    return finger, touched, contact.point_world_m, contact.normal_world, contact.force_on_tip_world_N
+
+
+def _contact(row: np.void) -> TrueContact:
+    touched: Literal["object", "table"] = "table" if row["touched"] else "object"
+    return TrueContact(FINGERS[row["finger"]], touched, row["point_m"], row["normal"], row["force_N"])

@@ -13,6 +13,7 @@ from drivers.simulation.plant import Plant, STEP_ns
 from drivers.simulation.settings import SimulationSettings
 from drivers.simulation.world import SimulatedWorld
 from tactile_lab.clock import Clock
+from tactile_lab.geometry.contacts import FINGERS
 
 PRIORITY = 70
 """Where permitted the physics comes before whatever else the machine does, but after the hand's frames."""
@@ -30,10 +31,11 @@ class PlantStation:
         plant: at rest.
         mirror: where others see it.
         clock: its time.
+        touches: show every touch of the fingertips as well, for sensors that feel where.
     """
 
-    def __init__(self, plant: Plant, mirror: PlantMirror, clock: Clock) -> None:
-        self._plant, self._mirror, self._clock = plant, mirror, clock
+    def __init__(self, plant: Plant, mirror: PlantMirror, clock: Clock, *, touches: bool = False) -> None:
+        self._plant, self._mirror, self._clock, self._touches = plant, mirror, clock, touches
         self._publish()
 
     def serve(self) -> None:
@@ -67,11 +69,14 @@ class PlantStation:
             plant.wrenches,
             plant.world_T_object,
         )
+        if self._touches:
+            self._mirror.publish_touches(plant.contacts(), [plant.world_T_distal(finger) for finger in FINGERS])
 
 
 def make(start: dict[str, Any], clock: Clock) -> PlantStation:
     """The plant of a simulated rig's settings and seed, shown in the memory at ``mirror``."""
-    world = SimulatedWorld(SimulationSettings.model_validate(start["simulation"]), start["seed"])
+    settings = SimulationSettings.model_validate(start["simulation"])
+    world = SimulatedWorld(settings, start["seed"])
     mirror = PlantMirror(Path(start["mirror"]), clock)
     mirror.move_base(world.plant.base)
-    return PlantStation(world.plant, mirror, clock)
+    return PlantStation(world.plant, mirror, clock, touches=settings.fingertips == "biotac")

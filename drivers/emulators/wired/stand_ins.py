@@ -35,6 +35,7 @@ class HandPlace:
         near, far: the cable's ends; the hand is at the far one.
         joints, motors: its calibration files, read backwards.
         palm, serial: its identity.
+        biotacs: calibration of its fingertips, where these send through the palm.
     """
 
     near: str
@@ -43,6 +44,7 @@ class HandPlace:
     motors: Path
     palm: PalmName = "0220"
     serial: int = SERIAL
+    biotacs: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -155,6 +157,8 @@ def _hand(plan: StandInPlan) -> dict[str, Any]:
         "serial": hand.serial,
         "seed": plan.seed,
         "joint_sensors": plan.simulation.joint_sensors.model_dump(mode="json"),
+        "biotacs": None if hand.biotacs is None else str(hand.biotacs),
+        "biotac": plan.simulation.biotac.model_dump(mode="json"),
     }
 
 
