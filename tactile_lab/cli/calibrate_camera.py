@@ -12,6 +12,7 @@ from tactile_lab.cli.options import Json, NoInput
 if TYPE_CHECKING:
     from calibration.camera_intrinsics import LensResult
     from drivers.camera.boards import AnyBoard
+    from tactile_lab.cli.wizard import Asker
     from tactile_lab.workflow.calibrating_camera import Gathering
 
 
@@ -23,7 +24,9 @@ def camera(
     board: Annotated[
         Path | None, typer.Option(help="Description of the board, as 'tactile-lab markers' wrote it.")
     ] = None,
-    out: Annotated[Path, typer.Option(help="File of the result.")] = Path("calibration/camera.yaml"),
+    out: Annotated[
+        Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/camera.yaml")
+    ] = None,
     station: Annotated[str, typer.Option(help="Installation it belongs to (a rig file's station).")] = "laboratory",
     serial: Annotated[str, typer.Option(help="Serial number of the camera.")] = "",
     size: Annotated[str, typer.Option(help="Size of a camera's pictures.")] = "1280x720",
@@ -32,37 +35,56 @@ def camera(
     views: Annotated[int, typer.Option(min=5, help="Fewest views for a PASS.")] = 12,
     most: Annotated[int, typer.Option(min=5, help="Stop after so many views.")] = 60,
     third_radial: Annotated[bool, typer.Option("--k3", help="A third radial coefficient, for wide lenses.")] = False,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
+    notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
     """Calibrate a lens, guided by what is still missing, and store it with its errors and a verdict.
 
-    Exit code 0: inside its limits; 3: stored, but outside of them; 2: nothing could be computed.
+    Ctrl+C or q at any step stores nothing.
+
+    Exit code 0: PASS; 2: nothing could be computed; 3: FAIL, outside its limits (kept as NAME.failed.yaml, which
+    sessions refuse); 4: the camera; 130: ended by the operator.
     """
     from calibration.camera_intrinsics import LensLimits, calibrate_lens
     from drivers.camera.boards import load_board
     from drivers.camera.source_settings import CameraSourceSettings
-    from tactile_lab.calibration_file import plain
-    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.cli.calibrate_steps import store_result
+    from tactile_lab.cli.wizard import Asker, may_write
     from tactile_lab.clock import MonotonicClock
     from tactile_lab.strict_yaml import validate
-    from tactile_lab.workflow.calibrating_camera import gather_views, lens_record, store_lens
+    from tactile_lab.workflow.calibrating_camera import LENS_COMMENT, gather_views, lens_record
 
+    asker, file = Asker(no_input, "calibrate camera"), out or Path("calibrations") / station / "camera.yaml"
+    may_write(file, replace, asker, no_input)
     shown = load_board(board) if board is not None else _usual_board()
     wanted = {"source": source, "size_px": _size(size), "exposure_ms": exposure_ms, "focus": focus}
     settings = validate(wanted, CameraSourceSettings, where="calibrate camera")
-    _begin(shown, is_live=not no_input)
-    found = gather_views(settings, shown, MonotonicClock(), most=most, least=views, told=_guide)
+    _begin(shown, asker)
+    goes_on = (lambda: True) if no_input else _Orders(asker)
+    found = gather_views(settings, shown, MonotonicClock(), most=most, least=views, told=_guide, goes_on=goes_on)
     limits = LensLimits(views=views)
     result = calibrate_lens(found.views, limits, third_radial=third_radial)
-    record = lens_record(result, station, shown, limits, serial)
-    store_lens(out, record)
-    if as_json:
-        emit_json({"file": str(out), **plain(record)})
     _show(found, result)
-    say(f"stored    {out}")
-    if not result.passed:
-        raise typer.Exit(3)
+    record = lens_record(result, station, shown, limits, serial, notes)
+    store_result(file, record, True, asker, no_input, as_json, LENS_COMMENT)
+
+
+class _Orders:
+    """What a person types while pictures are taken: d to be done, q to quit."""
+
+    def __init__(self, asker: Asker) -> None:
+        from tactile_lab.cli.terminal_input import LineInput
+
+        self._asker, self._lines = asker, LineInput()
+
+    def __call__(self) -> bool:
+        """Whether to go on. Raises InterruptionError when the person quits."""
+        typed = [line.strip().lower() for line in self._lines.lines()]
+        if "q" in typed:
+            raise self._asker.ended()
+        return "d" not in typed
 
 
 def _usual_board() -> AnyBoard:
@@ -71,13 +93,14 @@ def _usual_board() -> AnyBoard:
     return CharucoBoard()
 
 
-def _begin(board: AnyBoard, is_live: bool) -> None:
+def _begin(board: AnyBoard, asker: Asker) -> None:
+    """Tell what is to be done. Raises InterruptionError when the person quits."""
     from tactile_lab.cli.console import say, warn
 
     if board.measured_bar_mm is None:
         warn("the board's check bar was not measured: the lens does not depend on it, distances would")
-    if is_live:
-        say("Show the board in all parts of the picture, tilted each way, near and far. Ctrl-C ends it.")
+    say("Show the board in all parts of the picture, tilted each way, near and far.")
+    asker.choose("While pictures are taken, d and Enter is done, q and Enter quits.", {"": "begin"}, "")
 
 
 def _guide(found: Gathering) -> None:
@@ -98,7 +121,7 @@ def _guide(found: Gathering) -> None:
 
 
 def _show(found: Gathering, result: LensResult) -> None:
-    from tactile_lab.cli.console import complain, say, show_facts, show_table, warn
+    from tactile_lab.cli.console import complain, show_facts, show_table, warn
 
     lens, sigmas = result.lens, result.sigmas
     values = dict(zip(("fx_px", "fy_px", "cx_px", "cy_px"), (*lens.focal_px, *lens.centre_px), strict=True))
@@ -116,7 +139,6 @@ def _show(found: Gathering, result: LensResult) -> None:
         warn(f"{name} disagrees with the others ({error:.2f} px) and was left out")
     for problem in result.problems:
         complain(problem)
-    say("PASS" if result.passed else "FAIL", "bold green" if result.passed else "bold red")
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -84,9 +84,18 @@ def _tell_motion(report: MotionReport) -> None:
 
 
 def store_result(
-    file: Path, record: CalibrationRecord, replace: bool, asker: Asker, no_input: bool, as_json: bool
+    file: Path,
+    record: CalibrationRecord,
+    replace: bool,
+    asker: Asker,
+    no_input: bool,
+    as_json: bool,
+    comment: str = "",
 ) -> None:
     """Ask, write (a failed result beside the file), tell the verdict.
+
+    Args:
+        comment: at the head of the file.
 
     Raises:
         Exit: code 3, the result failed.
@@ -104,7 +113,7 @@ def store_result(
         may_write(file, replace, asker, no_input)
     if not asker.agree(f"Store it as {target}?"):
         raise asker.ended()
-    write_record(target, record)
+    write_record(target, record, comment)
     if as_json:
         emit_json({"file": str(target), **plain(record)})
     tell_verdict(record)

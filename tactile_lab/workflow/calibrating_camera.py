@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from calibration.camera_intrinsics import PARAMETERS, LensLimits, LensResult
 from calibration.camera_views import BoardView, Coverage, adds_something, coverage, view_of
-from calibration.store import CalibrationRecord, Covariance, new_record, write_record
+from calibration.store import CalibrationRecord, Covariance, new_record
 from drivers.camera.boards import AnyBoard
 from drivers.camera.frames import Image
 from drivers.camera.markers import other_dictionary
@@ -17,6 +16,7 @@ from drivers.camera.sources import Picture, open_source
 from tactile_lab.clock import Clock
 from tactile_lab.errors import ConfigurationError
 
+LENS_COMMENT = "Lens of the camera under the table. Made by tactile-lab calibrate camera."
 _LENS_VALID_DAYS = 365.0
 
 
@@ -50,6 +50,7 @@ def gather_views(
     most: int = 60,
     least: int = 12,
     told: Callable[[Gathering], None] = lambda gathering: None,
+    goes_on: Callable[[], bool] = lambda: True,
 ) -> Gathering:
     """Views of the board: all of a folder or video, of a camera until nothing is missing.
 
@@ -57,6 +58,7 @@ def gather_views(
         most: end with so many views.
         least: a camera is not stopped before so many, whatever they cover.
         told: after each picture that was used or refused, for guidance.
+        goes_on: asked before each picture; False ends with the views there are.
 
     Raises:
         ConfigurationError: no such source, or no picture shows the board; the dictionary it does show is named.
@@ -66,7 +68,7 @@ def gather_views(
     is_camera = settings.place().kind in ("device", "gstreamer")
     last: Image | None = None
     try:
-        while len(found.views) < most and (picture := source.read()) is not None:
+        while len(found.views) < most and goes_on() and (picture := source.read()) is not None:
             last = picture.image
             if _take(found, picture, board):
                 told(found)
@@ -105,7 +107,7 @@ def _nothing_found(source: str, board: AnyBoard, last: Image | None, found: Gath
 
 
 def lens_record(
-    result: LensResult, station: str, board: AnyBoard, limits: LensLimits, serial: str
+    result: LensResult, station: str, board: AnyBoard, limits: LensLimits, serial: str, notes: str = ""
 ) -> CalibrationRecord:
     """The result as the store keeps it."""
     names = [name for name in PARAMETERS if name in result.sigmas]
@@ -135,10 +137,6 @@ def lens_record(
             "problems": list(result.problems),
             "board": board.model_dump(mode="json"),
         },
+        notes=notes,
         valid_days=_LENS_VALID_DAYS,
     )
-
-
-def store_lens(path: Path, record: CalibrationRecord) -> None:
-    """Write the record. Raises ConfigurationError."""
-    write_record(path, record, "Lens of the camera under the table. Made by tactile-lab calibrate camera.")

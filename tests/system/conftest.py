@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from tactile_lab.cli.main import main
+from tests.support.warm_terminal import WarmProgram
 
 COMMAND = [sys.executable, "-m", "tactile_lab.cli.main"]
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "COLUMNS": "80", "NO_COLOR": "1"}
@@ -45,6 +46,13 @@ def call(*arguments: object, cwd: Path | None = None) -> Answer:
 def tactile_lab() -> Command:
     """The command line."""
     return call
+
+
+@pytest.fixture(scope="session")
+def program() -> Iterator[WarmProgram]:
+    """The command line on terminals of its own."""
+    with WarmProgram() as running:
+        yield running
 
 
 @pytest.fixture

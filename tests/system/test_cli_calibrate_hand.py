@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 import yaml
 
-from calibration.fingertip_data import load_fingertip_data
 from calibration.store import read_record
-from drivers.fingertip import load_fingertips
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.kinematics import JOINT_INDEX, joint_vector
 from tactile_lab.rigs.description import load_rig
 
 RIG = load_rig("sim")
-FAST = {"station": {"travel_m_s": 0.5, "turn_rad_s": 2.4, "press_m_s": 0.04, "settle_s": 0.2, "fingers_rad_s": 2.0}}
 
 
 def files(folder: Path) -> list[str]:
@@ -121,54 +118,6 @@ def test_tables_of_counts_that_can_not_be_used_are_named(inside, tmp_path, text,
 
 
 # --- force fingertips ----------------------------------------------------------------------------------------------
-
-
-def test_a_fingertip_is_measured_on_the_simulated_rig(inside, tmp_path):
-    kept, out = tmp_path / "ff.yaml", tmp_path / "fingertips.yaml"
-    words = ("calibrate", "fingertip", "--rig", "sim", "--finger", "FF", "--no-input")
-    fast = tmp_path / "fast.yaml"
-    fast.write_text(yaml.safe_dump(FAST))
-    answer = inside(*words, "--presses", 8, "--settings", fast, "--record", kept, "--out", out)
-    assert answer.code == 0, answer.err
-    assert "16/16 FF presses table top" in answer.err
-    assert "PASS" in answer.err
-    true, found = load_fingertips(RIG.files["fingertips"])["FF"], load_fingertips(out)["FF"]
-    assert found.mass_kg == pytest.approx(true.mass_kg, abs=1e-3)
-    np.testing.assert_allclose(found.com_distal_m, true.com_distal_m, atol=3e-3)
-    np.testing.assert_allclose(found.centre_distal_m, true.centre_distal_m, atol=1.5e-3)
-    assert np.abs(found.distal_T_sensor.rpy_rad).max() < np.radians(6.0)
-    data = load_fingertip_data(kept, RIG.installation)
-    assert (len(data.free), len(data.presses)) == (8, 8)
-    turned_over(inside, tmp_path, kept)
-    too_few(inside, tmp_path, kept)
-
-
-def turned_over(inside, folder: Path, kept: Path) -> None:
-    """The same wrenches with the opposite sign are refused."""
-    content = yaml.safe_load(kept.read_text())
-    for part in ("free", "presses"):
-        for entry in content[part]:
-            entry["wrench"] = [-value for value in entry["wrench"]]
-    path = folder / "sign.yaml"
-    path.write_text(yaml.safe_dump(content))
-    answer = inside("calibrate", "fingertip", "--from", path, "--out", folder / "none.yaml", "--no-input")
-    assert (answer.code, "opposite sign" in answer.err) == (2, True), answer.err
-    assert not (folder / "none.yaml").exists()
-
-
-def too_few(inside, folder: Path, kept: Path) -> None:
-    """Too few presses are refused, and a result outside its limits replaces nothing."""
-    content = yaml.safe_load(kept.read_text())
-    path, strict = folder / "few.yaml", folder / "strict.yaml"
-    path.write_text(yaml.safe_dump({**content, "presses": content["presses"][:2]}))
-    answer = inside("calibrate", "fingertip", "--from", path, "--out", folder / "none.yaml", "--no-input")
-    assert (answer.code, "2 presses, 6 needed" in answer.err) == (2, True)
-    strict.write_text(yaml.safe_dump({"limits": {"force_mN": 0.001}}))
-    words = ("--from", kept, "--settings", strict, "--out", folder / "none.yaml", "--no-input")
-    answer = inside("calibrate", "fingertip", *words)
-    assert (answer.code, "OUTSIDE" in answer.err) == (3, True)
-    assert (folder / "none.failed.yaml").exists()
-    assert not (folder / "none.yaml").exists()
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 
 from calibration.camera_intrinsics import LensLimits, calibrate_lens
 from calibration.camera_views import BoardView, adds_something, coverage, view_of
-from calibration.store import read_record
+from calibration.store import read_record, write_record
 from drivers.camera.boards import CharucoBoard
 from drivers.camera.calibration import load_camera
 from drivers.camera.source_settings import CameraSourceSettings
@@ -19,7 +19,7 @@ from drivers.simulation.board_camera import board_poses, draw_board, simulated_l
 from tactile_lab.clock import VirtualClock
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.poses import transform_points
-from tactile_lab.workflow.calibrating_camera import gather_views, lens_record, store_lens
+from tactile_lab.workflow.calibrating_camera import gather_views, lens_record
 
 LENS, BOARD = simulated_lens((640, 480)), CharucoBoard()
 
@@ -120,7 +120,7 @@ def test_a_folder_of_pictures_gives_a_stored_lens_that_loads(tmp_path: Path) -> 
     assert told == list(range(1, 9))
     result = calibrate_lens(found.views)
     assert result.lens.focal_px[0] == pytest.approx(LENS.focal_px[0], rel=0.01)
-    store_lens(tmp_path / "lens.yaml", lens_record(result, "laboratory", BOARD, LensLimits(), "C920-1"))
+    write_record(tmp_path / "lens.yaml", lens_record(result, "laboratory", BOARD, LensLimits(), "C920-1"))
     record = read_record(tmp_path / "lens.yaml")
     assert record.verdict == "FAIL"
     assert record.details["problems"][0] == "8 views, at least 12"
