@@ -20,16 +20,25 @@ Six = tuple[float, float, float, float, float, float]
 
 
 class WrenchPose(StrictModel):
-    """A mean wrench, N and N m, sensor frame, in a known orientation of the distal frame in the world (z up)."""
+    """A mean wrench in a known orientation.
+
+    Attributes:
+        world_R_distal: of the distal frame in the world, z up.
+        wrench: N and N m, sensor frame.
+        time_s: when, by any clock: the sensor's drift is alike in wrenches near in time. None where it is not known.
+    """
 
     world_R_distal: Square3
     wrench: Six
+    time_s: float | None = None
 
 
-def wrench_pose(world_R_distal: Array, wrench: Array) -> WrenchPose:
+def wrench_pose(world_R_distal: Array, wrench: Array, time_s: float | None = None) -> WrenchPose:
     """From arrays, shapes (3, 3) and (6,)."""
     rows = [[float(value) for value in row] for row in world_R_distal]
-    return WrenchPose.model_validate({"world_R_distal": rows, "wrench": [float(value) for value in wrench]})
+    return WrenchPose.model_validate(
+        {"world_R_distal": rows, "wrench": [float(value) for value in wrench], "time_s": time_s}
+    )
 
 
 class FingertipData(StrictModel):

@@ -8,17 +8,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from gtsam import Pose3, Rot3
-from scipy.optimize import OptimizeResult, least_squares
+from gtsam import Rot3
+from scipy.stats import chi2
 
-from calibration.fingertip_data import FingertipData, WrenchPose
+from calibration.fingertip_data import FingertipData
+from calibration.fingertip_model import PARTS, FingertipNoise, Part, Refined, refine, ups, wrenches
 from calibration.hand_eye import nearest_rotation
 from calibration.motion_check import Check, MotionReport
-from drivers.fingertip import GRAVITY, FingertipCalibration, RigidTransform
+from calibration.quality import CONFIDENCE
+from drivers.fingertip import FingertipCalibration, RigidTransform
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
 
@@ -30,9 +31,6 @@ PRESS_N = 0.3
 LARGEST_TILT_rad = float(np.radians(40.0))
 """Of the forces from the plate's normal: friction allows some, and a finger gives way along itself."""
 
-_LEVER_m, _WEIGHT_N, _FRICTION_rad, _SHAPE_m = 3e-4, 0.008, 0.3, 1e-3
-"""Errors of a press's lever, of an untouched force with its drift, of a force's direction, and of the shape before."""
-
 
 @dataclass(frozen=True, eq=False)
 class FingertipFit:
@@ -41,7 +39,8 @@ class FingertipFit:
     Attributes:
         calibration: the new one.
         turned_rad: by how much the mounting differs from the one before.
-        sigmas: standard deviations: mass (kg), centre of mass (m), mounting (rad), ellipsoid's centre and axes (m).
+        covariance: of what was found, shape (13, 13), in the order of :data:`calibration.fingertip_model.PARTS`.
+        variance_factor: squared residuals over what the stated noise allows.
         rms_force_N: what is left of the untouched forces, per axis.
         rms_lever_m: what is left of the presses' torques, per newton and axis.
         tilt_rad: root mean square angle between the presses' forces and the plate's normal.
@@ -49,40 +48,66 @@ class FingertipFit:
 
     calibration: FingertipCalibration
     turned_rad: float
-    sigmas: dict[str, float]
+    covariance: Array
+    variance_factor: float
     rms_force_N: float
     rms_lever_m: float
     tilt_rad: float
 
+    def sigma(self, part: Part) -> float:
+        """Standard deviation of a part's length: kg, radians or metres."""
+        rows = PARTS[part]
+        return float(np.sqrt(np.trace(self.covariance[rows, rows])))
 
-def fit_fingertip(data: FingertipData, before: FingertipCalibration) -> FingertipFit:
-    """Bias and weight, then the mounting, then the shape.
+    def errors(self, truth: FingertipCalibration) -> Array:
+        """How far the truth is from what was found, in the order of the covariance, shape (13,)."""
+        found = self.calibration
+        turn = found.distal_T_sensor.pose().rotation().between(truth.distal_T_sensor.pose().rotation())
+        back = found.distal_T_sensor.pose().rotation().matrix() @ Rot3.Logmap(turn)
+        pairs = (
+            ((truth.mass_kg,), (found.mass_kg,)),
+            (truth.com_distal_m, found.com_distal_m),
+            (truth.centre_distal_m, found.centre_distal_m),
+            (truth.semi_axes_m, found.semi_axes_m),
+        )
+        return np.concatenate([-back, *(np.subtract(true, mine) for true, mine in pairs)])
+
+    def holds(self, truth: FingertipCalibration, part: Part | None = None) -> bool:
+        """Whether the 95 % region of a part, or of everything together, holds the truth."""
+        rows = slice(None) if part is None else PARTS[part]
+        off, spread = self.errors(truth)[rows], self.covariance[rows, rows]
+        return bool(off @ np.linalg.solve(spread, off) <= chi2.ppf(CONFIDENCE, len(off)))
+
+
+def fit_fingertip(
+    data: FingertipData, before: FingertipCalibration, noise: FingertipNoise | None = None
+) -> FingertipFit:
+    """A rough mounting from the directions of the forces, then everything together.
 
     Raises:
-        ConfigurationError: too few or too similar orientations, soft presses, or readings of the opposite sign.
+        ConfigurationError: too few or too similar orientations, soft presses, readings of the opposite sign, or
+            no weight.
     """
     where = f"fingertip {data.finger}"
-    down, up = -_up(data.free), _up(data.presses)
+    down, up = -ups(data.free), ups(data.presses)
     _check_spread(down, LEAST_ORIENTATIONS, "untouched wrenches", where)
-    free, pressed = (np.array([pose.wrench for pose in part]) for part in (data.free, data.presses))
+    free, pressed = wrenches(data.free), wrenches(data.presses)
     _check_spread(up, LEAST_PRESSES, "presses", where, rank=2)
     bias = _bias(free, down)
     start = _mounting(pressed[:, :3] - bias[:3], up, free[:, :3] - bias[:3], down, where)
-    found = _refined(start, free - bias, down, pressed - bias, up, before)
-    sensor_R_distal, shape = start @ Rot3.Expmap(found.x[:3]).matrix(), found.x[3:]
-    place = np.array(before.distal_T_sensor.translation_m)
-    weight = _weight(free - bias, down @ sensor_R_distal.T)
-    loads = pressed - bias - _weights(weight, -up @ sensor_R_distal.T)
-    rest = free - bias - _weights(weight, down @ sensor_R_distal.T)
-    forces, torques = loads[:, :3] @ sensor_R_distal, loads[:, 3:] @ sensor_R_distal
-    turned = Rot3(before.distal_T_sensor.pose().rotation().matrix() @ sensor_R_distal)
+    found = refine(data, before, start, noise or FingertipNoise())
+    if found.mass_kg <= 0.0:
+        hint = "Turn the hand farther between the untouched readings, and let the sensor warm up"
+        raise ConfigurationError("the untouched readings show no weight", where=where, hint=hint)
+    turned = Rot3(before.distal_T_sensor.pose().rotation().matrix() @ found.sensor_R_distal)
     return FingertipFit(
-        calibration=_calibration(before, sensor_R_distal, weight, shape, place),
+        calibration=_calibration(before, found),
         turned_rad=float(np.linalg.norm(Rot3.Logmap(turned))),
-        sigmas=_sigmas(rest, found, weight[0]),
-        rms_force_N=_rms(rest[:, :3]),
-        rms_lever_m=_rms(_levers(shape, forces, torques, up, place)),
-        tilt_rad=_rms(_angles(forces, up)),
+        covariance=found.covariance,
+        variance_factor=found.variance_factor,
+        rms_force_N=_rms(found.rest[:, :3]),
+        rms_lever_m=_rms(found.rest_lever_m),
+        tilt_rad=_rms(_angles(found.forces_distal_N, up)),
     )
 
 
@@ -92,16 +117,11 @@ def wrench_motion(data: FingertipData) -> MotionReport:
     return MotionReport(
         (
             Check("untouched wrenches", len(data.free), LEAST_ORIENTATIONS, "", "take more"),
-            Check("spread of their orientations", _spread(_up(data.free), 3), LEAST_SPREAD, "of 0.33", turn),
+            Check("spread of their orientations", _spread(ups(data.free), 3), LEAST_SPREAD, "of 0.33", turn),
             Check("presses", len(data.presses), LEAST_PRESSES, "", "press more"),
-            Check("spread of their orientations", _spread(_up(data.presses), 2), LEAST_SPREAD, "of 0.5", "roll more"),
+            Check("spread of their orientations", _spread(ups(data.presses), 2), LEAST_SPREAD, "of 0.5", "roll more"),
         )
     )
-
-
-def _up(poses: Sequence[WrenchPose]) -> Array:
-    """The world's z axis in each distal frame, shape (n, 3)."""
-    return np.array([pose.world_R_distal[2] for pose in poses]).reshape(-1, 3)
 
 
 def _spread(directions: Array, rank: int) -> float:
@@ -157,90 +177,14 @@ def _mounting(forces: Array, up: Array, weights: Array, down: Array, where: str)
     return rotation
 
 
-def _weight(free: Array, down_sensor: Array) -> Array:
-    """Mass (kg) and mass times centre of mass (kg m) in the sensor frame, shape (4,), by least squares."""
-    rows = []
-    for direction in GRAVITY * down_sensor:
-        x, y, z = direction
-        cross = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # (m c) x g
-        rows += [np.column_stack([direction, np.zeros((3, 3))]), np.column_stack([np.zeros(3), cross])]
-    scale = np.tile(np.repeat([1.0, 100.0], 3), len(free))  # a torque of 0.1 N mm is about as sure as 10 mN
-    left, right = np.concatenate(rows) * scale[:, None], free.ravel() * scale
-    return np.asarray(np.linalg.lstsq(left, right, rcond=None)[0])
-
-
-def _weights(weight: Array, down_sensor: Array) -> Array:
-    """Wrenches of the weight, shape (n, 6), sensor frame."""
-    forces = weight[0] * GRAVITY * down_sensor
-    return np.hstack([forces, np.cross(weight[1:], GRAVITY * down_sensor)])
-
-
-def _levers(shape: Array, forces: Array, torques: Array, up: Array, place: Array) -> Array:
-    """What the contact points of a shape on a level plate leave of the torques, per newton, shape (n, 3), metres."""
-    centre, axes = shape[:3], shape[3:]
-    points = centre - axes**2 * up / np.linalg.norm(axes * up, axis=1, keepdims=True)
-    size = np.linalg.norm(forces, axis=1, keepdims=True)
-    return np.asarray((torques - np.cross(points - place, forces)) / size)
-
-
-def _refined(
-    start: Array, free: Array, down: Array, pressed: Array, up: Array, before: FingertipCalibration
-) -> OptimizeResult:
-    """A turn from the mounting to start with, centre and semi-axes that explain weights, levers and directions.
-
-    The levers tell the mounting whatever the friction; the shape stays near the one before where nothing tells it.
-    """
-    place, shape = np.array(before.distal_T_sensor.translation_m), _shape_before(before)
-
-    def misfit(unknowns: Array) -> Array:
-        rotation = start @ Rot3.Expmap(unknowns[:3]).matrix()
-        weight = _weight(free, down @ rotation.T)
-        loads = pressed - _weights(weight, -up @ rotation.T)
-        forces, torques = loads[:, :3] @ rotation, loads[:, 3:] @ rotation
-        weights = free[:, :3] - weight[0] * GRAVITY * down @ rotation.T
-        directions = forces / np.linalg.norm(forces, axis=1, keepdims=True) - up
-        parts = (
-            _levers(unknowns[3:], forces, torques, up, place) / _LEVER_m,
-            weights / _WEIGHT_N,
-            directions / _FRICTION_rad,
-            (unknowns[3:] - shape) / _SHAPE_m,
-        )
-        return np.concatenate([part.ravel() for part in parts])
-
-    scale = np.repeat([0.1, 1e-3], [3, 6])
-    return least_squares(misfit, np.concatenate([np.zeros(3), shape]), x_scale=scale)
-
-
-def _shape_before(before: FingertipCalibration) -> Array:
-    return np.array([*before.centre_distal_m, *before.semi_axes_m])
-
-
-def _calibration(
-    before: FingertipCalibration, sensor_R_distal: Array, weight: Array, shape: Array, place: Array
-) -> FingertipCalibration:
-    distal_R_sensor = sensor_R_distal.T
-    roll, pitch, yaw = Rot3(distal_R_sensor).xyz().tolist()
+def _calibration(before: FingertipCalibration, found: Refined) -> FingertipCalibration:
+    roll, pitch, yaw = Rot3(found.sensor_R_distal.T).xyz().tolist()
     mounting = RigidTransform(translation_m=before.distal_T_sensor.translation_m, rpy_rad=(roll, pitch, yaw))
-    com = Pose3(Rot3(distal_R_sensor), place).transformFrom(weight[1:] / max(weight[0], 1e-6))
     changes = {
         "distal_T_sensor": mounting,
-        "mass_kg": float(max(weight[0], 0.0)),
-        "com_distal_m": tuple(map(float, com)),
-        "centre_distal_m": tuple(map(float, shape[:3])),
-        "semi_axes_m": tuple(map(float, shape[3:])),
+        "mass_kg": found.mass_kg,
+        "com_distal_m": tuple(map(float, found.com_distal_m)),
+        "centre_distal_m": tuple(map(float, found.centre_distal_m)),
+        "semi_axes_m": tuple(map(float, found.semi_axes_m)),
     }
     return before.model_copy(update=changes)
-
-
-def _sigmas(rest: Array, found: OptimizeResult, mass_kg: float) -> dict[str, float]:
-    force, torque = _rms(rest[:, :3]), _rms(rest[:, 3:])
-    weight_N = max(GRAVITY * mass_kg, 1e-9) * float(np.sqrt(len(rest)))
-    spread = np.linalg.pinv(found.jac.T @ found.jac) * max(1.0, float(np.mean(np.square(found.fun))))
-    variances = np.diag(spread)
-    return {
-        "mass_kg": force / GRAVITY / float(np.sqrt(len(rest))),
-        "com_m": float(torque / weight_N),
-        "mounting_rad": float(np.sqrt(variances[:3].sum())),
-        "centre_m": float(np.sqrt(variances[3:6].sum())),
-        "semi_axes_m": float(np.sqrt(variances[6:].sum())),
-    }

@@ -7,33 +7,36 @@ from dataclasses import dataclass, field
 
 from calibration.fingertip_data import FingertipData, WrenchPose
 from calibration.fingertip_fit import FingertipFit, fit_fingertip, wrench_motion
-from calibration.fingertip_plan import PlannedFree, PlannedWrench
+from calibration.fingertip_model import FingertipNoise
+from calibration.fingertip_plan import PlannedWrench
 from calibration.guided_steps import GuidedSteps
 from calibration.motion_check import MotionReport
 from drivers.fingertip import FingertipCalibration
 
 
 @dataclass
-class FingertipWizard(GuidedSteps[PlannedWrench, WrenchPose]):
-    """One run through the wizard.
+class FingertipWizard(GuidedSteps[PlannedWrench, tuple[WrenchPose, ...]]):
+    """One run through the wizard. A step gives a free wrench, and that of the press after it if it plans one.
 
     Attributes:
         plan: what to measure.
         data: rig, finger and serial number; its wrenches are replaced by those that are measured.
         before: the fingertip's calibration so far.
+        noise: errors of the wrenches.
     """
 
     plan: Sequence[PlannedWrench]
     data: FingertipData
     before: FingertipCalibration
-    _taken: list[tuple[int, WrenchPose]] = field(default_factory=list)
+    noise: FingertipNoise = field(default_factory=FingertipNoise)
+    _taken: list[tuple[int, tuple[WrenchPose, ...]]] = field(default_factory=list)
 
     @property
     def measured(self) -> FingertipData:
         """The data with everything measured so far."""
-        found = self.observed()
-        free = tuple(wrench for planned, wrench in found if isinstance(planned, PlannedFree))
-        presses = tuple(wrench for planned, wrench in found if not isinstance(planned, PlannedFree))
+        found = [felt for _, felt in self.observed()]
+        free = tuple(felt[0] for felt in found)
+        presses = tuple(felt[1] for felt in found if len(felt) > 1)
         return self.data.model_copy(update={"free": free, "presses": presses})
 
     def motion(self) -> MotionReport:
@@ -42,4 +45,4 @@ class FingertipWizard(GuidedSteps[PlannedWrench, WrenchPose]):
 
     def solve(self) -> FingertipFit:
         """Mounting, weight and shape. Raises ConfigurationError when the wrenches do not tell them."""
-        return fit_fingertip(self.measured, self.before)
+        return fit_fingertip(self.measured, self.before, self.noise)

@@ -13,6 +13,7 @@ from calibration.hand_chain import mount_T_link
 from calibration.touch_plan import PlannedTouch, pointing_vector
 from drivers.ati.force_tip import ForceTip
 from sessions.calibration_station import PressingHand, StationSettings
+from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import DeviceError
 from tactile_lab.geometry.contacts import Array
 
@@ -38,17 +39,21 @@ class FingertipStation(PressingHand):
     """A rig that takes planned mean wrenches."""
 
     settings: FingertipStationSettings
+    _untouched: WrenchPose
 
-    def measure(self, planned: PlannedWrench) -> WrenchPose:
-        """Take one mean wrench.
+    def measure(self, planned: PlannedWrench) -> tuple[WrenchPose, ...]:
+        """Take one mean wrench; of a press also the one just before it, which tells the drift and the weight.
 
         Raises:
             DeviceError: the sensor gives no usable readings, or nothing was met.
             SafetyError: a limit was passed; the rig was stopped.
         """
-        wrench = self._free(planned) if isinstance(planned, PlannedFree) else self._pressed(planned, self._felt)
+        if isinstance(planned, PlannedFree):
+            taken: tuple[WrenchPose, ...] = (self._free(planned),)
+        else:
+            taken = self._pressed(planned, lambda touch: (self._untouched, self._felt(touch)))
         self.supervisor.approached()
-        return wrench
+        return taken
 
     def _free(self, planned: PlannedFree) -> WrenchPose:
         joints = pointing_vector(planned.finger)
@@ -61,7 +66,8 @@ class FingertipStation(PressingHand):
         return self._felt(planned)
 
     def _press(self, planned: PlannedTouch, before: Array, behind: Array) -> None:
-        """As for a touch; then down again while the finger gives way and the force falls."""
+        """As for a touch, with a free wrench first; then down again while the finger gives way and the force falls."""
+        self._untouched = self._felt(planned)
         super()._press(planned, before, behind)
         for _ in range(self.settings.holds):
             if self._motion.loads_N()[planned.finger] >= _HELD * self.settings.press_N:
@@ -77,7 +83,7 @@ class FingertipStation(PressingHand):
         readings = _Readings(sensor)
         pose = self._mean_pose(self.settings.capture_s, lambda: readings.take(self._motion.loads_N()[planned.finger]))
         rotation = self._world_T_mount.rotation().matrix() @ mount_T_link(pose, planned.finger)[:3, :3]
-        return wrench_pose(rotation, readings.mean())
+        return wrench_pose(rotation, readings.mean(), readings.newest_ns / NANOSECONDS)
 
 
 class _Readings:
@@ -86,6 +92,11 @@ class _Readings:
     def __init__(self, sensor: ForceTip) -> None:
         self._sensor = sensor
         self._found: dict[int, Array] = {}
+
+    @property
+    def newest_ns(self) -> int:
+        """When the newest was taken, ns; 0 without any."""
+        return max(self._found, default=0)
 
     def take(self, load_N: float) -> None:
         """The newest reading, unless it is void (an infinite load) or known already."""

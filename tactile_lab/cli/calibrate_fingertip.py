@@ -63,7 +63,7 @@ def fingertip(
         if record is not None:
             save_fingertip_data(record, data)
     tips = force_fingertips(described, data.finger)
-    fit = fit_fingertip(data, tips[data.finger])
+    fit = fit_fingertip(data, tips[data.finger], wanted.noise)
     _show(data, fit, wanted.limits)
     found = fingertip_record(data, fit, tips, here, notes, wanted.limits)
     store_result(file, found, True, asker, no_input, as_json)

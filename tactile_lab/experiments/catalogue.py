@@ -27,6 +27,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         laboratory.CAMERA_TRUTH,
         laboratory.GRAPH_STRESS,
         laboratory.CALIBRATE_FOREARM,
+        laboratory.CALIBRATE_FINGERTIP,
         laboratory.CRASH_RECOVERY,
     )
 }

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from calibration.fingertip_data import FingertipData
+from calibration.fingertip_model import FingertipNoise
 from calibration.fingertip_plan import plan_wrenches
 from calibration.fingertip_record import FingertipLimits
 from calibration.fingertip_wizard import FingertipWizard
@@ -28,10 +29,12 @@ class FingertipSettings(StrictModel):
 
     Attributes:
         limits: what a result must keep to.
+        noise: errors of the wrenches.
         station: how the hand moves.
     """
 
     limits: FingertipLimits = FingertipLimits()
+    noise: FingertipNoise = FingertipNoise()
     station: FingertipStationSettings = FingertipStationSettings()
 
 
@@ -69,7 +72,8 @@ def fingertip_wizard(request: FingertipRequest) -> Iterator[tuple[FingertipWizar
         hint = "Record its wrenches by hand, and give them with --from"
         raise ConfigurationError(f"{request.finger} can not be stretched alone", where="--finger", hint=hint)
     world_T_mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
-    wizard = FingertipWizard(plan_wrenches(request.finger, request.presses), _data(rig, request.finger), before)
+    plan, data = plan_wrenches(request.finger, request.presses), _data(rig, request.finger)
+    wizard = FingertipWizard(plan, data, before, request.settings.noise)
     with open_laboratory(cleared(rig), request.seed, "box-10x6x4") as laboratory:
         bench = laboratory.bench(Recorder(NullTraffic()))
         bench.connect()

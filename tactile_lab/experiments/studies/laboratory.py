@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tactile_lab.experiments import calibration_runs, camera_runs, crash_runs, graph_runs
+from calibration.fingertip_model import PARTS
+from tactile_lab.experiments import calibration_runs, camera_runs, crash_runs, fingertip_runs, graph_runs
 from tactile_lab.experiments.cells import grid
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.graph_stress import stock_solvers
@@ -57,6 +58,24 @@ CALIBRATE_FOREARM = Experiment(
         Column("noise found, of that stated", "noise", 2, kind="median"),
     ),
     ranges("method", "position error, mm", "error_mm", lambda cell: f"{cell['poses']} poses"),
+)
+
+CALIBRATE_FINGERTIP = Experiment(
+    "calibrate-fingertip",
+    "A force fingertip from its wrenches: any mounting, 4 to 20 g, joint bias 0.6°, a Nano17's drift, sliding presses.",
+    lambda grasps: grid(presses=[6, 10, 20]),
+    fingertip_runs.calibrate_fingertip,
+    (
+        Column("mounting, °: median / p95", "mounting_deg", 2, kind="pooled"),
+        Column("mass, g", "mass_g", 2, kind="pooled"),
+        Column("centre of mass, mm", "com_mm", 2, kind="pooled"),
+        Column("ellipsoid's centre, mm", "centre_mm", 2, kind="pooled"),
+        Column("semi-axes, mm", "axes_mm", 2, kind="pooled"),
+        Column("inside the 95 % region", "inside", 1, kind="percent"),
+        *(Column(f"inside, {part.replace('_', '-')} alone", f"inside_{part}", 1, kind="percent") for part in PARTS),
+        Column("noise found, of that stated", "noise", 2, kind="median"),
+    ),
+    ranges("presses", "error of the mounting, °", "error_deg", lambda cell: "8 orientations and presses", columns=1),
 )
 
 CRASH_RECOVERY = Experiment(

@@ -39,10 +39,11 @@ class Pretended:
         up, tip = rotation[2], TipEllipsoid()
         axes, place = np.array(tip.semi_axes_m), np.array([0.0, 0.0, 0.004])
         weight = -0.08 * up
-        press = np.zeros(3) if isinstance(planned, PlannedFree) else up
         point = np.array(tip.centre_distal_m) - axes**2 * up / np.linalg.norm(axes * up)
-        torque = np.cross(np.array([0, 0, 0.015]), weight) + np.cross(point - place, press)
-        return wrench_pose(rotation, np.concatenate([weight + press, torque]))
+        free = np.concatenate([weight, np.cross(np.array([0, 0, 0.015]), weight)])
+        press = np.concatenate([up, np.cross(point - place, up)])
+        pressed = () if isinstance(planned, PlannedFree) else (wrench_pose(rotation, free + press),)
+        return (wrench_pose(rotation, free), *pressed)
 
 
 def wizard() -> FingertipWizard:

@@ -8,7 +8,8 @@ from calibration.admission import Installation
 from calibration.electrodes import faulty_electrodes, load_untouched
 from calibration.fingertip_data import FingertipData, WrenchPose
 from calibration.fingertip_fit import fit_fingertip
-from calibration.fingertip_record import fingertip_record
+from calibration.fingertip_model import PARTS
+from calibration.fingertip_record import fingertip_record, judge_fingertip
 from calibration.joints import JointPose, corrected_tables, from_contacts, from_poses, joints_record, load_poses
 from calibration.refinement import JointOffset
 from calibration.store import write_record
@@ -16,6 +17,8 @@ from drivers.fingertip import GRAVITY, FingertipCalibration, RigidTransform, loa
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.kinematics import JOINT_INDEX, joint_vector
 from tactile_lab.errors import ConfigurationError
+from tactile_lab.experiments.fingertip_runs import NOMINAL as BEFORE
+from tactile_lab.experiments.fingertip_runs import drawn, recording
 from tactile_lab.rigs.description import load_rig
 
 HERE = Installation("simulated-hand")
@@ -86,6 +89,7 @@ def test_files_of_poses_that_do_not_fit_are_refused(tmp_path, text, words):
 
 # --- fingertips ----------------------------------------------------------------------------------------------------
 
+TRUE_SIMULATED = drawn(np.random.default_rng(1))
 NOMINAL = load_fingertips(load_rig("sim").files["fingertips"])["FF"]
 TRUE = NOMINAL.model_copy(
     update={
@@ -136,6 +140,42 @@ def test_mounting_weight_and_shape_are_found():
     np.testing.assert_allclose(found.centre_distal_m[:2], TRUE.centre_distal_m[:2], atol=3e-4)
 
 
+def test_the_stated_regions_hold_the_truth_whatever_mounting_weight_and_shape():
+    held, apart, off = [], [], []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        truth = drawn(rng)
+        found = fit_fingertip(recording(truth, rng, presses=8), BEFORE)
+        held.append(found.holds(truth))
+        apart += [found.holds(truth, part) for part in PARTS]
+        off.append(np.linalg.norm(found.errors(truth)[PARTS["mounting"]]) / found.sigma("mounting"))
+    assert sum(held) >= 10  # 9 or fewer of 12 come once in 50 times when a region holds 95 %
+    assert sum(apart) >= 54  # of 60
+    assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.5
+
+
+def test_drift_that_readings_share_counts_once():
+    data = recording(TRUE_SIMULATED, np.random.default_rng(0), presses=6)
+    timeless = data.model_copy(
+        update={
+            part: tuple(pose.model_copy(update={"time_s": None}) for pose in getattr(data, part))
+            for part in ("free", "presses")
+        }
+    )
+    timed, untimed = (fit_fingertip(each, BEFORE) for each in (data, timeless))
+    assert timed.variance_factor != untimed.variance_factor
+    assert timed.sigma("mounting") < untimed.sigma("mounting")  # the moment before a press tells its drift
+
+
+def test_more_noise_than_stated_widens_the_regions():
+    data = recording(TRUE_SIMULATED, np.random.default_rng(0), presses=6)
+    calm = BEFORE.model_copy(update={"force_drift_N": 0.002, "moment_drift_Nm": 1e-5, "force_sigma_N": 5e-4})
+    found = fit_fingertip(data, calm)
+    assert found.variance_factor > 4.0
+    judged = {judgement.name: judgement for judgement in judge_fingertip(found)}
+    assert not judged["noise, of what was stated"].ok
+
+
 def test_the_record_keeps_the_other_fingers(tmp_path):
     tips = load_fingertips(load_rig("sim").files["fingertips"])
     record = fingertip_record(recorded(), fit_fingertip(recorded(), NOMINAL), tips, HERE)
@@ -143,6 +183,8 @@ def test_the_record_keeps_the_other_fingers(tmp_path):
     back = load_fingertips(tmp_path / "fingertips.yaml")
     assert back["MF"] == tips["MF"]
     assert back["FF"].mass_kg == pytest.approx(0.012, abs=5e-4)
+    assert record.covariance is not None
+    assert len(record.covariance.of) == len(record.covariance.matrix) == 13
 
 
 def test_forces_of_the_opposite_sign_are_named():

@@ -30,6 +30,7 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "exploration-hand": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
     "camera-truth": ({"condition": ["sharp"]}, None),
     "calibrate-forearm": ({"method": ["touch"], "poses": ["20"]}, None),
+    "calibrate-fingertip": ({"presses": ["6"]}, None),
     "crash-recovery": ({"fault": ["kill -9"]}, None),
     "graph-stress": ({"solver": ["Cauchy", "ours"]}, None),
 }
