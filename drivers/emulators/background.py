@@ -48,6 +48,10 @@ class Pace:
         self._owed -= count
         return count
 
+    def wait_s(self, rate_hz: float) -> float:
+        """Time until the next message is due, seconds."""
+        return max((1.0 - self._owed) / rate_hz - (time.monotonic() - self._last_s), 0.0)
+
     def rest(self) -> None:
         """Nothing to do for a moment."""
         time.sleep(0.001)

@@ -15,7 +15,8 @@ from drivers.emulators.background import Background, Pace
 from drivers.emulators.closing import Closing
 from drivers.emulators.net_box_unit import NetBoxUnit
 
-_POLL_s = 0.001
+_SHORTEST_s, _LONGEST_s = 0.001, 0.02
+"""Between looks at the socket: records of fast streams go out a few at a time, and closing is seen in time."""
 
 
 class NetBoxServer(Closing):
@@ -70,12 +71,17 @@ class NetBoxServer(Closing):
             return self.unit.page(target)
 
     def _turn(self) -> None:
-        select.select([self._socket], [], [], _POLL_s)
+        patience_s = min(max(self._pace.wait_s(self.unit.rate_hz), _SHORTEST_s), _LONGEST_s)
+        if select.select([self._socket], [], [], patience_s)[0]:
+            self._answer()
+        if due := self._pace.due(self.unit.rate_hz):
+            self._send(due)
+
+    def _answer(self) -> None:
+        """Take every request that waits."""
         with contextlib.suppress(BlockingIOError, ConnectionError):
             while True:
-                payload, client = self._socket.recvfrom(100)
-                self._take(payload, client)
-        self._send(self._pace.due(self.unit.rate_hz))
+                self._take(*self._socket.recvfrom(100))
 
     def _take(self, payload: bytes, client: tuple[str, int]) -> None:
         with self._lock:
