@@ -35,7 +35,7 @@ class CalibrationFiles(StrictModel):
         joints: joint sensor tables of this hand (Shadow's calibration.yaml).
         motors: which motor pulls which joint.
         boards: settings of the motor boards; on wires they are uploaded at every start, and kept when left out.
-        rates: how often motors are asked for what; in place of ``hand.polling``.
+        rates: how often motors are asked for what, in place of ``hand.polling``; for hands on wires.
         gains: position control of this hand (``sr_edc_joint_position_controllers_PWM.yaml``); for hands on wires.
         fingertips: shape, mounting and weight of the fingertips.
         forearm: where the positioner stands in the world.
@@ -106,6 +106,8 @@ class RigDescription(StrictModel):
     def _wires_fit(self) -> RigDescription:
         if (self.kind == "wired") != (self.wires is not None):
             raise ValueError("wires belong to kind wired, and kind wired needs them")
+        if self.wires is None and any((self.calibration.boards, self.calibration.rates, self.calibration.gains)):
+            raise ValueError("calibration.boards, rates and gains belong to a hand on wires")
         if self.stand_ins and self.kind != "wired":
             raise ValueError("stand_ins belong to kind wired: a simulated rig needs none")
         if self.wires is not None and bool(self.wires.fingertips) != (self.fingertips == "nano17"):

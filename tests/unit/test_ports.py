@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -45,6 +46,38 @@ def test_the_port_that_goes_or_comes_is_named(plugged: list[Port]) -> None:
     plugged.append(pulled)
     gone, come = wait_for_change(VirtualClock(), [port for port in before if port.name != "can0"], 3.0)
     assert (gone, [port.name for port in come]) == ([], ["can0"])
+
+
+def test_the_port_that_is_unplugged_while_the_command_waits_is_named(
+    plugged: list[Port], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks = 0
+
+    def comports() -> list[Port]:
+        """The RS-485 adapter is pulled at the third look, and put in again before the second command."""
+        nonlocal looks
+        looks += 1
+        return plugged[1:] if 3 <= looks < 5 else list(plugged)
+
+    monkeypatch.setattr(ports.list_ports, "comports", comports)
+    told = CliRunner().invoke(app, ["rig", "list", "--ports", "--watch", "30"])
+    assert told.exit_code == 0
+    assert "/dev/ttyUSB1 went: RS-485" in told.output
+    assert "nothing changed" not in told.output
+    answer = CliRunner().invoke(app, ["rig", "list", "--ports", "--watch", "30", "--json"])
+    assert [port["name"] for port in json.loads(answer.stdout)["come"]] == ["/dev/ttyUSB1"]
+
+
+def test_a_port_is_named_by_the_name_that_stays(
+    plugged: list[Port], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    names, device = tmp_path / "by-id", tmp_path / "ttyUSB0"
+    names.mkdir()
+    device.touch()
+    (names / "usb-ATI-FF").symlink_to(device)
+    plugged[1].device = str(device)
+    monkeypatch.setattr(ports, "_STABLE_NAMES", names)
+    assert str(names / "usb-ATI-FF") in [port.name for port in list_all_ports()]
 
 
 def test_the_command_lists_them_for_people_and_programs(plugged: list[Port]) -> None:

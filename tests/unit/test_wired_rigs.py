@@ -18,7 +18,10 @@ from tactile_lab.errors import ConfigurationError, DeviceError
 from tactile_lab.rigs.build import build_interpreter, check_calibration
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.rigs.wired import hand_setup, stand_in_plan
-from tests.support.wire_rig import wire_rig
+from tests.support.wire_rig import SHIPPED, wire_rig
+
+SIMULATED = SHIPPED / "calibrations" / "simulated-hand"
+CALIBRATION = {role: str(SIMULATED / f"{role}.yaml") for role in ("joints", "motors", "fingertips", "forearm")}
 
 
 def changed(folder: Path, **changes: Any) -> str:
@@ -33,7 +36,7 @@ def test_the_shipped_rig_is_sound() -> None:
     plan = stand_in_plan(rig, 3, "cube-6")
     assert sorted(plan.boxes) == ["FF", "LF", "MF", "RF", "TH"]
     assert (plan.simulation.object, plan.seed) == ("cube-6", 3)
-    assert hand_setup(rig).hand.cycle_s == 0.001
+    assert hand_setup(rig).hand.cycle_s == rig.description.hand.cycle_s < rig.description.cycle_s
     assert set(build_interpreter(rig).perception.fingertips) == {"FF", "MF", "RF", "LF", "TH"}
 
 
@@ -44,11 +47,36 @@ def test_the_shipped_rig_is_sound() -> None:
         ({"kind": "simulated", "wires": None}, "stand_ins belong to kind wired"),
         ({"fingertips": "biotac"}, "BioTacs send through the palm"),
         ({"kind": "usb"}, "kind"),
+        (
+            {"kind": "simulated", "wires": None, "stand_ins": False, "calibration": CALIBRATION | {"gains": "g.yaml"}},
+            "boards, rates and gains belong to a hand on wires",
+        ),
     ],
 )
 def test_descriptions_that_contradict_themselves(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
     with pytest.raises(ConfigurationError, match=words):
         load_rig(changed(tmp_path, **changes))
+
+
+def test_the_published_files_of_a_hand_can_be_named_and_drive_it(tmp_path: Path, lab_data: Path) -> None:
+    folder = lab_data / "shadow_hand_config" / "378"
+    published = {
+        "boards": str(folder / "motor_board_effort_controllers.yaml"),
+        "rates": str(folder / "motor_data_polling.yaml"),
+        "gains": str(folder / "sr_edc_joint_position_controllers_PWM.yaml"),
+    }
+    rig = load_rig(changed(tmp_path, calibration=CALIBRATION | published, wires=without_camera(tmp_path)))
+    check_calibration(rig)
+    setup = hand_setup(rig)
+    assert setup.settings().gains.of("FFJ0").damping == 50.0
+    assert setup.motor_map().sign[setup.motor_map().numbers["FFJ4"]] == -1
+    assert set(published) <= set(rig.files), "a session keeps copies of them"
+
+
+def without_camera(folder: Path) -> dict[str, Any]:
+    wires: dict[str, Any] = yaml.safe_load(wire_rig(folder).read_text())["wires"]
+    del wires["camera"]
+    return wires
 
 
 def test_two_fingers_on_one_box(tmp_path: Path) -> None:
