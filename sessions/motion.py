@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from gtsam import Pose3, Rot3
@@ -54,15 +55,19 @@ class Motion:
     """The hand and the positioner as one thing that moves.
 
     Args:
-        bench: connected.
+        bench: connected before anything moves.
         supervisor: looks at every cycle.
     """
 
     def __init__(self, bench: Bench, supervisor: SafetySupervisor) -> None:
         self.bench, self.supervisor = bench, supervisor
-        self._base_q = bench.perception.base_q.copy()
         self._targets_rad: dict[str, float] = {}
         self._loads_N: dict[str, float] = {}
+
+    @cached_property
+    def _base_q(self) -> Array:
+        """The positioner's last target, shape (6,); before the first one, where it is."""
+        return self.bench.perception.base_q.copy()
 
     # --- time --------------------------------------------------------------------------------------------------
 
