@@ -17,6 +17,7 @@ from drivers.biotac.slot_codec import Channel
 from drivers.camera.camera import Camera
 from drivers.fingertip import FingertipSensor
 from drivers.positioner import Positioner
+from drivers.shadow.ethercat_link import EthercatCounts
 from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_process import HandProcess
 from drivers.simulation.objects import CATALOGUE
@@ -31,7 +32,7 @@ from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.check_fingertips import check_fingertips
 from tactile_lab.rigs.check_hand import check_hand
 from tactile_lab.rigs.description import Rig, load_rig
-from tactile_lab.rigs.findings import Finding
+from tactile_lab.rigs.findings import Finding, told_losses
 from tactile_lab.rigs.fingertip_rig import is_fingertip_rig, load_fingertip_rig
 from tactile_lab.rigs.hand_rig import is_hand_rig, load_hand_rig
 from tactile_lab.rigs.laboratory import open_laboratory
@@ -117,10 +118,11 @@ def _findings(bench: Bench, watch: StreamWatch) -> list[Finding]:
 
 def _hand(bench: Bench, watch: StreamWatch) -> Finding:
     figures: Figures = watch.figures(HAND_LINK)
-    words = [in_words(figures)]
+    words, losses, health = [in_words(figures)], tuple[str, ...](), bench.hand.health()
     if isinstance(bench.hand, HandProcess):
         report = bench.hand.report()
-        punctual, counts = report["punctuality"], report["hand"]
+        punctual, counts, health = report["punctuality"], report["hand"], tuple(report["health"])
+        losses = EthercatCounts(**report["wire"]).problems()
         figures |= {"start_late_p50_us": punctual["median_us"], "start_late_p99_us": punctual["p99_us"]}
         words += [str(bench.hand.ready), f"starts late by {punctual['p99_us']:.0f} us (99 %)"]
         figures |= {"serial": str(bench.hand.ready.serial or ""), "palm": str(bench.hand.ready.palm or "")}
@@ -128,24 +130,25 @@ def _hand(bench: Bench, watch: StreamWatch) -> Finding:
     elif isinstance(bench.hand, ShadowHand):
         counters = bench.hand.counters
         figures["lost_share"] = counters.lost / max(counters.cycles, 1)
-        figures |= _motors(bench.hand)
-        if "warmest_C" in figures:
-            words.append(f"warmest motor {figures['warmest_C']:.0f} C")
-    words.append(f"{100 * float(figures.get('lost_share', 0.0)):.1f} % of cycles lost")
-    return _finding("hand", bench.hand.health(), words, figures)
-
-
-def _motors(hand: ShadowHand) -> Figures:
-    sample = hand.newest
-    if sample is None or not np.isfinite(sample.motor.temperature_C).any():
-        return {}
-    return {"warmest_C": float(np.nanmax(sample.motor.temperature_C)), "spare_us": float(sample.idle_us)}
+        if bench.hand.newest is not None:
+            figures["spare_us"] = float(bench.hand.newest.idle_us)
+    if (warmest_C := bench.situation().warmest_C) is not None:
+        figures["warmest_C"] = warmest_C
+        words.append(f"warmest motor {warmest_C:.0f} C")
+    share = float(figures.get("lost_share", 0.0))
+    words.append(f"{100 * share:.1f} % of cycles lost")
+    problems, remarks = told_losses(health, share, losses)
+    return _finding("hand", problems, words + remarks, figures)
 
 
 def _base(bench: Bench, watch: StreamWatch) -> Finding:
     place = ", ".join(f"{value:.3f}" for value in bench.perception.base_q[:3])
     figures = watch.figures(BASE_LINK)
-    return _finding("base", _problems(bench.base), [f"at {place} m", in_words(figures)], figures)
+    problems, remarks = _problems(bench.base), list[str]()
+    if isinstance(bench.base, Positioner):
+        counters = bench.base.counters
+        problems, remarks = told_losses(problems, counters.lost / max(counters.cycles, 1))
+    return _finding("base", problems, [f"at {place} m", in_words(figures), *remarks], figures)
 
 
 def _fingertip(finger: str, tip: FingertipSensor | None, watch: StreamWatch) -> Finding:

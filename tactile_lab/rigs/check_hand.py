@@ -15,7 +15,7 @@ from drivers.shadow.palm_codec import SENSORS
 from drivers.shadow.pysoem_link import PysoemLink
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import DeviceError
-from tactile_lab.rigs.findings import Finding
+from tactile_lab.rigs.findings import TOLERATED_LOSS, Finding
 from tactile_lab.rigs.hand_rig import HandRig
 
 LISTEN_ns = 1_500_000_000
@@ -92,7 +92,7 @@ def _cycle(hand: ShadowHand, link: EthercatLink | PysoemLink, statistics: CycleS
     words = f"{statistics.summary()}; {counters.lost} of {counters.cycles} without a status"
     punctual = statistics.summary()
     figures = {"start_late_p50_us": punctual.median_us, "start_late_p99_us": punctual.p99_us, "lost_share": share}
-    return Finding("cycle", share < 0.01, "; ".join((words, *remarks)), figures)
+    return Finding("cycle", share < TOLERATED_LOSS, "; ".join((words, *remarks)), figures)
 
 
 def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+
+TOLERATED_LOSS = 0.01
+"""A driver bridges single lost cycles; a device that loses a larger share is not fit to work."""
 
 
 @dataclass(frozen=True)
@@ -21,3 +24,15 @@ class Finding:
     ok: bool
     detail: str
     figures: Mapping[str, float | str] = field(default_factory=dict)
+
+
+def told_losses(health: Sequence[str], share: float, losses: Sequence[str] = ()) -> tuple[tuple[str, ...], list[str]]:
+    """What speaks against a device, and what is only told: losses so rare that its driver bridges them.
+
+    Args:
+        health: the device's words about itself.
+        share: of its cycles that were lost.
+        losses: which of these words are about losses, besides those that count lost cycles.
+    """
+    minor = [words for words in health if share < TOLERATED_LOSS and (words in losses or words.endswith("cycles lost"))]
+    return tuple(words for words in health if words not in minor), minor

@@ -1,0 +1,28 @@
+"""Rare losses are told, and no reason to call a device unfit; anything else is."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import pytest
+
+from drivers.shadow.ethercat_link import EthercatCounts
+from tactile_lab.rigs.check import check_rig
+from tactile_lab.rigs.findings import told_losses
+
+COUNTS = EthercatCounts(cycles=1000, lost=2, empty=3)
+HEALTH = ("5 of 1000 cycles lost", *COUNTS.problems(), "FFJ3 (motor 1): silent")
+
+
+@pytest.mark.parametrize(("share", "problems"), [(0.005, 1), (0.05, 4)])
+def test_rare_losses_are_told_apart_from_what_is_wrong(share: float, problems: int) -> None:
+    wrong, told = told_losses(HEALTH, share, EthercatCounts(**asdict(COUNTS)).problems())
+    assert (len(wrong), len(told)) == (problems, 4 - problems)
+    assert "FFJ3 (motor 1): silent" in wrong
+
+
+def test_the_check_tells_the_warmest_motor() -> None:
+    hand = next(finding for finding in check_rig("sim") if finding.device == "hand")
+    assert hand.ok
+    assert float(hand.figures["warmest_C"]) > 15.0
+    assert "warmest motor" in hand.detail
