@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
@@ -10,6 +9,7 @@ import yaml
 from pydantic import Field
 
 from calibration.admission import Installation
+from calibration.store import write_whole
 from drivers.fingertip import Vector3
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
@@ -68,14 +68,4 @@ def load_fingertip_data(path: Path, here: Installation) -> FingertipData:
 
 def save_fingertip_data(path: Path, data: FingertipData) -> None:
     """Write wrenches as :func:`load_fingertip_data` reads them, whole or not at all. Raises ConfigurationError."""
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(yaml.safe_dump(data.model_dump(mode="json"), sort_keys=False), encoding="utf-8")
-        partial.replace(path)
-    except OSError as error:
-        hint = "Choose another file"
-        raise ConfigurationError(f"can not be written ({error.strerror})", where=str(path), hint=hint) from error
-    finally:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
+    write_whole(path, yaml.safe_dump(data.model_dump(mode="json"), sort_keys=False))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
@@ -19,6 +18,7 @@ from pydantic import Field, RootModel
 
 from calibration.hand_eye import nearest_rotation
 from calibration.observations import HandPose, Plane, PosePair, Spot, Target, Touch, View
+from calibration.store import write_whole
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.markers import MarkerSettings
 from drivers.fingertip import RigidTransform, Vector3
@@ -170,17 +170,7 @@ def save_data(path: Path, data: ForearmData) -> None:
         camera=data.camera,
         markers=data.markers,
     )
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(file.model_dump_json(indent=1), encoding="utf-8")
-        partial.replace(path)
-    except OSError as error:
-        hint = "Choose another file"
-        raise ConfigurationError(f"can not be written ({error.strerror})", where=str(path), hint=hint) from error
-    finally:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
+    write_whole(path, file.model_dump_json(indent=1))
 
 
 def _json(path: Path) -> Any:

@@ -166,18 +166,28 @@ def write_record(path: Path, record: CalibrationRecord, comment: str = "") -> No
     Raises:
         ConfigurationError: the file can not be written.
     """
-    text = sealed_text(record)
     head = "".join(f"# {line}\n" for line in comment.splitlines())
+    write_whole(path, head + sealed_text(record), "Choose another file with --out")
+
+
+def write_whole(path: Path, text: str, hint: str = "Choose another file") -> None:
+    """Write a file, and its folder, whole or not at all.
+
+    Args:
+        hint: what to do when it can not be written.
+
+    Raises:
+        ConfigurationError: the file can not be written.
+    """
     partial = path.with_name(f".{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with partial.open("w", encoding="utf-8") as file:
-            file.write(head + text)
+            file.write(text)
             file.flush()
             os.fsync(file.fileno())
         partial.replace(path)
     except OSError as error:
-        hint = "Choose another file with --out"
         raise ConfigurationError(f"can not be written ({error.strerror})", where=str(path), hint=hint) from error
     finally:
         with suppress(OSError):
