@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -75,10 +76,17 @@ class MethodSummary:
 
 
 def compare(judged: Sequence[Judged]) -> list[MethodSummary]:
-    """One summary a method, in order of appearance."""
+    """One summary a method, in order of appearance.
+
+    Several results of one method on one session are no independent runs of it: then each folder of results is a group
+    of its own, and named.
+    """
+    counts = Counter((each.session, each.method) for each in judged)
+    repeated = {method for (_, method), count in counts.items() if count > 1}
     groups: dict[str, list[Judged]] = {}
     for each in judged:
-        groups.setdefault(each.method, []).append(each)
+        name = f"{each.method}, {each.results}" if each.method in repeated else each.method
+        groups.setdefault(name, []).append(each)
     first = next(iter(groups.values()))
     return [_summary(method, group, first) for method, group in groups.items()]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -63,9 +64,10 @@ def compare_sessions(sessions: Sequence[Session], folders: Sequence[str], choice
     """Judge folders of results of sessions; all that hold results when none is named.
 
     Raises:
-        SessionError: a session has no such results, or can not be read.
+        SessionError: a session has no such results, can not be read, or is named twice.
         ConfigurationError: the chosen calibration can not be used.
     """
+    _check_different(sessions)
     judged: list[Judged] = []
     truths, clocks, unread = dict[str, TruthReport | None](), dict[str, ClockOffset](), dict[str, str]()
     for session in sessions:
@@ -79,6 +81,13 @@ def compare_sessions(sessions: Sequence[Session], folders: Sequence[str], choice
     return Comparison(tuple(judged), truths, clocks, unread, tuple(compare(judged)))
 
 
+def _check_different(sessions: Sequence[Session]) -> None:
+    """A session counted twice would make a confidence interval too narrow. Raises SessionError."""
+    for name, count in Counter(session.manifest.name for session in sessions).items():
+        if count > 1:
+            raise SessionError("is named twice", where=name, hint="Name each session once, and none beside its copy")
+
+
 def result_folders(session: Session, names: Sequence[str]) -> list[Path]:
     """Folders of results inside a session, or anywhere else by their path. Raises SessionError."""
     if not names:
@@ -86,7 +95,7 @@ def result_folders(session: Session, names: Sequence[str]) -> list[Path]:
         if not found:
             raise SessionError("holds no results", where=str(session.folder), hint="Replay the session to get some")
         return found
-    return [_folder(session, name) for name in names]
+    return list(dict.fromkeys(_folder(session, name) for name in names))
 
 
 def _folder(session: Session, name: str) -> Path:

@@ -56,6 +56,14 @@ def test_methods_are_gathered_and_compared_with_the_first_session_by_session() -
     assert difference.low > 0.2, "the sessions' own spread is much larger than that of the differences"
 
 
+def test_results_of_one_method_on_one_session_are_no_further_runs_of_it() -> None:
+    again = [Judged(each.session, "other settings", each.evaluation) for each in EVALUATIONS[:3]]
+    first, other, icp = compare([*EVALUATIONS[:3], *again, *EVALUATIONS[3:]])
+    names = (first.method, other.method, icp.method)
+    assert names == ("joint, 2-D, results", "joint, 2-D, other settings", "icp, 2-D")
+    assert [summary.runs for summary in (first, other, icp)] == [3, 3, 3]
+
+
 def test_what_nobody_knows_is_left_out_and_what_some_know_is_counted() -> None:
     (only,) = compare([judged("a", "joint", None), judged("b", "joint", 2.0)])
     assert only.figures[2].count == 1
