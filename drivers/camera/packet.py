@@ -66,7 +66,8 @@ def decode_packet(datagram: Datagram, *, largest_pixels: int = LARGEST_PIXELS) -
     if not (np.isfinite(rows["corners_px"]).all() and (rows["blur_px"] >= 0.0).all()):
         raise _error("corners that are no numbers")
     found = Detection(DICTIONARIES[dictionary], (width, height), {int(row["number"]): _marker(row) for row in rows})
-    image = decode_image(payload[rows_end:], largest_pixels=largest_pixels) if picture else None
+    promised = min(largest_pixels, width * height)  # a picture that says it is larger is not even decoded
+    image = decode_image(payload[rows_end:], largest_pixels=promised) if picture else None
     if image is not None and image.shape != (height, width):
         raise _error(f"a picture of {image.shape[1]} x {image.shape[0]} pixels instead of {width} x {height}")
     return Frame(datagram.stamp_ns, image, counter, dropped, found)

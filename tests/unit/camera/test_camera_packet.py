@@ -54,6 +54,11 @@ def test_a_bare_picture_is_a_packet_nobody_has_looked_at() -> None:
     assert picture_of(PICTURE) == PICTURE
 
 
+def told(width: int, height: int) -> bytes:
+    """A packet whose head tells another size than the picture's 64 x 48 pixels."""
+    return encode_packet(Frame(0, None, detection=Detection("DICT_4X4_50", (width, height), {})), PICTURE)
+
+
 @pytest.mark.parametrize(
     ("payload", "complaint"),
     [
@@ -63,10 +68,8 @@ def test_a_bare_picture_is_a_packet_nobody_has_looked_at() -> None:
         (encode_packet(FRAME)[:4] + b"\x02" + encode_packet(FRAME)[5:], "version 2"),
         (encode_packet(FRAME)[:5] + b"\xff" + encode_packet(FRAME)[6:], "dictionary 255"),
         (encode_packet(FRAME, PICTURE[:-9]), "PNG cut short"),
-        (
-            encode_packet(Frame(0, None, detection=Detection("DICT_4X4_50", (63, 48), {})), PICTURE),
-            "instead of 63 x 48",
-        ),
+        (told(65, 48), "instead of 65 x 48"),
+        (told(63, 48), "a picture of 64 x 48 pixels"),
         (encode_packet(FRAME)[:-4] + b"\x00\x00\xc0\x7f", "no numbers"),
     ],
 )
