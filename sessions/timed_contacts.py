@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -33,12 +33,14 @@ class ImportSettings:
         normal_sigma_rad: of the normals; None takes 0.1, or 0.35 where they are directions of forces: friction tilts
             a force by as much.
         gap_s: where no column says so, contacts farther apart in time belong to different grasps.
-        mesh: true object, a closed mesh beside the log, or None.
+        object_name: of the true object.
+        mesh: its closed mesh beside the log, or None.
     """
 
     point_sigma_m: float = 0.002
     normal_sigma_rad: float | None = None
     gap_s: float = 0.5
+    object_name: str = "object"
     mesh: str | None = None
 
 
@@ -50,7 +52,7 @@ def read_timed_contacts(path: Path, settings: ImportSettings | None = None) -> C
         ConfigurationError: a column or a line that does not fit; names it.
     """
     settings = settings or ImportSettings()
-    truth = None if settings.mesh is None else ObjectTruth(name=Path(settings.mesh).stem, mesh=settings.mesh)
+    truth = None if settings.mesh is None else ObjectTruth(name=settings.object_name, mesh=settings.mesh)
     if path.suffix.lower() == ".json":
         document = read_json(path)
         rows, truth = document["contacts"], _truth(document, path) or truth
@@ -69,11 +71,10 @@ def _truth(document: Mapping[str, Any], path: Path) -> ObjectTruth | None:
 
 
 def _with_sigmas(settings: ImportSettings, document: Mapping[str, Any]) -> ImportSettings:
-    return ImportSettings(
-        float(document.get("point_sigma_m", settings.point_sigma_m)),
-        document.get("normal_sigma_rad", settings.normal_sigma_rad),
-        settings.gap_s,
-        settings.mesh,
+    return replace(
+        settings,
+        point_sigma_m=float(document.get("point_sigma_m", settings.point_sigma_m)),
+        normal_sigma_rad=document.get("normal_sigma_rad", settings.normal_sigma_rad),
     )
 
 

@@ -29,11 +29,12 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
     """
     if log.exists():
         raise SessionError("exists already", where=str(log), hint="Choose another name with --out")
-    copy = None if mesh is None else log.with_suffix(mesh.suffix)
-    contacts = read_timed_contacts(file, replace(settings, mesh=None if copy is None else copy.name))
-    if mesh is not None and copy is not None:
+    if mesh is not None:
+        settings = replace(settings, object_name=mesh.stem, mesh=log.with_suffix(mesh.suffix).name)
+    contacts = read_timed_contacts(file, settings)
+    if mesh is not None:
         read_mesh(mesh)
-        _copy(mesh, copy)
+        _copy(mesh, log.with_suffix(mesh.suffix))
     try:
         write_contact_log(log, contacts)
         read_contact_log(log)  # refuses normals that point inward
