@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from gtsam import Pose3
 
-from drivers.shadow.kinematics import JOINT_INDEX, JOINTS, JOINT_LIMITS_rad
+from drivers.shadow.kinematics import JOINT_INDEX, JOINTS, JOINT_LIMITS_rad, palm_T_distal
 from drivers.shadow.motors import DRIVEN_JOINTS, angles_of_driven
 from drivers.simulation.geared_motors import motor_class
+from drivers.simulation.hand_plant import TrueContact
 from drivers.simulation.motor_bank import DEMAND_TIMEOUT_ns
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.geometry.contacts import Array
@@ -52,6 +54,14 @@ class FreeHand:
         angle = self._spread.T @ self._angles_rad
         pushing = ((angle <= low) & (self._duty < 0)) | ((angle >= high) & (self._duty > 0))
         return np.asarray(np.where(pushing, self._duty * self._stall_Nm, 0.0))
+
+    def contacts(self) -> tuple[TrueContact, ...]:
+        """Its fingertips touch nothing."""
+        return ()
+
+    def world_T_distal(self, finger: str) -> Pose3:
+        """Pose of a finger's distal frame; the palm's frame is the world."""
+        return palm_T_distal(self.joints_rad)[finger]
 
     def drive(self, duty: Array) -> None:
         """Duty cycles -1 to 1 from now on, shape (20,), order of ``DRIVEN_JOINTS``."""

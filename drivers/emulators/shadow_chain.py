@@ -7,20 +7,25 @@ from typing import Literal
 
 import numpy as np
 
+from drivers.biotac.settings import BioTacCalibration
 from drivers.emulators.ethercat_eeprom import SlaveIdentity, bare_eeprom, mapped_eeprom
 from drivers.emulators.ethercat_ring import EmulatedRing
 from drivers.emulators.ethercat_slave import SlaveController
 from drivers.emulators.free_hand import FreeHand
 from drivers.emulators.slave_application import Application, NoApplication
 from drivers.ethercat.registers import SyncManager
+from drivers.fingertip import RigidTransform
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motors import MotorMap
 from drivers.shadow.palm_images import BRIDGE_PRODUCT, CAN_BYTES, PALMS, SHADOW_VENDOR, PalmImage, PalmName
+from drivers.shadow.tactile_requests import TactileKind
+from drivers.simulation.biotac_emulator import BiotacSection
 from drivers.simulation.hand_plant import HandPlant
 from drivers.simulation.motor_bank import MotorBank
 from drivers.simulation.palm_emulator import CanBuses, JointSensors, NoTactile, PalmEmulator, TactileSection
-from drivers.simulation.settings import JointSensorSettings
+from drivers.simulation.settings import BiotacSettings, JointSensorSettings
 from tactile_lab.clock import Clock
+from tactile_lab.geometry.contacts import FINGERS
 
 EepromKind = Literal["bare", "mapped"]
 
@@ -84,6 +89,7 @@ class ChainSettings:
         vendor: of both slaves.
         service_ns: how long the palm takes for a command.
         seed: of noise and losses.
+        tactile: fingertips that send through the palm, where nothing else stands behind them; nothing touches them.
     """
 
     palm: PalmName = "0220"
@@ -93,6 +99,7 @@ class ChainSettings:
     vendor: int = SHADOW_VENDOR
     service_ns: int = _SERVICE_ns
     seed: int = 0
+    tactile: TactileKind = "none"
 
 
 @dataclass(frozen=True)
@@ -134,16 +141,24 @@ def emulated_hand(
         can: the motors' buses.
         plant: what its motors move; a hand in free air unless given.
         sensors: errors of its joint sensors.
-        tactile: fingertips that send through the palm; none unless given.
+        tactile: fingertips that send through the palm; those of the settings unless given.
     """
-    settings, plant = settings or ChainSettings(), plant or FreeHand(clock)
+    settings, free = settings or ChainSettings(), FreeHand(clock)
+    plant = plant or free
     image = PALMS[settings.palm]
     rng = np.random.default_rng(settings.seed)
     joints = JointSensors(calibration, sensors or JointSensorSettings(), rng)
     motors = MotorBank(plant, motor_map or MotorMap.load(), rng)
-    palm = PalmEmulator(plant, joints, motors, tactile or NoTactile(), rng, image, can)
+    palm = PalmEmulator(plant, joints, motors, tactile or _fingertips(settings.tactile, free, rng), rng, image, can)
     application = PalmApplication(palm, motors, image, clock, settings.service_ns)
     return EmulatedHand(_ring(application, image, clock, settings), application, plant)
+
+
+def _fingertips(kind: TactileKind, hand: FreeHand, rng: np.random.Generator) -> TactileSection:
+    if kind == "none":
+        return NoTactile()
+    usual = BioTacCalibration(electrodes=19, distal_T_sensor=RigidTransform(translation_m=(0.0, 0.0, 0.019)))
+    return BiotacSection.fitted(hand, dict.fromkeys(FINGERS, usual), BiotacSettings(), rng)
 
 
 def _ring(palm: PalmApplication, image: PalmImage, clock: Clock, settings: ChainSettings) -> EmulatedRing:

@@ -65,7 +65,8 @@ def emulated_hand(rig: HandRig) -> Iterator[dict[str, str]]:
         hint = "Make a cable (ip link add A type veth peer name B), name A in ethercat.interface and B in far_end"
         raise ConfigurationError("far_end is not named, so there is nothing to serve", where=rig.source, hint=hint)
     serial = _EMULATED_SERIAL if description.ethercat.serial is None else description.ethercat.serial
-    settings = ChainSettings(palm=description.hand.palm, serial=serial, eeprom="mapped")
+    hand = description.hand
+    settings = ChainSettings(palm=hand.palm, serial=serial, eeprom="mapped", tactile=hand.tactile)
     with EmulatedHandProcess(description.far_end, rig.folder / description.calibration.joints, settings):
         yield {"hand": f"hand {serial} at {description.far_end}"}
 

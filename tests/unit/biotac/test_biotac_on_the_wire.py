@@ -64,6 +64,22 @@ class Touched:
         return point
 
 
+def test_a_hand_that_stands_alone_has_untouched_biotacs_when_asked() -> None:
+    clock = VirtualClock()
+    chain = emulated_hand(clock, JOINTS, ChainSettings(tactile="biotac"))
+    link = EthercatLink("hand", EthercatSettings(interface="memory"), clock, MemoryPort(chain.ring))
+    hand = ShadowHand(link, clock, JOINTS, HandSettings(cycle_s=0.002, tactile="biotac"))
+    tip = BioTac("TH", TIPS["TH"])
+    hand.connect()
+    for _ in range(300):
+        clock.sleep_until_ns(clock.now_ns() + CYCLE_ns)
+        tip.update(hand.exchange())
+    tip.tare(UPRIGHT)
+    assert tip.health() == ()
+    assert tip.load_N(UPRIGHT) < 0.3
+    hand.close()
+
+
 @pytest.mark.parametrize("palm", ["0220", "0230", "0240"])
 def test_a_touch_in_the_plant_is_felt_through_the_palm(tmp_path: Path, palm: PalmName) -> None:
     bench = Touched(tmp_path, palm)
