@@ -13,11 +13,8 @@ from tactile_lab.cli.options import Json, NoInput, RigName
 if TYPE_CHECKING:
     from calibration.forearm_wizard import ForearmResult, ForearmWizard
     from calibration.recordings import ForearmData
-    from calibration.store import CalibrationRecord
     from tactile_lab.cli.wizard import Asker
     from tactile_lab.workflow.calibrating import CalibrationSettings
-
-OUTSIDE = 3
 
 
 class ForearmMethod(StrEnum):
@@ -69,9 +66,9 @@ def forearm(
     Exit code 0: PASS; 2: the input, or too little motion; 3: FAIL, outside a limit (kept as NAME.failed.yaml, which
     sessions refuse); 4: a device; 130: ended by the operator.
     """
-    from calibration.forearm_record import manual_record, record_of, target_file, transform_of
+    from calibration.forearm_record import manual_record, record_of, transform_of
     from calibration.recordings import save_data
-    from calibration.store import write_record
+    from tactile_lab.cli.calibrate_steps import store_result
     from tactile_lab.cli.wizard import Asker, may_write
     from tactile_lab.rigs.description import load_rig
 
@@ -94,11 +91,8 @@ def forearm(
         result = _solved(data, wanted)
         show_result(result)
         found = record_of(result, here, notes=notes, valid_days=valid_days)
-    target = target_file(file, found)
-    if not asker.agree(f"Store it as {target}?"):
-        raise asker.ended()
-    write_record(target, found, "Forearm to world: pose of the positioner's mount in the world frame.")
-    _conclude(target, found, as_json)
+    comment = "Forearm to world: pose of the positioner's mount in the world frame."
+    store_result(file, found, True, asker, no_input, as_json, comment)
 
 
 def _stated(sigma_mm: float | None, sigma_deg: float | None) -> tuple[float, float]:
@@ -224,18 +218,3 @@ def _show_pose(result: ForearmResult) -> None:
 
 def _three(values: list[float], unit: str) -> str:
     return "  ".join(f"{value:9.3f}" for value in values) + f"  {unit}"
-
-
-def _conclude(file: Path, record: CalibrationRecord, as_json: bool) -> None:
-    """The verdict, how to use the file, and the exit code."""
-    from tactile_lab.calibration_file import plain
-    from tactile_lab.cli.calibration_tables import tell_verdict
-    from tactile_lab.cli.console import emit_json, say
-
-    if as_json:
-        emit_json({"file": str(file), **plain(record)})
-    tell_verdict(record)
-    say(f"stored  {file}")
-    if record.verdict == "FAIL":
-        raise typer.Exit(OUTSIDE)
-    say(f"To use it, name it in the rig file: calibration.forearm: {file}")
