@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from drivers import positioner_codec
@@ -52,7 +51,6 @@ _TELEGRAMS = (
     ethercat.Telegram(ethercat.Command.LRW, 0x10000, bytes(302)),
     ethercat.Telegram(ethercat.Command.BRD, ethercat.physical(0, 0x130), bytes(2)),
 )
-_PICTURE = bytes(cv2.imencode(".png", np.full((8, 8), 200, np.uint8))[1])
 _SEEN = Detection("DICT_4X4_50", (8, 8), {0: SeenMarker(np.arange(8.0).reshape(4, 2), 0.5)})
 _LOG = "Sensor: BT1\n\nBegin File\n0.000000 1 1 17 2602 0 2713 0\n0.000227 1 1 0 2040 0 2041 1\n"
 
@@ -106,8 +104,8 @@ CODECS: dict[str, Codec] = {
     ),
     "tcp messages": (lambda payload: MessageReader().feed(payload), framed(b"TRIGGER") + framed(b"")),
     "camera packet": (
-        lambda payload: decode_packet(Datagram(MAGIC + payload, 0)),  # anything else goes to OpenCV as a picture
-        encode_packet(Frame(0, None, 5, 0, _SEEN), _PICTURE).removeprefix(MAGIC),
+        lambda payload: decode_packet(Datagram(MAGIC + payload, 0)),  # anything else, and the picture, is OpenCV's
+        encode_packet(Frame(0, None, 5, 0, _SEEN)).removeprefix(MAGIC),
     ),
     "ethercat frame": (ethercat.decode_frame, ethercat.encode_frame(_TELEGRAMS, bytes(6))),
     **_palm_statuses(),
