@@ -7,6 +7,7 @@ import numpy as np
 from drivers.shadow.posture import TipEllipsoid
 from sessions.bench import Bench
 from sessions.bounding_box import BoxProber
+from sessions.closing_tables import solve_closings
 from sessions.conductor_settings import ConductorSettings
 from sessions.decisions import Crew
 from sessions.grasp_cycle import GraspCycle
@@ -43,6 +44,7 @@ def autonomous_crew(
     """
     supervisor = SafetySupervisor(bench, settings.safety, bench.cycle_ns)
     tip, window = tip_shape(bench), settings.plan.yaw_window_rad
+    solve_closings(bench.clock, settings, tip, dimension)
     motion = Motion(bench, supervisor)
     cycle = GraspCycle(motion, settings.cycle, tip, window)
     planner = planner_for(slam, settings, tip, seed, dimension)

@@ -10,6 +10,7 @@ import numpy as np
 from sessions.attachments import Attachments
 from sessions.autonomous_crew import tip_shape
 from sessions.bench import Bench
+from sessions.closing_tables import solve_closings
 from sessions.conductor_settings import ConductorSettings
 from sessions.decisions import Crew, Performer
 from sessions.guided.by_hand import GraspByHand
@@ -51,6 +52,7 @@ def guided_crew(
     """
     supervisor = SafetySupervisor(bench, settings.safety, bench.cycle_ns)
     tip, cycle, guided = tip_shape(bench), settings.cycle, settings.guided
+    solve_closings(bench.clock, settings, tip, dimension)
     desk = Desk(bench, operator, guided, Attachments(session_folder), cycle.touch_force_N, pace)
     motion = GuidedMotion(bench, supervisor, desk)
     performer: Performer = (

@@ -9,6 +9,7 @@ import signal
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,12 +17,14 @@ from drivers.emulators.wired.stand_ins import StandIns
 from drivers.shadow.palm_images import PALMS
 from sessions import schemas
 from sessions.bench import Bench
+from sessions.decisions import Crew
 from sessions.mark_outcomes import TareReport
 from sessions.progress import NullProgress
 from sessions.recorder import Recorder
 from sessions.replay import Replay
 from sessions.session import Session
 from sessions.session_outcome import Ending, SessionOutcome
+from sessions.thinker_process import ThinkerProcess
 from tactile_lab.errors import DeviceError
 from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.rigs.build import build_interpreter
@@ -29,6 +32,7 @@ from tactile_lab.rigs.description import Rig, load_rig, rig_of_session
 from tactile_lab.rigs.laboratory import WiredLaboratory, open_laboratory
 from tactile_lab.slam import TactileSlam
 from tactile_lab.workflow import running
+from tactile_lab.workflow.attending import crew_for
 from tests.support.wire_rig import wire_rig
 
 
@@ -144,6 +148,26 @@ def test_a_hand_process_that_dies_ends_the_session_in_order(
     check_ended_in_order(folder, "its process has ended")
 
 
+def test_an_estimation_whose_process_dies_ends_the_session_in_order(
+    rig: Rig, laboratory: WiredLaboratory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    crews: list[Crew] = []
+
+    def kept(*args: Any, **kwargs: Any) -> Crew:
+        crews.append(crew_for(*args, **kwargs))
+        return crews[-1]
+
+    def kill() -> None:
+        thinking = crews[0].thinking
+        assert isinstance(thinking, ThinkerProcess)
+        os.kill(thinking.process_id, signal.SIGKILL)
+
+    monkeypatch.setattr(running, "crew_for", kept)
+    outcome, folder = run(rig, laboratory, tmp_path, At("descend", kill))
+    assert outcome.ending is Ending.STOPPED
+    check_ended_in_order(folder, "estimation: its process has ended")
+
+
 def check_ended_in_order(folder: Path, words: str) -> None:
     """A readable recording that says why, with the last cycles, and a hand that was left without demands."""
     session = Session.open(folder)
@@ -156,7 +180,7 @@ def check_ended_in_order(folder: Path, words: str) -> None:
     assert words in stop["cause"]
     assert stop["cycles"] or "camera" in words  # a lost connection is noticed before the first cycle has ended
     sent = [message.data for message in messages if message.topic == schemas.transmitted_topic("hand")]
-    if "process" not in words:  # a killed process sends nothing more: the motors halt by themselves after 20 ms
+    if words != "its process has ended":  # a killed hand process sends nothing more: the motors halt after 20 ms
         assert not any(PALMS["0220"].decode_command(sent[-1]).motor_data)
     replay = Replay(session, build_interpreter(rig_of_session(session)))
     assert all(isinstance(outcome, Grasp | TareReport) for outcome in replay.outcomes())

@@ -1,0 +1,27 @@
+"""The closings of a session, solved before its devices are connected."""
+
+from __future__ import annotations
+
+from drivers.shadow.closing import closing
+from drivers.shadow.posture import TipEllipsoid
+from sessions.conductor_settings import ConductorSettings
+from sessions.touching import ROW, TAP, TAP_HEIGHT_m
+from tactile_lab.clock import Clock, VirtualClock
+
+
+def solve_closings(clock: Clock, settings: ConductorSettings, tip: TipEllipsoid, dimension: int) -> None:
+    """Have every table that the session may need in memory; simulated time can wait for each until it is needed.
+
+    A table takes up to a second, in which no cycle would run: the process that plans has its own.
+    """
+    if isinstance(clock, VirtualClock):
+        return
+    plan = settings.plan
+    heights_m = plan.contour_heights_m if dimension == 2 else plan.surface_heights_m
+    wanted = {(name, height_m) for name in plan.closings for height_m in heights_m}
+    if dimension == 3:
+        wanted.add((TAP.closing, TAP_HEIGHT_m))
+    if settings.probing.enabled:
+        wanted |= {(TAP.closing, TAP_HEIGHT_m), (ROW.closing, settings.cycle.rake_height_m)}
+    for name, height_m in sorted(wanted):
+        closing(name, height_m, tip)
