@@ -42,6 +42,7 @@ from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.first_pose import first_row
 from tactile_lab.tracking.observability import observability, placement_sigma_m, planar_observability
 from tactile_lab.tracking.particle_filter import CERTAIN_VARIANCE, PoseEstimate
+from tactile_lab.tracking.pose_doubt import with_pose_doubt
 from tactile_lab.tracking.trackers import (
     GRAPH_METHODS,
     THESIS_METHODS,
@@ -281,7 +282,10 @@ class TactileSlam:
             shape = fit_shape(self._settings.shape_model, self.surface, free, floor_m)
             if self._settings.dimension == 2:
                 return shape.contour(self._settings.contour_resolution_m), None
-            return None, shape.mesh(self._settings.mesh_resolution_m, floor_m)
+            mesh = shape.mesh(self._settings.mesh_resolution_m, floor_m)
+            if self._tracker is not None and self._settings.method == "joint":
+                mesh = with_pose_doubt(mesh, shape, self._tracker.map, self._settings.motion)
+            return None, mesh
         except ShapeError:  # contacts that enclose nothing: the trajectory is still a result
             return None, None
 

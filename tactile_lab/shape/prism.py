@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tactile_lab.errors import ShapeError
@@ -78,7 +79,7 @@ class Prism:
         """
         contacts = contacts_of(gpis)
         up = contacts.normals[:, 2]
-        walls = np.flatnonzero(np.abs(up) <= _LEVEL_COSINE)
+        walls = np.flatnonzero(on_walls(contacts.normals))
         if len(walls) < _LEAST_WALL_CONTACTS:
             raise ShapeError(f"{len(walls)} contacts on walls are too few for an outline")
         ends = [_level(gpis, contacts, side, np.flatnonzero(side * up > _LEVEL_COSINE)) for side in (1.0, -1.0)]
@@ -124,6 +125,11 @@ class Prism:
             touched = np.unique(mesh.triangles[mesh.planes == part])
             sigma[touched] = np.maximum(sigma[touched], here[touched])
         return sigma
+
+
+def on_walls(normals: Array) -> NDArray[np.bool_]:
+    """Whether contacts with these normals, shape (n, 3), are on the walls of a prism and not on its ends."""
+    return np.asarray(np.abs(normals[:, 2]) <= _LEVEL_COSINE)
 
 
 def _level(gpis: Gpis, contacts: WeightedContacts, side: float, members: Indices) -> Level:

@@ -153,6 +153,10 @@ class FacetSmoother:
                 refused.add((kept, dropped))
         return best
 
+    def information(self, rows: Array, faces: FlatFaces) -> Array:
+        """Gauss-Newton information by all poses but the first, then by each face's tilt and offset."""
+        return self._normal_equations(self._rated(rows, faces))[0]
+
     def _rated(self, rows: Array, faces: FlatFaces) -> FacetedTrajectory:
         values, tilts = self._residuals(rows, faces)
         chi_square = float(np.sum(values**2) + np.sum(tilts**2))
@@ -183,20 +187,20 @@ class FacetSmoother:
         points, normals = self._space.to_object(rows[self._grasp_of], world.points_m, world.normals)
         count, dimension = points.shape
         contact, still, each = np.arange(count), np.zeros_like(normals), rows[self._grasp_of]
-        outward, tangents = faces.normals[faces.labels], _tangents(faces.normals)[faces.labels]
+        outward, along = faces.normals[faces.labels], tangents(faces.normals)[faces.labels]
         by_poses = np.zeros(((dimension + 1) * count, len(rows), self._space.size))
         by_faces = np.zeros(((dimension + 1) * count, faces.count, dimension))
         value = self._space.by_row(each, points, normals, outward, still)
         by_poses[contact, self._grasp_of] = value / world.point_sigma_m[:, None]
         stiffness = ~faces.leaning / world.normal_sigma_rad
-        tilt = np.column_stack([np.einsum("ndt,nd->nt", tangents, points), -np.ones(count)])
+        tilt = np.column_stack([np.einsum("ndt,nd->nt", along, points), -np.ones(count)])
         by_faces[contact, faces.labels] = tilt / world.point_sigma_m[:, None]
         for axis in range(dimension):
             unit = np.broadcast_to(np.eye(dimension)[axis], normals.shape)
             lines = (axis + 1) * count + contact
             turned = self._space.by_row(each, points, normals, still, unit)
             by_poses[lines, self._grasp_of] = turned * stiffness[:, None]
-            by_faces[lines, faces.labels, :-1] = -tangents[:, axis] * stiffness[:, None]
+            by_faces[lines, faces.labels, :-1] = -along[:, axis] * stiffness[:, None]
         free = by_poses[:, 1:].reshape(len(by_poses), -1)
         return np.hstack([free, by_faces.reshape(len(by_faces), -1)])
 
@@ -205,7 +209,7 @@ class FacetSmoother:
         free = (len(at.rows) - 1) * size
         rows = np.vstack([at.rows[:1], self._space.moved(at.rows[1:], step[:free].reshape(-1, size))])
         changes = step[free:].reshape(-1, dimension)
-        normals = at.faces.normals + np.einsum("sdt,st->sd", _tangents(at.faces.normals), changes[:, :-1])
+        normals = at.faces.normals + np.einsum("sdt,st->sd", tangents(at.faces.normals), changes[:, :-1])
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         return self._rated(rows, replace(at.faces, normals=normals, offsets_m=at.faces.offsets_m + changes[:, -1]))
 
@@ -222,7 +226,7 @@ class FacetSmoother:
             lines = np.r_[one * dimension : (one + 1) * dimension, other * dimension : (other + 1) * dimension]
             both = covariance[np.ix_(lines, lines)].reshape(2, dimension, 2, dimension)
             spread = both[0, :, 0] + both[1, :, 1] - both[0, :, 1] - both[1, :, 0]
-            change = np.append(_tangents(normals[:1])[0].T @ (normals[1] - normals[0]), offsets[1] - offsets[0])
+            change = np.append(tangents(normals[:1])[0].T @ (normals[1] - normals[0]), offsets[1] - offsets[0])
             costs[(one, other)] = float(change @ np.linalg.solve(spread, change))
         return costs
 
@@ -291,8 +295,8 @@ def _solid_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
     return FlatFaces(planes.labels, planes.normals, planes.offsets_m, np.zeros(len(seen), dtype=bool)), all_pairs
 
 
-def _tangents(normals: Array) -> Array:
-    """Orthonormal directions along each face, shape (s, d, d - 1)."""
+def tangents(normals: Array) -> Array:
+    """Orthonormal directions along each face, by which it tilts, shape (s, d, d - 1)."""
     if normals.shape[1] == 2:
         return np.stack([-normals[:, 1], normals[:, 0]], axis=1)[:, :, None]
     helper = np.where(np.abs(normals[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])

@@ -17,7 +17,7 @@ from scipy.linalg import lapack
 from scipy.optimize import minimize
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.kernels import Kernel, Matern52, Profile, SquaredExponential, ThinPlate
+from tactile_lab.shape.kernels import Kernel, Matern52, Profile, SquaredExponential, ThinPlate, cross_covariance
 from tactile_lab.shape.priors import PriorMean
 from tactile_lab.shape.settings import initial_kernel, observe, prior_mean
 from tactile_lab.tracking.contact_map import ContactMap
@@ -89,7 +89,29 @@ class PoseEvidence:
         Returns:
             Shape ((k - 1) size, (k - 1) size), positive definite.
         """
-        placed, size = self._placed(rows), self._space.size
+        whitened = self._whitened_change(rows, self._placed(rows))
+        total = whitened.T @ whitened + self._motion.information(rows)
+        total[np.diag_indices_from(total)] *= 1 + _LEAST_INFORMATION
+        return np.asarray(total)
+
+    def field_change(self, rows: Array, places_m: Array) -> Array:
+        """How the field follows the poses: derivatives of its mean at places by all poses but the first.
+
+        Args:
+            rows: poses, shape (k, size).
+            places_m: object frame, shape (q, d).
+
+        Returns:
+            Shape (q, (k - 1) size); metres by metres and radians.
+        """
+        placed = self._placed(rows)
+        near = cross_covariance(self._kernel, places_m, placed.points, len(placed.points))
+        whitened, _ = lapack.dtrtrs(placed.factor, near.T, lower=1)
+        return np.asarray(whitened.T @ self._whitened_change(rows, placed))
+
+    def _whitened_change(self, rows: Array, placed: _Placed) -> Array:
+        """Change of all that the contacts observe by all poses but the first, in units of what is expected of it."""
+        size = self._space.size
         count, dimension = placed.points.shape
         seen = np.zeros(((dimension + 1) * count, len(rows), size))
         contact = np.arange(count)
@@ -100,9 +122,7 @@ class PoseEvidence:
             turned = self._space.by_row(poses, placed.points, placed.normals, still, unit)
             seen[(axis + 1) * count + contact, self._grasp_of] = turned
         whitened, _ = lapack.dtrtrs(placed.factor, seen.reshape(len(seen), -1)[:, size:], lower=1)
-        total = whitened.T @ whitened + self._motion.information(rows)
-        total[np.diag_indices_from(total)] *= 1 + _LEAST_INFORMATION
-        return np.asarray(total)
+        return np.asarray(whitened)
 
     def value_and_leave_one_out_costs(self, rows: Array, asked: NDArray[np.intp]) -> tuple[float, Array]:
         """The negative log posterior, and for some contacts that of their density given all others.
