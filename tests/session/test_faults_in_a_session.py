@@ -1,0 +1,34 @@
+"""Faults of wires while a session runs: it ends in order, or goes on and says what it met. All of them stand in
+``python -m tests.support.session_fault_table``."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.support.session_sweep import run_with
+
+
+@pytest.mark.parametrize(
+    ("link", "fault", "words"),
+    [
+        ("hand", "unplug", "hand: the wire is unplugged"),
+        ("base", "delay", "cycles in a row without a status"),
+        ("ft/MF", "unplug", "ft/MF: the wire is unplugged"),
+    ],
+)
+def test_a_link_that_fails_ends_the_session_in_order_and_its_recording_is_whole(tmp_path, link, fault, words):
+    swept = run_with("sim", {link: fault}, tmp_path, at_s=0.5)
+    swept.check(link)
+    assert words in swept.ended
+    assert swept.replay.startswith("read")
+
+
+def test_a_session_goes_on_under_losses_counts_them_and_replays_identically(tmp_path):
+    swept = run_with("sim", {"hand": "drop", "base": "truncate", "ft/MF": "stale sequence"}, tmp_path)
+    assert not swept.ended
+    told = "; ".join(swept.told)
+    assert "hand: 3 of " in told
+    assert "base: 3 messages were no status of a positioner" in told
+    assert "3 undecodable base" in told
+    assert "MF: " in told
+    assert swept.replay == "identical"

@@ -1,0 +1,151 @@
+"""Sessions of all rigs and objects of the catalogue, replayed: the same samples, the same results, and how fast.
+
+python -m tests.support.replay_table --into docs/results.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import struct
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, is_dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from drivers.simulation.objects import CATALOGUE
+from sessions.interpreter import Interpreter
+from sessions.progress import NullProgress
+from sessions.session import Session
+from tactile_lab.errors import TactileLabError
+from tactile_lab.rigs import build, wired_bench
+from tactile_lab.rigs.description import load_rig
+from tactile_lab.workflow import replaying
+from tactile_lab.workflow.judging import differing_files
+from tactile_lab.workflow.running import SessionRequest, run_session
+from tests.support.results_section import write_section
+
+RIGS = "sim,sim-biotac,sim-wire"
+HEAD = """## Replay of all rigs and objects
+
+`python -m tests.support.replay_table --into docs/results.md`: a session of {grasps} grasps, seed 1, for every rig and
+object, and its replay as fast as possible. Samples: all that the decoders gave, in order, compared bit by bit. Results:
+trajectory, contacts, contour or surface, and the estimation's own record, compared byte by byte.
+
+| Rig | Object | Samples | Are the same | Results | Bytes read, times the original pace |
+|---|---|---:|---|---|---:|
+"""
+
+
+def bits(value: Any) -> bytes:
+    """Everything in a sample, as bytes."""
+    if isinstance(value, np.ndarray):
+        return value.tobytes()
+    if is_dataclass(value):
+        return b"".join(bits(getattr(value, field.name)) for field in fields(value))
+    if isinstance(value, (list, tuple)):
+        return b"".join(map(bits, value))
+    return struct.pack("<d", value) if isinstance(value, float) else repr(value).encode()
+
+
+class SampleDigest:
+    """Number and digest of the samples of a session, by the order in which they were understood."""
+
+    def __init__(self) -> None:
+        self.count, self._digest = 0, sha256()
+
+    def take(self, link: str, sample: Any) -> None:
+        """One sample of a link."""
+        self.count += 1
+        self._digest.update(link.encode() + bits(sample))
+
+    @property
+    def value(self) -> tuple[int, str]:
+        """What two equal sequences of samples have in common."""
+        return self.count, self._digest.hexdigest()
+
+
+@contextmanager
+def listening(module: Any) -> Iterator[SampleDigest]:
+    """Hear all samples of the interpreters that a module builds meanwhile."""
+    digest, make = SampleDigest(), module.build_interpreter
+
+    def heard(*arguments: Any) -> Interpreter:
+        interpreter: Interpreter = make(*arguments)
+        interpreter.listener = digest.take
+        return interpreter
+
+    with patch.object(module, "build_interpreter", heard):
+        yield digest
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """A session and its replay, compared."""
+
+    samples: int
+    same_samples: bool
+    differing: tuple[str, ...]
+    factor: float
+
+    def cells(self) -> tuple[str, ...]:
+        """As cells of the table."""
+        results = "identical" if not self.differing else f"differ: {', '.join(self.differing)}"
+        return str(self.samples), "yes" if self.same_samples else "NO", results, f"{self.factor:.1f}"
+
+
+def compare(rig: str, object_name: str, grasps: int, root: Path) -> Replayed:
+    """Run a session and replay it. Raises TactileLabError."""
+    request = SessionRequest(rig, object_name, root, seed=1, grasps=grasps)
+    with listening(_builder(rig)) as live:
+        finished = run_session(request, NullProgress())
+    session = Session.open(finished.folder)
+    out = session.folder / "replay"
+    with listening(replaying) as again:
+        replayed = replaying.replay_session(
+            session, replaying.recorded_slam(session), replaying.recorded_seed(session), out
+        )
+    differing = tuple(differing_files(session.results, out))
+    return Replayed(live.count, live.value == again.value, differing, replayed.read_factor or 0.0)
+
+
+def _builder(rig: str) -> Any:
+    """The module that builds the interpreter of a running session."""
+    return wired_bench if load_rig(rig).description.wires is not None else build
+
+
+def table(rigs: list[str], objects: list[str], grasps: int, row_done: Callable[[str], None]) -> str:
+    """The table; a session that fails is a row with its reason."""
+    rows = []
+    for rig in rigs:
+        for name in objects:
+            with tempfile.TemporaryDirectory() as root:
+                try:
+                    cells = compare(rig, name, grasps, Path(root)).cells()
+                except TactileLabError as error:
+                    cells = ("", "", f"failed: {error}", "")
+            rows.append(f"| {' | '.join((rig, name, *cells))} |\n")
+            row_done(rows[-1].strip())
+    return HEAD.format(grasps=grasps) + "".join(rows)
+
+
+def main() -> None:
+    """Print the table, or write it into a document."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--into", type=Path)
+    parser.add_argument("--rigs", default=RIGS)
+    parser.add_argument("--objects", default=",".join(CATALOGUE))
+    parser.add_argument("--grasps", type=int, default=2)
+    chosen = parser.parse_args()
+    text = table(chosen.rigs.split(","), chosen.objects.split(","), chosen.grasps, lambda row: print(row, flush=True))
+    if chosen.into:
+        write_section(chosen.into, "replays", text)
+
+
+if __name__ == "__main__":
+    main()

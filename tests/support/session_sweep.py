@@ -1,0 +1,207 @@
+"""Every fault of a wire in the middle of a session: does it end in order, or go on with the fault told and stored?
+
+A session of one grasp runs on a simulated rig, on virtual time. From the middle of the closing on, one of its links
+has one fault (:mod:`drivers.faults`, with the message layouts of the drivers' own sweeps). Anything but an error of
+ours is a traceback and ends the sweep; a link that is asked too often is a session that hangs.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from unittest.mock import patch
+
+from drivers.faults import CounterWrap, Fault, FaultyLink, MessageLayout, When, standard_faults
+from drivers.links import Datagram, Link
+from drivers.simulation.world import SimulatedWorld
+from sessions.progress import NullProgress
+from sessions.replay import Replay
+from sessions.schemas import EVENTS_TOPIC
+from sessions.session import Session
+from sessions.session_outcome import Ending
+from tactile_lab.clock import NANOSECONDS, Clock
+from tactile_lab.errors import TactileLabError
+from tactile_lab.rigs import laboratory
+from tactile_lab.rigs.build import build_interpreter
+from tactile_lab.rigs.description import rig_of_session
+from tactile_lab.workflow.judging import differing_files, has_results
+from tactile_lab.workflow.replaying import recorded_seed, recorded_slam, replay_session
+from tactile_lab.workflow.running import SessionRequest, run_session
+from tests.unit.test_device_sweeps import TestBioTacInThePalm, TestCamera, TestHand
+from tests.unit.test_nano17_sweep import TestNetBox
+from tests.unit.test_positioner_sweep import TestPositioner
+
+LAYOUTS: dict[str, dict[str, MessageLayout]] = {
+    "sim": {
+        "hand": TestHand.layout,
+        "base": TestPositioner.layout,
+        "ft/MF": TestNetBox.layout,
+        "camera": TestCamera.layout,
+    },
+    "sim-biotac": {
+        "hand": TestBioTacInThePalm.layout,
+        "base": TestPositioner.layout,
+        "camera": TestCamera.layout,
+    },
+}
+"""Rigs, their links, and what the faults must know of the messages."""
+
+BLIND: dict[str, dict[str, str]] = {
+    "hand": {**TestHand.blind, **TestBioTacInThePalm.blind},
+    "base": TestPositioner.blind,
+    "ft/MF": TestNetBox.blind,
+    "camera": TestCamera.blind,
+}
+"""What the devices can not see, and why, by link."""
+
+STRIKES_AT_s = 7.0
+"""When the faults strike: in a session of one grasp the fingers are closing then."""
+
+LONGEST_s = {"hand": 0.5, "base": 0.5, "ft/MF": 0.5, "camera": 1.5}
+"""From the fault to the session's end, where it ends: ten lost cycles, 0.2 s without a fingertip, a second for a
+picture, and the cycles that stop the hand."""
+
+HANGS_AFTER = 60_000
+"""Readings of one link; a session of one grasp needs some thousand."""
+
+
+class TimedFault(FaultyLink):
+    """A fault that strikes at a time, not at a number of messages.
+
+    Attributes:
+        struck_ns: when it first did.
+    """
+
+    def __init__(self, link: Link, clock: Clock, fault: Fault, when: When, at_s: float) -> None:
+        super().__init__(link, fault, replace(when, first=0))
+        self._clock, self._readings, self._at_ns = clock, 0, at_s * NANOSECONDS
+        self.struck_ns: int | None = None
+        self.armed = isinstance(fault, CounterWrap)  # its counters run wrong from the first message on
+
+    def receive(self) -> list[Datagram]:
+        self._readings += 1
+        assert self._readings < HANGS_AFTER, f"{self.name}: the session hangs"
+        self.armed = self.armed or self._clock.now_ns() >= self._at_ns
+        try:
+            return super().receive()
+        finally:
+            if self.injected and self.struck_ns is None:
+                self.struck_ns = self._clock.now_ns()
+
+
+@dataclass
+class Swept:
+    """What became of a session.
+
+    Attributes:
+        struck: how often the fault struck.
+        ended: why it ended, when it ended because of the fault.
+        after_s: how long after the first strike.
+        told: what its events and its record say that those of a sound session do not.
+        replay: what a replay of the recording gave.
+    """
+
+    struck: int
+    ended: str
+    after_s: float | None
+    told: tuple[str, ...] = ()
+    replay: str = ""
+
+    def check(self, link: str) -> None:
+        """Raises AssertionError for a session that took longer to end than its time-outs say."""
+        assert self.struck > 0, "the fault never struck"
+        assert not self.ended or (self.after_s is not None and self.after_s <= LONGEST_s[link]), self
+
+
+def faults(rig: str) -> Iterator[tuple[str, str]]:
+    """Links and names of faults of a rig."""
+    for link, layout in LAYOUTS[rig].items():
+        for name in sorted(standard_faults(layout)):
+            yield link, name
+
+
+def run_with(rig: str, faulty: dict[str, str], root: Path, at_s: float = STRIKES_AT_s) -> Swept:
+    """Run a session in which links have faults, by name, from a time on, and look at all it left.
+
+    Raises:
+        AssertionError: it hung, or what it left can not be read or replayed.
+    """
+    links: dict[str, TimedFault] = {}
+    with _faulty_world(rig, faulty, links, at_s):
+        try:
+            finished = run_session(SessionRequest(rig, "box-10x6x4", root, seed=1, grasps=1), NullProgress())
+            folder, outcome, error = finished.folder, finished.outcome, None
+        except TactileLabError as stopped:  # while connecting or closing: the folder says so
+            folder, outcome, error = max(root.iterdir()), None, stopped
+    session = Session.open(folder)
+    assert session.manifest.status in ("closed", "failed"), session.manifest.status
+    ended = str(error or "")
+    if outcome is not None and outcome.ending is not Ending.COMPLETE:
+        ended = outcome.reason
+    struck_ns = min((link.struck_ns for link in links.values() if link.struck_ns is not None), default=None)
+    return Swept(
+        struck=sum(link.injected for link in links.values()),
+        ended=ended,
+        after_s=None if struck_ns is None else _stopped_after_s(session, struck_ns),
+        told=tuple(_told(session)),
+        replay=_replayed(session),
+    )
+
+
+@contextmanager
+def _faulty_world(rig: str, faulty: dict[str, str], links: dict[str, TimedFault], at_s: float) -> Iterator[None]:
+    """The simulated rigs of this program have faulty links meanwhile."""
+    build = laboratory.simulated_world
+
+    def world_with_faults(*arguments: object) -> SimulatedWorld:
+        world = build(*arguments)  # type: ignore[arg-type]
+        given = world.links()
+        for name, fault_name in faulty.items():
+            fault, when = standard_faults(LAYOUTS[rig][name])[fault_name]
+            links[name] = TimedFault(given[name], world.clock, fault, when, at_s)
+        world.links = lambda: {**given, **links}  # type: ignore[method-assign]
+        return world
+
+    with patch.object(laboratory, "simulated_world", world_with_faults):
+        yield
+
+
+def _events(session: Session) -> Iterator[tuple[int, int, str]]:
+    """Stamp, level and words of a session's events."""
+    for message in session.traffic().messages():
+        if message.topic == EVENTS_TOPIC:
+            content = json.loads(message.data)
+            yield message.stamp_ns, content["level"], f"{content['name']}: {content['message']}"
+
+
+def _stopped_after_s(session: Session, struck_ns: int) -> float | None:
+    """From the fault to the conductor's word that it stopped; None when nothing stopped it."""
+    stamps = [stamp_ns for stamp_ns, _, words in _events(session) if words.startswith("safety: stopped")]
+    return (stamps[0] - struck_ns) / NANOSECONDS if stamps else None
+
+
+def _told(session: Session) -> Iterator[str]:
+    """Warnings of the devices with their last figures, and what the record counts as lost."""
+    for _, level, words in _events(session):
+        if level > 2 and "in all: " in words:
+            yield words.replace("in all: ", "")
+    for kind, number in session.manifest.data_loss.items():
+        yield f"{number} {kind}"
+
+
+def _replayed(session: Session) -> str:
+    """Understand the recording again: all of it must be readable, and results must be the same."""
+    if not has_results(session):
+        replay = Replay(session, build_interpreter(rig_of_session(session)))
+        outcomes = sum(1 for _ in replay.outcomes())
+        assert not replay.loss, replay.loss.describe()
+        return f"read, {outcomes} marks"
+    out = session.folder / "replay"
+    finished = replay_session(session, recorded_slam(session), recorded_seed(session), out)
+    assert not finished.unread, finished.unread
+    differing = differing_files(session.results, out)
+    assert not differing, differing
+    return "identical"
