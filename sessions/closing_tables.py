@@ -22,6 +22,6 @@ def solve_closings(clock: Clock, settings: ConductorSettings, tip: TipEllipsoid,
     if dimension == 3:
         wanted.add((TAP.closing, TAP_HEIGHT_m))
     if settings.probing.enabled:
-        wanted |= {(TAP.closing, TAP_HEIGHT_m), (ROW.closing, settings.cycle.rake_height_m)}
+        wanted |= {(TAP.closing, TAP_HEIGHT_m), (ROW.closing, settings.cycle.touch.rake_height_m)}
     for name, height_m in sorted(wanted):
         closing(name, height_m, tip)

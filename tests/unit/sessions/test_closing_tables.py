@@ -1,0 +1,46 @@
+"""Closings are in memory before the devices of a real rig are connected."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from drivers.shadow.posture import TipEllipsoid
+from sessions import closing_tables
+from sessions.closing_tables import solve_closings
+from sessions.conductor_settings import ConductorSettings
+from tactile_lab.clock import Clock, MonotonicClock, VirtualClock
+from tactile_lab.strict_yaml import validate
+
+
+@pytest.fixture
+def solved(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, float]]:
+    """The tables that are asked for."""
+    asked: list[tuple[str, float]] = []
+    monkeypatch.setattr(closing_tables, "closing", lambda name, height_m, tip: asked.append((name, height_m)))
+    return asked
+
+
+def solve(clock: Clock, dimension: int, **settings: Any) -> None:
+    solve_closings(clock, validate(settings, ConductorSettings, where="test"), TipEllipsoid(), dimension)
+
+
+def test_a_contour_needs_every_closing_at_its_height(solved: list[tuple[str, float]]) -> None:
+    solve(MonotonicClock(), 2)
+    assert solved == [("pinch", 0.022), ("radial", 0.022)]
+
+
+def test_a_surface_needs_every_height_and_the_taps(solved: list[tuple[str, float]]) -> None:
+    solve(MonotonicClock(), 3, plan={"closings": ["pinch"], "surface_heights_m": [0.018, 0.026]})
+    assert solved == [("pinch", 0.018), ("pinch", 0.026), ("radial", 0.022)]
+
+
+def test_a_bounding_box_needs_the_row_of_fingers_too(solved: list[tuple[str, float]]) -> None:
+    solve(MonotonicClock(), 2, probing={"enabled": True}, cycle={"touch": {"rake_height_m": 0.03}})
+    assert ("pinch", 0.03) in solved
+
+
+def test_simulated_time_waits_until_a_table_is_needed(solved: list[tuple[str, float]]) -> None:
+    solve(VirtualClock(), 3)
+    assert solved == []
