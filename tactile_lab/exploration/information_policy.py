@@ -27,7 +27,7 @@ from scipy.spatial import cKDTree
 
 from tactile_lab.exploration.candidates import Candidate
 from tactile_lab.exploration.information.particles import ARM_m
-from tactile_lab.exploration.policy import Belief, Decision, Surface, best_of, nothing_to_choose
+from tactile_lab.exploration.policy import Belief, Decision, Surface, best_of, surface_to_foresee
 from tactile_lab.exploration.prediction import (
     ExecutionNoise,
     ExpectedTouches,
@@ -111,13 +111,11 @@ class InformationPolicy:
     name: str = "information"
 
     def choose(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Decision:
-        if settled := nothing_to_choose(self.name, candidates, belief):
-            return settled
-        if belief.surface is None:
-            scores = np.zeros(len(candidates))
-            return best_of(self.name, scores, "the contacts enclose nothing yet, so nothing can be foreseen", rng)
-        promise = promised(candidates, belief, belief.surface, self.settings, rng)
-        return self._decided(candidates, belief.surface, belief, promise, rng)
+        surface = surface_to_foresee(self.name, candidates, belief, rng)
+        if isinstance(surface, Decision):
+            return surface
+        promise = promised(candidates, belief, surface, self.settings, rng)
+        return self._decided(candidates, surface, belief, promise, rng)
 
     def _decided(
         self,

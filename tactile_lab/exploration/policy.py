@@ -161,6 +161,18 @@ def nothing_to_choose(name: str, candidates: Sequence[Candidate], belief: Belief
     return None
 
 
+def surface_to_foresee(
+    name: str, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator
+) -> Surface | Decision:
+    """The surface by which a policy foresees contacts, or the decision where it has no choice or nothing to go by."""
+    if settled := nothing_to_choose(name, candidates, belief):
+        return settled
+    if belief.surface is None:
+        why = "the contacts enclose nothing yet, so nothing can be foreseen"
+        return best_of(name, np.zeros(len(candidates)), why, rng)
+    return belief.surface
+
+
 def best_of(name: str, scores: Array, reason: str, rng: np.random.Generator) -> Decision:
     """The candidate of highest score; among equal ones, and where all are equal, chance decides and the reason says so.
 

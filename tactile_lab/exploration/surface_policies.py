@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from tactile_lab.exploration.candidates import Candidate
 from tactile_lab.exploration.information.igef import IgefMetrics, IgefSettings, igef
 from tactile_lab.exploration.information.surface_uncertainty import POINT_SIGMA_m, contact_entropy
-from tactile_lab.exploration.policy import Belief, Decision, Surface, best_of, nothing_to_choose
+from tactile_lab.exploration.policy import Belief, Decision, Surface, best_of, nothing_to_choose, surface_to_foresee
 from tactile_lab.exploration.prediction import expected_touches, most_fingers, nominal_world
 from tactile_lab.exploration.regions import Region, RegionSettings, nearest_first, unexplored_regions
 from tactile_lab.geometry.contacts import Array
@@ -21,7 +21,6 @@ _BESIDE_m = 0.008
 """A contact this near to a region's vertices explores the region."""
 _PATIENCE = 3
 """So many fingers that met nothing in a region put it behind the others."""
-_NOTHING_YET = "the contacts enclose nothing yet, so nothing can be foreseen"
 
 
 @dataclass(frozen=True)
@@ -56,11 +55,9 @@ class ContactsPolicy:
     reason: str
 
     def choose(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Decision:
-        if settled := nothing_to_choose(self.name, candidates, belief):
-            return settled
-        if belief.surface is None:
-            return best_of(self.name, np.zeros(len(candidates)), _NOTHING_YET, rng)
-        surface = belief.surface
+        surface = surface_to_foresee(self.name, candidates, belief, rng)
+        if isinstance(surface, Decision):
+            return surface
         found = expected_contacts(candidates, belief, surface)
         touching = np.array([len(points) > 0 for points in found])
         if not touching.any():
@@ -77,11 +74,9 @@ class ClustersPolicy:
     name: str = "clusters"
 
     def choose(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Decision:
-        if settled := nothing_to_choose(self.name, candidates, belief):
-            return settled
-        if belief.surface is None:
-            return best_of(self.name, np.zeros(len(candidates)), _NOTHING_YET, rng)
-        surface = belief.surface
+        surface = surface_to_foresee(self.name, candidates, belief, rng)
+        if isinstance(surface, Decision):
+            return surface
         found = expected_contacts(candidates, belief, surface)
         regions = self._in_turn(belief, surface)
         variances = variances_at(belief, found)
