@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.gpis import Gpis, Prediction
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.posterior import Prediction
 
 Indices: TypeAlias = NDArray[np.intp]
 Nodes = TypeVar("Nodes")

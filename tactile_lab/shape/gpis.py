@@ -8,7 +8,6 @@ gradients f is nearly a signed distance in metres: ``f / |grad f|`` is a distanc
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
@@ -26,6 +25,7 @@ from tactile_lab.shape.kernels import (
     log_parameter_traces,
 )
 from tactile_lab.shape.observations import Observations, check_contacts
+from tactile_lab.shape.posterior import PosteriorMean, Prediction
 from tactile_lab.shape.priors import PriorMean
 from tactile_lab.shape.row_factor import RowFactor
 from tactile_lab.shape.settings import GpisSettings, initial_kernel, observe, prior_mean
@@ -39,21 +39,6 @@ _SINGLE_PRECISION_RATIO = 1000.0
 _AMPLITUDE_BOUNDS_m = (1e-3, 0.3)
 _LENGTH_BOUNDS_m = (0.010, 0.300)
 _NOISE_SCALE_BOUNDS = (0.3, 10.0)
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """The field at q places.
-
-    Attributes:
-        mean_m: shape (q,), positive outside.
-        gradient: shape (q, d); empty if not asked for.
-        variance_m2: shape (q,); empty if not asked for.
-    """
-
-    mean_m: Array
-    gradient: Array
-    variance_m2: Array
 
 
 class Gpis:
@@ -242,7 +227,7 @@ class Gpis:
         points_m = np.asarray(points_m, dtype=float)
         mean, slope = np.empty(len(points_m)), np.empty(points_m.shape)
         for block in self._blocks(len(points_m)):
-            mean[block], slope[block] = self._mean_and_gradient(points_m[block], gradient)
+            mean[block], slope[block] = self._posterior.at(points_m[block], gradient=gradient)
         return Prediction(mean, slope if gradient else slope[:0], self.variance(points_m) if variance else mean[:0])
 
     def _contact_sigmas(self) -> tuple[Array, Array]:
@@ -279,23 +264,11 @@ class Gpis:
         cross = cross_covariance_with_gradients(self.kernel, new, self.contacts_m, old)
         return self._factor.extended(cross, corner, places[:, :old].ravel(), places[:, old:].ravel())
 
-    def _mean_and_gradient(self, queries: Array, gradient: bool) -> tuple[Array, Array]:
-        """Mean and its gradient (left zero unless asked for) without forming the covariance with all rows."""
-        points = self.observations.points_m
-        count = self._gradient_count
-        on_values = self._weights[: len(points)]
-        on_gradients = self._weights[len(points) :].reshape(queries.shape[1], count).T
-        touched = points[:count]
-        phi = self.kernel.profile(cdist(queries, points, "sqeuclidean"))
-        along = queries @ on_gradients.T - np.sum(touched * on_gradients, axis=1)
-        slope = phi.first[:, :count]
-        mean = self.prior.value(queries) + phi.value @ on_values - 2 * np.einsum("qn,qn->q", slope, along)
-        if not gradient:
-            return mean, np.zeros_like(queries)
-        pull = 2 * phi.first * on_values
-        pull[:, :count] -= 4 * phi.second[:, :count] * along
-        change = queries * pull.sum(axis=1)[:, None] - pull @ points - 2 * slope @ on_gradients
-        return mean, self.prior.gradient(queries) + change
+    @cached_property
+    def _posterior(self) -> PosteriorMean:
+        points_m = self.observations.points_m
+        on_gradients = self._weights[len(points_m) :].reshape(points_m.shape[1], self._gradient_count).T
+        return PosteriorMean(self.kernel, self.prior, points_m, self._weights[: len(points_m)], on_gradients)
 
     def _variance(self, queries: Array, single: Array | None) -> Array:
         rows = cross_covariance(self.kernel, queries, self.observations.points_m, self._gradient_count)

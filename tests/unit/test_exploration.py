@@ -17,7 +17,8 @@ from tactile_lab.exploration.candidates import (
 from tactile_lab.exploration.rewards import explored_share, rate, variance_reward
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import FieldGrid
-from tactile_lab.shape.gpis import Gpis, Prediction
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.posterior import Prediction
 from tactile_lab.shape.surface import Contour, SurfaceMesh
 
 RADIUS_m = 0.030

@@ -8,7 +8,8 @@ import pytest
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import FieldGrid
-from tactile_lab.shape.gpis import Gpis, Prediction
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.posterior import Prediction
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.measurement import (
     CalibratedMeasurement,

@@ -8,7 +8,8 @@ from shape_examples import contacts_on_sphere
 
 from tactile_lab.errors import ShapeError
 from tactile_lab.shape.field_grid import FieldGrid
-from tactile_lab.shape.gpis import Gpis, Prediction
+from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.posterior import Prediction
 
 
 class LinearField:
