@@ -269,14 +269,14 @@ class _InSpace(_Session):
 
     def hand_step(self) -> tuple[Array, Rot3]:
         angle = np.deg2rad(self._rng.uniform(5.0, 25.0))
-        return self._rng.normal(0.0, 0.005, 3), Rot3.Expmap(angle * _any_direction(self._rng))
+        return self._rng.normal(0.0, 0.005, 3), Rot3.Expmap(angle * _unit(self._rng.normal(size=3)))
 
     def slip(self) -> Pose3:
         turn, way = self._scale * self._rng.normal(size=(2, 3))
         return Pose3(Rot3.Expmap(SLIP_SIGMA_rad * turn), SLIP_SIGMA_m * way)
 
     def approach(self, middle_world_m: Array) -> None:
-        turn = Rot3.Expmap(np.deg2rad(self._rng.uniform(20.0, 60.0)) * _any_direction(self._rng))
+        turn = Rot3.Expmap(np.deg2rad(self._rng.uniform(20.0, 60.0)) * _unit(self._rng.normal(size=3)))
         place = middle_world_m + self._rng.normal(0.0, 0.008, 3)
         self.world_T_palm = Pose3(turn * self.world_T_palm.rotation(), place)
 
@@ -285,11 +285,6 @@ def _directions(angles_rad: Array, tilts_rad: Array) -> Array:
     """Unit vectors at angles about z and tilts above the horizontal, shape (n, 3)."""
     level = np.cos(tilts_rad)
     return np.column_stack([np.cos(angles_rad) * level, np.sin(angles_rad) * level, np.sin(tilts_rad)])
-
-
-def _any_direction(rng: np.random.Generator) -> Array:
-    direction = rng.normal(size=3)
-    return np.asarray(direction / np.linalg.norm(direction))
 
 
 def _any_rotation(rng: np.random.Generator) -> Rot3:
