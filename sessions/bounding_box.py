@@ -31,6 +31,12 @@ _ASSUMED_m = 0.030
 _BEYOND_m = -0.040
 """From the front to the grasp frame in which the open fingers stand 25 mm clear of it."""
 
+_THUMB_ASIDE_m = 0.014
+"""Of the thumb's way from the middle of the grasp frame, toward its +y."""
+
+_SHORT_OF_ENDS_m = 0.005
+"""The thumb comes no nearer to the ends of the width than this: it would pass beside the object."""
+
 _TURNS_rad = {"left": np.pi / 2, "front": 0.0, "right": -np.pi / 2, "back": np.pi}
 
 
@@ -41,6 +47,7 @@ class ProbingSettings(StrictModel):
         enabled: feel it before the first grasp.
         search_m: how far from where the object is expected the search begins on every side.
         lanes_m: offsets of the lanes across the direction of a rake; two lie no farther apart than the row is wide.
+        thumb_lane_m: distance of the lanes in which the thumb feels the back.
         margin_m: added on every side: contacts are few, and the corner may lie between lanes.
         tallest_m: over objects higher than this the palm does not pass: their sides are not felt.
     """
@@ -48,6 +55,7 @@ class ProbingSettings(StrictModel):
     enabled: bool = False
     search_m: float = Field(default=0.13, gt=0.0)
     lanes_m: tuple[float, ...] = Field(default=(0.0, -0.05, 0.05), min_length=1)
+    thumb_lane_m: float = Field(default=0.025, gt=0.0)
     margin_m: float = Field(default=0.008, ge=0.0)
     tallest_m: float = Field(default=0.075, gt=0.0)
 
@@ -166,14 +174,32 @@ class BoxProber:
         return f"nothing met in {len(self._settings.lanes_m)} lanes"
 
     def _by_closing(self, found: Mapping[str, Array]) -> Array | str:
-        """The back, by the thumb: the fingers stand open beyond the front, or where that would be."""
-        middle_y_m = np.mean([found[side][:, 1].mean() for side in ("left", "right") if side in found] or [0.0])
+        """The back, by the thumb in lanes: the fingers stand open beyond the front, or where that would be.
+
+        A single lane would miss the corner of an object that is turned.
+        """
         front_m = max((float(points[:, 0].max()) for points in found.values()), default=_ASSUMED_m)
-        place = self._axes.transformFrom(np.array([front_m + _BEYOND_m, middle_y_m]))
-        points = self._toucher.close_thumb(GraspFrame(float(place[0]), float(place[1]), float(self._axes.theta())))
-        if points is None:
-            return "the thumb has no way down: the object is longer than the hand opens"
-        return self._in_box_frame(points) if len(points) else "the thumb met nothing"
+        landed, met = 0, []
+        for lane_m in self._thumb_lanes_m(found):
+            place = self._axes.transformFrom(np.array([front_m + _BEYOND_m, lane_m - _THUMB_ASIDE_m]))
+            frame = GraspFrame(float(place[0]), float(place[1]), float(self._axes.theta()))
+            points = self._toucher.close_thumb(frame)
+            if points is None:
+                landed += 1
+            elif len(points):
+                met.append(points)
+        if met:
+            return self._in_box_frame(np.vstack(met))
+        return "the thumb has no way down beside the object" if landed else "the thumb met nothing"
+
+    def _thumb_lanes_m(self, found: Mapping[str, Array]) -> Array:
+        """Where the thumb comes, from the middle outwards, box frame y: over the width found, short of its ends."""
+        sides_m = [points[:, 1] for side, points in found.items() if side in ("left", "right")]
+        every_m = np.concatenate([*sides_m, *([np.zeros(1)] if not sides_m else [])])
+        half_m = np.ptp(every_m) / 2 - _SHORT_OF_ENDS_m
+        count = int(max(0.0, half_m) // self._settings.thumb_lane_m)
+        lanes_m = (every_m.min() + every_m.max()) / 2 + self._settings.thumb_lane_m * np.arange(-count, count + 1)
+        return np.asarray(sorted(lanes_m, key=lambda lane_m: abs(lane_m - lanes_m.mean())))
 
     def _in_box_frame(self, points_m: Array) -> Array:
         return np.array([self._axes.transformTo(point[:2]) for point in points_m])

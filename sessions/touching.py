@@ -126,14 +126,26 @@ class Toucher:
         return found
 
     def close_thumb(self, frame: GraspFrame) -> Array | None:
-        """Come down around a grasp frame, the hand open, and close the thumb alone; results as of :meth:`rake`."""
+        """Come down around a grasp frame, the hand open, and close the thumb alone.
+
+        Returns:
+            Where the thumb met something, or stood on it on the way down, shape (n, 3), world frame; None where another
+            finger could not come down.
+        """
         s, motion = self.settings, self._motion
         table = closing(ROW.closing, s.rake_height_m, self._tip)
         progress = {finger: table.path(finger).valid[0] for finger in FINGERS}
         self._poise(table, Pattern(ROW.closing, progress), frame)
-        if not motion.probe_base(motion.base_joints(frame, table), self._cycle.descent_m_s, self._is_met):
+        stood: list[Array] = []
+
+        def met() -> bool:
+            if self._felt_N().get("TH", 0.0) > s.met_N:
+                stood.append(motion.tip_centre_world_m("TH", self._tip))
+            return self._is_met()
+
+        if not motion.probe_base(motion.base_joints(frame, table), self._cycle.descent_m_s, met):
             self._rise()
-            return None
+            return np.array(stood) if stood else None
         motion.wait(self._cycle.rest_s)
         motion.bench.begin_closing()
         path, found = table.path("TH"), np.empty((0, 3))

@@ -14,12 +14,13 @@ from sessions.conductor import Conductor
 from sessions.conductor_settings import ConductorSettings
 from sessions.cycle_settings import CycleSettings
 from sessions.explorer import ExplorationSettings
-from sessions.motion import Motion
+from sessions.motion import GraspFrame, Motion
 from sessions.next_grasp import FixedRule, PlanSettings
 from sessions.planner import Planner
 from sessions.safety import SafetySettings, SafetySupervisor
 from sessions.session_outcome import Ending, SessionOutcome
 from sessions.touching import Toucher
+from tactile_lab.experiments.outlines import first_crossing
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tests.support.disc_world import Disc, DiscWorld, TIP_CENTRE_m
 
@@ -74,6 +75,51 @@ def test_probing_can_be_interrupted_between_sides() -> None:
     box = prober(DiscWorld(Disc(np.zeros(2), radius_m=0.035))).feel(lambda: next(asked))
     assert box.top_m is not None
     assert [box.missing.get(side) for side in SIDES[1:]] == ["interrupted"] * 3
+
+
+class TurnedBoxToucher:
+    """Feels a box of 80 x 50 mm that is turned on the table: where tips on straight ways first meet its outline."""
+
+    def __init__(self, turn_rad: float) -> None:
+        corners = np.array([[0.04, 0.025], [-0.04, 0.025], [-0.04, -0.025], [0.04, -0.025]])
+        c, s = np.cos(turn_rad), np.sin(turn_rad)
+        self.outline_m = corners @ np.array([[c, s], [-s, c]])
+
+    def tap(self, frame: GraspFrame) -> np.ndarray:
+        return np.array([[frame.x_m, frame.y_m, 0.04]])
+
+    def rake(self, frame: GraspFrame, from_m: float) -> np.ndarray:
+        """Whatever reaches farthest toward the row, which is wide."""
+        way = np.array([np.cos(frame.yaw_rad), np.sin(frame.yaw_rad)])
+        foremost = self.outline_m[np.argmax(self.outline_m @ way)]
+        return np.array([[*foremost, 0.02]])
+
+    def close_thumb(self, frame: GraspFrame) -> np.ndarray:
+        thumb = closing("pinch", 0.028, TIP).path("TH")
+        start, way = frame.pose.transformFrom(thumb.start_m), frame.pose.rotation().rotate(thumb.direction)
+        beside = np.cross([0.0, 0.0, 1.0], way)[:2]
+        lines = [
+            first_crossing(self.outline_m, start[:2] + aside * beside, way[:2], 0.12) for aside in (-0.008, 0.0, 0.008)
+        ]
+        points = [np.array([*hit[0], 0.02]) for hit in lines if hit is not None]
+        return np.array(sorted(points, key=lambda point: point[0])[:1]).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 25.0, 35.0, 50.0, 65.0, -25.0, -50.0])
+def test_back_corner_of_a_turned_box_is_felt(turn_deg: float) -> None:
+    """One lane in the middle would stop at the flank, up to 20 mm short of the corner."""
+    toucher = TurnedBoxToucher(np.deg2rad(turn_deg))
+    box = BoxProber(toucher, ProbingSettings(), WINDOW_rad, (0.0, 0.0)).feel()  # type: ignore[arg-type]
+    assert "back" not in box.missing
+    assert box.low_m[0] == pytest.approx(toucher.outline_m[:, 0].min(), abs=0.0095)
+
+
+def test_thumb_that_stands_on_the_object_tells_its_place() -> None:
+    """Too long for the hand: no way down for the thumb, but the object reaches at least as far as it stood."""
+    world = DiscWorld(Disc(np.zeros(2), radius_m=0.060, height_m=0.045))
+    box = prober(world).feel()
+    assert "back" not in box.missing
+    assert box.low_m[0] < -0.045
 
 
 def felt(half_x_m: float = 0.06, half_y_m: float = 0.03) -> BoundingBox:
