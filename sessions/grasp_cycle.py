@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,7 +90,8 @@ class GraspCycle:
                 return True
             landed.update(hit)
             self.lift()
-            self._plan = self._evade(plan, hit, landed)
+            shift_m, window = self.settings.landing_shift_m, self._yaw_window_rad
+            self._plan = evaded(plan, self.plan, hit, landed, self._table(), shift_m, window)
         return False
 
     def _move_above(self) -> None:
@@ -117,22 +119,6 @@ class GraspCycle:
             self._motion.wait(s.rest_s)
             met()
         return hit
-
-    def _evade(self, plan: GraspPlan, hit: list[str], landed: set[str]) -> GraspPlan:
-        """The plan after a landing: shifted toward the fingers that landed, or turned when both sides did."""
-        if "TH" in landed and landed - {"TH"}:
-            landed.clear()
-            return replace(plan, frame=self._turned_away(plan.frame))
-        table = self._table()
-        directions = np.array([table.path(finger).start_m[:2] for finger in hit])
-        shift_m = self.settings.landing_shift_m * np.mean(directions / np.linalg.norm(directions, axis=1)[:, None], 0)
-        return replace(self.plan, frame=self.plan.frame.shifted_inside(shift_m))
-
-    def _turned_away(self, frame: GraspFrame) -> GraspFrame:
-        """A quarter turn, as far as the arm's yaw window allows, toward its middle."""
-        low, high = self._yaw_window_rad
-        turn = -np.pi / 2 if frame.yaw_rad > (low + high) / 2 else np.pi / 2
-        return replace(frame, yaw_rad=float(np.clip(frame.yaw_rad + turn, low, high)))
 
     # --- close and measure -------------------------------------------------------------------------------------
 
@@ -264,3 +250,37 @@ class GraspCycle:
 
     def _table(self) -> Closing:
         return closing(self.plan.closing, self.plan.height_m, self._tip)
+
+
+def evaded(
+    wanted: GraspPlan,
+    now: GraspPlan,
+    hit: Sequence[str],
+    landed: set[str],
+    table: Closing,
+    shift_m: float,
+    yaw_window_rad: tuple[float, float],
+) -> GraspPlan:
+    """The plan after a landing: shifted toward the fingers that landed, or turned when both sides did.
+
+    Args:
+        wanted, now: the plan as it was chosen, and what has become of it so far.
+        hit: fingers that landed just now.
+        landed: those that landed since the hand was turned, ``hit`` among them; emptied when it turns.
+        table: the plan's closing.
+        shift_m: how far to shift.
+        yaw_window_rad: yaws the arm can take up.
+    """
+    if "TH" in landed and landed - {"TH"}:
+        landed.clear()
+        return replace(wanted, frame=_turned_away(wanted.frame, yaw_window_rad))
+    directions = np.array([table.path(finger).start_m[:2] for finger in hit])
+    aside_m = shift_m * np.mean(directions / np.linalg.norm(directions, axis=1)[:, None], 0)
+    return replace(now, frame=now.frame.shifted_inside(aside_m))
+
+
+def _turned_away(frame: GraspFrame, yaw_window_rad: tuple[float, float]) -> GraspFrame:
+    """A quarter turn, as far as the arm's yaw window allows, toward its middle."""
+    low, high = yaw_window_rad
+    turn = -np.pi / 2 if frame.yaw_rad > (low + high) / 2 else np.pi / 2
+    return replace(frame, yaw_rad=float(np.clip(frame.yaw_rad + turn, low, high)))

@@ -24,6 +24,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         exploration.TABLE_4_2,
         exploration.TABLE_4_3,
         exploration.EXPLORATION_HAND,
+        exploration.EXPLORATION_KINEMATIC,
         laboratory.CAMERA_TRUTH,
         laboratory.GRAPH_STRESS,
         laboratory.CALIBRATE_FOREARM,

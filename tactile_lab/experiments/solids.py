@@ -20,6 +20,7 @@ from drivers.simulation.objects import CATALOGUE, object_model
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.experiments.ray_casting import first_hits
 from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.sampling import nearest_on_mesh
 
 DATA_VARIABLE = "TACTILE_LAB_DATA"
 """Environment variable: the folder with recorded data, among them ``ycb_meshes``."""
@@ -72,6 +73,10 @@ class Solid:
             None if face < 0 else (start + distance * way, self._normals[face])
             for start, way, distance, face in zip(starts_m, ways, distances_m, faces, strict=True)
         ]
+
+    def nearest(self, points_m: Array) -> tuple[Array, Array]:
+        """For points of shape (n, 3): distance to the surface, shape (n,), and the place of it that is nearest."""
+        return nearest_on_mesh(points_m, self.mesh)
 
 
 @lru_cache(maxsize=32)

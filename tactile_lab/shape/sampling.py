@@ -68,11 +68,16 @@ def distances_to_polygon(points_m: Array, polygon_m: Array) -> Array:
 
 def distances_to_mesh(points_m: Array, mesh: TriangleMesh) -> Array:
     """Exact distances from points of shape (q, 3) to the surface of a mesh."""
+    return nearest_on_mesh(points_m, mesh)[0]
+
+
+def nearest_on_mesh(points_m: Array, mesh: TriangleMesh) -> tuple[Array, Array]:
+    """Exact distances from points of shape (q, 3) to the surface of a mesh, and its nearest places, shape (q, 3)."""
     import igl  # here, so that importing this module stays quick
 
     vertices, faces = mesh_arrays(mesh)
-    squared = igl.point_mesh_squared_distance(np.ascontiguousarray(points_m), vertices, faces)[0]
-    return np.asarray(np.sqrt(squared), dtype=float)
+    squared, _, places = igl.point_mesh_squared_distance(np.ascontiguousarray(points_m), vertices, faces)
+    return np.asarray(np.sqrt(squared), dtype=float), np.asarray(places, dtype=float)
 
 
 def mesh_arrays(mesh: TriangleMesh) -> tuple[Array, Any]:

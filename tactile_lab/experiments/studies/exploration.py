@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactile_lab.experiments import exploration_runs, hand_exploration
+from tactile_lab.experiments import exploration_runs, hand_exploration, kinematic_exploration
 from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.study_columns import (
@@ -21,10 +21,12 @@ EXPLORATION_COLUMNS = (
     Column("correlation of promised and realised share", "promises", 2, kind="correlation"),
 )
 HAND_COLUMNS = (
-    Column("actions by B: median / p90 / max", "actions_B", 0),
-    Column("by A", "actions_A", 0),
-    Column("explored by B at the end", "share_B", 0, kind="percent"),
-    Column("simulated minutes", "minutes", 1),
+    Column("actions by A", "actions_A", 1, kind="estimate"),
+    Column("actions by B", "actions_B", 1, kind="estimate"),
+    Column("by A: median / p90 / max", "actions_A", 0),
+    Column("by B", "actions_B", 0),
+    Column("simulated minutes by A", "minutes_A", 1),
+    Column("explored by A at the end", "share_A", 0, kind="percent"),
     HAUSDORFF,
     REGISTRATION,
     Column("correlation of promised and realised share", "promises", 2, kind="correlation"),
@@ -63,6 +65,17 @@ EXPLORATION_HAND = Experiment(
     hand_exploration.explore_by_hand,
     HAND_COLUMNS,
     ranges("policy", "grasps until 90 % is explored (definition B)", "actions_B", _hand_condition, columns=2),
+    pooled=("object",),
+    grasps=hand_exploration.GRASPS,
+)
+
+EXPLORATION_KINEMATIC = Experiment(
+    "exploration-kinematic",
+    "The same candidates, policies and estimation without physics: kinematics on the true surface, measured noise.",
+    kinematic_exploration.settings,
+    kinematic_exploration.explore_by_kinematics,
+    HAND_COLUMNS,
+    ranges("policy", "approaches until 90 % is explored (definition A)", "actions_A", _hand_condition, columns=2),
     pooled=("object",),
     grasps=hand_exploration.GRASPS,
 )

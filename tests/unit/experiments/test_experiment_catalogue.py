@@ -28,6 +28,7 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "table-4.2": ({"candidates": ["10"], "policy": ["information", "clairvoyant"]}, 12),
     "table-4.3": ({"tracking": ["joint"], "policy": ["det"]}, 5),
     "exploration-hand": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
+    "exploration-kinematic": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
     "camera-truth": ({"condition": ["sharp"]}, None),
     "calibrate-forearm": ({"method": ["touch"], "poses": ["20"]}, None),
     "calibrate-fingertip": ({"presses": ["6"]}, None),

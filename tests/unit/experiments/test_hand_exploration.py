@@ -7,7 +7,8 @@ import pytest
 
 from drivers.simulation.objects import object_model
 from tactile_lab.experiments.catalogue import experiment
-from tactile_lab.experiments.hand_exploration import OBJECTS, laid_over, reachable_points
+from tactile_lab.experiments.hand_exploration import OBJECTS
+from tactile_lab.experiments.hand_judge import laid_over, reachable_points
 
 
 def test_outline_is_what_fingers_reach_in_the_plane() -> None:

@@ -1,0 +1,91 @@
+"""Policies over the hand's own candidates without physics: seconds a session, so that many can be compared.
+
+Planner, candidates, policies, estimation and judge are those of a session on the simulated rig
+(:mod:`tactile_lab.experiments.hand_exploration`); the grasps are done by
+:class:`tactile_lab.experiments.kinematic_hand.KinematicHand`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from drivers.shadow.posture import TipEllipsoid
+from sessions.autonomous_crew import planner_for
+from sessions.conductor_settings import ConductorSettings
+from sessions.decisions import DoGrasp, Veto
+from sessions.planner import Planner
+from sessions.thinker import Thinker
+from sessions.thinking import ThinkingHere
+from tactile_lab.experiments.cells import Cell, Setting, grid
+from tactile_lab.experiments.hand_exploration import OBJECTS, RIG, conductor_settings, estimation
+from tactile_lab.experiments.hand_judge import Judge, UntilExplored
+from tactile_lab.experiments.kinematic_hand import KinematicHand
+from tactile_lab.experiments.solids import solid
+from tactile_lab.rigs.build import force_tips
+from tactile_lab.rigs.description import load_rig
+from tactile_lab.slam import TactileSlam
+
+POLICIES = ("random", "clusters", "information")
+
+
+def settings(grasps: int) -> list[Setting]:
+    """Every object with each of these policies, in the plane and in space."""
+    return grid(object=list(OBJECTS), dimension=[2, 3], policy=list(POLICIES), grasps=[grasps])
+
+
+def explore_by_kinematics(cell: Cell) -> dict[str, Any]:
+    """One session. Cell: object, dimension, policy, grasps."""
+    rig, dimension, body = load_rig(RIG), int(cell["dimension"]), solid(cell["object"])
+    slam, settings = estimation(rig, cell), conductor_settings(rig, cell)
+    judge = Judge(body.mesh, slam, dimension)
+    calibration = next(iter(force_tips(rig).values()))
+    tip = TipEllipsoid(calibration.semi_axes_m, calibration.centre_distal_m)
+    planner = planner_for(slam, settings, tip, cell.seed, dimension)
+    decisions = UntilExplored(ThinkingHere(Thinker(slam, planner)), judge)
+    rng = np.random.default_rng([cell.seed, 52183])
+    hand = KinematicHand(body, settings.cycle, tip, settings.plan.yaw_window_rad, rng)
+    ending = _session(hand, decisions, planner, slam, judge, settings)
+    return {**judge.figures(slam.finish()), "status": judge.status(ending)}
+
+
+def _session(
+    hand: KinematicHand,
+    decisions: UntilExplored,
+    planner: Planner,
+    slam: TactileSlam,
+    judge: Judge,
+    settings: ConductorSettings,
+) -> str:
+    """Grasps until all is explored, or the object is lost by the limits of a session; how it ended."""
+    missed = empty = 0
+    while len(judge.grasps) < settings.grasps:
+        index = len(judge.grasps)
+        decisions.think(index)
+        decision = decisions.decide(index)
+        if not isinstance(decision, DoGrasp):
+            break
+        attempt = hand.attempt(decision.plan)
+        decisions.arrived(attempt.landings_world_m)
+        if attempt.grasp is None:
+            if (missed := missed + 1) >= settings.missed_approaches:
+                return "object lost"
+            continue
+        judge.truth.append(hand.world_T_body)
+        wanted = decisions.captured(attempt.grasp, attempt.plan)
+        assert not isinstance(wanted, Veto)
+        decisions.carried(hand.carry(wanted, attempt))
+        step = slam.take(attempt.grasp)
+        planner.estimated(step.index)
+        decisions.estimated(step)
+        judge.look(hand.elapsed_s / 60)
+        missed, empty = 0, 0 if attempt.grasp.touching else empty + 1
+        if empty >= settings.safety.empty_grasps or _strayed(decisions, settings):
+            return "object lost"
+    return "complete"
+
+
+def _strayed(decisions: UntilExplored, settings: ConductorSettings) -> bool:
+    away_m = decisions.centre_m - np.array(settings.safety.workspace_centre_m)
+    return float(np.linalg.norm(away_m)) > settings.safety.object_radius_m

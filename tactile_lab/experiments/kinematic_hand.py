@@ -1,0 +1,221 @@
+"""The hand's own grasps on a true surface without physics: kinematics, round fingertips, and the rig's measured noise.
+
+The hand comes down, lays its fingertips on the top and closes along the same lines as on the rig; a fingertip is a ball
+that stops where it first touches. What physics would add is drawn: fingertips pass beside their lines, contacts are
+measured imprecisely (:mod:`tactile_lab.experiments.sensing`), and an object that is carried slips in the hand.
+Middle phalanges do not touch, and an object stays where it is while the hand closes (on the simulated rig it is
+pushed by half a millimetre).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from gtsam import Pose2, Pose3, Rot3
+
+from drivers.shadow.closing import closing
+from drivers.shadow.posture import TipEllipsoid
+from sessions.conductor import holds
+from sessions.cycle_settings import CycleSettings
+from sessions.grasp_cycle import GraspPlan, evaded
+from sessions.hand_candidates import grasp_time_s, table_of
+from sessions.motion import GraspFrame
+from sessions.planner import Reorientation
+from sessions.touching import TAP, TAP_HEIGHT_m
+from tactile_lab.experiments.sensing import line_to_contact, measured_contact, planar_pose
+from tactile_lab.experiments.solids import Solid
+from tactile_lab.geometry.contacts import FINGERS, Array, ClosingLine, Contact, Grasp
+from tactile_lab.geometry.poses import rotate, spatial, transform_points
+
+PLACE_SIGMA_m = 0.010
+BESIDE_SIGMA_m = 0.0015
+SLIP_SIGMA_m = 0.005
+SLIP_SIGMA_rad = float(np.deg2rad(10.0))
+"""The simulated rig shows 1 to 7 mm per axis and 3 to 15 degrees rms while an object is carried, by object."""
+
+_STEP_m = 0.001
+_DESCENT_STEP_m = 0.003
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What came of a plan.
+
+    Attributes:
+        plan: where the hand really closed: landings shift it.
+        landings_world_m: where fingertips stood on the object, (3,) each.
+        grasp: None where the hand found no way down.
+    """
+
+    plan: GraspPlan
+    landings_world_m: list[Array]
+    grasp: Grasp | None
+
+
+class KinematicHand:
+    """Does grasps on an object on the table.
+
+    Args:
+        solid: the object; it stands near the world's origin, turned anyhow.
+        cycle: speeds and times of the rig.
+        tip: shape of its fingertips.
+        yaw_window_rad: of its arm.
+        rng: of everything that is drawn.
+    """
+
+    def __init__(
+        self,
+        solid: Solid,
+        cycle: CycleSettings,
+        tip: TipEllipsoid,
+        yaw_window_rad: tuple[float, float],
+        rng: np.random.Generator,
+    ) -> None:
+        self._solid, self._cycle, self._tip, self._window_rad, self._rng = solid, cycle, tip, yaw_window_rad, rng
+        self._radius_m = tip.semi_axes_m[0]
+        place = planar_pose(rng.normal(0.0, PLACE_SIGMA_m, 2), rng.uniform(-np.pi, np.pi))
+        self.world_T_body = spatial(place, -solid.foot_m)
+        self.elapsed_s = 0.0
+        self._here: GraspFrame | None = None
+        self._motion = Pose3()
+        self._count = 0
+
+    def attempt(self, plan: GraspPlan) -> Attempt:
+        """Tap on the top if the plan says so, come down, close and measure."""
+        probed = self._tap(plan.frame) if plan.tap else []
+        reached, landings = self._descend(plan)
+        self.elapsed_s += grasp_time_s(plan, self._cycle, self._here) + len(landings) * self._landing_s
+        self._here = plan.frame
+        if reached is None:
+            return Attempt(plan, landings, None)
+        contacts, lines = self._close(reached)
+        palm = reached.frame.pose * table_of(reached, self._tip).grasp_T_palm
+        stamp_ns = round(1e9 * self.elapsed_s)
+        grasp = Grasp(self._count, stamp_ns, (*contacts, *probed), palm, self._motion, lines)
+        self._count, self._motion = self._count + 1, Pose3()
+        return Attempt(reached, landings, grasp)
+
+    def carry(self, wanted: Reorientation, attempt: Attempt) -> Pose3:
+        """Turn and shift the object as it is held; it slips. Nothing where it is not held.
+
+        Returns:
+            The hand's motion in the world.
+        """
+        assert attempt.grasp is not None
+        if not holds(attempt.grasp.touching):
+            return Pose3()
+        frame = attempt.plan.frame
+        about = np.array([frame.x_m, frame.y_m, 0.0])
+        shift = np.append(wanted.shift_world_m, 0.0)
+        turned = Rot3.Yaw(wanted.turn_rad)
+        motion = Pose3(turned, about + shift - turned.rotate(about))
+        middle = Pose3(Rot3(), attempt.grasp.points_world_m.mean(axis=0))
+        x, y, turn = self._rng.normal(size=3) * [SLIP_SIGMA_m, SLIP_SIGMA_m, SLIP_SIGMA_rad]
+        slip = middle * spatial(Pose2(x, y, turn)) * middle.inverse()
+        self.world_T_body, self._motion = motion * slip * self.world_T_body, motion
+        cycle, way_m = self._cycle, float(np.linalg.norm(shift))
+        self.elapsed_s += max(abs(wanted.turn_rad) / cycle.carry_turn_rad_s, way_m / cycle.carry_m_s) + cycle.rest_s
+        return motion
+
+    @property
+    def _landing_s(self) -> float:
+        """How long it takes to lift, shift and come down again."""
+        cycle = self._cycle
+        return cycle.lift_m / cycle.descent_m_s + cycle.lift_m / cycle.travel_m_s + cycle.rest_s
+
+    # --- down --------------------------------------------------------------------------------------------------
+
+    def _descend(self, plan: GraspPlan) -> tuple[GraspPlan | None, list[Array]]:
+        """The plan with which the open hand came down to the table, and the landings before; None without a way."""
+        table, now, landings = table_of(plan, self._tip), plan, list[Array]()
+        landed: set[str] = set()
+        for _ in range(self._cycle.landing_tries):
+            open_m = np.array([table.path(f).centre_m(table.path(f).valid[0]) for f in FINGERS])
+            places, met = self._coming_down(transform_points(now.frame.pose, open_m), plan.height_m)
+            if not met.any():
+                return now, landings
+            level = int(met.any(axis=1).argmax())
+            hit = [finger for finger, meets in zip(FINGERS, met[level], strict=True) if meets]
+            landings.append(places[level, FINGERS.index(hit[0])])
+            landed.update(hit)
+            now = evaded(plan, now, hit, landed, table, self._cycle.landing_shift_m, self._window_rad)
+        return None, landings
+
+    def _tap(self, frame: GraspFrame) -> list[Contact]:
+        """Fingertips laid on what stands below: all that reach it when the first has met it."""
+        table, touch = closing(TAP.closing, TAP_HEIGHT_m, self._tip), self._cycle.touch
+        above_m = np.array([table.path(finger).centre_m(TAP.progress[finger]) for finger in FINGERS])
+        above_m = self._beside(transform_points(frame.pose, above_m))
+        places, met = self._coming_down(above_m, touch.lowest_m + self._radius_m)
+        if not met.any():
+            return []
+        levels = np.where(met.any(axis=0), met.argmax(axis=0), len(met))
+        reach_m = np.where(np.array(FINGERS) == "TH", 0.0, touch.reach_m) + touch.sink_m
+        found = []
+        for index, finger in enumerate(FINGERS):
+            if (levels[index] - levels.min()) * _DESCENT_STEP_m <= reach_m[index]:
+                found.append(replace(self._measured(finger, places[levels[index], index]), probed=True))
+        return found
+
+    def _coming_down(self, centres_world_m: Array, lowest_m: float) -> tuple[Array, Array]:
+        """Places (n, 5, 3) of fingertips on their way down, and which of them touch there, (n, 5)."""
+        heights_m = np.arange(self._cycle.lift_m + lowest_m, lowest_m - 1e-9, -_DESCENT_STEP_m)
+        places = np.repeat(centres_world_m[None], len(heights_m), axis=0)
+        places[:, :, 2] = heights_m[:, None]
+        return places, self._distances(places) < self._radius_m
+
+    # --- close -------------------------------------------------------------------------------------------------
+
+    def _close(self, plan: GraspPlan) -> tuple[list[Contact], tuple[ClosingLine, ...]]:
+        table = table_of(plan, self._tip)
+        starts = np.array([table.path(f).centre_m(table.path(f).valid[0]) for f in FINGERS])
+        ways = np.array([table.path(f).direction for f in FINGERS])
+        lengths = np.array([table.path(f).length_m * float(np.ptp(table.path(f).valid)) for f in FINGERS])
+        starts, ways = self._beside(transform_points(plan.frame.pose, starts)), rotate(plan.frame.pose, ways)
+        steps_m = np.minimum(np.arange(0.0, lengths.max() + _STEP_m, _STEP_m)[:, None], lengths)
+        places = starts + steps_m[..., None] * ways
+        stops, touched = self._stops(places, self._distances(places) < self._radius_m)
+        ends = places[stops, np.arange(5)]
+        contacts = [self._measured(f, end) for f, end, meets in zip(FINGERS, ends, touched, strict=True) if meets]
+        measured = {contact.finger: contact for contact in contacts}
+        lines = []
+        for finger, start, end, way in zip(FINGERS, starts, ends, ways, strict=True):
+            foremost = start + self._radius_m * way
+            if finger in measured:
+                lines.append(line_to_contact(foremost, measured[finger]))
+            else:
+                lines.append(ClosingLine(finger, foremost, end + self._radius_m * way, touched=False))
+        return contacts, tuple(lines)
+
+    def _stops(self, places: Array, meets: Array) -> tuple[Array, Array]:
+        """Step at which each finger stops, and whether it does so on the object: all close together."""
+        stops, touched, moving = np.zeros(5, dtype=int), np.zeros(5, dtype=bool), np.ones(5, dtype=bool)
+        for step in range(len(places)):
+            stops[moving] = step
+            touched |= moving & meets[step].astype(bool)
+            now = places[stops, np.arange(5)]
+            gaps = np.linalg.norm(now[:4] - now[4], axis=1)
+            near = np.append(gaps, gaps.min()) < self._cycle.finger_gap_m
+            moving &= ~touched & ~near
+        return stops, touched
+
+    # --- what is drawn -----------------------------------------------------------------------------------------
+
+    def _beside(self, centres_world_m: Array) -> Array:
+        """Fingertips as they really pass."""
+        aside = np.zeros_like(centres_world_m)
+        aside[:, :2] = self._rng.normal(0.0, BESIDE_SIGMA_m, (len(aside), 2))
+        return np.asarray(centres_world_m + aside)
+
+    def _measured(self, finger: str, centre_world_m: Array) -> Contact:
+        """The contact of a fingertip that stands at a place: where the surface is nearest to its centre."""
+        centre = transform_points(self.world_T_body.inverse(), centre_world_m[None])
+        _, places = self._solid.nearest(centre)
+        normal = centre[0] - places[0]
+        return measured_contact(finger, places[0], normal / np.linalg.norm(normal), self.world_T_body, self._rng)
+
+    def _distances(self, places_world_m: Array) -> Array:
+        """Of fingertips' centres (..., 3) to the surface."""
+        flat = transform_points(self.world_T_body.inverse(), places_world_m.reshape(-1, 3))
+        return self._solid.nearest(flat)[0].reshape(places_world_m.shape[:-1])
