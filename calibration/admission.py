@@ -12,7 +12,7 @@ from tactile_lab.calibration_file import is_stored
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.strict_yaml import load
 
-DEVICE_TABLES = frozenset({"joints", "motors", "markers", "boards", "rates", "gains", "geometry", "board"})
+DEVICE_TABLES = frozenset({"joints", "motors", "markers", "boards", "rates", "gains", "geometry", "block", "board"})
 """Roles that may be plain files: the maker's tables of a device, and descriptions of what a rig is built of."""
 
 UNCALIBRATED = "uncalibrated"
@@ -87,18 +87,38 @@ def admit(
 
 def check_record(record: CalibrationRecord, here: Installation, now: datetime) -> tuple[str, str] | None:
     """Why a record may not be used here and now, and what to do; None when it may."""
-    if record.rig != here.rig:
-        return f"is of rig {record.rig}, not of {here.rig}", f"Name a calibration of {here.rig}"
-    for device, serial in record.devices.items():
-        if here.devices.get(device, serial) != serial:
-            reason = f"is of {device} with serial number {serial}, not {here.devices[device]}"
-            return reason, f"Calibrate with the present {device}"
+    if (foreign := _foreign(record, here)) is not None:
+        return foreign
     if record.expired(now):
         return f"is valid until {record.valid_until_utc}", f"Calibrate again: tactile-lab calibrate {_command(record)}"
     if record.valid_until_utc is not None and (record.created - now).total_seconds() > _CLOCK_SLACK_s:
         return f"was made in the future, {record.created_utc}", "Set the computer's clock"
     if record.verdict != "PASS":
         return "did not pass its limits", f"Calibrate again: tactile-lab calibrate {_command(record)}"
+    return None
+
+
+def refuse_foreign(path: Path, here: Installation) -> None:
+    """Refuse a stored calibration of another rig or device; plain files do not say whose they are.
+
+    For judging old recordings, where it does not matter whether the calibration may still be used today.
+
+    Raises:
+        ConfigurationError: it is foreign, was changed by hand, or can not be read.
+    """
+    if is_stored(load(path)) and (foreign := _foreign(read_record(path), here)) is not None:
+        what, hint = foreign
+        raise ConfigurationError(what, where=str(path), hint=hint)
+
+
+def _foreign(record: CalibrationRecord, here: Installation) -> tuple[str, str] | None:
+    """How a record belongs to another rig or device, and what to do; None when it does not."""
+    if record.rig != here.rig:
+        return f"is of rig {record.rig}, not of {here.rig}", f"Name a calibration of {here.rig}"
+    for device, serial in record.devices.items():
+        if here.devices.get(device, serial) != serial:
+            reason = f"is of {device} with serial number {serial}, not {here.devices[device]}"
+            return reason, f"Calibrate with the present {device}"
     return None
 
 

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from calibration.admission import Installation
 from calibration.refinement import JointOffset
-from calibration.store import CalibrationRecord, new_record
+from calibration.store import CalibrationRecord, Covariance, new_record
 from drivers.shadow.kinematics import JOINT_INDEX
 from tactile_lab.calibration_file import check_seal, is_stored
 from tactile_lab.errors import ConfigurationError
@@ -176,6 +176,8 @@ def joints_record(
     *,
     trusted: bool = True,
     limits: JointLimits | None = None,
+    offsets: Mapping[str, JointOffset] | None = None,
+    covariance: Covariance | None = None,
 ) -> CalibrationRecord:
     """The record of corrected tables; it fails when a joint is outside its limits.
 
@@ -185,6 +187,8 @@ def joints_record(
         method, here, notes: for the record.
         trusted: whether what the corrections were found from kept to its own limits.
         limits: of the joints.
+        offsets: all joints that contacts were asked for, those that they do not tell too.
+        covariance: of those offsets.
 
     Raises:
         ConfigurationError: the tables can not be used, or a correction is too large to be one.
@@ -197,8 +201,10 @@ def joints_record(
         devices={device: serial for device, serial in here.devices.items() if device == "hand"},
         method=method,
         parameters=corrected_tables(path, corrections),
+        covariance=covariance,
         residuals={joint: found.rms_deg for joint, found in corrections.items()},
-        details={
+        details=_untold(offsets or {})
+        | {
             joint: {
                 "gain": found.gain,
                 "shift_deg": found.shift_deg,
@@ -211,6 +217,15 @@ def joints_record(
         verdict="PASS" if passed else "FAIL",
         notes=notes,
     )
+
+
+def _untold(offsets: Mapping[str, JointOffset]) -> dict[str, Any]:
+    """What is kept of joints whose offset the contacts do not tell: their tables stay as they are."""
+    return {
+        joint: {"told": False, "sigma_deg": float(np.degrees(found.sigma_rad))}
+        for joint, found in offsets.items()
+        if not found.observable
+    }
 
 
 def _refuse_large(corrections: Mapping[str, JointCorrection]) -> None:

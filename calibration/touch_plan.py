@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from gtsam import Pose3, Rot3
@@ -25,8 +26,12 @@ TURNS_rad = tuple(np.radians([-105.0, -35.0, 35.0, 105.0]))
 LEANS_rad = tuple(np.radians([12.0, 22.0]))
 """How far the finger leans against a face, or from the upright on the top."""
 
-_BENT = {"J3": np.radians(85.0), "J2": np.radians(60.0), "J1": np.radians(40.0)}
-_STRETCHED = {"J3": np.radians(8.0), "J2": np.radians(8.0), "J1": np.radians(4.0)}
+Flexion: TypeAlias = tuple[float, float, float]
+
+STRETCHED_rad: Flexion = (float(np.radians(8.0)), float(np.radians(8.0)), float(np.radians(4.0)))
+"""Flexion of J3, J2 and J1 of a finger that points."""
+
+_BENT_rad: Flexion = (float(np.radians(85.0)), float(np.radians(60.0)), float(np.radians(40.0)))
 _THUMB_AWAY = {"THJ5": np.radians(-30.0), "THJ4": 0.1, "THJ3": 0.0, "THJ2": 0.0, "THJ1": 0.0}
 
 
@@ -35,16 +40,23 @@ class PlannedTouch:
     """One touch to make.
 
     Attributes:
-        finger: which one is stretched.
+        finger: which one presses.
         patch: what it presses.
         place_world_m: where, shape (3,).
         world_R_distal: orientation of the fingertip, shape (3, 3).
+        flexion_rad: of the finger's J3, J2 and J1; stretched unless given.
     """
 
     finger: str
     patch: Patch
     place_world_m: Array
     world_R_distal: Array
+    flexion_rad: Flexion = STRETCHED_rad
+
+    @property
+    def joints_rad(self) -> Array:
+        """The hand's joints for it, shape (24,)."""
+        return pointing_vector(self.finger, self.flexion_rad)
 
     @property
     def instruction(self) -> str:
@@ -68,18 +80,22 @@ class PlannedTouch:
         return np.asarray(mount_joints(mount_T_forearm, 0.0))
 
 
-def pointing(finger: str) -> dict[str, float]:
-    """Joint angles with one long finger stretched, the others bent and the thumb aside, radians."""
+def pointing(finger: str, flexion_rad: Flexion = STRETCHED_rad) -> dict[str, float]:
+    """Joint angles with one long finger stretched (or flexed as given), the others and the thumb aside, radians.
+
+    The others are bent away from a finger that points, and stretched above one that is bent.
+    """
     angles = dict(_THUMB_AWAY)
+    away = _BENT_rad if flexion_rad == STRETCHED_rad else (0.0, 0.0, 0.0)
     for other in LONG_FINGERS:
-        shape = _STRETCHED if other == finger else _BENT
-        angles |= {f"{other}{joint}": float(angle) for joint, angle in shape.items()}
+        shape = flexion_rad if other == finger else away
+        angles |= {f"{other}{joint}": angle for joint, angle in zip(("J3", "J2", "J1"), shape, strict=True)}
     return angles
 
 
-def pointing_vector(finger: str) -> Array:
+def pointing_vector(finger: str, flexion_rad: Flexion = STRETCHED_rad) -> Array:
     """:func:`pointing` as a joint vector, shape (24,)."""
-    return joint_vector(pointing(finger))
+    return joint_vector(pointing(finger, flexion_rad))
 
 
 def plan_touches(
@@ -101,7 +117,7 @@ def _of_patch(patch: Patch, fingers: Sequence[str], count: int, number: int) -> 
         turn = TURNS_rad[(index + number) % len(TURNS_rad)]
         lean = LEANS_rad[(index // len(TURNS_rad)) % len(LEANS_rad)]
         place = patch.at(*_spread(index, count))
-        rotation = _orientation(patch, lean, turn, index)
+        rotation = orientation(patch, lean, turn, index)
         yield PlannedTouch(fingers[index % len(fingers)], patch, place, rotation)
 
 
@@ -111,7 +127,7 @@ def _spread(index: int, count: int) -> tuple[float, float]:
     return first, 2.0 * ((index * 0.618033988749895 + 0.3) % 1.0) - 1.0
 
 
-def _orientation(patch: Patch, lean: float, turn: float, index: int) -> Array:
+def orientation(patch: Patch, lean: float, turn: float, index: int) -> Array:
     """The fingertip pointing down, leaning against the face, or to one side and another on a top."""
     normal = patch.normal_world
     if isinstance(patch.target, Plane) and abs(normal[2]) < 0.5:

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from calibration.forearm_wizard import Observation, Planned
 from calibration.observations import HandPose, Touch, View
-from calibration.touch_plan import PlannedTouch, pointing_vector
+from calibration.touch_plan import PlannedTouch
 from calibration.view_plan import PlannedView
 from drivers.camera.boards import CharucoBoard, GridBoard, SingleMarker
 from drivers.camera.markers import MarkerSettings, detect
@@ -95,7 +95,7 @@ class PressingHand:
 
     def _pressed(self, planned: PlannedTouch, captured: Callable[[PlannedTouch], ObservedT]) -> ObservedT:
         """Press what is planned, observe, and go back before the face."""
-        tip, joints = self._tips[planned.finger], pointing_vector(planned.finger)
+        tip, joints = self._tips[planned.finger], planned.joints_rad
         before = planned.base_q(self._world_T_mount, joints, tip, self.settings.stand_off_m)
         behind = planned.base_q(self._world_T_mount, joints, tip, -self.settings.beyond_m)
         self._leave()

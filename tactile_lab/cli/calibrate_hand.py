@@ -1,4 +1,4 @@
-"""``tactile-lab calibrate joints`` and ``calibrate electrodes``: from recorded poses, contacts and counts."""
+"""``tactile-lab calibrate joints`` and ``calibrate electrodes``: from touches of a block, known poses, and counts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,13 @@ import typer
 from tactile_lab.cli.options import Json, NoInput, RigName
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from calibration.joints import JointCorrection
+    from calibration.recordings import ForearmData
+    from tactile_lab.cli.wizard import Asker
+    from tactile_lab.rigs.description import Rig
+    from tactile_lab.workflow.calibrating_joints import FoundJoints, JointRequest
 
 Source = Annotated[Path, typer.Option("--from", help="Recorded data.")]
 Replace = Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")]
@@ -18,8 +24,16 @@ Notes = Annotated[str, typer.Option(help="The operator's notes, kept with the re
 
 
 def joints(
-    source: Source,
+    source: Annotated[
+        Path | None, typer.Option("--from", help="Known poses, or recorded touches, instead of measuring.")
+    ] = None,
     rig: RigName = "sim",
+    block: Annotated[Path | None, typer.Option(help="Geometry file with the block, instead of the rig's.")] = None,
+    fingers: Annotated[str, typer.Option(help="Long fingers that press the block.")] = "FF,MF,RF",
+    rounds: Annotated[int, typer.Option(min=1, help="How often every face is pressed in every posture.")] = 1,
+    settings: Annotated[Path | None, typer.Option(help="Settings: limits, errors, speeds.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Keep the measured touches in this file too.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
     out: Annotated[
         Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/joints.yaml")
     ] = None,
@@ -30,58 +44,83 @@ def joints(
 ) -> None:
     """Correct the offsets and gains in the hand's joint tables.
 
-    From poses whose angles are known (tactile-joint-poses/1: by a jig or a plate), or from touches of one rigid known
-    body with several fingers (tactile-forearm-data/1, as calibrate forearm --record writes them): then those joints
-    are corrected whose offset the contacts tell.
+    Several fingers press one rigid block at a known place, stretched and bent; the forearm has to be calibrated. Those
+    joints are corrected whose offset the contacts tell, the others are named. Or --from: poses whose angles are known
+    (tactile-joint-poses/1: by a jig or a plate), or touches as --record here or in calibrate forearm writes them.
 
     Exit code 0: PASS; 2: the data can not be used; 3: FAIL, outside a limit (kept as NAME.failed.yaml, which sessions
-    refuse).
+    refuse); 4: a device; 130: ended by the operator.
     """
     from calibration.joints import joints_record, judge_joints
+    from calibration.recordings import save_data
     from tactile_lab.cli.calibrate_steps import store_result
-    from tactile_lab.cli.console import say, show_table
     from tactile_lab.cli.wizard import Asker
     from tactile_lab.rigs.description import load_rig
+    from tactile_lab.workflow.calibrating_joints import JointRequest, from_file, from_touches, load_settings
 
-    described = load_rig(rig)
-    method, corrections, trusted = _corrections(source, rig)
-    faults = judge_joints(corrections)
-    rows = [_joint_row(joint, found, faults[joint]) for joint, found in corrections.items()]
+    described, asker, wanted = load_rig(rig), Asker(no_input, "calibrate joints"), load_settings(settings)
+    if source is not None:
+        found = from_file(source, described, wanted)
+    else:
+        names = tuple(name.strip() for name in fingers.split(","))
+        data = _touched(JointRequest(rig, block, names, rounds, seed, wanted), described, asker)
+        if record is not None:
+            save_data(record, data)
+        found = from_touches(data, described, wanted)
+    _show_joints(found, judge_joints(found.corrections, wanted.limits))
+    stored = joints_record(
+        described.files["joints"],
+        found.corrections,
+        found.method,
+        described.installation,
+        notes,
+        trusted=found.trusted,
+        limits=wanted.limits,
+        offsets=found.offsets,
+        covariance=found.covariance,
+    )
+    file = out or Path("calibrations") / described.installation.rig / "joints.yaml"
+    store_result(file, stored, replace, asker, no_input, as_json)
+
+
+def _touched(request: JointRequest, rig: Rig, asker: Asker) -> ForearmData:
+    """Touches of the block, step by step. Raises TactileLabError."""
+    from calibration.recordings import ForearmData
+    from tactile_lab.cli.calibrate_steps import measure_all
+    from tactile_lab.cli.console import say
+    from tactile_lab.workflow.calibrating_joints import joint_wizard
+
+    here = rig.installation
+    with joint_wizard(request) as (wizard, station):
+        say(f"Joints on rig {request.rig}: {len(wizard.plan)} touches of the block", "bold")
+        asker.choose("The hand will move. Stands the block in its place?", {"y": "begin"}, "y")
+        measure_all(wizard, station, asker)
+        return ForearmData(here.rig, dict(here.devices), touches=wizard.touches)
+
+
+def _show_joints(found: FoundJoints, faults: Mapping[str, tuple[str, ...]]) -> None:
+    """The corrections, the joints that nothing tells, and the touches against their limits."""
+    from math import degrees
+
+    from tactile_lab.cli.console import say, show_table
+
+    rows = [_joint_row(joint, correction, faults[joint]) for joint, correction in found.corrections.items()]
+    rows += [
+        [joint, "", f"{degrees(offset.sigma_rad):.2f}", "", "", "", "not told by these contacts: left as it was"]
+        for joint, offset in found.offsets.items()
+        if not offset.observable
+    ]
     columns = ["joint", "shift, deg", "sigma", "gain", "left, deg", "poses", ""]
     show_table("Joints", columns, rows, right=(1, 2, 3, 4, 5))
-    if not trusted:
-        say("the contacts are outside their limits: see tactile-lab calibrate forearm", "bold red")
-    here = described.installation
-    record = joints_record(described.files["joints"], corrections, method, here, notes, trusted=trusted)
-    asker = Asker(no_input, "calibrate joints")
-    store_result(out or Path("calibrations") / here.rig / "joints.yaml", record, replace, asker, no_input, as_json)
+    for judgement in found.judgements:
+        say(f"touches: {judgement}", "dim" if judgement.ok else "bold red")
+    if not found.trusted:
+        say("the contacts are outside their limits", "bold red")
 
 
 def _joint_row(joint: str, found: JointCorrection, faults: tuple[str, ...]) -> list[str]:
     figures = [f"{found.shift_deg:+.2f}", f"{found.sigma_deg:.2f}", f"{found.gain:.3f}", f"{found.rms_deg:.2f}"]
     return [joint, *figures, str(found.poses or ""), "OUTSIDE: " + "; ".join(faults) if faults else "ok"]
-
-
-def _corrections(source: Path, rig: str) -> tuple[str, dict[str, JointCorrection], bool]:
-    """Method, corrections, and whether their data kept to their limits. Raises ConfigurationError."""
-    from calibration.forearm_record import check_origin
-    from calibration.forearm_wizard import solve_forearm
-    from calibration.joints import from_contacts, from_poses, load_poses
-    from calibration.recordings import FORMAT, load_data
-    from tactile_lab.errors import ConfigurationError
-    from tactile_lab.rigs.description import load_rig
-    from tactile_lab.strict_yaml import load
-
-    here, content = load_rig(rig).installation, load(source)
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        return "known poses", from_poses(load_poses(source, here).poses), True
-    data = load_data(source)
-    check_origin(data, here, str(source))
-    if not data.touches:
-        hint = "Record touches: tactile-lab calibrate forearm --method touch --record FILE"
-        raise ConfigurationError("holds pictures, which tell no finger's joints", where=str(source), hint=hint)
-    result = solve_forearm(data)
-    return "contacts", from_contacts(result.solution.offsets), result.quality.passed
 
 
 def electrodes(source: Source, as_json: Json = False, no_input: NoInput = False) -> None:

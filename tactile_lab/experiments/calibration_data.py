@@ -10,7 +10,7 @@ from gtsam import Pose3
 
 from calibration.hand_chain import mount_T_link
 from calibration.observations import HandPose, Touch, View
-from calibration.touch_plan import PlannedTouch, pointing_vector
+from calibration.touch_plan import PlannedTouch
 from calibration.view_plan import PALM_T_BOARD, PlannedView
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.markers import MarkerSettings, marker_corners
@@ -77,7 +77,7 @@ def touches_of(plan: Sequence[PlannedTouch], rig: TrueRig, rng: np.random.Genera
 
 
 def _touch(planned: PlannedTouch, rig: TrueRig, rng: np.random.Generator) -> Touch:
-    tip, joints = TipEllipsoid(), pointing_vector(planned.finger)
+    tip, joints = TipEllipsoid(), planned.joints_rad
     force_N = float(rng.uniform(*FORCES_N))
     base_q = planned.base_q(rig.world_T_mount, joints, tip, -rig.yield_m_N * force_N)
     axes, inward = np.array(tip.semi_axes_m), -planned.world_R_distal.T @ planned.patch.normal_world

@@ -42,6 +42,7 @@ class CalibrationFiles(StrictModel):
         normals: learned contact normals of BioTacs; the skin's at equation 2.24's point without.
         camera, markers: lens, and the markers of the rig; left out for a rig without a camera.
         geometry: what fingertips press to calibrate: edges of the table, a block, marked points.
+        block: a block at a known place, for the joints' calibration.
         board: what the hand shows to the camera to calibrate.
     """
 
@@ -56,6 +57,7 @@ class CalibrationFiles(StrictModel):
     camera: str | None = None
     markers: str | None = None
     geometry: str | None = None
+    block: str | None = None
     board: str | None = None
 
     @model_validator(mode="after")

@@ -1,0 +1,178 @@
+"""The joints' calibration on a rig: a block on its table, the wizard's plan, and the station that presses it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from calibration.block_plan import FINGERS, load_block, plan_block
+from calibration.block_problem import BlockSettings, BlockWizard, is_of_block, solve_block
+from calibration.forearm import load_forearm
+from calibration.forearm_record import check_origin
+from calibration.forearm_wizard import solve_forearm
+from calibration.geometry import Block
+from calibration.joints import JointCorrection, JointLimits, from_contacts, from_poses, load_poses
+from calibration.quality import Judgement
+from calibration.recordings import FORMAT, ForearmData, load_data
+from calibration.refinement import JointOffset
+from calibration.store import Covariance
+from drivers.shadow.posture import LONG_FINGERS
+from drivers.simulation.objects import object_model
+from drivers.simulation.settings import ObjectStart
+from sessions.calibration_station import CalibrationStation, StationSettings
+from sessions.recorder import NullTraffic, Recorder
+from tactile_lab.errors import ConfigurationError
+from tactile_lab.rigs.build import check_calibration
+from tactile_lab.rigs.description import Rig, load_rig
+from tactile_lab.rigs.laboratory import open_laboratory
+from tactile_lab.strict_yaml import StrictModel, load, load_model
+from tactile_lab.workflow.calibrating import cleared, tip_shapes
+
+BLOCK = "box-12x6x6"
+"""The object that a simulated rig has for a block."""
+
+_STEEL_kg = 3.4
+
+
+class JointSettings(StrictModel):
+    """A file of settings for ``calibrate joints``.
+
+    Attributes:
+        block: errors and limits of the touches, and the least of them.
+        limits: what the corrections must keep to.
+        station: how the hand moves.
+    """
+
+    block: BlockSettings = BlockSettings()
+    limits: JointLimits = JointLimits()
+    station: StationSettings = StationSettings()
+
+
+@dataclass(frozen=True)
+class JointRequest:
+    """What a person asks for.
+
+    Attributes:
+        rig: name of a shipped rig, or a rig file.
+        block: geometry file with the block, instead of the rig's.
+        fingers: long fingers that press.
+        rounds: how often every face is pressed in every posture.
+        seed: of a simulated rig.
+        settings: see there.
+    """
+
+    rig: str
+    block: Path | None = None
+    fingers: tuple[str, ...] = FINGERS
+    rounds: int = 1
+    seed: int = 0
+    settings: JointSettings = field(default_factory=JointSettings)
+
+
+@dataclass(frozen=True, eq=False)
+class FoundJoints:
+    """Corrections, and what they were found from.
+
+    Attributes:
+        method: in words.
+        corrections: by joint.
+        trusted: whether the data kept to their own limits.
+        offsets: all joints that contacts were asked for, the unobservable ones too.
+        covariance: of those offsets.
+        judgements: of the touches.
+    """
+
+    method: str
+    corrections: Mapping[str, JointCorrection]
+    trusted: bool = True
+    offsets: Mapping[str, JointOffset] = field(default_factory=dict)
+    covariance: Covariance | None = None
+    judgements: tuple[Judgement, ...] = ()
+
+
+def load_settings(path: Path | None) -> JointSettings:
+    """A file of settings; the usual ones without. Raises ConfigurationError."""
+    return JointSettings() if path is None else load_model(path, JointSettings)
+
+
+def from_file(source: Path, rig: Rig, settings: JointSettings) -> FoundJoints:
+    """Corrections from known poses or recorded touches. Raises ConfigurationError."""
+    here, content = rig.installation, load(source)
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        return FoundJoints("known poses", from_poses(load_poses(source, here).poses))
+    data = load_data(source)
+    check_origin(data, here, str(source))
+    if not data.touches:
+        hint = "Record touches: tactile-lab calibrate joints --record FILE"
+        raise ConfigurationError("holds pictures, which tell no finger's joints", where=str(source), hint=hint)
+    return from_touches(data, rig, settings)
+
+
+def from_touches(data: ForearmData, rig: Rig, settings: JointSettings) -> FoundJoints:
+    """Corrections of the joints that touches tell: of a block alone by the forearm's calibration, else with it.
+
+    Raises:
+        ConfigurationError: too few touches, or they tell no joint.
+    """
+    if is_of_block(data.touches):
+        found = solve_block(data.touches, load_forearm(rig.files["forearm"]), settings.block)
+        told = from_contacts(found.offsets)
+        return FoundJoints("contacts of a block", told, found.passed, found.offsets, found.covariance, found.judgements)
+    result = solve_forearm(data)
+    offsets, quality = result.solution.offsets, result.quality
+    return FoundJoints("contacts", from_contacts(offsets), quality.passed, offsets, None, quality.judgements)
+
+
+@contextmanager
+def joint_wizard(request: JointRequest) -> Iterator[tuple[BlockWizard, CalibrationStation]]:
+    """A wizard with a connected station; the hand is lifted off and everything closed in the end.
+
+    Raises:
+        ConfigurationError: the rig lacks what is needed, or a finger can not press alone.
+        DeviceError: the rig is not ready.
+    """
+    rig = load_rig(request.rig)
+    check_calibration(rig)
+    block, tips = _block(rig, request), tip_shapes(rig)
+    if unknown := sorted(set(request.fingers) - (set(LONG_FINGERS) & set(tips))):
+        hint = f"Press with some of {', '.join(LONG_FINGERS)} that have a calibrated fingertip"
+        raise ConfigurationError(f"{', '.join(unknown)} can not press alone", where="--fingers", hint=hint)
+    world_T_mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
+    wizard = BlockWizard(plan_block(block, request.fingers, request.rounds), request.settings.block)
+    with open_laboratory(_with_block(rig, block), request.seed, BLOCK) as laboratory:
+        bench = laboratory.bench(Recorder(NullTraffic()))
+        bench.connect()
+        try:
+            station = CalibrationStation(bench, world_T_mount, tips, request.settings.station)
+            yield wizard, station
+            station.close()
+        finally:
+            bench.close()
+
+
+def _block(rig: Rig, request: JointRequest) -> Block:
+    if request.block is None and "block" not in rig.files:
+        hint = "State its size and place in a file and name it with --block, or give known poses with --from"
+        raise ConfigurationError("no block of known place is named", where=rig.source, hint=hint)
+    return load_block(request.block or rig.files["block"])
+
+
+def _with_block(rig: Rig, block: Block) -> Rig:
+    """A simulated rig with its block where the file says, too heavy to be pushed; a real one as it is.
+
+    Raises:
+        ConfigurationError: a simulated rig has no such block.
+    """
+    if rig.description.kind != "simulated":
+        return rig
+    size_m = np.ptp(object_model(BLOCK).mesh.bounds, axis=0)
+    if not np.allclose(size_m, block.size_m, atol=1e-6):
+        what = "the simulated block is " + " x ".join(f"{1e3 * side:.0f}" for side in size_m) + " mm"
+        raise ConfigurationError(what, where=rig.source, hint="State that size")
+    place, yaw = block.world_T_block.translation_m, block.world_T_block.pose().rotation().yaw()
+    start = ObjectStart(x_m=place[0], y_m=place[1], yaw_rad=float(yaw))
+    return cleared(rig, {"start": start, "object_mass_kg": _STEEL_kg})
