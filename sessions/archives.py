@@ -9,6 +9,7 @@ from __future__ import annotations
 import shutil
 import stat
 import zipfile
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO
@@ -52,7 +53,8 @@ def export_archive(session: Session, path: Path) -> int:
     except FileExistsError as error:
         raise SessionError("exists already", where=str(path), hint="Choose another name") from error
     except OSError as error:
-        path.unlink(missing_ok=True)
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
         raise SessionError(f"can not be written ({error.strerror})", where=str(path), hint="Check the disk") from error
     return len(files)
 

@@ -310,14 +310,15 @@ def test_killed_page_costs_messages_and_nothing_else() -> None:
     assert not alive(pid)
 
 
-def test_recording_is_whole_when_its_page_is_killed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGSTOP])
+def test_recording_is_whole_when_its_page_is_killed_or_hangs(tmp_path: Path, way: signal.Signals) -> None:
     session = create_session(tmp_path, rig="sim", rig_description={}, object_name="box")
     with session, ViewFeed("127.0.0.1", 0, "", "test") as feed:
         session.recorder.watched_by(feed)
         for stamp in range(3 * QUEUE_LENGTH):
             if stamp == 5:
                 assert feed.pid is not None
-                os.kill(feed.pid, signal.SIGKILL)
+                os.kill(feed.pid, way)
             session.recorder.event(stamp, Level.INFO, "test", "x" * 2000)
         assert feed.dropped > 0
     assert session.manifest.status == "closed"
