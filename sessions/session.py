@@ -88,16 +88,6 @@ class Session:
             raise SessionError("changed since it was recorded", where=str(path), hint="Restore the recorded file")
         return path
 
-    def calibration_changes(self) -> list[str]:
-        """Roles whose calibration copy is missing or not the recorded one any more."""
-        changed = []
-        for role in self.manifest.calibration:
-            try:
-                self.calibration_file(role)
-            except SessionError:
-                changed.append(role)
-        return changed
-
     @property
     def being_recorded(self) -> bool:
         """Whether a living program is recording into it."""

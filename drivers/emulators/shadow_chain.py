@@ -115,11 +115,6 @@ class EmulatedHand:
         """The palm's slave controller."""
         return self.ring.slaves[1]
 
-    @property
-    def bridge_slave(self) -> SlaveController:
-        """The bridge's slave controller."""
-        return self.ring.slaves[0]
-
 
 def emulated_hand(
     clock: Clock,

@@ -50,10 +50,6 @@ class Joint:
     points_m: Array
     sigma_m: Array
 
-    @property
-    def is_corner(self) -> bool:
-        return len(self.points_m) == 1
-
 
 class JointMaker:
     """Joints between successive faces.
