@@ -93,12 +93,16 @@ def load_camera(path: Path) -> CameraCalibration:
     Raises:
         ConfigurationError: the file can not be read, or is no calibration.
     """
+    return _opencv(path) if is_opencv(path) else load_parameters(path, CameraCalibration)
+
+
+def is_opencv(path: Path) -> bool:
+    """Whether a file has OpenCV's head, which says not whose lens it is. Raises ConfigurationError."""
     try:
         with path.open("rb") as file:
-            head = file.read(9)
+            return file.read(9) == b"%YAML:1.0"
     except OSError as error:
         raise ConfigurationError(f"cannot be read ({error.strerror})", where=str(path)) from error
-    return _opencv(path) if head == b"%YAML:1.0" else load_parameters(path, CameraCalibration)
 
 
 def _opencv(path: Path) -> CameraCalibration:

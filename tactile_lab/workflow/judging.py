@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from drivers.camera.calibration import load_camera
+from calibration.admission import refuse_foreign
+from drivers.camera.calibration import is_opencv, load_camera
 from drivers.camera.markers import MarkerSettings
 from sessions.manifest import write_whole
 from sessions.progress import NullProgress, Progress
@@ -176,10 +177,13 @@ def marker_detector(session: Session, rig: Rig, choice: TruthChoice | None = Non
     """Finds the object in what the session's camera sent; None for a rig without a camera.
 
     Raises:
-        ConfigurationError: the chosen or recorded calibration can not be used.
+        ConfigurationError: the chosen or recorded calibration can not be used, or is of another rig.
         SessionError: the recording can not be read.
     """
     choice = choice or TruthChoice()
+    for chosen in (choice.lens, choice.markers):
+        if chosen is not None and not is_opencv(chosen):
+            refuse_foreign(chosen, rig.installation)
     if "camera" not in rig.files and choice.lens is None:
         return None
     where = f"{session.folder}/session.yaml"

@@ -14,7 +14,9 @@ import pytest
 import yaml
 from scipy.stats import t as student
 
+from calibration.store import read_record, write_record
 from tactile_lab.evaluation.trajectory import COLUMNS
+from tactile_lab.rigs.description import load_rig
 from tests.system.conftest import call_inside
 
 POSITION = ("pose", "rmse_mm")
@@ -102,6 +104,23 @@ def test_all_results_of_one_session_are_compared_when_it_is_judged_elsewhere(
     assert "odometry, 2-D" in answer.err
     assert "truth    first: from corners" in answer.err
     assert "clocks   first: camera to hand" in answer.err
+
+
+@pytest.mark.parametrize(
+    ("spoil", "told"),
+    [
+        (lambda lens: write_record(lens, read_record(lens).model_copy(update={"rig": "another"})), "is of rig another"),
+        (lambda lens: lens.write_text(lens.read_text().replace("focal_px: [", "focal_px: [1")), "changed"),
+    ],
+    ids=["another rig", "by hand"],
+)
+def test_a_lens_of_another_rig_or_changed_by_hand_gives_no_truth(
+    inside: Any, laboratory: Path, tmp_path: Path, spoil: Any, told: str
+) -> None:
+    lens = Path(shutil.copy(load_rig("sim").files["camera"], tmp_path / "lens.yaml"))
+    spoil(lens)
+    answer = inside("evaluate", "first", "--root", laboratory, "--results", "results", "--lens", lens)
+    assert (answer.code, told in answer.err) == (2, True), answer.err
 
 
 @pytest.mark.parametrize(
