@@ -10,6 +10,8 @@ from drivers.shadow.ethercat_link import EthercatLink
 from drivers.shadow.first_move import check_motor_map
 from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_samples import HandSample
+from drivers.shadow.hand_setup import HandSetup
+from drivers.shadow.motor_data import SlowData
 from drivers.shadow.motors import MotorMap
 from drivers.shadow.palm_codec import SENSORS
 from drivers.shadow.pysoem_link import PysoemLink
@@ -19,6 +21,7 @@ from tactile_lab.rigs.findings import TOLERATED_LOSS, Finding
 from tactile_lab.rigs.hand_rig import HandRig
 
 LISTEN_ns = 1_500_000_000
+_ONCE = -2.0  # in the words of motor_data_polling.yaml
 _COUNTS = range(1, 4095)
 _JOINT_CHANNELS = 26
 
@@ -34,7 +37,7 @@ def check_hand(rig: HandRig, clock: Clock, *, move: bool = False) -> list[Findin
     Raises:
         ConfigurationError: a file the rig names, or a master that is not installed.
     """
-    setup = rig.setup
+    setup = _asking_who(rig.setup)
     link = setup.link(clock)
     hand = setup.device(link, clock, set_up_boards=False)
     try:
@@ -47,6 +50,13 @@ def check_hand(rig: HandRig, clock: Clock, *, move: bool = False) -> list[Findin
         return [Finding("hand", False, str(error))]
     finally:
         _close(hand)
+
+
+def _asking_who(setup: HandSetup) -> HandSetup:
+    """The same hand, whose motors are also asked once for what never changes, such as their firmware."""
+    settings = setup.settings()
+    polling = settings.polling.model_copy(update={"slow_data": _ONCE})
+    return setup.model_copy(update={"hand": settings.model_copy(update={"polling": polling}), "rates": None})
 
 
 def _motor_map(hand: ShadowHand, motors: MotorMap, clock: Clock, cycle_s: float) -> Finding:
@@ -105,12 +115,21 @@ def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
     figures = f"{int(heard.sum())} of 20 answer, warmest {motors.names[hottest]} {temperature[hottest]:.0f} C"
     if np.isfinite(supply).any():
         figures += f", supply {np.nanmin(supply):.1f} V"
-    told = {
+    revisions = _firmware(sample)
+    figures += f", firmware revision {revisions}" if revisions else ""
+    told: dict[str, float | str] = {
+        "firmware": revisions,
         "warmest_C": float(temperature[hottest]),
         "answering": float(heard.sum()),
         "spare_us": float(sample.idle_us),
     }
     return Finding("motors", not problems and bool(heard.all()), "; ".join((*problems, figures)), told)
+
+
+def _firmware(sample: HandSample) -> str:
+    """Revisions of the motors' firmware, which should be one."""
+    revisions = sample.motor.slow[SlowData.SVN_REVISION]
+    return ", ".join(f"{revision:.0f}" for revision in np.unique(revisions[np.isfinite(revisions)]))
 
 
 def _joints(sample: HandSample) -> Finding:

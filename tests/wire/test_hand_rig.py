@@ -39,7 +39,7 @@ def test_a_sound_hand_is_told_part_by_part(tmp_path: Path) -> None:
     assert set(findings) == {"ring", "cycle", "motors", "joint sensors"}
     assert findings["ring"].detail == "hand 634, palm 0220 revision 1, in operation, no watchdog"
     assert "20 of 20 answer, warmest" in findings["motors"].detail
-    assert "supply 24.0 V" in findings["motors"].detail
+    assert "supply 24.0 V, firmware revision 1200" in findings["motors"].detail
     assert findings["joint sensors"].ok
     assert "without a status" in findings["cycle"].detail
 
