@@ -13,13 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from gtsam import Pose2, Pose3, Rot3
+from numpy.typing import NDArray
 
 from drivers.shadow.closing import closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.conductor import holds
 from sessions.cycle_settings import CycleSettings
 from sessions.grasp_cycle import GraspPlan, evaded
-from sessions.hand_candidates import grasp_time_s, table_of
+from sessions.hand_candidates import Verdicts, grasp_time_s, table_of
 from sessions.motion import GraspFrame
 from sessions.planner import Reorientation
 from sessions.touching import TAP, TAP_HEIGHT_m
@@ -158,7 +159,7 @@ class KinematicHand:
                 found.append(replace(self._measured(finger, places[levels[index], index]), probed=True))
         return found
 
-    def _coming_down(self, centres_world_m: Array, lowest_m: float) -> tuple[Array, Array]:
+    def _coming_down(self, centres_world_m: Array, lowest_m: float) -> tuple[Array, Verdicts]:
         """Places (n, 5, 3) of fingertips on their way down, and which of them touch there, (n, 5)."""
         heights_m = np.arange(self._cycle.lift_m + lowest_m, lowest_m - 1e-9, -_DESCENT_STEP_m)
         places = np.repeat(centres_world_m[None], len(heights_m), axis=0)
@@ -188,12 +189,12 @@ class KinematicHand:
                 lines.append(ClosingLine(finger, foremost, end + self._radius_m * way, touched=False))
         return contacts, tuple(lines)
 
-    def _stops(self, places: Array, meets: Array) -> tuple[Array, Array]:
+    def _stops(self, places: Array, meets: Verdicts) -> tuple[NDArray[np.intp], Verdicts]:
         """Step at which each finger stops, and whether it does so on the object: all close together."""
-        stops, touched, moving = np.zeros(5, dtype=int), np.zeros(5, dtype=bool), np.ones(5, dtype=bool)
+        stops, touched, moving = np.zeros(5, dtype=np.intp), np.zeros(5, dtype=bool), np.ones(5, dtype=bool)
         for step in range(len(places)):
             stops[moving] = step
-            touched |= moving & meets[step].astype(bool)
+            touched |= moving & meets[step]
             now = places[stops, np.arange(5)]
             gaps = np.linalg.norm(now[:4] - now[4], axis=1)
             near = np.append(gaps, gaps.min()) < self._cycle.finger_gap_m
