@@ -22,7 +22,7 @@ from tactile_lab.clock import NANOSECONDS
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.strict_yaml import StrictModel, load_model
 
-_EVERY_TURN, AT_FIRST = -1.0, -2.0
+_EVERY_TURN, _AT_FIRST = -1.0, -2.0
 
 _KINDS: dict[str, FromMotor] = {
     "flags": FromMotor.FLAGS,
@@ -68,9 +68,9 @@ class PollingRates(StrictModel):
     @model_validator(mode="after")
     def _meaningful(self) -> PollingRates:
         for name, rate in self.model_dump(exclude_none=True).items():
-            if rate <= 0.0 and rate not in (_EVERY_TURN, AT_FIRST):
+            if rate <= 0.0 and rate not in (_EVERY_TURN, _AT_FIRST):
                 raise ValueError(f"{name}: a rate is -1, -2 or a period above 0 s")
-        if self.flags == AT_FIRST or self.flags > 1.0 or self.temperature == AT_FIRST:
+        if self.flags == _AT_FIRST or self.flags > 1.0 or self.temperature == _AT_FIRST:
             raise ValueError("flags and temperature have to be asked again and again")
         return self
 
@@ -82,7 +82,7 @@ class PollingRates(StrictModel):
     @property
     def at_first(self) -> tuple[FromMotor, ...]:
         """Turns after connecting; the slow data come one after the other in as many turns as there are."""
-        once = self._with(AT_FIRST)
+        once = self._with(_AT_FIRST)
         slow = (FromMotor.SLOW_MISC,) * (len(SlowData) - 1 if FromMotor.SLOW_MISC in once else 0)
         return tuple(kind for kind in once if kind is not FromMotor.SLOW_MISC) + slow
 
