@@ -22,7 +22,7 @@ FINGERS = ("FF", "MF", "RF")
 
 FLEXIONS_rad: tuple[Flexion, ...] = (
     STRETCHED_rad,
-    (0.1, float(np.radians(35.0)), float(np.radians(21.0))),
+    (0.1, float(np.radians(45.0)), float(np.radians(27.0))),
     (0.1, float(np.radians(55.0)), float(np.radians(33.0))),
 )
 """Stretched, and bent beyond the knuckle, where a finger's last two joints share their travel about so."""
