@@ -44,7 +44,7 @@ def check_seal(content: Mapping[str, Any], where: str) -> None:
         hint = "Use the version of tactile-lab that wrote it, or calibrate again"
         raise ConfigurationError(f"has the form {content.get('format')}, not {FORMAT}", where=where, hint=hint)
     if content.get(SEAL) != seal_of(content):
-        hint = "Restore the file, or calibrate again; figures one knows are entered with calibrate forearm --manual"
+        hint = "Restore the file, or calibrate again (a known pose: calibrate forearm --method manual)"
         raise ConfigurationError("was changed by hand: its content does not fit its hash", where=where, hint=hint)
 
 
