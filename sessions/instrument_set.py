@@ -53,7 +53,7 @@ class InstrumentSet:
         named = {"hand": self._hand, "base": self._base, **self._wrench_devices, "camera": self._camera}
         if isinstance(self._hand, CyclingInstrument) and not ask:
             del named["hand"]
-        found = []
+        found: list[str] = []
         for name, device in named.items():
             if isinstance(device, WatchedInstrument):
                 with suppress(DeviceError):  # one that is gone has said so
