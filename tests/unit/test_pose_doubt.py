@@ -8,19 +8,23 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tactile_lab.experiments import spatial_data
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.choice import best_shape
+from tactile_lab.shape.choice import GpisShape, best_shape
 from tactile_lab.shape.polyhedron import Polyhedron
 from tactile_lab.shape.polyhedron_planes import fit_planes, weighted_contacts
 from tactile_lab.shape.prism import Prism
+from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.shape.standing_field import StandingField
 from tactile_lab.shape.surface import SurfaceMesh
-from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.facet_certainty import FacetCertainty
 from tactile_lab.tracking.facet_smoothing import tangents
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.pose_doubt import with_pose_doubt
 from tactile_lab.tracking.pose_evidence import PoseEvidence
+from tactile_lab.tracking.spatial_rows import SPATIAL
 from tests.support.simulated_contacts import true_map
 
 NOISE = MotionNoise()
@@ -106,3 +110,17 @@ def test_faces_at_right_angles_stay_so_whatever_the_poses_do() -> None:
     assert np.abs(turned[:, 2]).max() < 1e-4
     change = turned @ normals.T + normals @ turned.T
     assert np.abs(change).max() < 0.1 * np.abs(turned).max()
+
+
+def test_an_object_held_free_in_space_is_doubted_too() -> None:
+    data = spatial_data.simulate("ellipsoid", 0, motion="free", motion_scale=0.5, count=8)
+    placed = []
+    for grasp, pose in zip(data.grasps, data.world_T_body, strict=True):
+        contacts, motion = ContactSet.of_grasp(grasp, 3, 0.0), SPATIAL.row(grasp.hand_motion_world)
+        placed.append(PlacedGrasp(contacts, SPATIAL.row(pose), np.eye(6) * 1e-6, motion))
+    held = ContactMap(tuple(placed), GpisSettings(), SPATIAL)
+    model = GpisShape(held.fit())
+    given = model.mesh(COARSE_m)
+    doubtful = with_pose_doubt(given, model, held, NOISE)
+    added_mm = 1e3 * np.sqrt(np.median(doubtful.sigma_m**2 - given.sigma_m**2))
+    assert 0.05 < added_mm < 3.0
