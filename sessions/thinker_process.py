@@ -20,6 +20,7 @@ from tactile_lab.clock import Clock, VirtualClock
 from tactile_lab.errors import DeviceError, SessionError
 
 NAME = "estimation"
+_START_s = 120.0
 _HOME_s = 60.0
 """The estimation's last step may still be on its way when the session ends; it is thrown away after this."""
 
@@ -44,8 +45,14 @@ class ThinkerProcess:
         return self._child.process_id
 
     def __enter__(self) -> Self:
+        """Start the process and wait until it can think: starting is the one thing of it that disturbs cycles.
+
+        Raises:
+            SessionError: it does not start.
+        """
         try:
             self._child.start({"thinker": self._start})
+            self._child.ready(_START_s)
         except DeviceError as error:
             raise self._gone() from error
         return self

@@ -43,6 +43,7 @@ def main() -> None:
     threading.Thread(target=_read, args=(OrderReader(sys.stdin.fileno()), waiting), daemon=True).start()
     with threadpool_limits(limits=1, user_api="blas"):
         thinker: Thinker = unpacked(waiting.get()["thinker"])
+        say({"ready": True})
         while True:
             say(_answer(thinker, waiting.get()["question"]))
 

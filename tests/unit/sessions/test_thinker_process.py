@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -70,10 +71,10 @@ class EstimateSink:
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
         wanted = {schemas.SLAM_STATE_TOPIC, schemas.SLAM_SURFACE_TOPIC, schemas.PLAN_TOPIC, schemas.DECISION_TOPIC}
         if topic in wanted:
-            content = schemas.json.loads(data)
+            content = json.loads(data)
             del content["timestamp"]
             content.pop("seconds", None)
-            self.kept.append((topic, schemas.json.dumps(content)))
+            self.kept.append((topic, json.dumps(content)))
 
 
 class UndoesOnce(PolicyDecisions):
@@ -116,12 +117,12 @@ class Run:
         content = {"grasps": self.grasps, "cycle": QUICK, "fixed_grasps": 1, **exploration}
         self.settings = validate(content, ConductorSettings, where="test")
         self.world, self.sink = DiscWorld(Disc(np.array([0.005, -0.004]))), EstimateSink()
-        self.world.clock, self.world.recorder = self.clock, Recorder(self.sink)
-        self.crew: Crew = autonomous_crew(self.world, self.slam, self.settings, seed=3)
+        self.world.clock, self.world.recorder = self.clock, Recorder(self.sink)  # type: ignore[assignment]
+        self.crew: Crew = autonomous_crew(self.world, self.slam, self.settings, seed=3)  # type: ignore[arg-type]
 
     def go(self, watcher: NullProgress | None = None) -> SessionOutcome:
         with self.crew.thinking:
-            return Conductor(self.world, self.settings, self.crew, watcher).run()
+            return Conductor(self.world, self.settings, self.crew, watcher).run()  # type: ignore[arg-type]
 
     @property
     def process(self) -> ThinkerProcess:
@@ -145,7 +146,7 @@ def has_ended(process_id: int) -> bool:
 
 def everything(clock: Any) -> tuple[list[tuple[str, str]], list[bytes], list[bytes], bytes, Any]:
     run = Run(clock, slam(), policy="clusters")
-    decisions = UndoesOnce(run.crew.thinking, recorded_by(run.world))
+    decisions = UndoesOnce(run.crew.thinking, recorded_by(run.world))  # type: ignore[arg-type]
     run.crew = replace(run.crew, decisions=decisions)
     outcome = run.go()
     assert outcome.ending is Ending.COMPLETE, outcome.reason
@@ -210,7 +211,8 @@ class Idle:
     """Cycles of a session that waits; the next one fails when it is told to."""
 
     def __init__(self) -> None:
-        self.cycles, self.error = 0, None
+        self.cycles = 0
+        self.error: BaseException | None = None
 
     def __call__(self) -> None:
         self.cycles += 1
