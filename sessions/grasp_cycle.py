@@ -156,12 +156,7 @@ class GraspCycle:
 
     def capture(self) -> Grasp:
         """Gather samples, make a grasp of them, and take a picture of the object as it is held."""
-        bench = self._motion.bench
-        bench.begin_capture()
-        self._motion.wait(self.settings.capture_s)
-        grasp = bench.end_capture()
-        bench.truth_frame(self._motion.tick)
-        return grasp
+        return self._motion.capture(self.settings.capture_s)
 
     # --- carry -------------------------------------------------------------------------------------------------
 

@@ -20,7 +20,7 @@ from drivers.shadow.posture import TipEllipsoid
 from sessions.bench import Bench
 from sessions.safety import SafetySupervisor
 from tactile_lab.clock import NANOSECONDS
-from tactile_lab.geometry.contacts import FINGERS, Array
+from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
 
 _STRAIGHT_WRIST = forearm_T_palm(np.zeros(len(JOINTS)))
 _WITHDRAW_s = 0.15  # a positioner follows its targets late: back by more than it is behind
@@ -92,6 +92,14 @@ class Motion:
         """Cycles for a time."""
         for _ in range(self.cycles(duration_s)):
             self.tick()
+
+    def capture(self, seconds: float) -> Grasp:
+        """Gather samples for so long, make a grasp of them, and take a picture of the object as it is held."""
+        self.bench.begin_capture()
+        self.wait(seconds)
+        grasp = self.bench.end_capture()
+        self.bench.truth_frame(self.tick)
+        return grasp
 
     def cycles(self, duration_s: float) -> int:
         """Whole cycles in a duration, at least one."""

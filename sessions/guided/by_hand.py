@@ -73,12 +73,7 @@ class GraspByHand:
 
     def capture(self) -> Grasp:
         self._desk.enter(Stage.CAPTURE, "Capturing: hold still")
-        bench = self._motion.bench
-        bench.begin_capture()
-        self._motion.wait(self.settings.capture_s)
-        grasp = bench.end_capture()
-        bench.truth_frame(self._motion.tick)
-        return grasp
+        return self._motion.capture(self.settings.capture_s)
 
     def squeeze(self, touching: frozenset[str]) -> None:
         """The person squeezes."""
