@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,7 +40,8 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
         write_contact_log(log, contacts)
         read_contact_log(log)  # refuses normals that point inward
     except TactileLabError as error:
-        log.unlink(missing_ok=True)
+        with suppress(OSError):
+            log.unlink(missing_ok=True)
         if isinstance(error, ConfigurationError):
             raise ConfigurationError(error.what, where=str(file), hint=error.hint) from error
         raise
