@@ -93,7 +93,8 @@ def _show(data: FingertipData, fit: FingertipFit, limits: FingertipLimits) -> No
     from math import degrees
 
     from calibration.fingertip_record import judge_fingertip
-    from tactile_lab.cli.console import show_facts, show_table
+    from tactile_lab.cli.calibration_tables import show_quality
+    from tactile_lab.cli.console import show_facts
 
     new = fit.calibration
     facts = [
@@ -105,11 +106,7 @@ def _show(data: FingertipData, fit: FingertipFit, limits: FingertipLimits) -> No
         ("semi-axes", _millimetres(new.semi_axes_m)),
     ]
     show_facts(f"Fingertip {data.finger}", facts)
-    rows = [
-        [j.name, f"{j.value:.2f} {j.unit}", f"{j.limit:.2f}", "ok" if j.ok else "OUTSIDE"]
-        for j in judge_fingertip(fit, limits)
-    ]
-    show_table("Quality", ["", "is", "limit", ""], rows, right=(1, 2))
+    show_quality(judge_fingertip(fit, limits))
 
 
 def _millimetres(values: tuple[float, float, float]) -> str:

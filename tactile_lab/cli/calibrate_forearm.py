@@ -171,6 +171,7 @@ def show_result(result: ForearmResult) -> None:
     """Residuals of every pose, the figures against their limits, and the transform."""
     from math import degrees
 
+    from tactile_lab.cli.calibration_tables import show_quality
     from tactile_lab.cli.console import show_table
 
     rows = [
@@ -185,11 +186,7 @@ def show_result(result: ForearmResult) -> None:
     ]
     show_table("Residuals", ["pose", "mm", "deg", "px", ""], rows, right=(1, 2, 3))
     _show_pose(result)
-    figures = [
-        [j.name, f"{j.value:.2f} {j.unit}", f"{j.limit:.2f}", "ok" if j.ok else "OUTSIDE"]
-        for j in result.quality.judgements
-    ]
-    show_table("Quality", ["", "is", "limit", ""], figures, right=(1, 2))
+    show_quality(result.quality.judgements)
 
 
 def _show_pose(result: ForearmResult) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from calibration.quality import Judgement
 from calibration.store import CalibrationRecord
-from tactile_lab.cli.console import say, show_facts
+from tactile_lab.cli.console import say, show_facts, show_table
 
 _LONGEST = 12
 _LONGEST_TEXT = 200
@@ -34,6 +35,12 @@ def show_record(title: str, record: CalibrationRecord) -> None:
 def tell_verdict(record: CalibrationRecord) -> None:
     """PASS or FAIL, in its colour."""
     say(record.verdict, "bold green" if record.verdict == "PASS" else "bold red")
+
+
+def show_quality(judgements: Iterable[Judgement]) -> None:
+    """Figures against their limits."""
+    rows = [[j.name, f"{j.value:.2f} {j.unit}", f"{j.limit:.2f}", "ok" if j.ok else "OUTSIDE"] for j in judgements]
+    show_table("Quality", ["", "is", "limit", ""], rows, right=(1, 2))
 
 
 def _lines(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
