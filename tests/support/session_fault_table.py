@@ -30,7 +30,8 @@ Told: what its events and its record say, with the figures at the end.
 def row(rig: str, link: str, fault: str, swept: Swept) -> str:
     """One line of the table."""
     went = f"ends after {swept.after_s:.2f} s: {swept.ended}" if swept.ended else "goes on"
-    told = "; ".join(swept.told) or BLIND[link].get(fault, "harmless")
+    unseen = "as it ended" if swept.ended else BLIND[rig][link].get(fault, "harmless")
+    told = "; ".join(swept.told) or unseen
     cells = (rig, link, fault, str(swept.struck), went, told, swept.replay)
     return f"| {' | '.join(' '.join(cell.split()) for cell in cells)} |\n"
 

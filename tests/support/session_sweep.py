@@ -49,20 +49,27 @@ LAYOUTS: dict[str, dict[str, MessageLayout]] = {
 }
 """Rigs, their links, and what the faults must know of the messages."""
 
-BLIND: dict[str, dict[str, str]] = {
-    "hand": {**TestHand.blind, **TestBioTacInThePalm.blind},
-    "base": TestPositioner.blind,
-    "ft/MF": TestNetBox.blind,
-    "camera": TestCamera.blind,
+BLIND: dict[str, dict[str, dict[str, str]]] = {
+    "sim": {
+        "hand": TestHand.blind,
+        "base": TestPositioner.blind,
+        "ft/MF": TestNetBox.blind,
+        "camera": TestCamera.blind,
+    },
+    "sim-biotac": {
+        "hand": TestBioTacInThePalm.blind,
+        "base": TestPositioner.blind,
+        "camera": TestCamera.blind,
+    },
 }
-"""What the devices can not see, and why, by link."""
+"""What the devices can not see, and why, by rig and link."""
 
 STRIKES_AT_s = 7.0
 """When the faults strike: in a session of one grasp the fingers are closing then."""
 
-LONGEST_s = {"hand": 0.5, "base": 0.5, "ft/MF": 0.5, "camera": 1.5}
+LONGEST_s = {"hand": 1.0, "base": 0.5, "ft/MF": 0.5, "camera": 1.5}
 """From the fault to the session's end, where it ends: ten lost cycles, 0.2 s without a fingertip, a second for a
-picture, and the cycles that stop the hand."""
+picture, and the cycles that stop the hand. A finger whose angle seems to stand still is stopped by force."""
 
 HANGS_AFTER = 60_000
 """Readings of one link; a session of one grasp needs some thousand."""
@@ -188,8 +195,13 @@ def _told(session: Session) -> Iterator[str]:
     for _, level, words in _events(session):
         if level > 2 and "in all: " in words:
             yield words.replace("in all: ", "")
-    for kind, number in session.manifest.data_loss.items():
-        yield f"{number} {kind}"
+    lost: dict[str, list[tuple[str, int]]] = {}
+    for name, number in session.manifest.data_loss.items():
+        kind, _, topic = name.partition(" /")
+        lost.setdefault(kind, []).append((topic, number))
+    for kind, found in lost.items():
+        where = f"/{found[0][0]}" if len(found) == 1 and found[0][0] else f"in {len(found)} topics"
+        yield f"{sum(number for _, number in found)} {kind} {where if found[0][0] else ''}".strip()
 
 
 def _replayed(session: Session) -> str:
