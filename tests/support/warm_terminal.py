@@ -13,7 +13,7 @@ import pexpect
 from pexpect import fdpexpect
 
 PROGRAM = Path(__file__).with_name("warm_program.py")
-PATIENCE_s = 300
+PATIENCE_s = 200
 INTERRUPT = "\x03"
 ENVIRONMENT = {
     **os.environ,
@@ -34,6 +34,8 @@ class WarmProgram:
         return self
 
     def __exit__(self, *error: object) -> None:
+        if error[0] is not None:  # what still runs waits for an answer that never comes
+            self._process.kill()
         self._process.communicate(timeout=PATIENCE_s)
 
     def terminal(self, folder: Path, *words: object) -> Terminal:

@@ -25,22 +25,14 @@ from tactile_lab.rigs.description import load_rig
 from tests.support.warm_terminal import INTERRUPT, Terminal, WarmProgram
 
 RIG = load_rig("sim")
-FAST = {
-    "travel_m_s": 0.6,
-    "turn_rad_s": 3.0,
-    "press_m_s": 0.05,
-    "again_m_s": 0.01,
-    "settle_s": 0.15,
-    "capture_s": 0.2,
-    "fingers_rad_s": 3.0,
-}
+FAST = {"travel_m_s": 0.5, "turn_rad_s": 2.4, "press_m_s": 0.04, "settle_s": 0.2, "fingers_rad_s": 2.0}
 OLD = "an older result\n"
 MEASURED_deg = {0: 1.1, 45: 46.0, 90: 91.2}
 
 FOREARM = ("forearm", "--touches", 3, "--settings", "fast.yaml", "--record", "poses.json", "--out", "result.yaml")
 TOUCHED = ("forearm", "--from", "touches.json", "--out", "result.yaml")
 CAMERA = ("camera", "simulated:board", "--size", "640x480", "--out", "result.yaml")
-FINGERTIP = ("fingertip", "--finger", "FF", "--presses", 6, "--settings", "fast.yaml", "--out", "result.yaml")
+FINGERTIP = ("fingertip", "--finger", "FF", "--presses", 8, "--settings", "fast.yaml", "--out", "result.yaml")
 SOLVED = ("fingertip", "--from", "wrenches.yaml", "--out", "result.yaml")
 JOINTS = ("joints", "--from", "poses.yaml", "--out", "result.yaml")
 
@@ -69,11 +61,11 @@ STEPS = {
     "camera, store": At(CAMERA, (*BEGUN[:1], ("begin", "\n"), ("12 views", "d\n")), "Store it as result"),
     "fingertip, replace": At(FINGERTIP, (), REPLACE),
     "fingertip, begin": At(FINGERTIP, BEGUN[:1], "Is its way clear?"),
-    "fingertip, free": At(FINGERTIP, BEGUN, "1/14 FF free"),
+    "fingertip, free": At(FINGERTIP, BEGUN, "1/16 FF free"),
     "fingertip, pressed": At(
         FINGERTIP,
-        (*BEGUN, *((f"{step}/14", "s\n") for step in range(1, 9))),
-        "9/14 FF presses",
+        (*BEGUN, *((f"{step}/16", "s\n") for step in range(1, 9))),
+        "9/16 FF presses",
     ),
     "fingertip, store": At(SOLVED, BEGUN[:1], STORE),
     "joints, store": At(JOINTS, BEGUN[:1], STORE),
@@ -87,12 +79,12 @@ def measured(program: WarmProgram, tmp_path_factory: pytest.TempPathFactory) -> 
     folder = prepared(tmp_path_factory.mktemp("measured"))
     terminal = program.terminal(folder, "calibrate", *FINGERTIP, "--record", "wrenches.yaml")
     terminal.until("Is its way clear?", "y\n")
-    terminal.until("1/14 FF free", "\n")
-    terminal.until("2/14 FF free", "u\n")  # take it back, and do it again
-    terminal.until("1/14 FF free", "\n")
-    for step in range(2, 15):
-        terminal.until(f"{step}/14", "s\n" if step in (6, 7) else "\n")
-    terminal.until(STORE, "y\n")
+    terminal.until("1/16 FF free", "\n")
+    terminal.until("2/16 FF free", "u\n")  # take it back, and do it again
+    terminal.until("1/16 FF free", "\n")
+    for step in range(2, 17):
+        terminal.until(f"{step}/16", "s\n" if step in (6, 7) else "\n")
+    terminal.until("Store it as ", "y\n")
     (folder / "told.txt").write_text(terminal.ended(0))
     return folder
 
@@ -124,7 +116,7 @@ def contents(folder: Path) -> dict[str, str]:
 def test_a_fingertip_is_measured_and_stored(measured: Path) -> None:
     assert "PASS" in (measured / "told.txt").read_text()
     data = load_fingertip_data(measured / "wrenches.yaml", RIG.installation)
-    assert (len(data.free), len(data.presses)) == (12, 6)  # six turns, and the moment before each of six presses
+    assert (len(data.free), len(data.presses)) == (6 + 8, 8)  # every press begins untouched
     true, found = load_fingertips(RIG.files["fingertips"])["FF"], load_fingertips(measured / "result.yaml")["FF"]
     assert found.mass_kg == pytest.approx(true.mass_kg, abs=1e-3)
     np.testing.assert_allclose(found.centre_distal_m, true.centre_distal_m, atol=2e-3)
@@ -208,9 +200,9 @@ def test_ended_while_the_hand_moves_nothing_is_stored(program: WarmProgram, meas
     terminal = program.terminal(tmp_path, "calibrate", *FINGERTIP, "--record", "wrenches.yaml")
     terminal.until(REPLACE, "y\n")
     terminal.until("Is its way clear?", "y\n")
-    terminal.until("1/14", "\n")
-    terminal.until("1/14 FF free, hand pitched 0 deg, rolled 0 deg: done")
-    terminal.until("2/14", "\n")
+    terminal.until("1/16", "\n")
+    terminal.until("1/16 FF free, hand pitched 0 deg, rolled 0 deg: done")
+    terminal.until("2/16", "\n")
     terminal.until("\n")  # the key is taken: the hand is on its way, which takes it longer than the key its own
     terminal.type(INTERRUPT)
     terminal.ended(130)
