@@ -14,7 +14,7 @@ import select
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from drivers.orders import Order, OrderWriter
@@ -22,6 +22,7 @@ from tactile_lab.clock import NANOSECONDS, MonotonicClock
 from tactile_lab.errors import DeviceError, TactileLabError
 
 _READ_BYTES = 1_048_576
+_ENDING_s = 1.0
 
 
 class ChildProcess:
@@ -93,6 +94,8 @@ class ChildProcess:
         if not select.select([process.stdout], [], [], max(patience_s, 0.0))[0]:
             return None
         if not (data := os.read(process.stdout.fileno(), _READ_BYTES)):
+            with suppress(subprocess.TimeoutExpired):  # it says nothing more a moment before it has ended
+                process.wait(_ENDING_s)
             raise DeviceError("its process has ended", where=self.name, hint="See its last error, and connect again")
         return data
 

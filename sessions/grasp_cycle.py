@@ -100,8 +100,7 @@ class GraspCycle:
         self._motion.blend_fingers(table, self._progress, s.finger_rad_s)
         above = self._motion.base_joints(self.plan.frame, table, s.lift_m)
         self._motion.move_base(above, s.travel_m_s, s.turn_rad_s)
-        self._motion.wait(s.rest_s)
-        self._motion.bench.tare()
+        self._motion.tare(s.rest_s)
 
     def _come_down(self) -> list[str]:
         """Guarded descent; the fingers that landed on something."""

@@ -23,6 +23,7 @@ from tactile_lab.clock import NANOSECONDS
 from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
 
 _STRAIGHT_WRIST = forearm_T_palm(np.zeros(len(JOINTS)))
+_TARES = 5  # a fingertip that still swings is given so many rests
 _WITHDRAW_s = 0.15  # a positioner follows its targets late: back by more than it is behind
 _HOLD_WRIST = {"WRJ1": 0.0, "WRJ2": 0.0}
 
@@ -63,6 +64,7 @@ class Motion:
         self.bench, self.supervisor = bench, supervisor
         self._targets_rad: dict[str, float] = {}
         self._loads_N: dict[str, float] = {}
+        self._resting_N: dict[str, float] = {}
 
     @cached_property
     def _base_q(self) -> Array:
@@ -92,6 +94,19 @@ class Motion:
         """Cycles for a time."""
         for _ in range(self.cycles(duration_s)):
             self.tick()
+
+    def tare(self, rest_s: float) -> None:
+        """Rest, and take the fingertips as untouched; again where one refuses because the hand still moves.
+
+        What a fingertip shows that refuses to the end counts as nothing from here on: see :meth:`loads_N`.
+        """
+        self._resting_N = {}
+        for _ in range(_TARES):
+            self.wait(rest_s)
+            refused = self.bench.tare().refused
+            if not refused:
+                return
+        self._resting_N = {finger: self._loads_N[finger] for finger in refused}
 
     def capture(self, seconds: float) -> Grasp:
         """Gather samples for so long, make a grasp of them, and take a picture of the object as it is held."""
@@ -231,8 +246,8 @@ class Motion:
         return {name: joints[name] for name in names}
 
     def loads_N(self) -> dict[str, float]:
-        """Contact force on each fingertip at the end of the last cycle."""
-        return self._loads_N
+        """Contact force on each fingertip at the end of the last cycle, beyond what it showed at rest untared."""
+        return {finger: load_N - self._resting_N.get(finger, 0.0) for finger, load_N in self._loads_N.items()}
 
     def tip_centre_world_m(self, finger: str, tip: TipEllipsoid) -> Array:
         """Where a fingertip's centre is now, world frame, shape (3,)."""

@@ -54,9 +54,6 @@ ROW = Pattern(
 
 _DOWN, _BACK = np.array([0.0, 0.0, -1.0]), np.array([-1.0, 0.0, 0.0])
 
-_TARES = 3
-"""A fingertip that still swings is given so many rests."""
-
 TAP_HEIGHT_m = 0.022
 """Of the closing's table; the positioner does the rest of the height."""
 
@@ -72,7 +69,6 @@ class Toucher:
 
     def __init__(self, motion: Motion, cycle: CycleSettings, tip: TipEllipsoid) -> None:
         self._motion, self._cycle, self._tip = motion, cycle, tip
-        self._resting_N: dict[str, float] = {}
 
     @property
     def settings(self) -> TouchSettings:
@@ -139,7 +135,7 @@ class Toucher:
         stood: list[Array] = []
 
         def met() -> bool:
-            if self._felt_N().get("TH", 0.0) > s.met_N:
+            if self._motion.loads_N().get("TH", 0.0) > s.met_N:
                 stood.append(motion.tip_centre_world_m("TH", self._tip))
             return self._is_met()
 
@@ -149,11 +145,11 @@ class Toucher:
         motion.wait(self._cycle.rest_s)
         motion.bench.begin_closing()
         path, found = table.path("TH"), np.empty((0, 3))
-        while progress["TH"] < path.valid[1] and self._felt_N().get("TH", 0.0) <= s.met_N:
+        while progress["TH"] < path.valid[1] and self._motion.loads_N().get("TH", 0.0) <= s.met_N:
             progress["TH"] += self._cycle.closing_m_s * motion.cycle_s / path.length_m
             motion.set_fingers(table, progress)
             motion.tick()
-        if self._felt_N().get("TH", 0.0) > s.met_N:
+        if self._motion.loads_N().get("TH", 0.0) > s.met_N:
             motion.wait(self._cycle.rest_s)
             found = self._met_at(path.direction, frame)
             self._capture()
@@ -167,12 +163,12 @@ class Toucher:
         self._motion.rise(self._cycle.lift_m, self._cycle.travel_m_s)
 
     def _is_met(self) -> bool:
-        return max(self._felt_N().values(), default=0.0) > self.settings.met_N
+        return max(self._motion.loads_N().values(), default=0.0) > self.settings.met_N
 
     def _met_at(self, direction_grasp: Array, frame: GraspFrame) -> Array:
         """The foremost places of the fingertips that feel something, shape (n, 3), world frame."""
         ahead = np.asarray(frame.pose.rotation().rotate(direction_grasp))
-        met = [finger for finger, load_N in self._felt_N().items() if load_N > self.settings.met_N / 2]
+        met = [finger for finger, load_N in self._motion.loads_N().items() if load_N > self.settings.met_N / 2]
         surface = TipSurface.upright(self._tip.semi_axes_m, self._tip.centre_distal_m)
         frames = self._motion.bench.perception.world_T_distal
         return np.array([surface.leading_point(frames[f].matrix(), ahead) for f in met]).reshape(-1, 3)
@@ -186,12 +182,7 @@ class Toucher:
         motion, cycle = self._motion, self._cycle
         motion.blend_fingers(table, pattern.progress, cycle.finger_rad_s, pattern.aside(table))
         motion.move_base(motion.base_joints(frame, table, cycle.lift_m), *self._travel)
-        for _ in range(_TARES):
-            motion.wait(cycle.rest_s)
-            refused = motion.bench.tare().refused
-            self._resting_N = {finger: motion.loads_N()[finger] for finger in refused}
-            if not refused:
-                return
+        motion.tare(cycle.rest_s)
 
     def _approach(self, goal: Array, speed_m_s: float) -> bool:
         """Toward ``goal`` until a fingertip meets something; the positioner then stands where it is."""
@@ -221,9 +212,9 @@ class Toucher:
         rates = motor_rates(table, pattern.progress, direction_grasp, self._tip)
         gone_m = dict.fromkeys(rates, 0.0)
         for q in self._sinking(direction_grasp, frame, sink_m):
-            if max(self._felt_N().values(), default=0.0) < s.most_N:
+            if max(self._motion.loads_N().values(), default=0.0) < s.most_N:
                 motion.set_base(q)
-            for finger, load_N in self._felt_N().items():
+            for finger, load_N in self._motion.loads_N().items():
                 step_m = s.gain * float(np.clip(force_N - load_N, -1.0, 1.0)) * motion.cycle_s
                 gone_m[finger] = float(np.clip(gone_m[finger] + step_m, -s.reach_m, s.reach_m))
             aside = pattern.aside(table)
@@ -239,10 +230,6 @@ class Toucher:
         way[:3] = self._motion.bench.world_T_mount.rotation().unrotate(frame.pose.rotation().rotate(direction_grasp))
         for share in motion.shares(self.settings.press_s):
             yield start + min(1.0, 2.0 * share) * sink_m * way
-
-    def _felt_N(self) -> dict[str, float]:
-        """Contact forces of the fingertips; of those that could not be tared, what they feel more than at rest."""
-        return {f: load_N - self._resting_N.get(f, 0.0) for f, load_N in self._motion.loads_N().items()}
 
     def _capture(self) -> None:
         motion = self._motion

@@ -54,7 +54,7 @@ class Asker:
     def _line(self) -> str:
         try:
             return input()
-        except EOFError as error:
+        except (EOFError, RuntimeError) as error:  # ended, or closed before the program began
             hint = "Nothing was stored. Give --no-input where nobody answers"
             raise InterruptionError("there is nobody to ask", where=self._where, hint=hint) from error
 
