@@ -1,6 +1,6 @@
 """What the hand can do next around an object as it is estimated now: the real candidates, and why others are none.
 
-A candidate is a grasp frame (every yaw of the arm's window, shifts along and across the hand), a closing, a height of
+A candidate is a grasp frame (every yaw of the arm's window, shifts across it), a closing, a height of
 the fingertips and, where a surface is wanted, perhaps a tap on the top before it. Its expected contacts follow from
 the kinematics: the closing's lines against the estimated surface. What the arm can not reach, where the open fingers
 would come down on the object or the palm rest on it, and what the hand has just landed on, is no candidate.

@@ -44,6 +44,9 @@ class Laboratory(Protocol):
             first_move: nudge each motor of a real hand when connecting; None for what the rig file says.
         """
 
+    def remarks(self) -> tuple[str, ...]:
+        """What was not as it should be with the place itself so far, in words."""
+
 
 @dataclass(frozen=True)
 class SimulatedLaboratory:
@@ -64,6 +67,9 @@ class SimulatedLaboratory:
         """See :class:`Laboratory`."""
         return build_bench(self.rig, self.world, recorder)
 
+    def remarks(self) -> tuple[str, ...]:
+        return ()
+
 
 @dataclass(frozen=True)
 class WiredLaboratory:
@@ -79,6 +85,11 @@ class WiredLaboratory:
         """See :class:`Laboratory`."""
         truth = None if self.stand_ins is None else self.stand_ins.truth
         return build_wired_bench(self.rig, recorder, self.clock, truth=truth, first_move=first_move)
+
+    def remarks(self) -> tuple[str, ...]:
+        """Physics that could not keep up with the clock; see :class:`Laboratory`."""
+        lost_s = 0.0 if self.stand_ins is None else self.stand_ins.lost_s
+        return (f"the emulated laboratory stood still for {lost_s:.1f} s: this computer is too slow",) if lost_s else ()
 
 
 @contextmanager

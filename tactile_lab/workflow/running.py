@@ -14,6 +14,7 @@ from sessions.conductor import Conductor
 from sessions.conductor_settings import ConductorSettings
 from sessions.manifest import Status
 from sessions.progress import Progress
+from sessions.recorder import Level
 from sessions.session import RunningSession, create_session
 from sessions.session_outcome import Ending, SessionOutcome
 from tactile_lab.errors import ConfigurationError, EstimationError, InterruptionError
@@ -149,6 +150,9 @@ def _record(
                 outcome = Conductor(bench, settings, crew, progress).run()
             finally:
                 bench.close()
+        for remark in laboratory.remarks():
+            bench.event(Level.WARNING, "laboratory", remark)
+            progress.told(remark)
         _close(session, outcome, bench.counts.overruns, bench.undecodable)
     return outcome
 

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 import yaml
 from gtsam import Pose2, Pose3
 
+from drivers.camera.markers import MarkerSettings
 from drivers.emulators.wired import virtual_cable as cables
 from drivers.emulators.wired.plant_mirror import PlantMirror
+from drivers.emulators.wired.stand_ins import StandIns
 from drivers.emulators.wired.virtual_cable import virtual_cable
 from tactile_lab.clock import MonotonicClock
 from tactile_lab.errors import ConfigurationError, DeviceError
 from tactile_lab.rigs.build import build_interpreter, check_calibration
 from tactile_lab.rigs.description import load_rig
+from tactile_lab.rigs.laboratory import WiredLaboratory
 from tactile_lab.rigs.wired import hand_setup, stand_in_plan
 from tests.support.wire_rig import SHIPPED, wire_rig
 
@@ -143,3 +147,15 @@ def test_a_file_that_is_no_plants_memory(tmp_path: Path) -> None:
         PlantMirror(tmp_path / "other", MonotonicClock())
     with pytest.raises(DeviceError, match="no plant's memory"):
         PlantMirror(tmp_path / "none", MonotonicClock())
+
+
+def test_an_emulated_laboratory_that_could_not_keep_up_says_so(tmp_path: Path) -> None:
+    def place(lost_s: float) -> WiredLaboratory:
+        stand_ins = cast(StandIns, SimpleNamespace(lost_s=lost_s))
+        return WiredLaboratory(
+            load_rig(str(wire_rig(tmp_path))), MonotonicClock(), MarkerSettings(), stand_ins=stand_ins
+        )
+
+    assert place(0.0).remarks() == ()
+    (remark,) = place(1.26).remarks()
+    assert remark == "the emulated laboratory stood still for 1.3 s: this computer is too slow"
