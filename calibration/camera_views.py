@@ -15,9 +15,8 @@ import numpy as np
 from drivers.camera.board_pose import board_pose
 from drivers.camera.boards import AnyBoard
 from drivers.camera.calibration import CameraCalibration
-from drivers.camera.edges import edge_blur_px
 from drivers.camera.frames import Image
-from drivers.camera.markers import coarse_markers
+from drivers.camera.markers import seen_markers
 from tactile_lab.geometry.contacts import Array
 
 LEAST_CORNERS = 8
@@ -74,7 +73,7 @@ def rough_lens(size_px: tuple[int, int]) -> CameraCalibration:
 
 def view_of(name: str, image: Image, board: AnyBoard) -> BoardView | str:
     """The view a picture gives, or why it gives none, in words."""
-    blurs = [edge_blur_px(image, quad) for quad in coarse_markers(image, board.dictionary).values()]
+    blurs = [marker.blur_px for marker in seen_markers(image, board.dictionary).values()]
     if not blurs:
         return f"no marker of {board.dictionary} is to be seen"
     if (blur := float(np.median(blurs))) > _LARGEST_BLUR_px:

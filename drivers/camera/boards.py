@@ -14,9 +14,8 @@ import cv2
 import numpy as np
 from pydantic import Field, RootModel, field_validator, model_validator
 
-from drivers.camera.edges import refine_corners
 from drivers.camera.frames import Image
-from drivers.camera.markers import coarse_markers, dictionary_or_file, opencv_dictionary
+from drivers.camera.markers import detect, dictionary_or_file, opencv_dictionary
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.strict_yaml import StrictModel, load, validate
@@ -90,12 +89,12 @@ class SingleMarker(Printed):
 
     def matched(self, image: Image) -> tuple[Array, Array]:
         """Corners on the board (n, 3), metres, and in the picture (n, 2), pixels; n = 0 where it is not seen."""
-        found = coarse_markers(image, self.dictionary)
+        found = detect(image, self.dictionary)
         if self.number not in found:
             return np.zeros((0, 3)), np.zeros((0, 2))
         half = self.side_m * self.scale / 2
         corners = half * np.array([[-1.0, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]])
-        return corners, refine_corners(image, found[self.number])
+        return corners, found[self.number]
 
 
 class GridBoard(Printed):
@@ -131,11 +130,9 @@ class GridBoard(Printed):
 
     def matched(self, image: Image) -> tuple[Array, Array]:
         """Corners on the board (n, 3), metres, and in the picture (n, 2), pixels; n = 0 where it is not seen."""
-        seen = coarse_markers(image, self.dictionary)
-        found = {number: quad for number, quad in seen.items() if number in self.numbers}
-        pixels = [refine_corners(image, quad) for quad in found.values()]
+        found = {number: quad for number, quad in detect(image, self.dictionary).items() if number in self.numbers}
         points = [self.marker_corners_m(number) for number in found]
-        return np.concatenate([np.zeros((0, 3)), *points]), np.concatenate([np.zeros((0, 2)), *pixels])
+        return np.concatenate([np.zeros((0, 3)), *points]), np.concatenate([np.zeros((0, 2)), *found.values()])
 
     def marker_corners_m(self, number: int) -> Array:
         """Corners of one of its markers, true size, shape (4, 3), board frame."""

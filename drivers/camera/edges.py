@@ -1,8 +1,9 @@
-"""Corners of a black square from its edges, to a few hundredths of a pixel.
+"""Corners of a black square from its edges, to a few hundredths of a pixel, and how blurred it is.
 
 OpenCV's corner refinement looks for the point all gradients around are orthogonal to. On the convex corner of a blurred
 square this point lies inside the true corner (a quarter pixel on each axis at the rig's resolution), so that squares
 look too small. Blur does not move a straight edge, so here lines are laid through the edges and cut with each other.
+Nor must the far end of the white border move it, whose own blur reaches the edge: see :mod:`drivers.camera.profiles`.
 """
 
 from __future__ import annotations
@@ -11,124 +12,147 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from drivers.camera.frames import Image
+from drivers.camera.frames import Image, SeenMarker
+from drivers.camera.profiles import Profiles, fit_profiles
 from tactile_lab.geometry.contacts import Array
 
 _ALONG = np.linspace(0.12, 0.88, 28)  # shares of a side where its edge is looked for; blur rounds the ends
 _STEPS = 25  # samples across the edge
-_REACH_MODULES, _MODULES = 0.42, 6.0  # how far across, in modules: less than half of the black border and the white one
-_LARGEST_REACH_px, _SMALLEST_REACH_px = 4.0, 1.5
+_INSIDE, _OUTSIDE = -1.7, 1.9  # how far across, in half modules: into the black module, and beyond the white
+_REACH_blurs = 2.5  # farther out the blurred edge has its end levels
+_SMALLEST_REACH_px, _LARGEST_REACH_px = 1.5, 6.0
+_PASSES = 3
+_FARTHEST_px = 5.0
+"""A corner that moved so far from the first guess, or by a module, has come to another edge."""
+_SCATTER_px = 0.05
 _BOWED_px = 90.0
 """Shorter edges bow by less than their noise in the lenses of laboratories (a tenth of barrel distortion)."""
 
 
-def refine_corners(image: Image, corners_px: Array) -> Array:
-    """Corners (4, 2) of a dark square on white, clockwise in the picture, from a guess within about a pixel.
+def refine_square(image: Image, corners_px: Array, modules: int) -> SeenMarker:
+    """A dark square on white, from a guess at its corners (4, 2) within a few pixels, clockwise in the picture.
 
-    Two passes: noise draws an edge toward where it was looked for. Returns the guess where an edge can not be found.
+    Several passes: noise draws an edge toward where it was looked for, and only a known blur tells how far to look.
+    Where an edge can not be found, the guess is given back, with an infinite blur.
+
+    Args:
+        image: grey levels.
+        corners_px: the guess.
+        modules: of the marker's black square along a side; around it is half a module of white at least.
     """
-    return _pass(image, _pass(image, corners_px))
-
-
-def _pass(image: Image, corners_px: Array) -> Array:
-    following = np.roll(corners_px, -1, axis=0)
-    sides = following - corners_px
-    lengths = np.linalg.norm(sides, axis=1)
-    reach = float(np.clip(_REACH_MODULES * lengths.min() / _MODULES, _SMALLEST_REACH_px, _LARGEST_REACH_px))
-    outward = np.stack([sides[:, 1], -sides[:, 0]], axis=1) / lengths[:, None]
-    middles = corners_px[:, None] + _ALONG[:, None] * sides[:, None]
-    offsets, found = _edge_offsets(image, middles, outward, reach)
-    if np.any(found.sum(axis=1) < len(_ALONG) // 2):
-        return corners_px
-    points = middles + offsets[..., None] * outward[:, None]
-    edges = [_edge(points[side][found[side]], float(lengths[side])) for side in range(4)]
-    return np.array(
-        [
-            _crossing(edges[side - 1].tangent(corners_px[side]), edges[side].tangent(corners_px[side]))
-            for side in range(4)
-        ]
-    )
-
-
-def edge_blur_px(image: Image, corners_px: Array) -> float:
-    """How wide the widest edge of a dark square on white is: standard deviation of its blur, pixels.
-
-    From the steepest rise of the mean profile across each side and the square's contrast; of a Gaussian blur the rise
-    is contrast / (sigma * sqrt(2 pi)). Motion widens two of the four edges, so that the widest one counts.
-    Infinite for a square without contrast.
-    """
-    sides = np.roll(corners_px, -1, axis=0) - corners_px
-    lengths = np.linalg.norm(sides, axis=1)
-    reach = float(np.clip(_REACH_MODULES * lengths.min() / _MODULES, _SMALLEST_REACH_px, _LARGEST_REACH_px))
-    outward = np.stack([sides[:, 1], -sides[:, 0]], axis=1) / lengths[:, None]
-    middles = corners_px[:, None] + _ALONG[:, None] * sides[:, None]
-    profiles = _levels(image, middles, outward, np.linspace(-reach, reach, _STEPS)).mean(axis=1)
-    steepest = np.diff(profiles, axis=1).max(axis=1) / (2 * reach / (_STEPS - 1))
-    return float(np.max(_contrast(image, corners_px) / np.maximum(steepest, 1e-9)) / np.sqrt(2 * np.pi))
-
-
-def _contrast(image: Image, corners_px: Array) -> float:
-    """Grey levels between the dark and the light parts around a square."""
-    low = np.maximum(np.floor(corners_px.min(axis=0)).astype(int), 0)
-    high = np.ceil(corners_px.max(axis=0)).astype(int) + 1
-    patch = image[low[1] : high[1], low[0] : high[0]]
-    dark, light = np.percentile(patch, [5, 95]) if patch.size else (0.0, 0.0)
-    return float(light - dark) or np.inf
-
-
-def _edge_offsets(image: Image, middles: Array, outward: Array, reach: float) -> tuple[Array, Array]:
-    """Where along the outward normal the grey level rises, (4, n), and whether it clearly does, (4, n).
-
-    The centroid of the rise: blur spreads it evenly to both sides.
-    """
-    across = np.linspace(-reach, reach, _STEPS)
-    rise = np.maximum(np.diff(_levels(image, middles, outward, across), axis=2), 0.0)
-    total = rise.sum(axis=2)
-    between = (across[1:] + across[:-1]) / 2
-    return rise @ between / np.maximum(total, 1e-9), total > 0.5 * np.median(total)
-
-
-def _levels(image: Image, middles: Array, outward: Array, across: Array) -> Array:
-    """Grey levels along lines across the edges, shape (4, places along, places across)."""
-    points = middles[:, :, None] + across[:, None] * outward[:, None, None]
-    maps = points.reshape(-1, len(across), 2).astype(np.float32)
-    levels = cv2.remap(image, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(levels, float).reshape(4, -1, len(across))
+    lost = SeenMarker(corners_px, np.inf)
+    farthest_px = min(_FARTHEST_px, float(np.ptp(corners_px, axis=0).max()) / modules)
+    found, blur_px = corners_px, None
+    for _ in range(_PASSES):
+        sides = _Sides.of(found, modules)
+        middles, across_px = sides.middles, sides.across_px(blur_px)
+        levels = _levels(image, middles, sides.outward, across_px)
+        profiles = fit_profiles(across_px, levels.mean(axis=1), sides.half_module_px, blur_px)
+        corners = None if profiles is None else _corners(sides, profiles, levels)
+        if profiles is None or corners is None or np.abs(corners - corners_px).max() > farthest_px:
+            return lost
+        found, blur_px = corners, profiles.blur_px
+    return lost if blur_px is None else SeenMarker(found, float(blur_px.max()))
 
 
 @dataclass(frozen=True, eq=False)
-class _Edge:
-    """An edge: a line through ``middle``, and how far it bows to the side of ``across``: c0 + c1 t + c2 t^2."""
+class _Sides:
+    """The four sides of a square: from each corner to the next.
 
-    middle: Array
-    direction: Array
-    bow: Array
+    Attributes:
+        corners_px: where they begin, shape (4, 2).
+        along_px: their vectors, shape (4, 2).
+        outward: their unit normals, shape (4, 2).
+        half_module_px: how far outward the white border ends at their middles, shape (4,).
+    """
+
+    corners_px: Array
+    along_px: Array
+    outward: Array
+    half_module_px: Array
+
+    @staticmethod
+    def of(corners_px: Array, modules: int) -> _Sides:
+        """The sides of corners (4, 2); the homography that maps a square there tells where the white ends."""
+        along_px = np.roll(corners_px, -1, axis=0) - corners_px
+        outward = np.stack([along_px[:, 1], -along_px[:, 0]], axis=1)
+        outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+        square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
+        mapping = cv2.getPerspectiveTransform(square, corners_px.astype(np.float32))
+        far = 1.0 + 1.0 / modules
+        ends = np.array([[[0.0, -far], [far, 0.0], [0.0, far], [-far, 0.0]]])
+        half_module_px = np.sum((cv2.perspectiveTransform(ends, mapping)[0] - corners_px) * outward, axis=1)
+        return _Sides(corners_px, along_px, outward, np.maximum(half_module_px, 0.5))
 
     @property
-    def across(self) -> Array:
-        return np.array([self.direction[1], -self.direction[0]])
+    def lengths_px(self) -> Array:
+        """Shape (4,)."""
+        return np.asarray(np.linalg.norm(self.along_px, axis=1))
 
-    def tangent(self, near_px: Array) -> tuple[Array, Array]:
-        """Point and direction of the edge near a point."""
-        t = float((near_px - self.middle) @ self.direction)
-        aside, slope = np.polyval(self.bow, t), np.polyval(np.polyder(self.bow), t)
-        return self.middle + t * self.direction + aside * self.across, self.direction + slope * self.across
+    @property
+    def middles(self) -> Array:
+        """Where the edges are looked for, shape (4, places, 2)."""
+        return np.asarray(self.corners_px[:, None] + _ALONG[:, None] * self.along_px[:, None])
+
+    def across_px(self, blur_px: Array | None) -> Array:
+        """How far outward grey levels are taken, shape (4, n); ``blur_px`` (4,) where it is known."""
+        reach = _LARGEST_REACH_px if blur_px is None else _REACH_blurs * blur_px
+        reach = np.clip(reach, _SMALLEST_REACH_px, _LARGEST_REACH_px)
+        inside = np.clip(_INSIDE * self.half_module_px, -reach, -_SMALLEST_REACH_px)
+        outside = np.clip(_OUTSIDE * self.half_module_px, _SMALLEST_REACH_px, reach)
+        return np.linspace(inside, outside, _STEPS, axis=1)
 
 
-def _edge(points: Array, length_px: float) -> _Edge:
-    """The edge nearest to points (n, 2), bowed if it is long; points beyond three times the median are left out."""
+def _corners(sides: _Sides, profiles: Profiles, levels: Array) -> Array | None:
+    """The corners (4, 2) in which the edges cut each other; None where too little of an edge is to be seen."""
+    offsets_px, contrast = profiles.places(levels)
+    is_edge = contrast > 0.5 * np.median(contrast, axis=1, keepdims=True)
+    if np.any(is_edge.sum(axis=1) < len(_ALONG) // 2):
+        return None
+    bows = _bows(offsets_px, is_edge, sides.lengths_px > _BOWED_px)
+    unit = sides.along_px / sides.lengths_px[:, None]
+    begin, end = (_tangents(bows, share, sides, unit) for share in (0.0, 1.0))
+    return _crossings(begin, (np.roll(end[0], 1, axis=0), np.roll(end[1], 1, axis=0)))
+
+
+def _bows(offsets_px: Array, is_edge: NDArray[np.bool_], is_long: NDArray[np.bool_]) -> Array:
+    """Parabolas through offsets along the sides, c0 + c1 u + c2 u^2 with the share u of the side, shape (4, 3).
+
+    Offsets beyond three times the median are left out; c2 is zero for short sides.
+    """
+    powers = _ALONG[:, None] ** np.arange(3)
+    powers = powers * np.stack([np.ones(4), np.ones(4), is_long], axis=1)[:, None]
+    unused = np.eye(3) * np.stack([np.zeros(4), np.zeros(4), ~is_long], axis=1)[:, None]
+    weights = is_edge.astype(float)
     for _ in range(2):
-        middle = points.mean(axis=0)
-        direction = np.linalg.svd(points - middle, full_matrices=False)[2][0]
-        along, aside = (points - middle) @ direction, (points - middle) @ [direction[1], -direction[0]]
-        bow = np.polyfit(along, aside, 2) if length_px > _BOWED_px else np.zeros(1)
-        away = np.abs(aside - np.polyval(bow, along))
-        points = points[away <= max(3.0 * float(np.median(away)), 0.05)]
-    return _Edge(middle, direction, bow)
+        weighted = powers.swapaxes(1, 2) * weights[:, None]
+        bows = np.linalg.solve(weighted @ powers + unused, weighted @ offsets_px[..., None])
+        away = np.abs(offsets_px - (powers @ bows)[..., 0])
+        middle = np.nanmedian(np.where(is_edge, away, np.nan), axis=1, keepdims=True)
+        weights = (is_edge & (away <= np.maximum(3.0 * middle, _SCATTER_px))).astype(float)
+    return np.asarray(bows[..., 0])
 
 
-def _crossing(one: tuple[Array, Array], two: tuple[Array, Array]) -> Array:
+def _tangents(bows: Array, share: float, sides: _Sides, unit: Array) -> tuple[Array, Array]:
+    """Points and directions, (4, 2) each, of the edges at one end of the sides."""
+    aside = bows @ [1.0, share, share**2]
+    slope = bows @ [0.0, 1.0, 2.0 * share] / sides.lengths_px
+    points = sides.corners_px + share * sides.along_px + aside[:, None] * sides.outward
+    return points, unit + slope[:, None] * sides.outward
+
+
+def _crossings(one: tuple[Array, Array], two: tuple[Array, Array]) -> Array:
+    """Where lines, given by points and directions (4, 2), cut each other, shape (4, 2)."""
     (p, u), (q, v) = one, two
-    along = np.linalg.solve(np.stack([u, -v], axis=1), q - p)
-    return np.asarray(p + along[0] * u)
+    along = np.linalg.solve(np.stack([u, -v], axis=2), (q - p)[..., None])[:, 0]
+    return np.asarray(p + along * u)
+
+
+def _levels(image: Image, middles: Array, outward: Array, across_px: Array) -> Array:
+    """Grey levels along lines across the edges, shape (4, places along, places across)."""
+    points = middles[:, :, None] + across_px[:, None, :, None] * outward[:, None, None]
+    maps = points.reshape(-1, _STEPS, 2).astype(np.float32)
+    levels = cv2.remap(image, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(levels, float).reshape(4, -1, _STEPS)

@@ -16,7 +16,7 @@ from gtsam import Pose3
 from pydantic import Field, field_validator
 
 from drivers.camera.calibration import CameraCalibration
-from drivers.camera.edges import edge_blur_px, refine_corners
+from drivers.camera.edges import refine_square
 from drivers.camera.frames import Detection, Image, SeenMarker
 from drivers.fingertip import RigidTransform
 from tactile_lab.geometry.contacts import Array
@@ -142,12 +142,19 @@ def _detector(dictionary: str) -> Any:
     return cv2.aruco.ArucoDetector(opencv_dictionary(dictionary), parameters)
 
 
-def detect(image: Image, dictionary: str) -> dict[int, Array]:
-    """Markers in a picture by number: corners, shape (4, 2), pixels, refined below a pixel.
+def seen_markers(image: Image, dictionary: str) -> dict[int, SeenMarker]:
+    """Markers in a picture by number: corners to a few hundredths of a pixel, and how sharp each of them is.
 
     A number seen more than once is left out: which of the two it is can not be known.
     """
-    return {number: refine_corners(image, corners) for number, corners in coarse_markers(image, dictionary).items()}
+    modules = opencv_dictionary(dictionary).markerSize + 2
+    found = coarse_markers(image, dictionary)
+    return {number: refine_square(image, corners, modules) for number, corners in found.items()}
+
+
+def detect(image: Image, dictionary: str) -> dict[int, Array]:
+    """The corners of :func:`seen_markers` alone, shape (4, 2), pixels."""
+    return {number: marker.corners_px for number, marker in seen_markers(image, dictionary).items()}
 
 
 def coarse_markers(image: Image, dictionary: str) -> dict[int, Array]:
@@ -160,9 +167,7 @@ def coarse_markers(image: Image, dictionary: str) -> dict[int, Array]:
 
 def detection(image: Image, dictionary: str) -> Detection:
     """Everything a picture says of markers, with how sharp each of them is."""
-    found = detect(image, dictionary)
-    markers = {number: SeenMarker(corners, edge_blur_px(image, corners)) for number, corners in found.items()}
-    return Detection(dictionary, (image.shape[1], image.shape[0]), markers)
+    return Detection(dictionary, (image.shape[1], image.shape[0]), seen_markers(image, dictionary))
 
 
 def other_dictionary(image: Image, dictionary: str) -> str | None:
