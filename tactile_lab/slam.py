@@ -62,6 +62,7 @@ class SlamSettings(TrackingSettings):
         shape_model: of the final outline or surface; "auto" is chosen by evidence.
         lost_after: successive untracked grasps after which the object counts as lost.
         contour_resolution_m, mesh_resolution_m: of the final shape.
+        largest_sigma_m: the parts of the shape that are known so well are written once more, apart; None for not.
     """
 
     back_end: BackEndSettings = BackEndSettings()
@@ -71,6 +72,7 @@ class SlamSettings(TrackingSettings):
     shape_model: ShapeName = "auto"
     contour_resolution_m: float = Field(default=0.001, gt=0)
     mesh_resolution_m: float = Field(default=0.003, gt=0)
+    largest_sigma_m: float | None = Field(default=None, gt=0)
 
 
 class TactileSlam:

@@ -29,6 +29,10 @@ def reconstruct(
     settings: Annotated[
         Path | None, typer.Option(help="YAML file with parameters of the estimation, by the names in slam.json.")
     ] = None,
+    largest_sigma: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Write the parts of the shape that are known so well once more: known.ply."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the results.", show_default="beside the data, named by method")
     ] = None,
@@ -47,7 +51,12 @@ def reconstruct(
 
     del no_input
     wishes = Wishes(
-        None if method is None else method.value, dimension, seed, settings, None if shape is None else shape.value
+        None if method is None else method.value,
+        dimension,
+        seed,
+        settings,
+        None if shape is None else shape.value,
+        None if largest_sigma is None else largest_sigma / 1000,
     )
     with LiveProgress(f"reconstruction of {source}") as progress:
         finished = reconstruct(source, root, wishes, out, progress)

@@ -17,6 +17,8 @@ FILES = (
     ("mesh.ply", "mesh"),
     ("mesh.glb", "for viewers"),
     ("contour.csv", "contour"),
+    ("known.ply", "well known"),
+    ("known.csv", "well known"),
     ("trajectory.csv", "trajectory"),
     ("evaluation.json", "evaluation"),
     ("report.html", "report"),

@@ -6,6 +6,7 @@
 ``contour.csv``     dimension 2: the outer contour in the object frame, closed
 ``mesh.ply/.glb``   the shape in the object frame with per-vertex ``sigma_m``; in dimension 2 the contour
                     extruded from the table to the highest contact
+``known.csv/.ply``  on wish: the parts of the contour or surface whose standard deviation is small enough
 ``slam.json``       method, seed, settings, what happened in each step, every loop with its verdict
 ``timing.json``     seconds a step: the only file that two runs of one session do not share
 ==================  ===============================================================================
@@ -24,10 +25,11 @@ import numpy as np
 from tactile_lab.errors import SessionError
 from tactile_lab.evaluation.plain import json_text, plain
 from tactile_lab.evaluation.prism import Triangles, open_ring, prism
-from tactile_lab.evaluation.tables import NANOSECOND_s, contacts_text, contour_text
+from tactile_lab.evaluation.tables import NANOSECOND_s, contacts_text, contour_text, pieces_text
 from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.shape.mesh_io import write_glb, write_ply
+from tactile_lab.shape.support import supported_mesh, supported_pieces
 from tactile_lab.shape.surface import Contour, SurfaceMesh
 from tactile_lab.slam_result import SlamResult, SlamStep
 
@@ -36,7 +38,11 @@ _LEAST_HEIGHT_m = 0.001
 
 
 def write_results(
-    folder: Path, result: SlamResult, grasps: Sequence[Grasp], settings: Mapping[str, Any] | None = None
+    folder: Path,
+    result: SlamResult,
+    grasps: Sequence[Grasp],
+    settings: Mapping[str, Any] | None = None,
+    largest_sigma_m: float | None = None,
 ) -> list[Path]:
     """Write all result files of one SLAM run; the files written, in the order of the table above.
 
@@ -45,6 +51,7 @@ def write_results(
         result: the finished run.
         grasps: the grasps it was made from, in order.
         settings: the SLAM settings, kept in ``slam.json``.
+        largest_sigma_m: write what is known so well once more, apart; None for not.
 
     Raises:
         SessionError: the folder cannot be written.
@@ -54,6 +61,7 @@ def write_results(
         "trajectory.csv": trajectory_text(Trajectory(stamps_s, tuple(result.world_T_object))),
         "contacts.csv": contacts_text(grasps),
         **({} if result.contour is None else {"contour.csv": contour_text(result.contour.points_m)}),
+        **_known_contour(result, largest_sigma_m),
         "slam.json": json_text(_slam_record(result, settings or {})),
         "timing.json": json_text({"schema_version": SCHEMA_VERSION, "step_seconds": result.step_seconds}),
     }
@@ -61,7 +69,8 @@ def write_results(
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
             (folder / name).write_text(text, encoding="utf-8", newline="\n")
-        return [*(folder / name for name in texts), *_write_mesh(folder, result, grasps)]
+        meshes = [*_write_mesh(folder, result, grasps), *_write_known_mesh(folder, result, largest_sigma_m)]
+        return [*(folder / name for name in texts), *meshes]
     except OSError as error:
         raise SessionError(f"results cannot be written ({error})", where=str(folder), hint="Check the disk") from error
 
@@ -74,6 +83,19 @@ def _write_mesh(folder: Path, result: SlamResult, grasps: Sequence[Grasp]) -> li
     write_ply(paths[0], mesh)
     write_glb(paths[1], mesh)
     return paths
+
+
+def _known_contour(result: SlamResult, largest_sigma_m: float | None) -> dict[str, str]:
+    if result.contour is None or largest_sigma_m is None:
+        return {}
+    return {"known.csv": pieces_text([piece.points_m for piece in supported_pieces(result.contour, largest_sigma_m)])}
+
+
+def _write_known_mesh(folder: Path, result: SlamResult, largest_sigma_m: float | None) -> list[Path]:
+    if result.mesh is None or largest_sigma_m is None:
+        return []
+    write_ply(folder / "known.ply", supported_mesh(result.mesh, largest_sigma_m))
+    return [folder / "known.ply"]
 
 
 def upright_contour(result: SlamResult, grasps: Sequence[Grasp]) -> SurfaceMesh | None:

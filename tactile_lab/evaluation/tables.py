@@ -96,6 +96,12 @@ def contour_text(points_m: Array) -> str:
     return _csv_text(("x_m", "y_m"), [[repr(float(x)), repr(float(y))] for x, y in [*ring, ring[0]]])
 
 
+def pieces_text(pieces_m: Sequence[Array]) -> str:
+    """``known.csv`` of open lines of shape (n, 2), object frame: piece, x_m, y_m; a closed contour is one piece."""
+    rows = [[str(number), repr(float(x)), repr(float(y))] for number, piece in enumerate(pieces_m) for x, y in piece]
+    return _csv_text(("piece", "x_m", "y_m"), rows)
+
+
 def read_contour(path: Path) -> Array:
     """Read ``contour.csv``: points of the outer contour, shape (n, 2), object frame, the first one repeated.
 

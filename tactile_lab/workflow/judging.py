@@ -29,7 +29,8 @@ from tactile_lab.slam import TactileSlam
 from tactile_lab.strict_yaml import validate
 
 EVALUATION = "evaluation.json"
-REPLAYABLE = ("trajectory.csv", "contacts.csv", "contour.csv", "mesh.ply", "mesh.glb", "slam.json")
+_KNOWN = ("known.csv", "known.ply")
+REPLAYABLE = ("trajectory.csv", "contacts.csv", "contour.csv", "mesh.ply", "mesh.glb", *_KNOWN, "slam.json")
 """Result files that a replay of the same session gives again, byte for byte."""
 RESULT_FILES = (*REPLAYABLE, "timing.json", TRUTH_TRAJECTORY, EVALUATION, report.REPORT)
 """All files of a folder of results."""
@@ -136,7 +137,8 @@ def judge(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp]
     if not grasps:
         return FinishedSession(session.folder, out, problem="no grasp was recorded")
     try:
-        write_results(out, slam.finish(), grasps, slam.settings.model_dump(mode="json"))
+        wanted = slam.settings
+        write_results(out, slam.finish(), grasps, wanted.model_dump(mode="json"), wanted.largest_sigma_m)
         evaluation, _ = _write_evaluation(session, rig, out)
         report.write(session.folder, out)
     except TactileLabError as error:

@@ -37,6 +37,7 @@ class Wishes:
         seed: of all that is left to chance.
         settings: a YAML file with any part of :class:`tactile_lab.slam.SlamSettings`.
         shape: model of the final shape by name, see :data:`tactile_lab.shape.models.ShapeName`.
+        largest_sigma_m: write the parts of the shape that are known so well once more, apart.
     """
 
     method: str | None = None
@@ -44,6 +45,7 @@ class Wishes:
     seed: int | None = None
     settings: Path | None = None
     shape: str | None = None
+    largest_sigma_m: float | None = None
 
     def applied(self, given: dict[str, Any]) -> SlamSettings:
         """The settings: the data's, changed by the file's, changed by the options'.
@@ -54,7 +56,12 @@ class Wishes:
         from_file = {} if self.settings is None else load(self.settings)
         if not isinstance(from_file, dict):
             raise ConfigurationError("must be keys with values", where=str(self.settings), hint="Correct the file")
-        options = {"method": self.method, "dimension": self.dimension, "shape_model": self.shape}
+        options = {
+            "method": self.method,
+            "dimension": self.dimension,
+            "shape_model": self.shape,
+            "largest_sigma_m": self.largest_sigma_m,
+        }
         wanted = {**given, **from_file, **{key: value for key, value in options.items() if value is not None}}
         return validate(wanted, SlamSettings, where="options" if self.settings is None else str(self.settings))
 
@@ -103,7 +110,7 @@ def reconstruct_log(
     progress.phase(len(log.grasps), "model and evaluation")
     remove_results(out)
     try:
-        write_results(out, slam.finish(), log.grasps, settings.model_dump(mode="json"))
+        write_results(out, slam.finish(), log.grasps, settings.model_dump(mode="json"), settings.largest_sigma_m)
         evaluation = write_evaluation(out, truth, log.truth.name if log.truth else path.stem)
     except TactileLabError as error:
         return FinishedSession(path, out, problem=str(error))
