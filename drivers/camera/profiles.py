@@ -19,7 +19,7 @@ from scipy.special import ndtr
 
 from tactile_lab.geometry.contacts import Array
 
-_ROUNDS, _FIRST_ROUNDS = 2, 4
+_ROUNDS, _FIRST_ROUNDS = 1, 4
 _START_EDGES_px = np.linspace(-1.5, 1.5, 5)
 _START_BLURS_px = np.array([0.5, 0.7, 1.0, 1.4, 2.0, 2.8])
 SMALLEST_BLUR_px, LARGEST_BLUR_px = 0.3, 4.0
