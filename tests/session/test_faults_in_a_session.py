@@ -18,7 +18,7 @@ from tests.support.session_sweep import run_with
 )
 def test_a_link_that_fails_ends_the_session_in_order_and_its_recording_is_whole(tmp_path, link, fault, words):
     swept = run_with("sim", {link: fault}, tmp_path, at_s=0.5)
-    swept.check(link)
+    swept.check(link, fault)
     assert words in swept.ended
     assert swept.replay.startswith("read")
 

@@ -11,9 +11,21 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.support.results_section import write_section
-from tests.support.session_sweep import BLIND, LAYOUTS, LONGEST_s, STRIKES_AT_s, Swept, faults, run_with
+from tests.support.session_sweep import (
+    BLIND,
+    LAYOUTS,
+    LONGEST_s,
+    STRIKES_AT_s,
+    Swept,
+    UNTIL_IT_MOVES_s,
+    faults,
+    run_with,
+)
 
-TIMES = ", ".join(f"{link} {most:g} s" for link, most in LONGEST_s.items())
+TIMES = ", ".join(
+    [f"{link} {most:g} s" for link, most in LONGEST_s.items()]
+    + [f"{link}, {fault} {most:g} s" for (link, fault), most in UNTIL_IT_MOVES_s.items()]
+)
 HEAD = f"""## Faults in the middle of a session
 
 `python -m tests.support.session_fault_table --into docs/results.md`: a session of one grasp on the box, seed 1, for
@@ -45,7 +57,7 @@ def table(rigs: list[str], only: str, row_done: Callable[[str], None]) -> str:
                 continue
             with tempfile.TemporaryDirectory() as root:
                 swept = run_with(rig, {link: fault}, Path(root))
-            swept.check(link)
+            swept.check(link, fault)
             rows.append(row(rig, link, fault, swept))
             row_done(rows[-1].strip())
     return HEAD + "".join(rows)
