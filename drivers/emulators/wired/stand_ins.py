@@ -21,6 +21,9 @@ from drivers.simulation.settings import SimulationSettings
 from tactile_lab.clock import Clock
 from tactile_lab.errors import DeviceError
 
+_GONE_ns = 2_000_000_000
+"""Without a step of the physics for so long there is none."""
+
 SERIAL = 634
 """Of the emulated hand."""
 
@@ -110,7 +113,14 @@ class StandIns:
         self._open.close()
 
     def truth(self) -> StandInTruth:
-        """The object's true pose."""
+        """The object's true pose.
+
+        Raises:
+            DeviceError: the physics does not run any more; every emulator goes on, in a world that stands still.
+        """
+        if self._memory.age_ns > _GONE_ns:
+            hint = "Its process has ended, or this computer is far too slow; run again"
+            raise DeviceError("the emulated laboratory stands still", where="plant", hint=hint)
         return StandInTruth(self._memory.world_T_object)
 
     @property
