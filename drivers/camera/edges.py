@@ -23,7 +23,7 @@ _STEPS = 25  # samples across the edge
 _INSIDE, _OUTSIDE = -1.7, 1.9  # how far across, in half modules: into the black module, and beyond the white
 _REACH_blurs = 2.5  # farther out the blurred edge has its end levels
 _SMALLEST_REACH_px, _LARGEST_REACH_px = 1.5, 6.0
-_PASSES = 3
+_PASSES = 2
 _FARTHEST_px = 5.0
 """A corner that moved so far from the first guess, or by a module, has come to another edge."""
 _SCATTER_px = 0.05
