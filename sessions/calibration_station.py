@@ -126,14 +126,8 @@ class PressingHand:
         raise DeviceError(f"{planned.finger} met nothing at {planned.patch.target.name}", where="touch", hint=hint)
 
     def _tare(self, finger: str) -> None:
-        for _ in range(self.settings.tares):
-            self._motion.wait(self.settings.settle_s)
-            report = self.bench.tare((finger,))
-            if not report.refused:
-                return
-        raise DeviceError(
-            f"can not be zeroed: {report.refused[finger]}", where=finger, hint="See tactile-lab rig check"
-        )
+        if refused := self._motion.tare(self.settings.settle_s, (finger,), self.settings.tares):
+            raise DeviceError(f"can not be zeroed: {refused[finger]}", where=finger, hint="See tactile-lab rig check")
 
     # --- motion ------------------------------------------------------------------------------------------------
 

@@ -6,7 +6,7 @@ looks at it; so no verb of the grasp cycle can forget to be supervised.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -95,18 +95,21 @@ class Motion:
         for _ in range(self.cycles(duration_s)):
             self.tick()
 
-    def tare(self, rest_s: float) -> None:
-        """Rest, and take the fingertips as untouched; again where one refuses because the hand still moves.
+    def tare(self, rest_s: float, fingers: Sequence[str] = FINGERS, tries: int = _TARES) -> Mapping[str, str]:
+        """Rest, and take fingertips as untouched; again where one refuses because the hand still moves.
 
         What a fingertip shows that refuses to the end counts as nothing from here on: see :meth:`loads_N`.
+
+        Returns:
+            The reasons of those that refused to the end, by finger.
         """
-        self._resting_N = {}
-        for _ in range(_TARES):
+        self._resting_N, refused = {}, dict[str, str]()
+        for _ in range(tries):
             self.wait(rest_s)
-            refused = self.bench.tare().refused
-            if not refused:
-                return
+            if not (refused := dict(self.bench.tare(fingers).refused)):
+                break
         self._resting_N = {finger: self._loads_N[finger] for finger in refused}
+        return refused
 
     def capture(self, seconds: float) -> Grasp:
         """Gather samples for so long, make a grasp of them, and take a picture of the object as it is held."""

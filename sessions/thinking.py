@@ -26,12 +26,7 @@ Question = Callable[Concatenate[Thinker, Arguments], Answer]
 class Thinking(Protocol):
     """Where the thinker lives; a context while a session asks."""
 
-    def ask(
-        self,
-        question: Callable[Concatenate[Thinker, Arguments], Answer],
-        *args: Arguments.args,
-        **kwargs: Arguments.kwargs,
-    ) -> Answer:
+    def ask(self, question: Question[Arguments, Answer], *args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
         """The answer.
 
         Raises:
@@ -59,12 +54,7 @@ class ThinkingHere:
     def __init__(self, thinker: Thinker) -> None:
         self._thinker = thinker
 
-    def ask(
-        self,
-        question: Callable[Concatenate[Thinker, Arguments], Answer],
-        *args: Arguments.args,
-        **kwargs: Arguments.kwargs,
-    ) -> Answer:
+    def ask(self, question: Question[Arguments, Answer], *args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
         """See :meth:`Thinking.ask`."""
         return answered(self._thinker, question, args, kwargs)
 

@@ -6,7 +6,7 @@ Tips touch by penetration: 500 N/m. A held disc goes with the palm, a released o
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -196,12 +196,12 @@ class DiscWorld:
 
     # --- marks -------------------------------------------------------------------------------------------------
 
-    def _mark(self, kind: MarkKind) -> object:
+    def _mark(self, kind: MarkKind, fingers: tuple[str, ...] = FINGERS) -> object:
         self.marks.append(kind)
-        return self.perception.mark(Mark(kind, self.clock.now_ns()))
+        return self.perception.mark(Mark(kind, self.clock.now_ns(), fingers))
 
-    def tare(self) -> TareReport:
-        report = self._mark(MarkKind.TARE)
+    def tare(self, fingers: Iterable[str] = FINGERS) -> TareReport:
+        report = self._mark(MarkKind.TARE, tuple(fingers))
         assert isinstance(report, TareReport)
         return report
 
