@@ -44,7 +44,7 @@ def palms_called(name: str, seed: int) -> Array:
 def fixed_settings(grasps: int) -> list[Setting]:
     """Table 4.2: every policy with the ten candidates, the main ones with the others."""
     thesis = ("random", "variance", "clusters", "clusters-appendix", "entropy", "igef", "igef-shape")
-    ours = ("information", "look-ahead", INFORMED, CLAIRVOYANT)
+    ours = ("information", INFORMED, CLAIRVOYANT)
     return [
         *grid(candidates=["10"], policy=[*thesis, *ours], grasps=[grasps]),
         *grid(candidates=["100"], policy=["random", "variance", *ours], grasps=[grasps]),

@@ -56,7 +56,6 @@ class InformationSettings(StrictModel):
         point_sigma_m, normal_sigma_rad: of a contact's measurement.
         pose_sigma_m: a pose known to this (a turn with an arm of 30 mm) is good enough.
         pose_weight: of the pose's information against the shape's; 1 is the chain rule, 0 asks for the shape alone.
-        look_ahead: how many grasps are planned together; 1 is greedy.
         least_gain: stop when no grasp promises so many nats; 0 never does.
         known_sigma_m: stop when the surface is explored to ``enough`` and known so well everywhere; None never does.
         enough: share of the surface near contacts at which that question is asked.
@@ -72,7 +71,6 @@ class InformationSettings(StrictModel):
     normal_sigma_rad: float = Field(default=float(np.deg2rad(5.0)), gt=0)
     pose_sigma_m: float = Field(default=0.003, gt=0)
     pose_weight: float = Field(default=1.0, ge=0)
-    look_ahead: int = Field(default=1, ge=1)
     least_gain: float = Field(default=0.0, ge=0)
     known_sigma_m: float | None = Field(default=None, gt=0)
     enough: float = Field(default=0.9, gt=0, le=1)
@@ -90,16 +88,12 @@ class Promise:
         pose: nats about the pose, shape (c,).
         shape: nats about the shape, shape (c,).
         touching: expected number of contacts, shape (c,).
-        chance: probability that a candidate explores each vertex, shape (c, n).
-        worth: nats that exploring each vertex brings, 0 for explored ones, shape (c, n).
         new_share: expected share of the whole surface that is newly explored, shape (c,).
     """
 
     pose: Array
     shape: Array
     touching: Array
-    chance: Array
-    worth: Array
     new_share: Array
 
 
@@ -127,8 +121,7 @@ class InformationPolicy:
     ) -> Decision:
         times = np.array([candidate.time_s for candidate in candidates])
         nats = self.settings.pose_weight * promise.pose + promise.shape
-        rates = planned_rates(nats, promise, times, self.settings.look_ahead)
-        rates = np.where(promise.touching > 0, rates, -np.inf)
+        rates = np.where(promise.touching > 0, nats / times, -np.inf)
         decision = best_of(self.name, rates, "", rng)
         if decision.chosen is None:
             return decision
@@ -182,7 +175,7 @@ def promised(
     worth = worth * _hope(surface, belief, reach_m)
     new_share = chance @ (fresh * surface.sizes) / surface.sizes.sum()
     touching = touches.touching.sum(axis=2).mean(axis=1)
-    return Promise(pose, np.sum(chance * worth, axis=1), touching, chance, worth, new_share)
+    return Promise(pose, np.sum(chance * worth, axis=1), touching, new_share)
 
 
 def unexplored(surface: Surface, belief: Belief, reach_m: float) -> Mask:
@@ -204,22 +197,6 @@ def covered_chance(touches: ExpectedTouches, surface: Surface, reach_m: float) -
             reached = reached | near[met[:, finger]]
         chance[index] = reached.mean(axis=0)
     return chance
-
-
-def planned_rates(nats: Array, promise: Promise, times: Array, depth: int) -> Array:
-    """Nats per second of each candidate followed by the best ``depth - 1`` grasps after it, shape (c,).
-
-    The following grasps count with what the first is expected to leave, and tell the pose as the first one does.
-    """
-    gained, spent = nats.copy(), times.copy()
-    left = 1.0 - promise.chance
-    for _ in range(depth - 1):
-        following = np.einsum("an,bn,bn->ab", left, promise.chance, promise.worth)
-        best = (following / times).argmax(axis=1)
-        gained += following[np.arange(len(nats)), best]
-        spent += times[best]
-        left = left * (1.0 - promise.chance[best])
-    return np.asarray(gained / spent)
 
 
 def _patches(surface: Surface, reach_m: float) -> Array:

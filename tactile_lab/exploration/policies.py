@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.exploration.information.igef import IgefSettings
-from tactile_lab.exploration.information_policy import InformationPolicy, InformationSettings
+from tactile_lab.exploration.information_policy import InformationPolicy
 from tactile_lab.exploration.policy import Policy
 from tactile_lab.exploration.pose_policies import (
     PoseSwitchPolicy,
@@ -28,7 +28,6 @@ from tactile_lab.exploration.surface_policies import (
 )
 
 DEFAULT_POLICY = "information"
-_LOOK_AHEAD = 3
 
 
 def _variance() -> Policy:
@@ -66,7 +65,6 @@ POLICIES: Mapping[str, Callable[[], Policy]] = MappingProxyType(
         "mutual-information": lambda: PoseSwitchPolicy("mutual-information", information_gain, _variance()),
         "renyi": lambda: PoseSwitchPolicy("renyi", renyi_gain, _variance()),
         "information": InformationPolicy,
-        "look-ahead": lambda: InformationPolicy(InformationSettings(look_ahead=_LOOK_AHEAD), "look-ahead"),
     }
 )
 """How each policy is made, by its name."""
