@@ -16,6 +16,7 @@ from gtsam import Pose3
 from drivers.fingertip import FingertipCalibration, FingertipSensor
 from sessions.black_box import Situation
 from sessions.cycle_timing import CycleCounts, CycleTiming
+from sessions.device_losses import DeviceLosses
 from sessions.instrument_set import InstrumentSet
 from sessions.instruments import (
     BaseInstrument,
@@ -75,7 +76,8 @@ class Bench:
         self.fingertip_calibrations = dict(fingertip_calibrations or {})
         self._timing = CycleTiming(clock, cycle_ns)
         self._devices = InstrumentSet(hand, base, self.wrench_devices, camera)
-        self._state = StateRecording(observer, clock, truth, self._devices)
+        self._losses = DeviceLosses(observer.interpreter, hand)
+        self._state = StateRecording(observer, clock, truth, self._devices, self._losses)
         self._observer = observer
         self._force_ranges_N = dict(force_ranges_N or {})
 
@@ -100,9 +102,9 @@ class Bench:
         return self.perception.world_T_mount
 
     @property
-    def undecodable(self) -> Mapping[str, int]:
-        """Received messages that broke their protocol, by link."""
-        return self._observer.interpreter.undecodable
+    def losses(self) -> Mapping[str, int]:
+        """What the devices lost, by kind and link; complete once the bench is closed."""
+        return self._losses.counts()
 
     @property
     def counts(self) -> CycleCounts:

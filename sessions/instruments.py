@@ -116,6 +116,9 @@ class HandInstrument(Instrument, Protocol):
     def health(self) -> tuple[str, ...]:
         """What is wrong, in words; empty when all is well."""
 
+    def losses(self) -> Mapping[str, int]:
+        """What is missing of its traffic since connecting, by kind. Raises DeviceError when nobody knows."""
+
 
 class BaseInstrument(Instrument, Protocol):
     """The live positioner."""

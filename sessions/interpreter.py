@@ -3,8 +3,9 @@
 Live, every link is tapped. The tap (:class:`Observer`) first records a datagram and then, still before the device
 that asked for it sees it, hands the same bytes to the :class:`Interpreter`, whose decoders and :class:`Perception`
 are objects apart from the live devices. A replay hands the recorded bytes to an equal Interpreter. The order of
-recording *is* the order of processing, for marks too, and the Interpreter's clock shows the stamp of the message
-in hand, in both cases. So nothing can be understood live that the recording does not say.
+recording *is* the order of processing, for marks too, and the Interpreter's clock shows the newest stamp that is not
+one link's word alone (:mod:`sessions.agreed_time`), in both cases. So nothing can be understood live that the
+recording does not say.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any
 
 from drivers.camera.packet import picture_of
 from drivers.links import Datagram
+from sessions.agreed_time import AgreedTime
 from sessions.instruments import BaseReading, Decoder, FrameReading, HandReading
 from sessions.mark_outcomes import Outcome
 from sessions.marks import Mark
@@ -48,7 +50,7 @@ class Interpreter:
         hand, base: decoders of those links.
         wrenches: decoders of the fingertips' own links, by finger; empty when the hand carries their data.
         camera: decoder of camera frames, if the rig has a camera.
-        clock: the clock the decoders were built with; it is set to the stamp of each message.
+        clock: the clock the decoders were built with; it follows the stamps.
     """
 
     def __init__(
@@ -62,7 +64,7 @@ class Interpreter:
         clock: VirtualClock | None = None,
     ) -> None:
         self.perception = perception
-        self.clock = clock or VirtualClock()
+        self.clock, self.time = clock or VirtualClock(), AgreedTime()
         self.newest: dict[str, Heard] = {}
         """The newest sample of each link that gave one, and when it came."""
         self.undecodable: Counter[str] = Counter()
@@ -81,7 +83,8 @@ class Interpreter:
 
     def received(self, link: str, payload: bytes, stamp_ns: int) -> None:
         """Take one received datagram. Bytes that break the protocol are counted; links not known are left alone."""
-        self.clock.sleep_until_ns(stamp_ns)
+        self.time.received(link, stamp_ns)
+        self._set_clock()
         route = self._routes.get(link)
         if route is None:
             return
@@ -92,8 +95,13 @@ class Interpreter:
 
     def mark(self, mark: Mark) -> Outcome | None:
         """Take one mark; see :meth:`Perception.mark`."""
-        self.clock.sleep_until_ns(mark.stamp_ns)
+        self.time.stamped(mark.stamp_ns)
+        self._set_clock()
         return self.perception.mark(mark)
+
+    def _set_clock(self) -> None:
+        if self.time.now_ns is not None:
+            self.clock.sleep_until_ns(self.time.now_ns)
 
     def _route(self, link: str, decoder: Decoder[Any], take: Callable[[Any], None]) -> Callable[[Datagram], None]:
         def route(datagram: Datagram) -> None:

@@ -172,6 +172,11 @@ def received_link(topic: str) -> str | None:
     return link_of(topic) if is_raw(topic) and topic.endswith("/rx") else None
 
 
+def stamped_by(topic: str) -> str | None:
+    """Name of the link that stamps a topic's messages; None where the program does."""
+    return "camera" if topic == IMAGE_TOPIC else received_link(topic)
+
+
 def link_of(topic: str) -> str:
     """Name of the link of a topic that carries bytes."""
     return topic.removeprefix("/link/").rpartition("/")[0]

@@ -8,6 +8,7 @@ from typing import Protocol
 from gtsam import Pose3
 
 from drivers.shadow.kinematics import JOINTS
+from sessions.device_losses import DeviceLosses
 from sessions.fingertip_samples import record_fingertips
 from sessions.health_watch import HealthWatch
 from sessions.instrument_set import InstrumentSet
@@ -36,6 +37,7 @@ class StateRecording:
         clock: the session's.
         truth: the truth channel of a simulated rig.
         devices: know what is wrong with them.
+        losses: what they lost; looked after here.
 
     Attributes:
         watch: tells what goes wrong with devices and fingertips.
@@ -47,8 +49,10 @@ class StateRecording:
         clock: Clock,
         truth: Callable[[], TruthReading] | None,
         devices: InstrumentSet,
+        losses: DeviceLosses,
     ) -> None:
-        self._observer, self._clock, self._truth, self._devices = observer, clock, truth, devices
+        self._observer, self._clock, self._truth = observer, clock, truth
+        self._devices, self._losses = devices, losses
         self.watch = HealthWatch(self._warn)
 
     def record(self) -> None:
@@ -62,7 +66,8 @@ class StateRecording:
         record_fingertips(recorder, now_ns, seen.fingertips)
         recorder.frames(now_ns, {"palm": seen.world_T_palm, **seen.world_T_distal})
         self.record_truth()
-        self.watch.look([*self._devices.problems(), *seen.problems()])
+        self._losses.look()
+        self.watch.look([*self._devices.problems(), *self._losses.problems(), *seen.problems()])
 
     def record_truth(self) -> None:
         """Where the object really is, on a simulated rig. Raises SessionError."""
@@ -72,6 +77,7 @@ class StateRecording:
 
     def conclude(self) -> None:
         """What went wrong with the devices, with its last figures. Raises SessionError."""
+        self._losses.conclude()
         if not self._observer.recorder.broken:
             tips = self._observer.interpreter.perception.problems()
             self.watch.conclude([*self._devices.problems(ask=True), *tips])

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 
+from sessions import schemas
+from sessions.agreed_time import AgreedTime
 from sessions.raw_frames import DeviceStamp
 
 LATE_ns = 100_000_000
-"""A message counts as late when its stamp lies this far behind the newest one recorded."""
+"""A message counts as late when its stamp lies this far behind the newest one that is not a single link's word."""
 
 
 class StreamCounts:
@@ -28,22 +30,29 @@ class StreamCounts:
         self.dropped: Counter[str] = Counter()
         self.unwritten: Counter[str] = Counter()
         self._next: dict[str, int] = {}
+        self._time = AgreedTime()
 
-    def take(self, topic: str, behind_ns: int, device: DeviceStamp) -> None:
+    def take(self, topic: str, stamp_ns: int, device: DeviceStamp) -> None:
         """One message was recorded.
 
         Args:
-            behind_ns: how far its stamp lies behind the newest one.
             device: what the device says of it. A counter that goes back has begun anew, which is no gap.
         """
         self.messages[topic] += 1
-        if behind_ns > LATE_ns:
+        if self._behind_ns(topic, stamp_ns) > LATE_ns:
             self.late[topic] += 1
         if device.counter is not None:
             missing = device.counter - self._next.get(topic, device.counter)
             if missing > 0:
                 self.gaps[topic] += missing
             self._next[topic] = device.counter + device.readings
+
+    def _behind_ns(self, topic: str, stamp_ns: int) -> int:
+        if (link := schemas.stamped_by(topic)) is None:
+            self._time.stamped(stamp_ns)
+        else:
+            self._time.received(link, stamp_ns)
+        return (self._time.now_ns or 0) - stamp_ns
 
     def losses(self) -> dict[str, int]:
         """Everything that is not zero, by kind and topic, for a session's record."""

@@ -153,7 +153,7 @@ class TrafficWriter:
         if device is None:
             stamper = self._stampers.get(topic)
             device = UNSTAMPED if stamper is None else stamper(data)
-        self.streams.take(topic, self._log_ns - stamp_ns, device)
+        self.streams.take(topic, stamp_ns, device)
         content = raw_frames.encode(data, stamp_ns, device) if schemas.is_raw(topic) else data
         self._log_ns = max(self._log_ns, stamp_ns)
         channel = self._channels.get(topic) or self._register(topic)

@@ -268,6 +268,10 @@ class ShadowHand:
         """A copy of the counters."""
         return replace(self._guard.counters)
 
+    def losses(self) -> dict[str, int]:
+        """Cycles since connecting without a valid status."""
+        return {"lost cycles": self._guard.counters.lost}
+
     @property
     def newest(self) -> HandSample | None:
         """The newest good sample; None before connecting."""

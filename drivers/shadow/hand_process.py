@@ -177,6 +177,11 @@ class HandProcess:
         """What is wrong with hand and wire, in words. Raises DeviceError when the process is gone."""
         return tuple(self.report()["health"])
 
+    def losses(self) -> dict[str, int]:
+        """Cycles without a valid status, and blocks of traffic not read in time. Raises as :meth:`report`."""
+        report = self.report()
+        return {"lost cycles": report["hand"]["lost"], "queue drops": report["dropped_blocks"]}
+
     def _show(self, record: Record) -> str:
         """Show the tap a message; an error's words."""
         if record.kind is RecordKind.ERROR:

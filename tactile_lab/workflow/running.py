@@ -153,7 +153,7 @@ def _record(
         for remark in laboratory.remarks():
             bench.event(Level.WARNING, "laboratory", remark)
             progress.told(remark)
-        _close(session, outcome, bench.counts.overruns, bench.undecodable)
+        _close(session, outcome, bench.counts.overruns, bench.losses)
     return outcome
 
 
@@ -203,7 +203,7 @@ def _conductor_settings(rig: Rig, request: SessionRequest) -> ConductorSettings:
     return settings.model_copy(update=changes)
 
 
-def _close(session: RunningSession, outcome: SessionOutcome, overruns: int, undecodable: Mapping[str, int]) -> None:
+def _close(session: RunningSession, outcome: SessionOutcome, overruns: int, losses: Mapping[str, int]) -> None:
     status: Status = "closed"
     if outcome.ending is Ending.INTERRUPTED:
         status = "interrupted"
@@ -211,5 +211,4 @@ def _close(session: RunningSession, outcome: SessionOutcome, overruns: int, unde
         status = "failed"
     as_asked = outcome.ending in {Ending.COMPLETE, Ending.INTERRUPTED}
     counts = {"grasps": len(outcome.grasps), "overruns": overruns}
-    lost = {f"undecodable {link}": number for link, number in undecodable.items()}
-    session.close(status, counts=counts, data_loss=lost, problem="" if as_asked else outcome.reason)
+    session.close(status, counts=counts, data_loss=losses, problem="" if as_asked else outcome.reason)

@@ -1,6 +1,7 @@
 """Sessions of all rigs and objects of the catalogue, replayed: the same samples, the same results, and how fast.
 
 python -m tests.support.replay_table --into docs/results.md
+python -m tests.support.replay_table --into docs/results.md --rigs sim-wire --objects box-10x6x4,cylinder --grasps 3
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import argparse
 import struct
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from hashlib import sha256
@@ -28,14 +29,15 @@ from tactile_lab.rigs.description import load_rig
 from tactile_lab.workflow import replaying
 from tactile_lab.workflow.judging import differing_files
 from tactile_lab.workflow.running import SessionRequest, run_session
-from tests.support.results_section import write_section
+from tests.support.results_section import GrowingTable
 
 RIGS = "sim,sim-biotac,sim-wire"
 HEAD = """## Replay of all rigs and objects
 
-`python -m tests.support.replay_table --into docs/results.md`: a session of {grasps} grasps, seed 1, for every rig and
-object, and its replay as fast as possible. Samples: all that the decoders gave, in order, compared bit by bit. Results:
-trajectory, contacts, contour or surface, and the estimation's own record, compared byte by byte.
+`python -m tests.support.replay_table --into docs/results.md`: a session of two grasps, seed 1, for every rig and
+object (on `sim-wire` of three, in real time: `--rigs sim-wire --objects NAMES --grasps 3`), and its replay as fast as
+possible. Samples: all that the decoders gave, in order, compared bit by bit. Results: trajectory, contacts, contour or
+surface, and the estimation's own record, compared byte by byte.
 
 | Rig | Object | Samples | Are the same | Results | Bytes read, times the original pace |
 |---|---|---:|---|---|---:|
@@ -119,9 +121,8 @@ def _builder(rig: str) -> Any:
     return wired_bench if load_rig(rig).description.wires is not None else build
 
 
-def table(rigs: list[str], objects: list[str], grasps: int, row_done: Callable[[str], None]) -> str:
-    """The table; a session that fails is a row with its reason."""
-    rows = []
+def run(table: GrowingTable, rigs: list[str], objects: list[str], grasps: int) -> None:
+    """Run sessions and replay them; one that fails is a row with its reason."""
     for rig in rigs:
         for name in objects:
             with tempfile.TemporaryDirectory() as root:
@@ -129,22 +130,20 @@ def table(rigs: list[str], objects: list[str], grasps: int, row_done: Callable[[
                     cells = compare(rig, name, grasps, Path(root)).cells()
                 except TactileLabError as error:
                     cells = ("", "", f"failed: {error}", "")
-            rows.append(f"| {' | '.join((rig, name, *cells))} |\n")
-            row_done(rows[-1].strip())
-    return HEAD.format(grasps=grasps) + "".join(rows)
+            table.put((rig, name), cells)
 
 
 def main() -> None:
-    """Print the table, or write it into a document."""
+    """Print the table, or write it into a document row by row."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--into", type=Path)
     parser.add_argument("--rigs", default=RIGS)
     parser.add_argument("--objects", default=",".join(CATALOGUE))
     parser.add_argument("--grasps", type=int, default=2)
     chosen = parser.parse_args()
-    text = table(chosen.rigs.split(","), chosen.objects.split(","), chosen.grasps, lambda row: print(row, flush=True))
-    if chosen.into:
-        write_section(chosen.into, "replays", text)
+    keys = [(rig, name) for rig in RIGS.split(",") for name in CATALOGUE]
+    table = GrowingTable(chosen.into, "replays", HEAD, keys)
+    run(table, chosen.rigs.split(","), chosen.objects.split(","), chosen.grasps)
 
 
 if __name__ == "__main__":

@@ -1,16 +1,17 @@
 """Every fault of a wire in the middle of a session, as a table.
 
 python -m tests.support.session_fault_table --into docs/results.md
+python -m tests.support.session_fault_table --into docs/results.md --missing
 """
 
 from __future__ import annotations
 
 import argparse
 import tempfile
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
 
-from tests.support.results_section import write_section
+from tests.support.results_section import GrowingTable, Key
 from tests.support.session_sweep import (
     BLIND,
     LAYOUTS,
@@ -39,40 +40,36 @@ Told: what its events and its record say, with the figures at the end.
 """
 
 
-def row(rig: str, link: str, fault: str, swept: Swept) -> str:
-    """One line of the table."""
+def cells(rig: str, link: str, fault: str, swept: Swept) -> tuple[str, ...]:
+    """One line of the table, behind its link and fault."""
     went = f"ends after {swept.after_s:.2f} s: {swept.ended}" if swept.ended else "goes on"
     unseen = "as it ended" if swept.ended else BLIND[rig][link].get(fault, "harmless")
     told = "; ".join(swept.told) or unseen
-    cells = (rig, link, fault, str(swept.struck), went, told, swept.replay)
-    return f"| {' | '.join(' '.join(cell.split()) for cell in cells)} |\n"
+    return str(swept.struck), went, told, swept.replay
 
 
-def table(rigs: list[str], only: str, row_done: Callable[[str], None]) -> str:
-    """The table. Raises AssertionError for a session that hung, or that left what can not be read."""
-    rows = []
-    for rig in rigs:
-        for link, fault in faults(rig):
-            if only not in f"{link} {fault}":
-                continue
-            with tempfile.TemporaryDirectory() as root:
-                swept = run_with(rig, {link: fault}, Path(root))
-            swept.check(link, fault)
-            rows.append(row(rig, link, fault, swept))
-            row_done(rows[-1].strip())
-    return HEAD + "".join(rows)
+def run(table: GrowingTable, keys: Sequence[Key]) -> None:
+    """Run sessions. Raises AssertionError for one that hung, or that left what can not be read."""
+    for rig, link, fault in keys:
+        with tempfile.TemporaryDirectory() as root:
+            swept = run_with(rig, {link: fault}, Path(root))
+        swept.check(link, fault)
+        table.put((rig, link, fault), cells(rig, link, fault, swept))
 
 
 def main() -> None:
-    """Print the table, or write it into a document."""
+    """Print the table, or write it into a document row by row."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--into", type=Path)
     parser.add_argument("--rigs", default=",".join(LAYOUTS))
     parser.add_argument("--only", default="", help="Part of the link's or the fault's name.")
+    parser.add_argument("--missing", action="store_true", help="Only what the document does not have.")
     chosen = parser.parse_args()
-    text = table(chosen.rigs.split(","), chosen.only, lambda line: print(line, flush=True))
-    if chosen.into:
-        write_section(chosen.into, "session faults", text)
+    table = GrowingTable(
+        chosen.into, "session faults", HEAD, [(rig, *fault) for rig in LAYOUTS for fault in faults(rig)]
+    )
+    asked = [(rig, *fault) for rig in chosen.rigs.split(",") for fault in faults(rig) if chosen.only in " ".join(fault)]
+    run(table, [key for key in asked if not chosen.missing or key in table.missing])
 
 
 if __name__ == "__main__":

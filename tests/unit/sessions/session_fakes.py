@@ -162,6 +162,7 @@ class FakeDevice:
     close_error: DeviceError | None = None
     work_ns: int = 0
     clock: VirtualClock | None = None
+    lost: dict[str, int] = field(default_factory=dict)
 
     def connect(self):
         self.calls.append(f"connect {self.name}")
@@ -180,6 +181,9 @@ class FakeDevice:
         if self.work_ns:
             self.clock.sleep_until_ns(self.clock.now_ns() + self.work_ns)
         return self.link.receive()[-1:]
+
+    def losses(self):
+        return self.lost
 
     def ask(self):
         self.link.send(b"TRIGGER")
