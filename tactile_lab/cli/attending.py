@@ -45,6 +45,7 @@ def attendance(way: GuidedWay | None, page: PageAddress | None, title: str) -> I
         title: of the page.
 
     Raises:
+        ConfigurationError: there is no such key for a pedal.
         ConfigurationError, DeviceError: the page can not be opened there.
     """
     with ExitStack() as stack:

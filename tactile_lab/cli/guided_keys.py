@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from sessions.guided.operator import Ask, Request
+from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import FINGERS
 
 UP, DOWN, LEFT, RIGHT, PAGE_DOWN, ENTER, ESCAPE = "up", "down", "left", "right", "page down", "enter", "escape"
@@ -71,7 +72,19 @@ BINDINGS: tuple[Binding, ...] = (
 BY_KEY = {binding.key: binding for binding in BINDINGS}
 BY_WORD = {binding.word: binding for binding in BINDINGS}
 
+_SPARE = {
+    **{f"\x1b[{number}~": f"f{key}" for key, number in enumerate((15, 17, 18, 19, 20, 21, 23, 24), 5)},
+    **{f"\x1bO{letter}": f"f{key}" for key, letter in enumerate("PQRS", 1)},
+    **dict.fromkeys(("\x1b[H", "\x1b[1~", "\x1bOH"), "home"),
+    **dict.fromkeys(("\x1b[F", "\x1b[4~", "\x1bOF"), "end"),
+    "\x1b[2~": "insert",
+    "\x1b[3~": "delete",
+    "\x1b[5~": "page up",
+}
+"""Keys without a meaning of their own, for pedals."""
+
 _SEQUENCES = {
+    **_SPARE,
     "\x1b[A": UP,
     "\x1b[B": DOWN,
     "\x1b[C": RIGHT,
@@ -83,6 +96,7 @@ _SEQUENCES = {
     "\x1b[6~": PAGE_DOWN,
 }
 _LONGEST = max(map(len, _SEQUENCES))
+_NAMED = {"\r": ENTER, "\n": ENTER, "\x1b": ESCAPE, "\t": "tab"}
 
 
 def split_keys(text: str) -> list[str]:
@@ -96,7 +110,7 @@ def split_keys(text: str) -> list[str]:
             length = _unknown_length(text)
         else:
             length = 1
-            keys.append({"\r": ENTER, "\n": ENTER, "\x1b": ESCAPE}.get(text[0], text[0]))
+            keys.append(_NAMED.get(text[0], text[0]))
         text = text[length:]
     return keys
 
@@ -107,6 +121,16 @@ def _unknown_length(text: str) -> int:
         if "@" <= character <= "~":
             return length
     return len(text)
+
+
+def pedal_key(name: str) -> str:
+    """The key of a pedal: a character, or the name of a key without one. Raises ConfigurationError."""
+    named = sorted({"tab", *_SEQUENCES.values()})
+    key = name if len(name) == 1 else name.lower().replace("-", " ")
+    if key and len(key) != 1 and key not in named:
+        hint = f"A character, or one of: {', '.join(named)}"
+        raise ConfigurationError(f"no key is called {name!r}", where="--pedal", hint=hint)
+    return key
 
 
 def request_of_line(line: str) -> Request | None:

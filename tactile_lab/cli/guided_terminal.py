@@ -16,7 +16,7 @@ from rich.text import Text
 
 from sessions.guided.operator import Ask, Panel, Request, Stage
 from tactile_lab.cli.console import people, say
-from tactile_lab.cli.guided_keys import BY_KEY, ENTER, ESCAPE, Binding, request_of_line, split_keys
+from tactile_lab.cli.guided_keys import BY_KEY, ENTER, ESCAPE, Binding, pedal_key, request_of_line, split_keys
 from tactile_lab.cli.guided_screen import as_lines, as_panel
 from tactile_lab.cli.terminal_input import KeyInput, LineInput
 
@@ -30,13 +30,16 @@ class KeyTerminal:
     The panel is drawn by a thread of its own, so that a slow terminal delays nothing.
 
     Args:
-        pedal: a key that captures, beside those that always do; "" for none.
+        pedal: a key that captures, beside those that always do, see :func:`pedal_key`; "" for none.
+
+    Raises:
+        ConfigurationError: there is no such key.
     """
 
     attended = True
 
     def __init__(self, pedal: str = "") -> None:
-        self._pedal = pedal
+        self._pedal = pedal_key(pedal)
         self._input = KeyInput()
         self._panel: Panel | None = None
         self._typing: tuple[Binding, str] | None = None
@@ -148,6 +151,6 @@ class LineTerminal:
 
 
 def terminal_for(pedal: str = "") -> KeyTerminal | LineTerminal:
-    """What fits standard input and standard error as they are."""
+    """What fits standard input and standard error as they are. Raises ConfigurationError as :class:`KeyTerminal`."""
     able = sys.stdin.isatty() and people.is_terminal and not people.is_dumb_terminal
     return KeyTerminal(pedal) if able else LineTerminal()

@@ -7,14 +7,17 @@ import pty
 import termios
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from sessions.guided.operator import Ask, Panel, Request, Stage
 from sessions.guided.sight import Sight
-from tactile_lab.cli.guided_keys import BINDINGS, BY_KEY, request_of_line, split_keys
+from tactile_lab.cli.guided_keys import BINDINGS, BY_KEY, pedal_key, request_of_line, split_keys
 from tactile_lab.cli.guided_screen import as_lines, as_panel, facts
+from tactile_lab.cli.guided_terminal import KeyTerminal
 from tactile_lab.cli.terminal_input import KeyInput, LineInput
+from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import FINGERS
 
 GUIDE = Path(__file__).parents[2] / "docs" / "guided-sessions.md"
@@ -31,8 +34,8 @@ def test_the_guide_tells_the_keys(key: str) -> None:
 
 
 def test_keys_are_told_apart_in_what_a_terminal_sends() -> None:
-    sent = "g \x1b[A\x1bOD\x1b[6~\r\x1b[15~u\x1b"
-    assert split_keys(sent) == ["g", " ", "up", "left", "page down", "enter", "u", "escape"]
+    sent = "g \x1b[A\x1bOD\x1b[6~\r\x1b[15~u\x1b[99~\x1b"
+    assert split_keys(sent) == ["g", " ", "up", "left", "page down", "enter", "f5", "u", "escape"]
 
 
 @pytest.mark.parametrize("text", ["\x1b[", "\x1bO", "\x1b[1;2;3", "\x00\x07", "\x1b\x1b[A"])
@@ -76,6 +79,26 @@ def _use_and_interrupt(ours: int, theirs: int) -> None:
         os.write(ours, b"g\x1b[A")
         assert split_keys(keys.read()) == ["g", "up"]
         raise KeyboardInterrupt
+
+
+PEDALS = [("f5", b"\x1b[15~"), ("b", b"b"), ("Page-Up", b"\x1b[5~"), ("tab", b"\t")]
+
+
+@pytest.mark.parametrize(("pedal", "sends"), PEDALS)
+def test_pedal_may_send_any_key(pedal: str, sends: bytes, terminal: tuple[int, int], monkeypatch: Any) -> None:
+    ours, theirs = terminal
+    with open(theirs, closefd=False) as keyboard:
+        monkeypatch.setattr("sys.stdin", keyboard)
+        keys = KeyTerminal(pedal)
+        with keys._input:  # without the panel and its thread
+            os.write(ours, b"q" + sends + b"\x1b[6~")
+            assert keys.requests() == [Request(Ask.NEXT), Request(Ask.NEXT)]
+
+
+def test_pedal_that_no_key_is_called_is_refused_with_the_names_there_are() -> None:
+    with pytest.raises(ConfigurationError, match="no key is called 'pedal-1'") as refused:
+        pedal_key("pedal-1")
+    assert "f12" in refused.value.hint
 
 
 def test_terminal_is_put_back_whatever_happens(terminal: tuple[int, int]) -> None:
