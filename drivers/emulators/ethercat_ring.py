@@ -81,17 +81,17 @@ class EmulatedRing:
             slave.work()
 
     def _round(self, telegram: Telegram) -> Telegram:
-        passed = replace(telegram, circulated=False)
+        passed = replace(telegram, circulated=False) if telegram.circulated else telegram
         for slave in self.slaves[: self.faults.connected]:
             passed = slave.process(passed)
         return passed
 
     def _lost(self, way: str) -> bool:
-        left = getattr(self.faults, way)
+        left, share = getattr(self.faults, way), self.faults.drop_share
         if left:
             setattr(self.faults, way, left - 1)
-        lost = bool(left) or (self.faults.drop_share > 0 and self._rng.random() < self.faults.drop_share / 2)
-        self.counts.lost += int(lost)
+        lost = bool(left) or (share > 0 and self._rng.random() < share / 2)
+        self.counts.lost += lost
         return lost
 
     def _in_order(self, answer: bytes) -> list[bytes]:

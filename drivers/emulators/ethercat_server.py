@@ -28,7 +28,7 @@ from drivers.shadow.palm_codec import CanFrame
 from drivers.shadow.real_time import request_real_time
 from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock
 
-_IDLE_s = 0.02
+_IDLE_s, _LOOK_ns = 0.02, 5_000_000
 _START_s, _ANSWER_s = 30.0, 5.0
 
 
@@ -37,6 +37,7 @@ class HandServer:
 
     def __init__(self, hand: EmulatedHand, port: Port, can: MotorCanBuses, clock: Clock) -> None:
         self._hand, self._port, self._can, self._clock = hand, port, can, clock
+        self._look_ns = clock.now_ns()
 
     def run(self) -> None:
         """Serve. Raises DeviceError when the interface goes."""
@@ -46,7 +47,7 @@ class HandServer:
                     self._port.send(answer)
                 continue
             self._hand.ring.work()
-            if select.select([sys.stdin], [], [], 0)[0]:
+            if self._asked():
                 if not (line := sys.stdin.readline()):
                     return
                 say(self._obey(json.loads(line)))
@@ -54,6 +55,14 @@ class HandServer:
     def _patience_s(self) -> float:
         due_ns = self._hand.ring.due_ns
         return _IDLE_s if due_ns is None else max(due_ns - self._clock.now_ns(), 0) / NANOSECONDS
+
+    def _asked(self) -> bool:
+        """Whether there is an order, or no one left to give one; looked at now and then, as it costs a system call."""
+        now_ns = self._clock.now_ns()
+        if now_ns < self._look_ns:
+            return False
+        self._look_ns = now_ns + _LOOK_ns
+        return bool(select.select([sys.stdin], [], [], 0)[0])
 
     def _obey(self, order: dict[str, Any]) -> dict[str, Any]:
         hand = self._hand

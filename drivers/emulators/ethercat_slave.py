@@ -7,6 +7,7 @@ SyncManagers have one buffer; others are refused on the way to SAFEOP. No mailbo
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -18,7 +19,7 @@ from drivers.ethercat.registers import FMMU_BYTES, SYNC_MANAGER_BYTES, AlState, 
 from tactile_lab.clock import Clock
 
 _FMMUS, _SYNC_MANAGERS, _RAM_KIB = 3, 4, 1
-_RAM_END = Register.PROCESS_RAM + 1024 * _RAM_KIB
+_RAM_START, _RAM_END = int(Register.PROCESS_RAM), Register.PROCESS_RAM + 1024 * _RAM_KIB
 _READ_ONLY = (range(0x0010), range(0x0110, 0x0112), range(0x0130, 0x0136), range(0x0440, 0x0442))
 _DIVIDER, _WATCHDOG_TICKS, _TICK_ns = 0x09C2, 1000, 40
 
@@ -53,8 +54,8 @@ class SlaveController:
         struct.pack_into("<H", self._memory, Register.WATCHDOG_DIVIDER, _DIVIDER)
         struct.pack_into("<H", self._memory, Register.WATCHDOG_TIME_PDI, _WATCHDOG_TICKS)
         struct.pack_into("<H", self._memory, Register.WATCHDOG_TIME, _WATCHDOG_TICKS)
-        self._blocks: list[Block] = []
         self._fmmus: list[tuple[int, int, int, int]] = []
+        self._load_blocks(())
         self._states = StateMachine(self._setup_error)
         self._pending_since_ns: int | None = None
         self._fed_ns = 0
@@ -79,7 +80,7 @@ class SlaveController:
         self.work()
         command = telegram.command
         if command in _LOGICAL:
-            return self._logical(telegram)
+            return self._logical(telegram) if self._fmmus else telegram
         passed = telegram
         if command in _BY_POSITION or command in _TO_ALL:
             passed = replace(telegram, address=physical(telegram.slave + 1, telegram.register))
@@ -110,22 +111,22 @@ class SlaveController:
         return replace(telegram, data=data, working_counter=counter & 0xFFFF)
 
     def _logical(self, telegram: Telegram) -> Telegram:
-        data, first, last = bytearray(telegram.data), telegram.address, telegram.address + len(telegram.data)
-        wrote = read = False
+        command, data, first = telegram.command, bytearray(telegram.data), telegram.address
+        last, wrote, read = first + len(data), False, False
         for logical, length, memory, kind in self._fmmus:
             low, high = max(first, logical), min(last, logical + length)
             if low >= high:
                 continue
             at, own = memory + low - logical, slice(low - first, high - first)
-            if kind & 2 and telegram.command is not Command.LRD:
+            if kind & 2 and command is not Command.LRD:
                 wrote |= self._write(at, telegram.data[own])
-            if kind & 1 and telegram.command is not Command.LWR:
+            if kind & 1 and command is not Command.LWR:
                 found = self._read(at, high - low)
                 read |= found is not None
                 data[own] = found if found is not None else data[own]
-        weight = 2 if telegram.command is Command.LRW else 1
-        counter = telegram.working_counter + weight * wrote + read
-        return replace(telegram, data=bytes(data), working_counter=counter & 0xFFFF)
+        weight = 2 if command is Command.LRW else 1
+        counter = telegram.working_counter + weight * wrote + read & 0xFFFF
+        return Telegram(command, first, bytes(data), telegram.index, counter, telegram.interrupt, telegram.circulated)
 
     # --- memory, from the master's side ------------------------------------------------------------------------
 
@@ -133,7 +134,7 @@ class SlaveController:
         end = address + length
         if end > _RAM_END:
             return None
-        if end > Register.PROCESS_RAM:
+        if end > _RAM_START:
             return self._read_blocks(address, end)
         if address <= Register.EEPROM_CONTROL < end:
             self.eeprom.look(self._memory)
@@ -156,10 +157,12 @@ class SlaveController:
 
     def _write(self, address: int, data: bytes) -> bool:
         end = address + len(data)
-        if end > _RAM_END or any(address in each for each in _READ_ONLY):
+        if end > _RAM_END:
             return False
-        if end > Register.PROCESS_RAM:
+        if end > _RAM_START:
             return self._write_blocks(address, data)
+        if any(address in each for each in _READ_ONLY):
+            return False
         self._memory[address:end] = data
         self._react(address, end)
         return True
@@ -186,18 +189,15 @@ class SlaveController:
             self._fed_ns = now_ns
 
     def _segments(self, address: int, end: int) -> list[tuple[int, int, Block | None]]:
-        """An address range cut at the borders of the guarded blocks."""
-        borders = {address, end}
-        borders |= {edge for block in self._blocks for edge in (block.start, block.end) if address < edge < end}
-        cuts = sorted(borders)
-        return [
-            (low, high, next((block for block in self._blocks if block.start <= low < block.end), None))
-            for low, high in pairwise(cuts)
-        ]
-
-    @property
-    def _first_to_master(self) -> int:
-        return next((block.number for block in self._blocks if not block.to_slave), -1)
+        """An address range cut at the borders of the guarded blocks; kept, as every cycle asks for the same."""
+        if (known := self._cuts.get((address, end))) is None:
+            borders = {address, end}
+            borders |= {edge for block in self._blocks for edge in (block.start, block.end) if address < edge < end}
+            known = self._cuts[address, end] = [
+                (low, high, next((block for block in self._blocks if block.start <= low < block.end), None))
+                for low, high in pairwise(sorted(borders))
+            ]
+        return known
 
     # --- registers that do something ---------------------------------------------------------------------------
 
@@ -205,7 +205,9 @@ class SlaveController:
         if address < Register.FMMU + 0x100 and end > Register.FMMU:
             self._load_fmmus()
         if address < Register.SYNC_MANAGER + 0x80 and end > Register.SYNC_MANAGER:
-            self._load_blocks()
+            self._load_blocks(self._blocks)
+        if address < Register.WATCHDOG_STATUS and end > Register.WATCHDOG_DIVIDER:
+            self._load_watchdog()
         if address <= Register.AL_CONTROL < end:
             self._request_state()
         if address <= Register.EEPROM_CONTROL + 1 < end:
@@ -219,17 +221,31 @@ class SlaveController:
             if active & 1 and length and (first_bit, last_bit, bit) == (0, 7, 0):
                 self._fmmus.append((logical, length, memory, kind))
 
-    def _load_blocks(self) -> None:
-        before = {(block.number, block.start, block.end): block.full for block in self._blocks}
-        self._blocks = []
-        for number in range(_SYNC_MANAGERS):
-            at = Register.SYNC_MANAGER + SYNC_MANAGER_BYTES * number
-            start, length, control, _, active = struct.unpack_from("<HHBBB", self._memory, at)
-            if active & 1 and length:
-                full = before.get((number, start, start + length), False)
-                to_slave, watched = bool(control & 0x04), bool(control & 0x40)
-                block = Block(number, start, start + length, to_slave, watched, control & 3 == 2, full)
-                self._blocks.append(block)
+    def _load_blocks(self, before: Sequence[Block]) -> None:
+        full = {(block.number, block.start, block.end) for block in before if block.full}
+        blocks = (self._block(number) for number in range(_SYNC_MANAGERS))
+        self._blocks = [block for block in blocks if block is not None]
+        for block in self._blocks:
+            block.full = (block.number, block.start, block.end) in full
+        self._inward = [block for block in self._blocks if block.to_slave]
+        self._outward = [block for block in self._blocks if not block.to_slave]
+        self._first_to_master = self._outward[0].number if self._outward else -1
+        self._cuts: dict[tuple[int, int], list[tuple[int, int, Block | None]]] = {}
+        self._load_watchdog()
+
+    def _block(self, number: int) -> Block | None:
+        """What a SyncManager guards; None when it is off."""
+        at = Register.SYNC_MANAGER + SYNC_MANAGER_BYTES * number
+        start, length, control, _, active = struct.unpack_from("<HHBBB", self._memory, at)
+        if not (active & 1 and length):
+            return None
+        return Block(number, start, start + length, bool(control & 0x04), bool(control & 0x40), control & 3 == 2)
+
+    def _load_watchdog(self) -> None:
+        """Time without a fed SyncManager after which the slave leaves OP; 0 where nothing is watched."""
+        (divider,) = struct.unpack_from("<H", self._memory, Register.WATCHDOG_DIVIDER)
+        (ticks,) = struct.unpack_from("<H", self._memory, Register.WATCHDOG_TIME)
+        self._watchdog_ns = (divider + 2) * _TICK_ns * ticks if any(block.watched for block in self._blocks) else 0
 
     def _request_state(self) -> None:
         before = self._states.status.state
@@ -259,10 +275,10 @@ class SlaveController:
     def work(self) -> None:
         """What the slave has done since the last frame: the application's turn, the watchdog."""
         now_ns = self._clock.now_ns()
-        if (due_ns := self.due_ns) is not None and now_ns >= due_ns:
+        if self._pending_since_ns is not None and now_ns >= self._pending_since_ns + self.application.service_ns:
             self._pending_since_ns = None
             self._serve()
-        if self._states.status.state == AlState.OP and self._watchdog_expired(now_ns):
+        if self._watchdog_ns and now_ns - self._fed_ns > self._watchdog_ns and self._states.status.state == AlState.OP:
             self.counts.watchdog_trips += 1
             self._states.watchdog()
 
@@ -270,25 +286,14 @@ class SlaveController:
         state = self._states.status.state
         if state < AlState.SAFEOP:
             return
-        inward = [block for block in self._blocks if block.to_slave]
-        taken = tuple(bytes(self._memory[block.start : block.end]) for block in inward)
-        for block in inward:
+        taken = tuple(bytes(self._memory[block.start : block.end]) for block in self._inward)
+        for block in self._inward:
             block.full = False
-        answer = self.application.serve(taken, operating=state == AlState.OP)
-        if answer is not None:
+        if (answer := self.application.serve(taken, operating=state == AlState.OP)) is not None:
             self._publish(answer)
 
     def _publish(self, contents: tuple[bytes, ...]) -> None:
-        outward = [block for block in self._blocks if not block.to_slave]
-        for block, content in zip(outward, contents, strict=True):
+        for block, content in zip(self._outward, contents, strict=True):
             if not block.full:
                 self._memory[block.start : block.end] = content
                 block.full = True
-
-    def _watchdog_expired(self, now_ns: int) -> bool:
-        if not any(block.watched for block in self._blocks):
-            return False
-        (divider,) = struct.unpack_from("<H", self._memory, Register.WATCHDOG_DIVIDER)
-        (ticks,) = struct.unpack_from("<H", self._memory, Register.WATCHDOG_TIME)
-        limit_ns = (divider + 2) * _TICK_ns * ticks
-        return bool(limit_ns and now_ns - self._fed_ns > limit_ns)

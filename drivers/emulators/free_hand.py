@@ -16,6 +16,9 @@ from tactile_lab.geometry.contacts import Array
 FULL_SPEED_rad_s = 4.0
 """Speed of every joint at full duty cycle (assumed)."""
 
+_LOOK_ns = 100_000  # looks closer together, those of one cycle of the palm, see the same posture
+_LOWEST_rad, _HIGHEST_rad = (np.ascontiguousarray(limits_rad) for limits_rad in JOINT_LIMITS_rad.T)
+
 
 class FreeHand:
     """Joints that follow their motors on a clock's time; at a limit the motor pushes with its stall torque.
@@ -30,10 +33,13 @@ class FreeHand:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._spread = _shares_of_motors()
+        self._of_motors = np.ascontiguousarray(self._spread.T)
+        self._low_rad, self._high_rad = self._of_motors @ _LOWEST_rad, self._of_motors @ _HIGHEST_rad
         self._stall_Nm = np.array([motor_class(joint).stall_Nm for joint in DRIVEN_JOINTS])
-        self._angles_rad: Array = np.asarray(np.mean(JOINT_LIMITS_rad, axis=1))
-        self._duty = np.zeros(len(DRIVEN_JOINTS))
+        self._angles_rad: Array = (_LOWEST_rad + _HIGHEST_rad) / 2
         self._moved_ns = self._driven_ns = clock.now_ns()
+        self._resting = True
+        self.drive(np.zeros(len(DRIVEN_JOINTS)))
 
     @property
     def stamp_ns(self) -> int:
@@ -43,17 +49,18 @@ class FreeHand:
     @property
     def joints_rad(self) -> Array:
         """Joint angles, shape (24,), radians."""
-        self._move()
-        return np.array(self._angles_rad)
+        self._look()
+        return self._angles_rad.copy()
 
     @property
     def motor_torque_Nm(self) -> Array:
         """Torque of each driven joint's motor, shape (20,): none unless it pushes against a limit."""
-        self._move()
-        low, high = self._spread.T @ JOINT_LIMITS_rad[:, 0], self._spread.T @ JOINT_LIMITS_rad[:, 1]
-        angle = self._spread.T @ self._angles_rad
-        pushing = ((angle <= low) & (self._duty < 0)) | ((angle >= high) & (self._duty > 0))
-        return np.asarray(np.where(pushing, self._duty * self._stall_Nm, 0.0))
+        self._look()
+        if self._resting:
+            return np.zeros(len(DRIVEN_JOINTS))
+        angle_rad = self._of_motors @ self._angles_rad
+        pushing = (angle_rad <= self._low_rad) & self._falling | (angle_rad >= self._high_rad) & self._rising
+        return np.asarray(self._push_Nm * pushing)
 
     def contacts(self) -> tuple[TrueContact, ...]:
         """Its fingertips touch nothing."""
@@ -65,15 +72,21 @@ class FreeHand:
 
     def drive(self, duty: Array) -> None:
         """Duty cycles -1 to 1 from now on, shape (20,), order of ``DRIVEN_JOINTS``."""
-        self._move()
-        self._duty = np.asarray(duty, float).copy()
-        self._driven_ns = self._moved_ns
+        self._move(self._clock.now_ns())
+        self._driven_ns, self._resting = self._moved_ns, not duty.any()
+        self._falling, self._rising = duty < 0, duty > 0
+        self._speed_rad_s, self._push_Nm = self._spread @ duty * FULL_SPEED_rad_s, duty * self._stall_Nm
 
-    def _move(self) -> None:
+    def _look(self) -> None:
         now_ns = self._clock.now_ns()
-        turning_ns = max(min(now_ns, self._driven_ns + DEMAND_TIMEOUT_ns) - self._moved_ns, 0)
-        turned = self._spread @ self._duty * FULL_SPEED_rad_s * turning_ns / NANOSECONDS
-        self._angles_rad = np.clip(self._angles_rad + turned, JOINT_LIMITS_rad[:, 0], JOINT_LIMITS_rad[:, 1])
+        if now_ns - self._moved_ns >= _LOOK_ns:
+            self._move(now_ns)
+
+    def _move(self, now_ns: int) -> None:
+        turning_ns = min(now_ns, self._driven_ns + DEMAND_TIMEOUT_ns) - self._moved_ns
+        if turning_ns > 0 and not self._resting:
+            turned_rad = self._speed_rad_s * (turning_ns / NANOSECONDS)
+            self._angles_rad = np.minimum(np.maximum(self._angles_rad + turned_rad, _LOWEST_rad), _HIGHEST_rad)
         self._moved_ns = now_ns
 
 

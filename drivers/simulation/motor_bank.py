@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,9 +22,11 @@ GAUGE_COUNTS_PER_Nm = 2000.0
 """Strain-gauge difference per joint torque (assumed: a real hand's is set by its gauges)."""
 
 _GAUGE_NOISE = 2.0
+_NO_DEMAND, _OVER_TEMPERATURE = int(MotorFlag.NO_DEMAND), int(MotorFlag.OVER_TEMPERATURE)
 _GAUGE_MIDDLE = 2048
 _SUPPLY_V, _AMBIENT_C, _HALT_C = 24.0, 25.0, 60.0
 _STALL_RISE_C, _THERMAL_TIME_s = 80.0, 200.0
+_WARMING_ns = 10_000_000  # so often the windings' temperature follows their load
 _SLOW_WORDS = (0, 1200, 1200, 0, 4711, 0, 131, 2020, 0x0A1F, 300, 4500, 0, 0, 0, 5, 5000, 0x0D)
 """Answers of the slow data types 0 to 0x10: firmware revision, serial, gear ratio, date, torque loop."""
 
@@ -51,7 +55,7 @@ class MotorBank:
         self._stall_Nm = np.array([motor.stall_Nm for motor in classes])
         self._stall_mA = np.array([motor.stall_current_mA for motor in classes])
         self._pwm = np.zeros(MOTORS)
-        self._flags = np.full(MOTORS, int(MotorFlag.NO_DEMAND))
+        self._flags = np.full(MOTORS, _NO_DEMAND)
         self._celsius = np.full(MOTORS, _AMBIENT_C)
         self._config = np.zeros((MOTORS, len(CONFIG_TYPES)), int)
         self._max_pwm = np.full(MOTORS, MAX_PWM)
@@ -70,12 +74,12 @@ class MotorBank:
     def tick(self) -> None:
         """No demand came in time: every motor halts until the next one."""
         self._halts_at_ns = None
-        self._flags |= int(MotorFlag.NO_DEMAND)
+        self._flags |= _NO_DEMAND
         self._turn(np.zeros(MOTORS))
 
     def take(self, command: PalmCommand) -> None:
         """Pass a command's words on to the motors."""
-        words = np.asarray(command.motor_data, int)
+        words = np.array(command.motor_data, int)
         kind = command.to_motor_data_type
         self._frames += 1
         self._warm()
@@ -100,7 +104,7 @@ class MotorBank:
             kind_now = self._slow_turns // 2 % (len(_SLOW_WORDS) - 1) + 1  # even and odd motors each go through all
             self._slow_turns += 1
             return np.full(MOTORS, kind_now, np.int16), np.full(MOTORS, _SLOW_WORDS[kind_now], np.uint16)
-        return gauges.astype(np.int16), (np.rint(self._misc(kind, gauges)).astype(int) & 0xFFFF).astype(np.uint16)
+        return gauges.astype(np.int16), np.rint(self._misc(kind, gauges)).astype(np.int64).astype(np.uint16)
 
     def _misc(self, kind: int, gauges: Array) -> Array:
         match kind:
@@ -125,7 +129,7 @@ class MotorBank:
 
     @property
     def _torque_Nm(self) -> Array:
-        return np.asarray(self._sign * self._plant.motor_torque_Nm[self._row_of_motor])
+        return np.asarray(self._sign * self._plant.motor_torque_Nm.take(self._row_of_motor))
 
     @property
     def _load(self) -> Array:
@@ -137,7 +141,7 @@ class MotorBank:
         return np.minimum(np.maximum(np.rint(self._torque_Nm * GAUGE_COUNTS_PER_Nm + noise), -32768), 32767)
 
     def _demand(self, words: NDArray[np.int_]) -> None:
-        self._flags &= ~int(MotorFlag.NO_DEMAND)
+        self._flags &= ~_NO_DEMAND
         self._halts_at_ns = self._plant.stamp_ns + DEMAND_TIMEOUT_ns
         self._turn(np.minimum(np.maximum(words, -self._max_pwm), self._max_pwm))
 
@@ -148,13 +152,13 @@ class MotorBank:
         return np.asarray(np.rint((wanted + 0.5 * missing) / (GAUGE_COUNTS_PER_Nm * self._stall_Nm) * MAX_PWM), int)
 
     def _turn(self, pwm: Array | NDArray[np.int_]) -> None:
-        self._pwm = np.where(self._flags & int(MotorFlag.OVER_TEMPERATURE), 0.0, pwm)
-        self._plant.drive((self._sign * self._pwm)[self._motor_of_row] / MAX_PWM)
+        self._pwm = np.where(self._flags & _OVER_TEMPERATURE, 0.0, pwm)
+        self._plant.drive((self._sign * self._pwm).take(self._motor_of_row) / MAX_PWM)
 
     def _reset(self, words: NDArray[np.int_]) -> None:
         """A reset addresses a motor by its number on its bus; it comes back halted and with its stored settings."""
         reset = words & 0xFFFF == 0x5200 | np.arange(MOTORS) % 10
-        self._flags[reset] = int(MotorFlag.NO_DEMAND)
+        self._flags[reset] = _NO_DEMAND
         self._max_pwm[reset], self._max_torque[reset] = MAX_PWM, MAX_TORQUE
         self._turn(np.where(reset, 0.0, self._pwm))
 
@@ -173,9 +177,11 @@ class MotorBank:
 
     def _warm(self) -> None:
         """Windings approach the temperature of their present load; too hot, they halt for good."""
-        elapsed_s = (self._plant.stamp_ns - self._warmed_at_ns) / NANOSECONDS
-        self._warmed_at_ns = self._plant.stamp_ns
+        elapsed_ns = self._plant.stamp_ns - self._warmed_at_ns
+        if elapsed_ns < _WARMING_ns:
+            return
+        self._warmed_at_ns += elapsed_ns
         final = _AMBIENT_C + _STALL_RISE_C * self._load**2
-        self._celsius += (final - self._celsius) * (1 - np.exp(-elapsed_s / _THERMAL_TIME_s))
+        self._celsius += (final - self._celsius) * (1 - math.exp(-elapsed_ns / NANOSECONDS / _THERMAL_TIME_s))
         if (hot := self._celsius > _HALT_C).any():
-            self._flags[hot] |= int(MotorFlag.OVER_TEMPERATURE)
+            self._flags[hot] |= _OVER_TEMPERATURE

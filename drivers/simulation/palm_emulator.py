@@ -69,8 +69,8 @@ class JointSensors:
     def counts(self, joints_rad: Array) -> NDArray[np.uint16]:
         """One reading of all 37 channels for true angles of shape (24,)."""
         noise_rad = self._noise_rad * self._rng.standard_normal(len(joints_rad))
-        counts = self._calibration.raw_counts(joints_rad + self._bias_rad + noise_rad)
-        return np.minimum(np.maximum(np.rint(counts), 0.0), _ADC_FULL_SCALE).astype(np.uint16)
+        counts = np.rint(self._calibration.raw_counts(joints_rad + self._bias_rad + noise_rad)).astype(np.int64)
+        return np.minimum(np.maximum(counts, 0), _ADC_FULL_SCALE).astype(np.uint16)
 
 
 class CanBuses(Protocol):
