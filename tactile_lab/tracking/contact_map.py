@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +38,15 @@ class PlacedGrasp:
     left_out: frozenset[int] = frozenset()
     moved_freely: bool = False
 
-    @property
+    @cached_property
     def kept(self) -> NDArray[np.intp]:
         """Indices of the contacts that are part of the shape."""
-        return np.array([i for i in range(len(self.contacts_world)) if i not in self.left_out], dtype=np.intp)
+        return np.delete(np.arange(len(self.contacts_world)), sorted(self.left_out))
+
+    @property
+    def kept_world(self) -> ContactSet:
+        """The contacts that are part of the shape, world frame."""
+        return self.contacts_world.selected(self.kept) if self.left_out else self.contacts_world
 
     @property
     def used(self) -> bool:
@@ -96,7 +102,7 @@ class ContactMap:
         """Whether the object followed the hand's motion before each grasp, shape (n,)."""
         return np.array([not grasp.moved_freely for grasp in self.placed])
 
-    @property
+    @cached_property
     def contacts(self) -> ContactSet:
         """Contacts that make up the shape, object frame."""
         return self.contacts_world.in_object_frame(self.rows[self.grasp_indices], self.space)
@@ -108,12 +114,12 @@ class ContactMap:
         places = [self.space.to_object(row, free, free)[0] for row, free in known if len(free)]
         return np.vstack([np.empty((0, self.placed[0].contacts_world.dimension)), *places])
 
-    @property
+    @cached_property
     def contacts_world(self) -> ContactSet:
         """The same contacts where they were touched, world frame."""
-        return ContactSet.concatenated([grasp.contacts_world.selected(grasp.kept) for grasp in self.placed])
+        return ContactSet.concatenated([grasp.kept_world for grasp in self.placed])
 
-    @property
+    @cached_property
     def grasp_indices(self) -> NDArray[np.intp]:
         """The grasp that each of :attr:`contacts` comes from, shape (n,)."""
         return np.repeat(np.arange(len(self.placed)), [len(grasp.kept) for grasp in self.placed])
@@ -178,6 +184,10 @@ class ContactMap:
 
     def fit(self) -> Gpis:
         """The shape, with the current kernel parameters."""
+        return self._field
+
+    @cached_property
+    def _field(self) -> Gpis:
         contacts = self.contacts
         return Gpis.fit(
             contacts.points_m, contacts.normals, contacts.point_sigma_m, contacts.normal_sigma_rad, self.settings

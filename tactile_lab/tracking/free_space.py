@@ -55,7 +55,7 @@ def free_space_costs(gpis: Gpis, free_object_m: Array) -> Array:
         Shape (n,).
     """
     count, each, dimension = free_object_m.shape
-    found = gpis.predict(free_object_m.reshape(-1, dimension), variance=True)
-    sigma = np.sqrt(found.variance_m2 + _TOLERANCE_m**2)
-    surely = log_ndtr((found.mean_m + _TOLERANCE_m) / sigma)
+    places = free_object_m.reshape(-1, dimension)
+    sigma = np.sqrt(gpis.variance(places, rough=True) + _TOLERANCE_m**2)
+    surely = log_ndtr((gpis.mean(places) + _TOLERANCE_m) / sigma)
     return np.asarray(-_WEIGHT * surely.reshape(count, each).sum(axis=1))

@@ -41,8 +41,9 @@ _POOR_GAIN = 2.5
 _MOST_REGROUPINGS = 3
 """A trajectory that took several wrong turns is mended at one after the other."""
 
-_BACKWARD_HYPOTHESES = 4
-"""Kept when a session is read backwards: a second opinion need not be as thorough as the first."""
+_BACKWARD_SPREAD = {2: (4, 8), 3: (3, 4)}
+"""Hypotheses kept, and branches smoothed, when a session is read backwards, by the dimension of the contacts: a second
+opinion need not be as thorough as the first, and in space it costs as much."""
 
 
 class JointSettings(StrictModel):
@@ -206,8 +207,8 @@ class JointTracker:
         """The hypotheses that the same grasps give in the opposite order."""
         placed, space = self.map.placed, self._space
         last = replace(placed[-1], left_out=frozenset(), covariance=placed[0].covariance)
-        fewer = {"hypotheses": _BACKWARD_HYPOTHESES, "smoothed": 2 * _BACKWARD_HYPOTHESES}
-        settings = self._settings.model_copy(update=fewer)
+        spread = _BACKWARD_SPREAD[self.map.dimension]
+        settings = self._settings.model_copy(update={"hypotheses": spread[0], "smoothed": spread[1]})
         tracker = JointTracker(replace(self.map, placed=(last,)), self._noise, settings, self._kernel_every)
         for grasp, later in zip(placed[-2::-1], placed[:0:-1], strict=True):
             tracker.predict(space.inverse(later.motion))

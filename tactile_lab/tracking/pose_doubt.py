@@ -92,7 +92,7 @@ def _walls(contact_map: ContactMap) -> ContactMap:
 
 
 def _seen_from_above(grasp: PlacedGrasp) -> PlacedGrasp:
-    kept = grasp.contacts_world.selected(grasp.kept)
+    kept = grasp.kept_world
     walls = kept.selected(on_walls(kept.normals))
     level = walls.normals[:, :2] / np.linalg.norm(walls.normals[:, :2], axis=1, keepdims=True)
     flat = ContactSet(walls.points_m[:, :2], level, walls.point_sigma_m, walls.normal_sigma_rad, np.empty((0, 2)))

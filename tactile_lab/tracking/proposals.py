@@ -15,7 +15,7 @@ from pydantic import Field as Limit
 from scipy.stats import norm, qmc
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.field_grid import Field
+from tactile_lab.shape.gpis import Gpis
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.motion import MotionNoise
@@ -75,7 +75,7 @@ class Fit:
 def propose(
     predicted: Array,
     contacts: ContactSet,
-    field: Field,
+    field: Gpis,
     noise: MotionNoise,
     settings: ProposalSettings,
     space: PoseRows = PLANAR,
@@ -119,7 +119,7 @@ class GraspMatch:
         self,
         predicted: Array,
         contacts: ContactSet,
-        field: Field,
+        field: Gpis,
         noise: MotionNoise,
         settings: ProposalSettings,
         space: PoseRows = PLANAR,
@@ -130,8 +130,8 @@ class GraspMatch:
     def variance(self, rows: Array) -> Array:
         """The field's variance at every contact for poses of shape (n, size), shape (n, m)."""
         points, _ = self._placed(rows)
-        found = self._field.predict(points.reshape(-1, self._contacts.dimension), variance=True)
-        return np.asarray(found.variance_m2.reshape(points.shape[:2]))
+        found = self._field.variance(points.reshape(-1, self._contacts.dimension), rough=True)
+        return np.asarray(found.reshape(points.shape[:2]))
 
     def fit(self, rows: Array, variance_m2: Array) -> Fit:
         """Cost, gradient and information of poses of shape (n, size), given the field's variance there.

@@ -30,6 +30,9 @@ _DOUBTFUL_CHI_SQUARE = 16.0
 _MOST_DOUBTS = 12
 """Contacts that are looked at once more: on faces of so few, or so far from theirs, and at most so many."""
 
+_HOPELESS_nats = 100.0
+"""Flat faces that are less likely than the field by more than this stay so, whichever contacts are left out."""
+
 
 class SharpJudge:
     """Rates hypotheses whose object has flat faces."""
@@ -46,7 +49,7 @@ class SharpJudge:
         """The map, or the one with poses smoothed together with flat faces if those explain its contacts better."""
         smooth = self._judge.rated(contact_map)
         sharp = self._faceted(contact_map) or self._sharp(contact_map)
-        if sharp is None:
+        if sharp is None or sharp.cost > smooth.cost + _HOPELESS_nats:
             return smooth
         settled = self._reconsidered(sharp)
         if settled.map is not sharp.map:
