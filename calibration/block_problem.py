@@ -180,9 +180,8 @@ class BlockProblem(TouchProblem):
         return self.noise.joint_offset_rad
 
     @property
-    def _prior_sigmas(self) -> Array:
-        of_joints = [_WRIST_rad if joint in WRIST else self._prior_rad for joint in self.joints]
-        return np.array([*of_joints, self.noise.yield_m_N])
+    def _joint_sigmas(self) -> Array:
+        return np.array([_WRIST_rad if joint in WRIST else self._prior_rad for joint in self.joints])
 
 
 def _off(known: Pose3) -> Evaluation:

@@ -16,7 +16,7 @@ import numpy as np
 from gtsam import Pose3
 from pydantic import Field
 
-from calibration.hand_chain import LinkMotion, joints_of, link_motion, mount_T_link
+from calibration.hand_chain import HandNoise, LinkMotion, joints_of, link_motion, mount_T_link
 from calibration.hand_eye import solve_ax_xb, solve_ax_zb
 from calibration.observations import View
 from calibration.pose_residuals import PoseResidual
@@ -42,27 +42,22 @@ from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import rotation_angle_rad, transform_points
 from tactile_lab.geometry.rotations import skew
-from tactile_lab.strict_yaml import StrictModel
 
 _ROUNDS = 2
 _FIXED_UNKNOWNS = 18  # mount, board and camera
 
 
-class BoardNoise(StrictModel):
-    """Errors of a picture, one standard deviation.
+class BoardNoise(HandNoise):
+    """Errors of a picture, one standard deviation; the corners' as measured on rendered pictures of the rig's camera.
 
     Attributes:
         corner_px: of a detected corner, per axis.
-        corner_bias_px: the part of it that is the same in every picture of a standing marker.
-        joint_offset_rad: offset of every joint, for good.
-        hand_rad, hand_m: of the hand's pose in one picture, per axis.
+        corner_bias_px: what is the same in every picture of a standing marker, per corner and axis: sides that bow in
+            the lens, and a print that is not exactly as large as its bar says.
     """
 
-    corner_px: float = Field(default=0.15, gt=0.0)
+    corner_px: float = Field(default=0.05, gt=0.0)
     corner_bias_px: float = Field(default=0.03, ge=0.0)
-    joint_offset_rad: float = Field(default=float(np.radians(0.6)), gt=0.0)
-    hand_rad: float = Field(default=float(np.radians(0.04)), gt=0.0)
-    hand_m: float = Field(default=1e-4, gt=0.0)
 
 
 class BoardProblem:
@@ -186,10 +181,10 @@ class BoardProblem:
             parts = (by_mount, by_board, _by_camera(camera, places), by_offset)
             return (seen - view.board_px).ravel(), [_rows(slopes @ part) for part in parts]
 
-        _, derivatives = evaluate(values)
-        by_hand = derivatives[1] @ values.atPose3(BOARD).inverse().AdjointMap()  # a motion of the link
-        hand = np.repeat([self.noise.hand_rad, self.noise.hand_m], 3) ** 2
-        covariance = by_hand @ np.diag(hand) @ by_hand.T + self.noise.corner_px**2 * np.eye(2 * len(view.board_px))
+        _, (by_mount, _, _, by_offset) = evaluate(values)
+        base = self.noise.base_sigma_m * by_mount[:, 3:]  # as if the mount had moved
+        joints = self.noise.joint_noise_rad * by_offset
+        covariance = base @ base.T + joints @ joints.T + self.noise.corner_px**2 * np.eye(2 * len(view.board_px))
         return Measurement((MOUNT, BOARD, CAMERA, OFFSETS), covariance, evaluate)
 
     def _glass_shift(self, chain: _Chain, values: gtsam.Values) -> Array:

@@ -6,15 +6,31 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from pydantic import Field
 
 from calibration.observations import HandPose
 from drivers.positioner_kinematics import mount_T_forearm
 from drivers.shadow.kinematics import JOINT_INDEX, JOINTS, forearm_T_palm_matrix, palm_T_distal_matrices
 from drivers.shadow.posture import finger_joints
 from tactile_lab.geometry.contacts import FINGERS, Array
+from tactile_lab.strict_yaml import StrictModel
 
 WRIST = ("WRJ2", "WRJ1")
 _STEP_rad = 1e-5
+
+
+class HandNoise(StrictModel):
+    """Errors of where hand and positioner say they stand, one standard deviation.
+
+    Attributes:
+        joint_offset_rad: offset of every joint, for good.
+        joint_noise_rad: of a joint's angle in one touch or picture, after averaging.
+        base_sigma_m: of the positioner's place in one touch or picture, per axis.
+    """
+
+    joint_offset_rad: float = Field(default=float(np.radians(0.6)), gt=0.0)
+    joint_noise_rad: float = Field(default=float(np.radians(0.025)), ge=0.0)
+    base_sigma_m: float = Field(default=1e-4, gt=0.0)
 
 
 def joints_of(links: Sequence[str]) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
 """Forearm to world from touches: fingertips on faces and points of known place.
 
 A touch on a face says that the contact point lies in the face, one number; on a known point it says three. The contact
-point comes from the fingertip's sensor through the kinematics, with the joints' offsets among the unknowns.
+point comes from the fingertip's sensor through the kinematics, with the joints' offsets among the unknowns; so is how
+far each face is from where it should be, which all touches of it share.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from gtsam import Pose3, Rot3
 from pydantic import Field
 
-from calibration.hand_chain import joints_of, link_motion, mount_T_link
+from calibration.hand_chain import HandNoise, joints_of, link_motion, mount_T_link
 from calibration.hand_eye import nearest_rotation
 from calibration.observations import Plane, Touch
 from calibration.pose_residuals import PoseResidual
@@ -31,29 +32,24 @@ from calibration.refinement import (
 )
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.rotations import skew
-from tactile_lab.strict_yaml import StrictModel
 
 _STRAY = 1e-3
 """How little the closed form's start is pulled to the guess, as a share: it only settles what no touch tells."""
 
 _ROUNDS = 2
+_EXACT_m = 1e-6
+"""Of a face whose place is stated to be exact."""
 
 
-class TouchNoise(StrictModel):
-    """Errors of a touch beyond the fingertip's own, one standard deviation.
+class TouchNoise(HandNoise):
+    """Errors of a touch, one standard deviation.
 
     Attributes:
-        joint_offset_rad: offset of every joint, for good.
         yield_m_N: how far a tip yields per newton.
-        joint_noise_rad: of a joint's angle in one touch, after averaging.
-        base_sigma_m: of the positioner's place in one touch.
-        point_sigma_m: least error of a contact point per axis, whatever its sensor says.
+        point_sigma_m: least error of a contact point in any direction, whatever its sensor says.
     """
 
-    joint_offset_rad: float = Field(default=float(np.radians(0.6)), gt=0.0)
     yield_m_N: float = Field(default=3e-4, gt=0.0)
-    joint_noise_rad: float = Field(default=float(np.radians(0.03)), ge=0.0)
-    base_sigma_m: float = Field(default=1e-4, gt=0.0)
     point_sigma_m: float = Field(default=3e-4, gt=0.0)
 
 
@@ -69,6 +65,7 @@ class TouchProblem:
     def __init__(self, touches: Sequence[Touch], noise: TouchNoise | None = None, guess: Pose3 | None = None) -> None:
         self.touches, self.noise = tuple(touches), noise or TouchNoise()
         self.joints = joints_of([touch.finger for touch in touches])
+        self._faces = {touch.target.name: touch.target.sigma_m for touch in touches if isinstance(touch.target, Plane)}
         self._start = closed_form(touches, guess or Pose3())
 
     @property
@@ -93,7 +90,7 @@ class TouchProblem:
     def _first_values(self) -> gtsam.Values:
         values = gtsam.Values()
         values.insert(MOUNT, self._start)
-        values.insert(OFFSETS, np.zeros(len(self.joints) + 1))
+        values.insert(OFFSETS, np.zeros(len(self._prior_sigmas)))
         return values
 
     def _measurements(self, chosen: Sequence[int], values: gtsam.Values) -> list[Measurement]:
@@ -102,41 +99,58 @@ class TouchProblem:
         return [*touches, prior_of_offsets(self._prior_sigmas)]
 
     @property
+    def _joint_sigmas(self) -> Array:
+        """Of the joints' offsets, as known before."""
+        return np.full(len(self.joints), self.noise.joint_offset_rad)
+
+    @property
     def _prior_sigmas(self) -> Array:
-        return np.array([self.noise.joint_offset_rad] * len(self.joints) + [self.noise.yield_m_N])
+        """Of all small unknowns: the joints' offsets, the tips' yield, the faces' shifts along their normals."""
+        faces = np.maximum(list(self._faces.values()), _EXACT_m)
+        return np.concatenate([self._joint_sigmas, [self.noise.yield_m_N], faces])
 
     def _measurement(self, touch: Touch, world_T_mount: Pose3, about: Array) -> Measurement:
         """The factor of one touch, linear in the offsets near ``about``."""
-        motion = link_motion(touch.pose, touch.finger, self.joints, about[:-1])
+        size = len(self.joints)
+        motion = link_motion(touch.pose, touch.finger, self.joints, about[:size])
         tip = np.append(touch.point_distal_m, 1.0)
         point, moves = (motion.mount_T_link @ tip)[:3], (motion.derivatives @ tip)[:, :3].T
         directions, place = touch.target.directions(), touch.target.point_world_m
-        yields = (touch.force_N * directions @ _outward(touch))[:, None]
+        straight = self._along(touch)
 
         def evaluate(values: gtsam.Values) -> tuple[Array, list[Array]]:
             pose: Pose3 = values.atPose3(MOUNT)
             rotation = pose.rotation().matrix()
             unknowns = values.atVector(OFFSETS)
-            at = point + moves @ (unknowns[:-1] - about[:-1])
-            residual = directions @ (rotation @ at + pose.translation() - place) + yields @ unknowns[-1:]
+            at = point + moves @ (unknowns - about)[:size]
+            residual = directions @ (rotation @ at + pose.translation() - place) + straight @ unknowns[size:]
             turned = directions @ rotation
-            return residual, [np.hstack([-turned @ skew(at), turned]), np.hstack([turned @ moves, yields])]
+            return residual, [np.hstack([-turned @ skew(at), turned]), np.hstack([turned @ moves, straight])]
 
         turned = directions @ world_T_mount.rotation().matrix()
         spread = self._point_covariance(touch, motion.mount_T_link[:3, :3], moves)
-        covariance = turned @ spread @ turned.T + touch.target.sigma_m**2 * np.eye(len(directions))
+        own_m = 0.0 if isinstance(touch.target, Plane) else touch.target.sigma_m
+        covariance = turned @ spread @ turned.T + own_m**2 * np.eye(len(directions))
         return Measurement((MOUNT, OFFSETS), covariance, evaluate)
+
+    def _along(self, touch: Touch) -> Array:
+        """How the tips' yield and the faces' shifts change a touch's residual, shape (1 or 3, 1 + faces)."""
+        directions = touch.target.directions()
+        shifts = np.zeros((len(directions), len(self._faces)))
+        if isinstance(touch.target, Plane):
+            shifts[0, list(self._faces).index(touch.target.name)] = -1.0
+        return np.column_stack([touch.force_N * directions @ _outward(touch), shifts])
 
     def _point_covariance(self, touch: Touch, mount_R_distal: Array, moves: Array) -> Array:
         """Covariance of a contact point in the mount's frame, offsets aside."""
-        floor = self.noise.point_sigma_m**2 * np.eye(3)
-        sensed = mount_R_distal @ touch.point_covariance_m2 @ mount_R_distal.T
+        variances, axes = np.linalg.eigh(mount_R_distal @ touch.point_covariance_m2 @ mount_R_distal.T)
+        sensed = axes * np.maximum(variances, self.noise.point_sigma_m**2) @ axes.T
         joints = self.noise.joint_noise_rad**2 * moves @ moves.T
-        return np.asarray(sensed + floor + joints + self.noise.base_sigma_m**2 * np.eye(3))
+        return np.asarray(sensed + joints + self.noise.base_sigma_m**2 * np.eye(3))
 
     def _solution(self, measured: Sequence[Measurement], values: gtsam.Values) -> Solution:
         size = len(self.joints)
-        factor = variance_factor(measured, values, 6 + size + 1)
+        factor = variance_factor(measured, values, 6 + len(self._prior_sigmas))
         scale = max(1.0, factor)
         offsets, spread = values.atVector(OFFSETS), np.sqrt(np.diag(marginal(measured, values, OFFSETS)))
         prior = self.noise.joint_offset_rad
@@ -148,15 +162,15 @@ class TouchProblem:
             },
             variance_factor=factor,
             values=values,
-            numbers={"yield_mm_per_N": 1e3 * float(offsets[-1]), "yield_sigma_mm_per_N": 1e3 * float(spread[-1])},
+            numbers={"yield_mm_per_N": 1e3 * float(offsets[size]), "yield_sigma_mm_per_N": 1e3 * float(spread[size])},
             outliers=outliers(measured[:-1], values),
         )
 
     def _residual(self, touch: Touch, world_T_mount: Pose3, unknowns: Array) -> PoseResidual:
-        link = link_motion(touch.pose, touch.finger, self.joints, unknowns[:-1]).mount_T_link
+        size = len(self.joints)
+        link = link_motion(touch.pose, touch.finger, self.joints, unknowns[:size]).mount_T_link
         point = world_T_mount.transformFrom((link @ np.append(touch.point_distal_m, 1.0))[:3])
-        relaxed = point + unknowns[-1] * touch.force_N * _outward(touch)
-        off = touch.target.directions() @ (relaxed - touch.target.point_world_m)
+        off = touch.target.directions() @ (point - touch.target.point_world_m) + self._along(touch) @ unknowns[size:]
         normal = world_T_mount.rotation().matrix() @ link[:3, :3] @ touch.normal_distal
         return PoseResidual(f"{touch.finger} on {touch.target.name}", float(np.linalg.norm(off)), _tilt(touch, normal))
 

@@ -28,7 +28,8 @@ SAMPLES = 20
 CONTACT_SIGMA_m = 1e-3
 YIELD_m_N = 3e-4
 FORCES_N = (0.2, 1.0)
-CORNER_SIGMA_px = 0.15
+CORNER_SIGMA_px, CORNER_BIAS_px = 0.05, 0.03
+"""As measured on pictures of the simulated rig's camera; the bias is that of a standing marker."""
 BASE_SIGMA_m = 1e-4
 
 CAMERA = CameraCalibration(
@@ -66,20 +67,26 @@ class TrueRig:
         return cls(Pose3.Expmap(motion), bias, YIELD_m_N * abs(rng.standard_normal()))
 
     def measured(self, base_q: Array, joints_rad: Array, rng: np.random.Generator) -> HandPose:
-        """What the sensors say of a true pose: bias, and noise averaged over a press."""
+        """What the sensors say of a true pose: bias, and noise averaged over a press or picture."""
         noise = JOINT_NOISE_rad / np.sqrt(SAMPLES) * rng.standard_normal(len(JOINTS))
-        return HandPose(base_q, joints_rad + self.bias_rad + noise)
+        shaken = np.repeat([BASE_SIGMA_m, 0.0], 3) * rng.standard_normal(6)
+        return HandPose(base_q + shaken, joints_rad + self.bias_rad + noise)
 
 
 def touches_of(plan: Sequence[PlannedTouch], rig: TrueRig, rng: np.random.Generator) -> list[Touch]:
-    """Every planned touch as the sensors would tell it: 1 mm of noise per axis on the contact point."""
-    return [_touch(planned, rig, rng) for planned in plan]
+    """Every planned touch as the sensors would tell it: 1 mm of noise per axis on the contact point.
+
+    The faces are off by what their geometry states, each by as much in all of its touches.
+    """
+    targets = {planned.patch.target.name: planned.patch.target for planned in plan}
+    shifts_m = {name: target.sigma_m * float(rng.standard_normal()) for name, target in targets.items()}
+    return [_touch(planned, shifts_m[planned.patch.target.name], rig, rng) for planned in plan]
 
 
-def _touch(planned: PlannedTouch, rig: TrueRig, rng: np.random.Generator) -> Touch:
+def _touch(planned: PlannedTouch, shift_m: float, rig: TrueRig, rng: np.random.Generator) -> Touch:
     tip, joints = TipEllipsoid(), planned.joints_rad
     force_N = float(rng.uniform(*FORCES_N))
-    base_q = planned.base_q(rig.world_T_mount, joints, tip, -rig.yield_m_N * force_N)
+    base_q = planned.base_q(rig.world_T_mount, joints, tip, shift_m - rig.yield_m_N * force_N)
     axes, inward = np.array(tip.semi_axes_m), -planned.world_R_distal.T @ planned.patch.normal_world
     support = axes**2 * inward / np.linalg.norm(axes * inward)
     return Touch(
@@ -96,16 +103,17 @@ def _touch(planned: PlannedTouch, rig: TrueRig, rng: np.random.Generator) -> Tou
 def views_of(plan: Sequence[PlannedView], rig: TrueRig, rng: np.random.Generator) -> list[View]:
     """Every planned picture as the camera would give it, with the board glued on a little askew."""
     askew = Pose3.Expmap(np.concatenate([0.03 * rng.standard_normal(3), 0.003 * rng.standard_normal(3)]))
-    return [_view(planned, rig, PALM_T_BOARD.pose() * askew, rng) for planned in plan]
+    bias_px = CORNER_BIAS_px * rng.standard_normal((4, 2))
+    return [_view(planned, rig, PALM_T_BOARD.pose() * askew, bias_px, rng) for planned in plan]
 
 
-def _view(planned: PlannedView, rig: TrueRig, palm_T_board: Pose3, rng: np.random.Generator) -> View:
+def _view(planned: PlannedView, rig: TrueRig, palm_T_board: Pose3, bias_px: Array, rng: np.random.Generator) -> View:
     base_q = planned.base_q(Pose3())
     mount_T_palm = Pose3(mount_T_link(HandPose(base_q, planned.joints_rad), "palm"))
     board = transform_points(rig.world_T_mount * mount_T_palm * palm_T_board, BOARD_m)
     world = transform_points(MARKERS.world_T_worldmarker.pose(), MARKERS.world_corners_m)
-    shaken = base_q + np.repeat([BASE_SIGMA_m, 0.0], 3) * rng.standard_normal(6)
-    return View(rig.measured(shaken, planned.joints_rad, rng), BOARD_m, _seen(board, rng), _seen(world, rng))
+    pose = rig.measured(base_q, planned.joints_rad, rng)
+    return View(pose, BOARD_m, _seen(board, rng), _seen(world, rng) + bias_px)
 
 
 def _seen(points_world_m: Array, rng: np.random.Generator) -> Array:

@@ -46,7 +46,7 @@ GRAPH_STRESS = Experiment(
 
 CALIBRATE_FOREARM = Experiment(
     "calibrate-forearm",
-    "Forearm to world by touch and by a board on the palm: joint bias 0.6°, contacts 1 mm, corners 0.15 px.",
+    "Forearm to world by touch and by a board on the palm: joint bias 0.6°, contacts 1 mm, corners 0.05 px.",
     lambda grasps: (
         grid(method=[calibration_runs.TOUCH], poses=[20, 40]) + grid(method=[calibration_runs.MARKER], poses=[10, 20])
     ),
