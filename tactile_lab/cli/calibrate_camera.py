@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.options import Json, NoInput
+from tactile_lab.cli.page_address import PORT, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
     from calibration.camera_intrinsics import LensResult
@@ -37,6 +38,10 @@ def camera(
     third_radial: Annotated[bool, typer.Option("--k3", help="A third radial coefficient, for wide lenses.")] = False,
     replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
     notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
+    view: View = False,
+    view_port: Port = PORT,
+    listen: Listen = "127.0.0.1",
+    token: Token = "",
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -51,40 +56,31 @@ def camera(
     from drivers.camera.boards import load_board
     from drivers.camera.source_settings import CameraSourceSettings
     from tactile_lab.cli.calibrate_steps import store_result
-    from tactile_lab.cli.wizard import Asker, may_write
+    from tactile_lab.cli.wizard import may_write, wizard
     from tactile_lab.clock import MonotonicClock
     from tactile_lab.strict_yaml import validate
     from tactile_lab.workflow.calibrating_camera import LENS_COMMENT, gather_views, lens_record
 
-    asker, file = Asker(no_input, "calibrate camera"), out or Path("calibrations") / station / "camera.yaml"
-    may_write(file, replace, asker, no_input)
-    shown = load_board(board) if board is not None else _usual_board()
-    wanted = {"source": source, "size_px": _size(size), "exposure_ms": exposure_ms, "focus": focus}
-    settings = validate(wanted, CameraSourceSettings, where="calibrate camera")
-    _begin(shown, asker)
-    goes_on = (lambda: True) if no_input else _Orders(asker)
-    found = gather_views(settings, shown, MonotonicClock(), most=most, least=views, told=_guide, goes_on=goes_on)
-    limits = LensLimits(views=views)
-    result = calibrate_lens(found.views, limits, third_radial=third_radial)
-    _show(found, result)
-    record = lens_record(result, station, shown, limits, serial, notes)
-    store_result(file, record, True, asker, no_input, as_json, LENS_COMMENT)
+    file, page = (
+        out or Path("calibrations") / station / "camera.yaml",
+        PageAddress.wanted(view, listen, view_port, token),
+    )
+    with wizard("calibrate camera", no_input, page) as asker:
+        may_write(file, replace, asker, no_input)
+        shown = load_board(board) if board is not None else _usual_board()
+        wanted = {"source": source, "size_px": _size(size), "exposure_ms": exposure_ms, "focus": focus}
+        settings = validate(wanted, CameraSourceSettings, where="calibrate camera")
+        _begin(shown, asker)
 
+        def goes_on() -> bool:
+            return asker.taken() != "d"
 
-class _Orders:
-    """What a person types while pictures are taken: d to be done, q to quit."""
-
-    def __init__(self, asker: Asker) -> None:
-        from tactile_lab.cli.terminal_input import LineInput
-
-        self._asker, self._lines = asker, LineInput()
-
-    def __call__(self) -> bool:
-        """Whether to go on. Raises InterruptionError when the person quits."""
-        typed = [line.strip().lower() for line in self._lines.lines()]
-        if "q" in typed:
-            raise self._asker.ended()
-        return "d" not in typed
+        found = gather_views(settings, shown, MonotonicClock(), most=most, least=views, told=_guide, goes_on=goes_on)
+        limits = LensLimits(views=views)
+        result = calibrate_lens(found.views, limits, third_radial=third_radial)
+        _show(found, result)
+        record = lens_record(result, station, shown, limits, serial, notes)
+        store_result(file, record, True, asker, no_input, as_json, LENS_COMMENT)
 
 
 def _usual_board() -> AnyBoard:
@@ -101,6 +97,7 @@ def _begin(board: AnyBoard, asker: Asker) -> None:
         warn("the board's check bar was not measured: the lens does not depend on it, distances would")
     say("Show the board in all parts of the picture, tilted each way, near and far.")
     asker.choose("While pictures are taken, d and Enter is done, q and Enter quits.", {"": "begin"}, "")
+    asker.offer("Show the board in all parts of the picture, tilted each way, near and far.", {"d": "done"})
 
 
 def _guide(found: Gathering) -> None:

@@ -9,6 +9,7 @@ import typer
 
 from tactile_lab.cli.calibrate_biotac import Finger
 from tactile_lab.cli.options import Json, NoInput, RigName
+from tactile_lab.cli.page_address import PORT, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
     from calibration.fingertip_data import FingertipData
@@ -33,6 +34,10 @@ def fingertip(
     seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
     replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
     notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
+    view: View = False,
+    view_port: Port = PORT,
+    listen: Listen = "127.0.0.1",
+    token: Token = "",
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -48,25 +53,26 @@ def fingertip(
     from calibration.fingertip_fit import fit_fingertip
     from calibration.fingertip_record import fingertip_record
     from tactile_lab.cli.calibrate_steps import store_result
-    from tactile_lab.cli.wizard import Asker, may_write
+    from tactile_lab.cli.wizard import may_write, wizard
     from tactile_lab.rigs.description import load_rig
     from tactile_lab.workflow.calibrating_fingertip import FingertipRequest, force_fingertips
 
-    described, asker, wanted = load_rig(rig), Asker(no_input, "calibrate fingertip"), _settings(settings)
-    here = described.installation
+    described, wanted = load_rig(rig), _settings(settings)
+    here, page = described.installation, PageAddress.wanted(view, listen, view_port, token)
     file = out or Path("calibrations") / here.rig / "fingertips.yaml"
-    may_write(file, replace, asker, no_input)
-    if source is not None:
-        data = load_fingertip_data(source, here)
-    else:
-        data = _measured(FingertipRequest(rig, finger.value, seed, presses, wanted), asker)
-        if record is not None:
-            save_fingertip_data(record, data)
-    tips = force_fingertips(described, data.finger)
-    fit = fit_fingertip(data, tips[data.finger], wanted.noise)
-    _show(data, fit, wanted.limits)
-    found = fingertip_record(data, fit, tips, here, notes, wanted.limits)
-    store_result(file, found, True, asker, no_input, as_json)
+    with wizard(f"calibrate fingertip, rig {rig}", no_input, page) as asker:
+        may_write(file, replace, asker, no_input)
+        if source is not None:
+            data = load_fingertip_data(source, here)
+        else:
+            data = _measured(FingertipRequest(rig, finger.value, seed, presses, wanted), asker)
+            if record is not None:
+                save_fingertip_data(record, data)
+        tips = force_fingertips(described, data.finger)
+        fit = fit_fingertip(data, tips[data.finger], wanted.noise)
+        _show(data, fit, wanted.limits)
+        found = fingertip_record(data, fit, tips, here, notes, wanted.limits)
+        store_result(file, found, True, asker, no_input, as_json)
 
 
 def _settings(path: Path | None) -> FingertipSettings:
@@ -81,7 +87,7 @@ def _measured(request: FingertipRequest, asker: Asker) -> FingertipData:
     from tactile_lab.cli.console import say
     from tactile_lab.workflow.calibrating_fingertip import fingertip_wizard
 
-    with fingertip_wizard(request) as (wizard, station):
+    with fingertip_wizard(request, asker.onlooker) as (wizard, station):
         say(f"Fingertip {request.finger} on rig {request.rig}: {len(wizard.plan)} wrenches, free and pressed", "bold")
         asker.choose("The hand will move, and turn. Is its way clear?", {"y": "begin"}, "y")
         measure_all(wizard, station, asker)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.options import Json, NoInput, RigName
+from tactile_lab.cli.page_address import PORT, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
     from calibration.forearm_wizard import ForearmResult, ForearmWizard
@@ -55,13 +56,17 @@ def forearm(
     seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
     replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
     notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
+    view: View = False,
+    view_port: Port = PORT,
+    listen: Listen = "127.0.0.1",
+    token: Token = "",
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
     """Find where the forearm's mount stands in the world, step by step, and say how good the answer is.
 
     The motion is checked before anything is solved, and what is missing is told. Ctrl+C or q at any step stores
-    nothing.
+    nothing. With --view a page in the browser shows the hand and the steps, and takes the answers too.
 
     Exit code 0: PASS; 2: the input, or too little motion; 3: FAIL, outside a limit (kept as NAME.failed.yaml, which
     sessions refuse); 4: a device; 130: ended by the operator.
@@ -69,30 +74,31 @@ def forearm(
     from calibration.forearm_record import manual_record, record_of, transform_of
     from calibration.recordings import save_data
     from tactile_lab.cli.calibrate_steps import store_result
-    from tactile_lab.cli.wizard import Asker, may_write
+    from tactile_lab.cli.wizard import may_write, wizard
     from tactile_lab.rigs.description import load_rig
 
-    here, asker = load_rig(rig).installation, Asker(no_input, "calibrate forearm")
+    here, page = load_rig(rig).installation, PageAddress.wanted(view, listen, view_port, token)
     file = out or Path("calibrations") / here.rig / "forearm.yaml"
-    may_write(file, replace, asker, no_input)
-    if method is ForearmMethod.MANUAL:
-        sigmas = _stated(sigma_mm, sigma_deg)
-        pose = transform_of([value / 1e3 for value in translation_mm], rpy_deg)
-        found = manual_record(pose, *sigmas, here, notes=notes, valid_days=valid_days)
-    else:
-        wanted = _settings(settings)
-        if source is not None:
-            data = _recorded(source, here)
+    with wizard(f"calibrate forearm, rig {rig}", no_input, page) as asker:
+        may_write(file, replace, asker, no_input)
+        if method is ForearmMethod.MANUAL:
+            sigmas = _stated(sigma_mm, sigma_deg)
+            pose = transform_of([value / 1e3 for value in translation_mm], rpy_deg)
+            found = manual_record(pose, *sigmas, here, notes=notes, valid_days=valid_days)
         else:
-            names = tuple(name.strip() for name in fingers.split(","))
-            data = _measured(asker, wanted, rig, method, seed, geometry, board, names, touches, pictures)
-            if record is not None:
-                save_data(record, data)
-        result = _solved(data, wanted)
-        show_result(result)
-        found = record_of(result, here, notes=notes, valid_days=valid_days)
-    comment = "Forearm to world: pose of the positioner's mount in the world frame."
-    store_result(file, found, True, asker, no_input, as_json, comment)
+            wanted = _settings(settings)
+            if source is not None:
+                data = _recorded(source, here)
+            else:
+                names = tuple(name.strip() for name in fingers.split(","))
+                data = _measured(asker, wanted, rig, method, seed, geometry, board, names, touches, pictures)
+                if record is not None:
+                    save_data(record, data)
+            result = _solved(data, wanted)
+            show_result(result)
+            found = record_of(result, here, notes=notes, valid_days=valid_days)
+        comment = "Forearm to world: pose of the positioner's mount in the world frame."
+        store_result(file, found, True, asker, no_input, as_json, comment)
 
 
 def _stated(sigma_mm: float | None, sigma_deg: float | None) -> tuple[float, float]:
@@ -142,7 +148,7 @@ def _measured(
     from tactile_lab.workflow.calibrating import ForearmRequest, forearm_wizard
 
     request = ForearmRequest(rig, method.value, seed, geometry, board, fingers, touches, pictures, settings)
-    with forearm_wizard(request) as (wizard, station):
+    with forearm_wizard(request, asker.onlooker) as (wizard, station):
         _tell_plan(rig, wizard)
         asker.choose("The hand will move. Is its way clear?", {"y": "begin"}, "y")
         measure_all(wizard, station, asker)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.options import Json, NoInput, RigName
+from tactile_lab.cli.page_address import PORT, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -39,6 +40,10 @@ def joints(
     ] = None,
     replace: Replace = False,
     notes: Notes = "",
+    view: View = False,
+    view_port: Port = PORT,
+    listen: Listen = "127.0.0.1",
+    token: Token = "",
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -54,33 +59,35 @@ def joints(
     from calibration.joints import joints_record, judge_joints
     from calibration.recordings import save_data
     from tactile_lab.cli.calibrate_steps import store_result
-    from tactile_lab.cli.wizard import Asker
+    from tactile_lab.cli.wizard import wizard
     from tactile_lab.rigs.description import load_rig
     from tactile_lab.workflow.calibrating_joints import JointRequest, from_file, from_touches, load_settings
 
-    described, asker, wanted = load_rig(rig), Asker(no_input, "calibrate joints"), load_settings(settings)
-    if source is not None:
-        found = from_file(source, described, wanted)
-    else:
-        names = tuple(name.strip() for name in fingers.split(","))
-        data = _touched(JointRequest(rig, block, names, rounds, seed, wanted), described, asker)
-        if record is not None:
-            save_data(record, data)
-        found = from_touches(data, described, wanted)
-    _show_joints(found, judge_joints(found.corrections, wanted.limits))
-    stored = joints_record(
-        described.files["joints"],
-        found.corrections,
-        found.method,
-        described.installation,
-        notes,
-        trusted=found.trusted,
-        limits=wanted.limits,
-        offsets=found.offsets,
-        covariance=found.covariance,
-    )
-    file = out or Path("calibrations") / described.installation.rig / "joints.yaml"
-    store_result(file, stored, replace, asker, no_input, as_json)
+    described, wanted = load_rig(rig), load_settings(settings)
+    here, page = described.installation, PageAddress.wanted(view, listen, view_port, token)
+    with wizard(f"calibrate joints, rig {rig}", no_input, page) as asker:
+        if source is not None:
+            found = from_file(source, described, wanted)
+        else:
+            names = tuple(name.strip() for name in fingers.split(","))
+            data = _touched(JointRequest(rig, block, names, rounds, seed, wanted), described, asker)
+            if record is not None:
+                save_data(record, data)
+            found = from_touches(data, described, wanted)
+        _show_joints(found, judge_joints(found.corrections, wanted.limits))
+        stored = joints_record(
+            described.files["joints"],
+            found.corrections,
+            found.method,
+            here,
+            notes,
+            trusted=found.trusted,
+            limits=wanted.limits,
+            offsets=found.offsets,
+            covariance=found.covariance,
+        )
+        file = out or Path("calibrations") / here.rig / "joints.yaml"
+        store_result(file, stored, replace, asker, no_input, as_json)
 
 
 def _touched(request: JointRequest, rig: Rig, asker: Asker) -> ForearmData:
@@ -91,7 +98,7 @@ def _touched(request: JointRequest, rig: Rig, asker: Asker) -> ForearmData:
     from tactile_lab.workflow.calibrating_joints import joint_wizard
 
     here = rig.installation
-    with joint_wizard(request) as (wizard, station):
+    with joint_wizard(request, asker.onlooker) as (wizard, station):
         say(f"Joints on rig {request.rig}: {len(wizard.plan)} touches of the block", "bold")
         asker.choose("The hand will move. Stands the block in its place?", {"y": "begin"}, "y")
         measure_all(wizard, station, asker)

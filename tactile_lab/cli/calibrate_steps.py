@@ -69,18 +69,27 @@ def _measure(wizard: Guided[P, T], step: Step[P], station: Station[P, T], asker:
     except DeviceError as error:
         warn(str(error))
         return asker.choose("Not measured. Again, or skip it?", {"s": "skip", "a": "again"}, "s") == "s"
-    say(f"{step.number}/{step.count} {step.instruction}: done", "dim")
+    motion = wizard.motion()
+    missing = ", ".join(check.name for check in motion.checks if not check.ok)
+    say(f"{step.number}/{step.count} {step.instruction}: done{missing and f'; not enough yet: {missing}'}", "dim")
+    asker.show_beside("Motion", *_motion_table(motion))
     return True
 
 
 def _tell_motion(report: MotionReport) -> None:
     from tactile_lab.cli.console import show_table
 
+    columns, rows, right = _motion_table(report)
+    show_table("Motion", columns, rows, right=right)
+
+
+def _motion_table(report: MotionReport) -> tuple[list[str], list[list[str]], tuple[int, ...]]:
+    """What there is of the motion, and what is missing: columns, rows, and which columns hold numbers."""
     rows = [
         [check.name, f"{check.value:.4g} {check.unit}", f"{check.needed:.4g}", "enough" if check.ok else check.advice]
         for check in report.checks
     ]
-    show_table("Motion", ["", "is", "needed", ""], rows, right=(1, 2))
+    return ["", "is", "needed", ""], rows, (1, 2)
 
 
 def store_result(
@@ -92,7 +101,7 @@ def store_result(
     as_json: bool,
     comment: str = "",
 ) -> None:
-    """Ask, write (a failed result beside the file), tell the verdict.
+    """Tell the verdict, ask, and write (a failed result beside the file).
 
     Args:
         comment: at the head of the file.
@@ -108,6 +117,7 @@ def store_result(
     from tactile_lab.cli.console import emit_json, say
     from tactile_lab.cli.wizard import may_write
 
+    tell_verdict(record)
     target = target_file(file, record)
     if target == file:
         may_write(file, replace, asker, no_input)
@@ -116,7 +126,6 @@ def store_result(
     write_record(target, record, comment)
     if as_json:
         emit_json({"file": str(target), **plain(record)})
-    tell_verdict(record)
     say(f"stored  {target}")
     if record.verdict == "FAIL":
         raise typer.Exit(OUTSIDE)

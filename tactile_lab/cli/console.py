@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Protocol
 
 from rich import box
 from rich.console import Console
@@ -16,19 +17,47 @@ people = Console(stderr=True, highlight=False)
 """For people: standard error, colours only on a terminal and without NO_COLOR."""
 
 
+class Onlooker(Protocol):
+    """Somewhere else that people are told the same, such as a wizard's page."""
+
+    def line(self, text: str, style: str = "") -> None: ...
+    def table(
+        self, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[int]
+    ) -> None: ...
+
+
+_onlookers: list[Onlooker] = []
+
+
+@contextmanager
+def told_to(onlooker: Onlooker) -> Iterator[None]:
+    """Within the block, whatever people are told here is told there too."""
+    _onlookers.append(onlooker)
+    try:
+        yield
+    finally:
+        _onlookers.remove(onlooker)
+
+
 def say(text: str, style: str = "") -> None:
     """One line for people, shown as it is (no markup, never broken)."""
     people.print(Text(text, style=style), soft_wrap=True)
+    for onlooker in _onlookers:
+        onlooker.line(text, style)
 
 
 def complain(text: str) -> None:
     """One error line for people."""
     people.print(Text.assemble(("error: ", "bold red"), text), soft_wrap=True)
+    for onlooker in _onlookers:
+        onlooker.line(f"error: {text}", "bold red")
 
 
 def warn(text: str) -> None:
     """One warning line for people."""
     people.print(Text.assemble(("warning: ", "bold yellow"), text), soft_wrap=True)
+    for onlooker in _onlookers:
+        onlooker.line(f"warning: {text}", "bold yellow")
 
 
 def emit_json(document: Any) -> None:
@@ -47,9 +76,12 @@ def show_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]
     for index, column in enumerate(columns):
         last = index == len(columns) - 1
         grid.add_column(column, justify="right" if index in right else "left", no_wrap=not last)
-    for row in rows:
+    shown = list(rows)
+    for row in shown:
         grid.add_row(*map(Text, row))
     people.print(grid)
+    for onlooker in _onlookers:
+        onlooker.table(title, columns, shown, right)
 
 
 def show_facts(title: str, facts: Iterable[tuple[str, str]]) -> None:
@@ -57,8 +89,10 @@ def show_facts(title: str, facts: Iterable[tuple[str, str]]) -> None:
     grid = Table.grid(padding=(0, 2))
     grid.add_column(style="dim", no_wrap=True)
     grid.add_column()
-    for name, value in facts:
-        if value:
-            grid.add_row(Text(name), Text(value))
-    say(title, "bold")
+    shown = [(name, value) for name, value in facts if value]
+    for name, value in shown:
+        grid.add_row(Text(name), Text(value))
+    people.print(Text(title, style="bold"), soft_wrap=True)
     people.print(grid)
+    for onlooker in _onlookers:
+        onlooker.table(title, ("", ""), shown, ())

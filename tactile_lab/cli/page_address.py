@@ -12,6 +12,7 @@ from tactile_lab.errors import ConfigurationError
 PORT = 8090
 LEAST_TOKEN = 16
 
+View = Annotated[bool, typer.Option("--view", help="Show and lead this in a browser too.")]
 Port = Annotated[int, typer.Option("--view-port", min=0, max=65535, help="Port of the page; 0 takes a free one.")]
 Listen = Annotated[
     str, typer.Option("--listen", metavar="ADDRESS", help="Address of the page; others than this computer's: --token.")
@@ -29,6 +30,11 @@ class PageAddress:
     address: str
     port: int
     token: str
+
+    @classmethod
+    def wanted(cls, view: bool, address: str, port: int, token: str) -> PageAddress | None:
+        """The address when a page was asked for."""
+        return cls(address, port, token) if view else None
 
     def checked(self) -> tuple[str, int, str]:
         """Address, port and token to use. Raises ConfigurationError."""

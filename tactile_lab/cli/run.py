@@ -91,7 +91,7 @@ def run(
     guided = mode is Mode.GUIDED
     if confirm and (no_input or guided):
         raise typer.BadParameter("asks before every grasp of an autonomous session", param_hint="'--confirm'")
-    page = PageAddress(listen, view_port, token) if view else None
+    page = PageAddress.wanted(view, listen, view_port, token)
     way = GuidedWay(_led_by(led_by), automatic_capture or None, pedal, pace, no_input)
     tell_left_open(out)
     request = SessionRequest(

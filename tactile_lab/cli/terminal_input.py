@@ -8,6 +8,7 @@ import os
 import select
 import sys
 import termios
+import time
 from types import TracebackType
 from typing import Any, Self
 
@@ -74,6 +75,13 @@ class LineInput:
         self._rest = ""
         self.closed = False
         """The end of the input was reached."""
+
+    def wait(self, seconds: float | None) -> None:
+        """Until something can be read, for so long at most; for ever with None. Without an input, so long."""
+        if not self.closed:
+            select.select([self._descriptor], [], [], seconds)
+        elif seconds:
+            time.sleep(seconds)
 
     def lines(self) -> list[str]:
         """Complete lines that were typed since the last call."""

@@ -1,16 +1,27 @@
-"""Questions of a wizard in a terminal: one key, or one word, each with what it means."""
+"""Questions of a wizard: one key, or one word, each with what it means; answered in the terminal or on its page."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.text import Text
+from typer import Exit
 
-from tactile_lab.cli.console import people, warn
-from tactile_lab.errors import ConfigurationError, InterruptionError
+from sessions.recorder import NullTraffic, TrafficSink
+from tactile_lab.cli.console import people, say, told_to, warn
+from tactile_lab.cli.terminal_input import LineInput
+from tactile_lab.errors import ConfigurationError, InterruptionError, TactileLabError
+from tactile_lab.view.wizard_feed import QUIT, WizardFeed
 
-QUIT = "q"
+if TYPE_CHECKING:
+    from tactile_lab.cli.page_address import PageAddress
+
+_LOOK_s, _RENEW = 0.05, 20
+"""How often the page is looked at for an answer, and after how many looks it is shown everything again."""
 
 
 class Asker:
@@ -19,10 +30,19 @@ class Asker:
     Args:
         silent: never ask (``--no-input``).
         where: the wizard's name, for messages.
+        page: where the person may answer too.
     """
 
-    def __init__(self, silent: bool, where: str) -> None:
-        self._silent, self._where = silent, where
+    def __init__(self, silent: bool, where: str, page: WizardFeed | None = None) -> None:
+        self._silent, self._where, self._page = silent, where, page
+        self._input: LineInput | None = None
+        self._typed: deque[str] = deque()
+        self._offered: Mapping[str, str] = {}
+
+    @property
+    def onlooker(self) -> TrafficSink:
+        """Where the hand's state is shown while it moves."""
+        return self._page or NullTraffic()
 
     def choose(self, question: str, answers: Mapping[str, str], usual: str) -> str:
         """One of some keys; Enter takes the usual one.
@@ -34,29 +54,123 @@ class Asker:
             return usual
         known = {**answers, QUIT: "quit"}
         words = ", ".join(f"{'Enter' if key == usual else key} {meaning}" for key, meaning in known.items())
+        if self._page is not None:
+            self._page.ask(question, known, usual)
         while True:
             people.print(Text.assemble((question, "bold"), f"  [{words}] "), end="")
-            answer = self._line().strip().lower() or usual
-            if answer == QUIT:
-                raise self.ended()
+            answer = self._answer(known, usual)
             if answer in known:
-                return answer
+                return self._taken(answer)
             warn(f"{answer!r} is none of the answers")
 
     def agree(self, question: str, usual: bool = True) -> bool:
         """Yes or no. Raises InterruptionError when the person quits."""
         return self.choose(question, {"y": "yes", "n": "no"}, "y" if usual else "n") == "y"
 
+    def offer(self, what: str, answers: Mapping[str, str]) -> None:
+        """From here on these may be typed or pressed at any time, see :meth:`taken`; nobody waits for them."""
+        self._offered = {**answers, QUIT: "quit"}
+        if self._page is not None:
+            self._page.ask(what, self._offered, "")
+
+    def taken(self) -> str | None:
+        """What is typed or pressed now of what is offered. Raises InterruptionError when the person quits."""
+        answer = None if self._silent else self._next(0.0)
+        return self._taken(answer) if answer is not None and answer in self._offered else None
+
+    def show_beside(self, title: str, columns: list[str], rows: list[list[str]], right: tuple[int, ...]) -> None:
+        """A table that changes all the time: on the page, where it takes the place of the older one."""
+        if self._page is not None:
+            self._page.table(title, columns, rows, right)
+
+    def part(self) -> None:
+        """Leave the page open until the person has read it."""
+        if self._page is not None and not self._silent:
+            with suppress(InterruptionError, KeyboardInterrupt):
+                self.choose("The page shows how it ended.", {"": "close it"}, "")
+
     def ended(self) -> InterruptionError:
         """What a person who quits is told."""
         return InterruptionError("ended by the operator", where=self._where, hint="Nothing was stored")
 
-    def _line(self) -> str:
+    def _taken(self, answer: str) -> str:
+        if answer == QUIT:
+            raise self.ended()
+        if self._page is not None:
+            self._page.settled()
+        return answer
+
+    def _answer(self, known: Mapping[str, str], usual: str) -> str:
+        """Wait for what is typed, or pressed; what was pressed is shown in the terminal too."""
+        looks = 0
+        while (answer := self._next(_LOOK_s if self._page else None)) is None:
+            looks += 1
+            if self._page is not None and looks % _RENEW == 0:
+                self._page.renew()
+        return answer or usual
+
+    def _next(self, seconds: float | None) -> str | None:
+        """What was typed or pressed next; None when nothing was within a time. Raises InterruptionError."""
+        if self._page is not None and (pressed := self._page.answer()) is not None:
+            people.print("(on the page)")
+            return pressed
+        if not self._typed:
+            self._typed.extend(self._lines(seconds))
+        return self._typed.popleft().strip().lower() if self._typed else None
+
+    def _lines(self, seconds: float | None) -> list[str]:
         try:
-            return input()
-        except (EOFError, RuntimeError) as error:  # ended, or closed before the program began
-            hint = "Nothing was stored. Give --no-input where nobody answers"
-            raise InterruptionError("there is nobody to ask", where=self._where, hint=hint) from error
+            self._input = self._input or LineInput()
+        except (AttributeError, OSError, ValueError) as error:  # closed before the program began
+            raise self._nobody() from error
+        self._input.wait(seconds)
+        lines = self._input.lines()
+        if not lines and self._input.closed and self._page is None:
+            raise self._nobody()
+        return lines
+
+    def _nobody(self) -> InterruptionError:
+        hint = "Nothing was stored. Give --no-input where nobody answers"
+        return InterruptionError("there is nobody to ask", where=self._where, hint=hint)
+
+
+@contextmanager
+def wizard(where: str, no_input: bool, page: PageAddress | None) -> Iterator[Asker]:
+    """Who may be asked while a wizard runs: a person at the terminal, and on its page.
+
+    Args:
+        where: the wizard's name.
+        no_input: nobody is asked.
+        page: where its page is to be; None for none.
+
+    Raises:
+        ConfigurationError, DeviceError: the page can not be opened there.
+    """
+    if page is None:
+        yield Asker(no_input, where)
+        return
+    with WizardFeed(*page.checked(), where) as feed:
+        say(f"page: {feed.url}")
+        asker = Asker(no_input, where, feed)
+        with told_to(feed), _until_read(asker, feed):
+            yield asker
+
+
+@contextmanager
+def _until_read(asker: Asker, feed: WizardFeed) -> Iterator[None]:
+    """The page stays until its end was read, be it an error; but not when the person left."""
+    try:
+        yield
+    except InterruptionError:
+        raise
+    except TactileLabError as error:
+        feed.line(f"error: {error}", "bold red")
+        asker.part()
+        raise
+    except Exit:
+        asker.part()
+        raise
+    asker.part()
 
 
 def may_write(out: Path, replace: bool, asker: Asker, silent: bool) -> None:

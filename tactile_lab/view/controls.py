@@ -28,7 +28,7 @@ BUTTONS: tuple[tuple[Ask, str, IconName, str], ...] = (
     (Ask.END, "End", Icon.PLAYER_STOP, "End the session; press twice"),
 )
 _ROWS = 8
-_STYLE = "padding:0 0.9em 0.6em 0.9em;font-size:0.85em;line-height:1.45"
+PANEL_STYLE = "padding:0 0.9em 0.6em 0.9em;font-size:0.85em;line-height:1.45"
 
 
 class Controls:
@@ -82,12 +82,12 @@ def status_html(scene: Scene) -> str:
     """The state of the session in a few lines."""
     guide, parts = scene.guide, []
     if guide.get("paused"):
-        parts.append(_banner(f"Paused: {guide['paused']}", "#b7791f"))
+        parts.append(banner(f"Paused: {guide['paused']}", "#b7791f"))
     if guide:
-        parts.append(_line(f"Grasp {guide.get('grasp', '')}: {guide.get('stage', '')}", "font-weight:600"))
-        parts.append(_line(str(guide.get("prompt", "")), "font-size:1.15em;font-weight:600;color:#1f6feb"))
-        parts.append(_line(str(guide.get("capture", "")), "color:#57606a"))
-    parts.append(_forces(scene))
+        parts.append(line_html(f"Grasp {guide.get('grasp', '')}: {guide.get('stage', '')}", "font-weight:600"))
+        parts.append(line_html(str(guide.get("prompt", "")), "font-size:1.15em;font-weight:600;color:#1f6feb"))
+        parts.append(line_html(str(guide.get("capture", "")), "color:#57606a"))
+    parts.append(forces_html(scene))
     facts = [
         ("pose", _pose(scene)),
         ("explored", "" if scene.surface is None else f"{scene.surface.explored:.0%} of the surface is known"),
@@ -99,10 +99,11 @@ def status_html(scene: Scene) -> str:
     parts += [_fact(name, value) for name, value in facts if value]
     if scene.surface is not None:
         parts.append(_scale())
-    return f'<div style="{_STYLE}">{"".join(parts)}</div>'
+    return f'<div style="{PANEL_STYLE}">{"".join(parts)}</div>'
 
 
-def _forces(scene: Scene) -> str:
+def forces_html(scene: Scene) -> str:
+    """A bar for the force on each fingertip."""
     cells = []
     for finger in FINGERS:
         load_N = scene.loads_N.get(finger, 0.0)
@@ -136,9 +137,9 @@ def history_html(scene: Scene) -> str:
         said = html.escape(f"{step.get('verdict', '')}: {step.get('reason', '')}" if step else "")
         rows.append(f"<tr><td>{grasp.index + 1}</td><td>{len(grasp.fingers)}</td><td>{said}</td></tr>")
     if not rows:
-        return f'<div style="{_STYLE}">no grasp yet</div>'
+        return f'<div style="{PANEL_STYLE}">no grasp yet</div>'
     head = '<tr style="text-align:left;color:#57606a"><th>grasp</th><th>contacts</th><th>the estimate says</th></tr>'
-    return f'<div style="{_STYLE}"><table style="width:100%">{head}{"".join(rows)}</table></div>'
+    return f'<div style="{PANEL_STYLE}"><table style="width:100%">{head}{"".join(rows)}</table></div>'
 
 
 def _scale() -> str:
@@ -151,13 +152,15 @@ def _scale() -> str:
     )
 
 
-def _line(text: str, style: str) -> str:
+def line_html(text: str, style: str) -> str:
+    """A line of text in a style; nothing for no text."""
     return f'<div style="{style}">{html.escape(text)}</div>' if text else ""
 
 
-def _banner(text: str, colour: str) -> str:
+def banner(text: str, colour: str) -> str:
+    """White text on a colour."""
     style = f"background:{colour};color:white;border-radius:4px;padding:0.3em 0.6em;margin-bottom:0.4em;font-weight:600"
-    return _line(text, style)
+    return line_html(text, style)
 
 
 def _fact(name: str, value: str) -> str:

@@ -42,9 +42,10 @@ class Drawing:
 
     Args:
         server: the page.
+        distance: of the eye at first, as a multiple of what shows a hand at an object.
     """
 
-    def __init__(self, server: viser.ViserServer) -> None:
+    def __init__(self, server: viser.ViserServer, distance: float = 1.0) -> None:
         self._scene = server.scene
         self._nodes: dict[str, list[Any]] = {}
         server.scene.set_up_direction("+z")
@@ -59,8 +60,9 @@ class Drawing:
             section_color=(190, 197, 206),
         )
         server.scene.add_frame("/world", axes_length=0.04, axes_radius=0.0012)
-        server.initial_camera.position = np.array([-0.28, -0.37, 0.31])
-        server.initial_camera.look_at = np.array([0.045, -0.03, 0.075])  # the panel covers the right of the page
+        middle, eye = np.array([0.045, -0.03, 0.075]), np.array([-0.325, -0.34, 0.235])  # the panel covers the right
+        server.initial_camera.position = middle + distance * eye
+        server.initial_camera.look_at = middle
         server.initial_camera.fov = np.radians(42.0)
 
     def draw(self, scene: Scene) -> None:

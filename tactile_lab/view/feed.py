@@ -1,161 +1,36 @@
-"""The session's end of the page: copies of messages out, requests in, and never a wait.
-
-The page is a process of its own. What it is to show goes through a bounded queue to a thread that writes to the
-process's standard input: a page that is slow, stopped or dead holds up that thread and nothing else, and what does
-not fit into the queue is counted and left out.
-"""
+"""The session's end of the page: copies of messages out, requests in."""
 
 from __future__ import annotations
 
-import base64
-import contextlib
-import json
-import queue
-import subprocess
-import sys
-import threading
 from collections import deque
-from collections.abc import Sequence
-from types import TracebackType
-from typing import Self
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from sessions.guided.operator import Ask, Panel, Request, request_of
-from tactile_lab.errors import DeviceError
-from tactile_lab.view.scene import SHOWN_TOPICS
+from tactile_lab.view.link import PageLink
 
-QUEUE_LENGTH = 400
-"""Messages that may wait: some ten seconds of a session."""
 PAGE_ASKS = frozenset(Ask) - {Ask.ATTACH, Ask.MOVE, Ask.FINGERS}
 """What a page may ask for: nothing that moves the hand by itself, and no files of this computer."""
-START_TIMEOUT_s = 60.0
-_END_TIMEOUT_s = 2.0
 _PENDING = 50
-_LINE_BYTES = 10_000
 
 
-class ViewFeed:
-    """A page that shows a running session; a :class:`~sessions.recorder.TrafficSink` and an operator.
+class ViewFeed(PageLink):
+    """A page that shows a running session; an operator of it.
 
     Args:
-        address, port: where the page listens; port 0 takes a free one.
-        token: what a visitor has to show; "" for none, on the loopback interface only.
-        title: of the page.
+        address, port, token, title: see :class:`~tactile_lab.view.link.PageLink`.
     """
 
     attended = False
 
     def __init__(self, address: str, port: int, token: str, title: str) -> None:
-        self._settings = {"address": address, "port": port, "token": token, "title": title}
-        self.dropped = 0
-        """Messages that were left out because the page did not keep up."""
-        self.url = ""
-        """Where the page is, once it is there."""
-        self._queue: queue.Queue[bytes | None] = queue.Queue(QUEUE_LENGTH)
+        super().__init__("session", address, port, token, title)
         self._asked: deque[Request] = deque(maxlen=_PENDING)
-        self._process: subprocess.Popen[bytes] | None = None
-        self._ready = threading.Event()
-        self._problem = ""
-        self._threads: list[threading.Thread] = []
 
-    # --- lifecycle ---------------------------------------------------------------------------------------------
-
-    def __enter__(self) -> Self:
-        """Start the page and wait until it listens. Raises DeviceError when it does not."""
-        command = [sys.executable, "-m", "tactile_lab.view.process"]
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True
-        )
-        self._queue.put_nowait(json.dumps(self._settings).encode() + b"\n")
-        for work in (self._send, self._listen):
-            thread = threading.Thread(target=work, name="page", daemon=True)
-            thread.start()
-            self._threads.append(thread)
-        if not self._ready.wait(START_TIMEOUT_s) or self._problem:
-            self.close()
-            text = self._problem or f"did not start within {START_TIMEOUT_s:.0f} s"
-            raise DeviceError(text, where="page", hint="Choose another --view-port, or go on without --view")
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """End the page; bounded in time, whatever state the page is in."""
-        process, self._process = self._process, None
-        if process is None:
-            return
-        with contextlib.suppress(queue.Full):
-            self._queue.put_nowait(None)
-        try:
-            process.wait(_END_TIMEOUT_s)
-        except subprocess.TimeoutExpired:
-            process.kill()  # a stopped process hears nothing else
-            process.wait()
-        for thread in self._threads:
-            thread.join(_END_TIMEOUT_s)
-        for pipe in (process.stdin, process.stdout):
-            if pipe is not None:
-                with contextlib.suppress(OSError):
-                    pipe.close()
-
-    @property
-    def pid(self) -> int | None:
-        """Process id of the page while it runs."""
-        return None if self._process is None else self._process.pid
-
-    # --- out ---------------------------------------------------------------------------------------------------
-
-    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        """Show this; at once, whatever the page does."""
-        if topic not in SHOWN_TOPICS:
-            return
-        content = {"topic": topic, "stamp_ns": stamp_ns, "dropped": self.dropped}
-        line = json.dumps({**content, "data": base64.b64encode(data).decode()})
-        try:
-            self._queue.put_nowait(line.encode() + b"\n")
-        except queue.Full:
-            self.dropped += 1
-
-    def _send(self) -> None:
-        """Thread: from the queue to the page; may be held up for as long as the page is."""
-        process = self._process
-        assert process is not None
-        assert process.stdin is not None
-        try:
-            while (line := self._queue.get()) is not None:
-                process.stdin.write(line)
-                process.stdin.flush()
-            process.stdin.close()
-        except (OSError, ValueError):  # the page is gone: the queue fills, and what follows is counted
-            return
-
-    # --- in ----------------------------------------------------------------------------------------------------
-
-    def _listen(self) -> None:
-        """Thread: what the page says, line by line, until it ends."""
-        process = self._process
-        assert process is not None
-        assert process.stdout is not None
-        with contextlib.suppress(OSError, ValueError):
-            while line := process.stdout.readline(_LINE_BYTES):
-                self._heard(line)
-        if not self._ready.is_set():
-            self._problem = self._problem or "ended before it listened"
-            self._ready.set()
-
-    def _heard(self, line: bytes) -> None:
-        """One line of the page; lines that mean nothing are left out."""
-        try:
-            content = json.loads(line)
-            if "url" in content or "problem" in content:
-                self.url, self._problem = str(content.get("url", "")), str(content.get("problem", ""))
-                self._ready.set()
-            elif (request := request_of(content)).ask in PAGE_ASKS:
-                self._asked.append(request)
-        except (ValueError, TypeError, AttributeError):
-            return
+    def pressed(self, content: Mapping[str, Any]) -> None:
+        """Keep what may be asked for. Raises ValueError for what is no request."""
+        if (request := request_of(content)).ask in PAGE_ASKS:
+            self._asked.append(request)
 
     def requests(self) -> Sequence[Request]:
         """What was pressed since the last call."""

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import redirect_stdout
 from io import StringIO
 from types import TracebackType
-from typing import Self
+from typing import Literal, Self
 
 import viser
 from viser import _messages
@@ -19,6 +19,14 @@ from tactile_lab.view.controls import Controls
 from tactile_lab.view.drawing import Drawing
 from tactile_lab.view.gate import Gate, inner_address, is_loopback, serve
 from tactile_lab.view.scene import Scene
+from tactile_lab.view.wizard_feed import QUIT
+from tactile_lab.view.wizard_panel import WizardPanel
+
+Say = Callable[..., None]
+"""Says what was pressed, by names: ask and text, or question and answer."""
+
+_WHOLE_TABLE = 3.0
+"""A wizard's hand presses the edges of the table too: seen from so much farther away."""
 
 
 class Page:
@@ -28,11 +36,19 @@ class Page:
         address, port: where it listens; port 0 takes a free one.
         token: what a visitor has to show; needed for any address but the loopback interface's.
         title: of the page.
-        press: called with what was pressed, in another thread; None where there is nothing to ask for.
+        panel: whose buttons it has.
+        say: called with what was pressed, in another thread; None where there is nothing to ask for.
     """
 
     def __init__(
-        self, address: str, port: int, token: str, title: str, press: Callable[[Ask, str], None] | None = None
+        self,
+        address: str,
+        port: int,
+        token: str,
+        title: str,
+        *,
+        panel: Literal["session", "wizard"] = "session",
+        say: Say | None = None,
     ) -> None:
         if not token and not is_loopback(address):
             raise DeviceError(
@@ -45,8 +61,8 @@ class Page:
         self._inner.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
         self._inner.gui.set_panel_label(title)
         self.scene = Scene()
-        self._drawing = Drawing(self._inner)
-        self._controls = Controls(self._inner, press or (lambda ask, text: None), live=press is not None)
+        self._drawing = Drawing(self._inner, _WHOLE_TABLE if panel == "wizard" else 1.0)
+        self._controls = _controls(self._inner, panel, say)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="door", daemon=True)
         self._server: asyncio.Server | None = None
@@ -92,6 +108,21 @@ class Page:
         if self.scene.changed:
             self._drawing.draw(self.scene)
             self._controls.draw(self.scene)
+
+
+def _controls(server: viser.ViserServer, panel: str, say: Say | None) -> Controls | WizardPanel:
+    """The panel, which says what is pressed."""
+    told: Say = say or (lambda **content: None)
+
+    def press(ask: Ask, text: str) -> None:
+        told(ask=ask.value, text=text)
+
+    def answer(question: int, key: str) -> None:
+        told(question=question, answer=key)
+
+    if panel == "wizard":
+        return WizardPanel(server, answer, QUIT)
+    return Controls(server, press, live=say is not None)
 
 
 def refuse_tunnels(server: viser.ViserServer) -> None:

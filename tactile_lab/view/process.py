@@ -12,7 +12,6 @@ import sys
 import threading
 from typing import Any, BinaryIO
 
-from sessions.guided.operator import Ask
 from tactile_lab.errors import TactileLabError
 
 DRAW_PERIOD_s = 0.1
@@ -40,11 +39,8 @@ def main() -> int:
     settings = json.loads(sys.stdin.buffer.readline())
     from tactile_lab.view.page import Page
 
-    def press(ask: Ask, text: str) -> None:
-        mouth.say(ask=ask.value, text=text)
-
     try:
-        with Page(**settings, press=press) as page:
+        with Page(**settings, say=mouth.say) as page:
             mouth.say(url=page.url)
             _show(page)
     except TactileLabError as error:

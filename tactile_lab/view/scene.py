@@ -14,6 +14,8 @@ from sessions import schemas
 from tactile_lab.geometry.contacts import Array
 
 PALM = "palm"
+WIZARD_TOPIC = "/wizard"
+"""What a calibration wizard shows and asks; it goes to a page only and is not recorded."""
 MESSAGES = 6
 """So many of the last events are shown."""
 SIGMA_FULL_m = 0.010
@@ -72,6 +74,7 @@ class Scene:
         plan: the next grasp, as :func:`sessions.view_messages.plan_message` gives it.
         steps: what the estimation said of each grasp.
         guide: what the person of a guided session is shown.
+        wizard: what the person of a calibration wizard is shown: question, lines, tables.
         messages: the newest events.
         stamp_ns: session clock of the newest message.
         dropped: messages that were left out because the page did not keep up.
@@ -88,6 +91,7 @@ class Scene:
     plan: dict[str, Any] = field(default_factory=dict)
     steps: dict[int, dict[str, Any]] = field(default_factory=dict)
     guide: dict[str, Any] = field(default_factory=dict)
+    wizard: dict[str, Any] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
     stamp_ns: int = 0
     dropped: int = 0
@@ -183,6 +187,11 @@ def _guide(scene: Scene, content: dict[str, Any]) -> None:
     scene.changed.add("guide")
 
 
+def _wizard(scene: Scene, content: dict[str, Any]) -> None:
+    scene.wizard = {name: content[name] for name in ("question", "lines", "tables")}
+    scene.changed.add("wizard")
+
+
 def _event(scene: Scene, content: dict[str, Any]) -> None:
     scene.messages = [*scene.messages, str(content["message"])][-MESSAGES:]
     scene.changed.add("guide")
@@ -198,6 +207,7 @@ _READERS = {
     schemas.PLAN_TOPIC: _plan,
     schemas.GUIDE_TOPIC: _guide,
     schemas.EVENTS_TOPIC: _event,
+    WIZARD_TOPIC: _wizard,
 }
 SHOWN_TOPICS = frozenset(_READERS)
 """What a page needs to be given."""

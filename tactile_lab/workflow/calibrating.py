@@ -25,7 +25,7 @@ from drivers.shadow.posture import LONG_FINGERS, TipEllipsoid
 from drivers.simulation.settings import HandBoard, ObjectStart
 from sessions.bench import Bench
 from sessions.calibration_station import Board, CalibrationStation, StationSettings
-from sessions.recorder import NullTraffic, Recorder
+from sessions.recorder import Recorder, TrafficSink
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
@@ -79,8 +79,14 @@ class ForearmRequest:
 
 
 @contextmanager
-def forearm_wizard(request: ForearmRequest) -> Iterator[tuple[ForearmWizard, CalibrationStation]]:
+def forearm_wizard(
+    request: ForearmRequest, onlooker: TrafficSink
+) -> Iterator[tuple[ForearmWizard, CalibrationStation]]:
     """A wizard with a connected station; the hand is lifted off and everything closed in the end.
+
+    Args:
+        request: see there.
+        onlooker: is shown the hand while it moves.
 
     Raises:
         ConfigurationError: the rig lacks what the method needs.
@@ -92,7 +98,7 @@ def forearm_wizard(request: ForearmRequest) -> Iterator[tuple[ForearmWizard, Cal
     plan, data = _plan(rig, request), _data(rig, request.method)
     wizard = ForearmWizard("touch" if request.method == "touch" else "marker", plan, data, request.settings.wizard)
     with open_laboratory(rig, request.seed, "box-10x6x4") as laboratory:
-        bench = laboratory.bench(Recorder(NullTraffic()))
+        bench = laboratory.bench(Recorder(onlooker))
         bench.connect()
         try:
             station = _station(rig, request, data, bench)

@@ -15,7 +15,7 @@ from calibration.forearm import load_forearm
 from drivers.fingertip import FingertipCalibration, load_fingertips
 from drivers.shadow.posture import LONG_FINGERS
 from sessions.fingertip_station import FingertipStation, FingertipStationSettings
-from sessions.recorder import NullTraffic, Recorder
+from sessions.recorder import Recorder, TrafficSink
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
@@ -58,8 +58,14 @@ class FingertipRequest:
 
 
 @contextmanager
-def fingertip_wizard(request: FingertipRequest) -> Iterator[tuple[FingertipWizard, FingertipStation]]:
+def fingertip_wizard(
+    request: FingertipRequest, onlooker: TrafficSink
+) -> Iterator[tuple[FingertipWizard, FingertipStation]]:
     """A wizard with a connected station; the hand is lifted off and everything closed in the end.
+
+    Args:
+        request: see there.
+        onlooker: is shown the hand while it moves.
 
     Raises:
         ConfigurationError: the rig lacks what is needed, or the finger can not be stretched alone.
@@ -75,7 +81,7 @@ def fingertip_wizard(request: FingertipRequest) -> Iterator[tuple[FingertipWizar
     plan, data = plan_wrenches(request.finger, request.presses), _data(rig, request.finger)
     wizard = FingertipWizard(plan, data, before, request.settings.noise)
     with open_laboratory(cleared(rig), request.seed, "box-10x6x4") as laboratory:
-        bench = laboratory.bench(Recorder(NullTraffic()))
+        bench = laboratory.bench(Recorder(onlooker))
         bench.connect()
         try:
             station = FingertipStation(bench, world_T_mount, tip_shapes(rig), request.settings.station)

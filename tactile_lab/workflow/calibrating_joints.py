@@ -24,7 +24,7 @@ from drivers.shadow.posture import LONG_FINGERS
 from drivers.simulation.objects import object_model
 from drivers.simulation.settings import ObjectStart
 from sessions.calibration_station import CalibrationStation, StationSettings
-from sessions.recorder import NullTraffic, Recorder
+from sessions.recorder import Recorder, TrafficSink
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
@@ -128,8 +128,12 @@ def from_touches(data: ForearmData, rig: Rig, settings: JointSettings) -> FoundJ
 
 
 @contextmanager
-def joint_wizard(request: JointRequest) -> Iterator[tuple[BlockWizard, CalibrationStation]]:
+def joint_wizard(request: JointRequest, onlooker: TrafficSink) -> Iterator[tuple[BlockWizard, CalibrationStation]]:
     """A wizard with a connected station; the hand is lifted off and everything closed in the end.
+
+    Args:
+        request: see there.
+        onlooker: is shown the hand while it moves.
 
     Raises:
         ConfigurationError: the rig lacks what is needed, or a finger can not press alone.
@@ -144,7 +148,7 @@ def joint_wizard(request: JointRequest) -> Iterator[tuple[BlockWizard, Calibrati
     world_T_mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
     wizard = BlockWizard(plan_block(block, request.fingers, request.rounds), request.settings.block)
     with open_laboratory(_with_block(rig, block), request.seed, BLOCK) as laboratory:
-        bench = laboratory.bench(Recorder(NullTraffic()))
+        bench = laboratory.bench(Recorder(onlooker))
         bench.connect()
         try:
             station = CalibrationStation(bench, world_T_mount, tips, request.settings.station)

@@ -22,7 +22,8 @@ def load() -> None:
     import tactile_lab.cli.app
     import tactile_lab.workflow.calibrating
     import tactile_lab.workflow.calibrating_camera
-    import tactile_lab.workflow.calibrating_fingertip  # noqa: F401
+    import tactile_lab.workflow.calibrating_fingertip
+    import tactile_lab.workflow.calibrating_joints  # noqa: F401
 
 
 def serve() -> None:

@@ -31,11 +31,12 @@ class WarmProgram:
         self._process = subprocess.Popen(
             [sys.executable, str(PROGRAM)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=ENVIRONMENT
         )
+        self._terminal: Terminal | None = None
         return self
 
     def __exit__(self, *error: object) -> None:
-        if error[0] is not None:  # what still runs waits for an answer that never comes
-            self._process.kill()
+        if self._terminal is not None:
+            self._terminal.hang_up()  # what a failed test has left waits for an answer that never comes
         self._process.communicate(timeout=PATIENCE_s)
 
     def terminal(self, folder: Path, *words: object) -> Terminal:
@@ -45,7 +46,8 @@ class WarmProgram:
         self.tell(json.dumps(order))
         assert self.answer() == "ready"
         os.close(its)
-        return Terminal(self, ours)
+        self._terminal = Terminal(self, ours)
+        return self._terminal
 
     def tell(self, line: str) -> None:
         """One order."""
@@ -65,23 +67,28 @@ class Terminal:
     def __init__(self, program: WarmProgram, descriptor: int) -> None:
         self._program = program
         self._child = fdpexpect.fdspawn(descriptor, timeout=PATIENCE_s, encoding="utf-8")
-        self._told = ""
+        self.told = ""
+        """What it has said, up to the last text that was waited for."""
 
     def until(self, text: str, then: str = "") -> None:
         """Wait for a text, then type something."""
         self._child.expect_exact(text)
-        self._told += str(self._child.before) + text
+        self.told += str(self._child.before) + text
         self.type(then)
 
     def type(self, text: str) -> None:
         """Type something now."""
         self._child.send(text)
 
+    def hang_up(self) -> None:
+        """The terminal goes, and with it what runs on it."""
+        self._child.close()
+
     def ended(self, code: int) -> str:
         """Everything it said, once it ended with that exit code. A traceback fails the test."""
         self._child.expect(pexpect.EOF)
         self._child.close()
-        told = self._told + str(self._child.before)
+        told = self.told + str(self._child.before)
         assert self._program.answer() == str(code), told
         assert "Traceback" not in told, told
         return told

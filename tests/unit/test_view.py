@@ -29,8 +29,9 @@ from tactile_lab.errors import ConfigurationError, DeviceError
 from tactile_lab.geometry.contacts import Contact, Grasp
 from tactile_lab.view.controls import history_html, status_html
 from tactile_lab.view.drawing import patches
-from tactile_lab.view.feed import QUEUE_LENGTH, ViewFeed
+from tactile_lab.view.feed import ViewFeed
 from tactile_lab.view.gate import Gate, Head, inner_address, is_loopback, new_token, parse_head
+from tactile_lab.view.link import QUEUE_LENGTH
 from tactile_lab.view.page import Page
 from tactile_lab.view.scene import Scene, ellipse
 from tactile_lab.view.skeleton import bones
@@ -242,6 +243,7 @@ def test_page_makes_no_public_tunnel_and_is_reached_through_its_door_only() -> N
     """In a process of its own: viser leaves its event loop unclosed."""
     code = """
 from viser import _messages
+from tactile_lab.view.link import QUEUE_LENGTH
 from tactile_lab.view.page import Page
 with Page("127.0.0.1", 0, "", "test") as page:
     inner = page._inner
@@ -257,6 +259,7 @@ with Page("127.0.0.1", 0, "", "test") as page:
 def test_page_is_drawn_again_and_again_without_a_complaint() -> None:
     """In a process of its own, as above; what viser warns of counts as an error."""
     code = """
+from tactile_lab.view.link import QUEUE_LENGTH
 from tactile_lab.view.page import Page
 from tests.unit.test_view import recorded
 with Page("127.0.0.1", 0, "", "test") as page:

@@ -20,6 +20,7 @@ from drivers.fingertip import RigidTransform
 from drivers.positioner_settings import PositionerSettings
 from drivers.shadow.kinematics import JOINT_INDEX
 from drivers.shadow.posture import TipEllipsoid
+from sessions.recorder import NullTraffic
 from tactile_lab.errors import ConfigurationError, DeviceError
 from tactile_lab.experiments import calibration_data
 from tactile_lab.experiments.calibration_data import TrueRig, touches_of
@@ -129,14 +130,14 @@ def test_the_wizard_repeats_and_tells_what_is_missing() -> None:
 def test_blocks_that_do_not_fit_are_named(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "block.yaml"
     path.write_text(text)
-    with pytest.raises(ConfigurationError, match=words), joint_wizard(JointRequest("sim", path)):
+    with pytest.raises(ConfigurationError, match=words), joint_wizard(JointRequest("sim", path), NullTraffic()):
         pass
 
 
 def test_fingers_that_can_not_press_alone_are_named() -> None:
     with (
         pytest.raises(ConfigurationError, match="TH can not press alone"),
-        joint_wizard(JointRequest("sim", fingers=("TH",))),
+        joint_wizard(JointRequest("sim", fingers=("TH",)), NullTraffic()),
     ):
         pass
 
