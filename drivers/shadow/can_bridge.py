@@ -21,7 +21,7 @@ from drivers.links import Link, link_health
 from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings
 from drivers.shadow.motor_can import BITRATE
 from drivers.shadow.palm_codec import CanFrame, EdcCommand, PalmCommand, PalmStatus
-from drivers.shadow.palm_images import PALMS, PalmName
+from drivers.shadow.palm_images import PALMS, USUAL_PALM, PalmName
 from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock
 from tactile_lab.errors import CodecError, TactileLabError
 
@@ -40,7 +40,8 @@ class ShadowBridgeBus(can.BusABC):
         channel: network interface the hand is plugged into.
         can_filters: as for any python-can bus.
         motor_bus: bus of sent messages that name no channel, 1 or 2.
-        palm: which palm the hand has.
+        palm: which palm the hand has; as its product code tells unless given, and the usual one behind a ``link`` that
+            does not know.
         link: a link to the palm in place of one over EtherCAT on ``channel``; it need not be open.
         clock: paces the cycles.
 
@@ -58,27 +59,30 @@ class ShadowBridgeBus(can.BusABC):
         can_filters: CanFilters | None = None,
         *,
         motor_bus: int | str = 1,
-        palm: PalmName | int | str = "0220",
+        palm: PalmName | int | str | None = None,
         link: Link | None = None,
         clock: Clock | None = None,
         **options: Any,
     ) -> None:
         self._default_bus = _checked_bus(motor_bus)
-        self._image = PALMS[_checked_palm(palm)]
+        named = None if palm is None else _checked_palm(palm)
+        self._image = PALMS[named or USUAL_PALM]
         self._clock = clock or MonotonicClock()
-        self._link = link or _ethercat(channel, self._image.name, self._clock)
+        self._link = link or _ethercat(channel, named, self._clock)
         self._next_ns = self._clock.now_ns()
         self._epoch_ns = time.time_ns() - self._next_ns
         self._received: deque[can.Message] = deque()
         self.cycles = self.lost = self.damaged = self.surplus = 0
         self.channel_info = f"Shadow hand's motor buses at {channel or self._link.name}, {BITRATE // 1000} kbit/s"
-        self._open_link()
+        self._open_link(named)
         super().__init__(channel=channel, can_filters=can_filters, **options)
         self._can_protocol = can.CanProtocol.CAN_20
 
-    def _open_link(self) -> None:
+    def _open_link(self, palm: PalmName | None) -> None:
         try:
             self._link.open()
+            if palm is None and isinstance(self._link, EthercatLink):
+                self._image = self._link.hand.image
             self._cycle(CanFrame())
             self.cycles = self.lost = 0  # the first cycle has nothing to answer yet
         except TactileLabError as error:
@@ -204,7 +208,7 @@ def _checked_palm(palm: PalmName | int | str) -> PalmName:
     return named
 
 
-def _ethercat(channel: Any, palm: PalmName, clock: Clock) -> Link:
+def _ethercat(channel: Any, palm: PalmName | None, clock: Clock) -> Link:
     if not channel:
         raise can.CanInitializationError("no channel. Name the network interface the hand is plugged into")
     return EthercatLink("hand", EthercatSettings(interface=str(channel), palm=palm), clock)

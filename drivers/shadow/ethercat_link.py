@@ -84,6 +84,26 @@ class EthercatCounts:
         return tuple(words for words, count in remarks.items() if count)
 
 
+def find_palm(settings: EthercatSettings, clock: Clock, port: Port | None = None) -> PalmName:
+    """Which palm is on the ring, by its product code; no slave changes its state.
+
+    Args:
+        settings: where it is, and what must be there.
+        clock: the session's.
+        port: as for :class:`EthercatLink`.
+
+    Raises:
+        DeviceError: what is missing or wrong, and what to do; also for a product code that can not be driven.
+    """
+    master = EtherCatMaster(port or RawPort(settings.interface), clock, settings.master)
+    master.open()
+    try:
+        _, _, image = HandRing(master, settings.palm, settings.serial).look()
+        return image.name
+    finally:
+        master.close()
+
+
 class EthercatLink:
     """A link to the palm.
 

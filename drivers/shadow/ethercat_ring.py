@@ -13,6 +13,7 @@ from drivers.shadow.palm_images import (
     BRIDGE_PRODUCT,
     IMAGE_BASE,
     SHADOW_VENDOR,
+    WHICH_PALMS,
     PalmImage,
     PalmName,
     describe_product,
@@ -90,9 +91,7 @@ class HandRing:
         Raises:
             DeviceError: what is missing or wrong, and what to do.
         """
-        self._check_ring()
-        bridge, palm = self._identify(0), self._identify(1)
-        image = self._checked_image(bridge, palm)
+        bridge, palm, image = self.look()
         self._master.broadcast(Register.FMMU, _ALL_REGISTERS)
         self._master.broadcast(Register.SYNC_MANAGER, _ALL_REGISTERS)
         self._give_addresses()
@@ -105,6 +104,18 @@ class HandRing:
         return HandIdentity(bridge, palm, image, watchdog_s)
 
     # --- who is there ------------------------------------------------------------------------------------------
+
+    def look(self) -> tuple[BoardIdentity, BoardIdentity, PalmImage]:
+        """Bridge and palm by their EEPROMs, and the process image that belongs to the palm's product code.
+
+        No slave changes its state.
+
+        Raises:
+            DeviceError: what is missing or wrong, and what to do.
+        """
+        self._check_ring()
+        bridge, palm = self._identify(0), self._identify(1)
+        return bridge, palm, self._checked_image(bridge, palm)
 
     def _check_ring(self) -> None:
         count = self._master.count_slaves()
@@ -131,7 +142,7 @@ class HandRing:
         image = palm_of_product(palm.product)
         if image is None:
             what = f"the second slave is {describe_product(palm.product)} (product {palm.product:#x})"
-            raise self._wrong(what, "Palms 0220, 0230 and 0240 can be driven")
+            raise self._wrong(what, WHICH_PALMS)
         self._check_expected(image, palm)
         return image
 

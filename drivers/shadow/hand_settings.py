@@ -12,7 +12,7 @@ from drivers.shadow.motor_load import LoadLimits
 from drivers.shadow.motor_polling import PollingRates
 from drivers.shadow.motor_watch import HeatLimits
 from drivers.shadow.motors import DRIVEN_JOINTS
-from drivers.shadow.palm_images import PalmName
+from drivers.shadow.palm_images import USUAL_PALM, PalmName
 from drivers.shadow.tactile_requests import TactileKind
 from tactile_lab.strict_yaml import StrictModel
 
@@ -21,7 +21,7 @@ class HandSettings(StrictModel):
     """How the host drives the hand.
 
     Attributes:
-        palm: which palm the hand has.
+        palm: which palm the hand has; on a cable the product code tells where this is left out (:attr:`palm_stated`).
         cycle_s: period of the exchanges while connecting and closing, seconds.
         demand: what the motors are told: a duty cycle, or a torque that they keep by themselves at 5 kHz.
         gains: position control, in counts of that demand.
@@ -38,7 +38,7 @@ class HandSettings(StrictModel):
         reset_motors: reset the motor boards when connecting; they then need ``reset_wait_s`` to come back.
     """
 
-    palm: PalmName = "0220"
+    palm: PalmName = USUAL_PALM
     cycle_s: float = Field(default=0.01, gt=0.0)
     demand: Literal["pwm", "torque"] = "pwm"
     gains: GainTable = GainTable()
@@ -54,6 +54,11 @@ class HandSettings(StrictModel):
     close_cycles: int = Field(default=5, ge=1)
     reset_motors: bool = False
     reset_wait_s: float = Field(default=3.2, ge=0.0, le=30.0)
+
+    @property
+    def palm_stated(self) -> bool:
+        """Whether someone named the palm, so that another one is refused."""
+        return "palm" in self.model_fields_set
 
     @model_validator(mode="after")
     def _duty_cycles_exist(self) -> HandSettings:

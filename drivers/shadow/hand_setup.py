@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from drivers.links import Link
-from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings
+from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings, find_palm
 from drivers.shadow.gains import load_gains
 from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_settings import HandSettings
@@ -14,6 +14,7 @@ from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.motor_configuration import load_configurations
 from drivers.shadow.motor_polling import load_rates
 from drivers.shadow.motors import MotorMap
+from drivers.shadow.palm_images import PalmName
 from drivers.shadow.pysoem_link import PysoemLink
 from tactile_lab.clock import Clock
 from tactile_lab.errors import ConfigurationError
@@ -47,6 +48,20 @@ class HandSetup(StrictModel):
     rates: Path | None = None
     gains: Path | None = None
 
+    def known(self, clock: Clock) -> HandSetup:
+        """The same hand with its palm named: as it is stated, else as the ring tells by the palm's product code.
+
+        Raises:
+            DeviceError: what is missing on the ring or wrong, and what to do.
+        """
+        palm = self.stated_palm or find_palm(self.ethercat, clock)
+        return self.model_copy(update={"hand": self.hand.model_copy(update={"palm": palm})})
+
+    @property
+    def stated_palm(self) -> PalmName | None:
+        """The palm that a file names, of the hand or of its cable; None where the ring is to tell."""
+        return self.hand.palm if self.hand.palm_stated else self.ethercat.palm
+
     def settings(self) -> HandSettings:
         """How the hand is driven, with the polling rates and gains of the files. Raises ConfigurationError."""
         changes: dict[str, object] = {} if self.rates is None else {"polling": load_rates(self.rates)}
@@ -55,7 +70,7 @@ class HandSetup(StrictModel):
         return self.hand.model_copy(update=changes)
 
     def link(self, clock: Clock) -> EthercatLink | PysoemLink:
-        """The hand's link, not open.
+        """The hand's link, not open; to a palm that is :meth:`known`.
 
         Raises:
             ConfigurationError: the master is not installed, or two places name different palms.

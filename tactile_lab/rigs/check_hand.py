@@ -38,16 +38,22 @@ def check_hand(rig: HandRig, clock: Clock, *, move: bool = False) -> list[Findin
         ConfigurationError: a file the rig names, or a master that is not installed.
     """
     setup = _asking_who(rig.setup)
+    setup.check_files()
+    try:
+        return _findings(setup.known(clock), clock, move=move)
+    except DeviceError as error:
+        return [Finding("hand", False, str(error))]
+
+
+def _findings(setup: HandSetup, clock: Clock, *, move: bool) -> list[Finding]:
     link = setup.link(clock)
     hand = setup.device(link, clock, set_up_boards=False)
     try:
         hand.connect()
         sample, statistics = _listen(hand, clock, round(setup.hand.cycle_s * NANOSECONDS))
         motors = setup.motor_map()
-        found = [_ring(link), _cycle(hand, link, statistics), _motors(hand, sample, motors), _joints(sample)]
+        found = [_ring(link, setup), _cycle(hand, link, statistics), _motors(hand, sample, motors), _joints(sample)]
         return [*found, _motor_map(hand, motors, clock, setup.hand.cycle_s)] if move else found
-    except DeviceError as error:
-        return [Finding("hand", False, str(error))]
     finally:
         _close(hand)
 
@@ -87,9 +93,9 @@ def _listen(hand: ShadowHand, clock: Clock, cycle_ns: int) -> tuple[HandSample, 
     return sample, statistics
 
 
-def _ring(link: Link) -> Finding:
+def _ring(link: Link, setup: HandSetup) -> Finding:
     if not isinstance(link, EthercatLink):
-        return Finding("ring", True, "bridge and palm, in operation")
+        return Finding("ring", True, f"bridge and palm {setup.hand.palm}, in operation")
     found = link.hand
     watchdog = "no watchdog" if found.watchdog_s is None else f"watchdog {1000 * found.watchdog_s:.0f} ms"
     words = f"hand {found.serial}, palm {found.image.name} revision {found.palm.revision}, in operation, {watchdog}"

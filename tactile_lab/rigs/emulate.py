@@ -25,6 +25,7 @@ from drivers.emulators.net_box_server import NetBoxServer
 from drivers.emulators.net_box_unit import NetBoxUnit
 from drivers.emulators.pty_port import PtyPort
 from drivers.emulators.shadow_chain import ChainSettings
+from drivers.shadow.palm_images import USUAL_PALM
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.fingertip_rig import FingertipRig, place_of
 from tactile_lab.rigs.hand_rig import HandRig
@@ -65,8 +66,8 @@ def emulated_hand(rig: HandRig) -> Iterator[dict[str, str]]:
         hint = "Make a cable (ip link add A type veth peer name B), name A in ethercat.interface and B in far_end"
         raise ConfigurationError("far_end is not named, so there is nothing to serve", where=rig.source, hint=hint)
     serial = _EMULATED_SERIAL if description.ethercat.serial is None else description.ethercat.serial
-    hand = description.hand
-    settings = ChainSettings(palm=hand.palm, serial=serial, eeprom="mapped", tactile=hand.tactile)
+    palm, tactile = rig.setup.stated_palm or USUAL_PALM, description.hand.tactile
+    settings = ChainSettings(palm=palm, serial=serial, eeprom="mapped", tactile=tactile)
     with EmulatedHandProcess(description.far_end, rig.folder / description.calibration.joints, settings):
         yield {"hand": f"hand {serial} at {description.far_end}"}
 

@@ -18,7 +18,7 @@ from sessions.recorder import Recorder
 from tactile_lab.clock import Clock, MonotonicClock
 from tactile_lab.rigs.build import build_bench, simulated_world
 from tactile_lab.rigs.description import Rig
-from tactile_lab.rigs.wired import stand_in_plan
+from tactile_lab.rigs.wired import stand_in_plan, with_palm
 from tactile_lab.rigs.wired_bench import build_wired_bench
 from tactile_lab.strict_yaml import load_model
 
@@ -27,10 +27,13 @@ class Laboratory(Protocol):
     """A place with devices.
 
     Attributes:
+        rig: what is there, with the palm that was found on the hand's cable where the file leaves that open.
         markers: of the rig with this object, for the truth.
         target: the object, where its shape is known.
     """
 
+    @property
+    def rig(self) -> Rig: ...
     @property
     def markers(self) -> MarkerSettings: ...
     @property
@@ -101,19 +104,21 @@ def open_laboratory(rig: Rig, seed: int, object_name: str) -> Iterator[Simulated
     Raises:
         ConfigurationError: no such object in a simulation, or stand-ins that this program does not have.
         ShapeError: the object's mesh can not be used.
-        DeviceError: a stand-in can not be started.
+        DeviceError: a stand-in can not be started, or the rig leaves it to the hand's cable which palm there is, and
+            none that can be driven is found.
     """
     if rig.description.kind == "simulated":
         yield SimulatedLaboratory(rig, simulated_world(rig, seed, object_name))
     elif rig.description.stand_ins:
         target, clock = object_model(object_name), MonotonicClock()
         with StandIns(stand_in_plan(rig, seed, object_name), clock) as stand_ins, preferred():
-            yield WiredLaboratory(rig, clock, marker_settings(target, _markers(rig)), target, stand_ins)
+            found, markers = with_palm(rig, clock), marker_settings(target, _markers(rig))
+            yield WiredLaboratory(found, clock, markers, target, stand_ins)
     else:
         known = object_name in CATALOGUE or object_name.startswith(MESH_PREFIX)
-        target_or_none = object_model(object_name) if known else None
+        target_or_none, clock = object_model(object_name) if known else None, MonotonicClock()
         with preferred():
-            yield WiredLaboratory(rig, MonotonicClock(), _markers(rig), target_or_none)
+            yield WiredLaboratory(with_palm(rig, clock), clock, _markers(rig), target_or_none)
 
 
 def _markers(rig: Rig) -> MarkerSettings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from drivers.ati.wire import ForceWire
@@ -11,7 +12,9 @@ from drivers.camera.markers import MarkerSettings
 from drivers.camera.source_settings import CameraSourceSettings, source_beside
 from drivers.emulators.wired.stand_ins import SERIAL, HandPlace, Place, StandInPlan
 from drivers.shadow.hand_setup import HandSetup
+from drivers.shadow.palm_images import USUAL_PALM
 from sessions.interpreter import HAND_LINK
+from tactile_lab.clock import Clock
 from tactile_lab.errors import CodecError, ConfigurationError
 from tactile_lab.rigs.description import Rig, gauge_role
 from tactile_lab.rigs.wires import LocalCamera, RemoteCamera, Wires
@@ -39,6 +42,16 @@ def hand_setup(rig: Rig) -> HandSetup:
         rates=_whole(files.get("rates")),
         gains=_whole(files.get("gains")),
     )
+
+
+def with_palm(rig: Rig, clock: Clock) -> Rig:
+    """A rig on wires with its palm named, so that a session keeps by which process image its bytes are read.
+
+    Raises:
+        DeviceError: the rig file leaves it to the ring, which does not tell.
+    """
+    hand = rig.description.hand.model_copy(update={"palm": hand_setup(rig).known(clock).hand.palm})
+    return replace(rig, description=rig.description.model_copy(update={"hand": hand}))
 
 
 def force_wire(rig: Rig, finger: str) -> ForceWire:
@@ -108,7 +121,7 @@ def _hand_place(rig: Rig) -> HandPlace:
         far=wiring.far_end,
         joints=rig.files["joints"].resolve(),
         motors=rig.files["motors"].resolve(),
-        palm=rig.description.hand.palm,
+        palm=hand_setup(rig).stated_palm or USUAL_PALM,
         serial=SERIAL if wiring.ethercat.serial is None else wiring.ethercat.serial,
         biotacs=rig.files["fingertips"].resolve() if rig.description.fingertips == "biotac" else None,
     )

@@ -85,7 +85,7 @@ def run_session(request: SessionRequest, progress: Progress, attendance: Attenda
 
     Raises:
         ConfigurationError, ShapeError: the request can not be met; nothing was recorded.
-        DeviceError: the rig is not ready; the session folder says so.
+        DeviceError: the rig is not ready; the session folder says so, where there is one yet.
         SessionError: the session could not be recorded.
         InterruptionError: a person ended it at once; the session folder is kept and readable.
     """
@@ -98,6 +98,7 @@ def run_session(request: SessionRequest, progress: Progress, attendance: Attenda
     slam = TactileSlam(slam_settings(request.method, request.dimension, rig.description.motion), request.seed)
     progress.phase(0, "connect")
     with open_laboratory(rig, request.seed, request.object_name) as laboratory:
+        rig = laboratory.rig
         session = _new_session(rig, laboratory, slam, request, overlooked)
         with _kept_when_interrupted(session):
             outcome = _record(session, rig, laboratory, slam, request, progress, attendance)

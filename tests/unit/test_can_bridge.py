@@ -28,16 +28,14 @@ CALIBRATION = JointCalibration.load(Path(rigs.__file__).parent / "calibrations" 
 
 
 class Rig:
-    """The emulated hand, and python-can's bus on it."""
+    """The emulated hand, and python-can's bus on it, which takes the palm from its product code."""
 
     def __init__(self, palm: PalmName = "0220", *, missing: frozenset[int] = frozenset(), **options: object) -> None:
         self.clock, self.motors = VirtualClock(), MotorCanBuses(missing)
         self.hand = emulated_hand(self.clock, CALIBRATION, ChainSettings(palm=palm), can=self.motors)
         port = MemoryPort(self.hand.ring)
         self.link = EthercatLink("hand", EthercatSettings(interface="memory", poll_every=10), self.clock, port)
-        self.bus = can.Bus(
-            interface="shadow_bridge", channel="memory", link=self.link, clock=self.clock, palm=palm, **options
-        )
+        self.bus = can.Bus(interface="shadow_bridge", channel="memory", link=self.link, clock=self.clock, **options)
 
 
 @pytest.fixture

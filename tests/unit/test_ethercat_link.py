@@ -13,15 +13,16 @@ from drivers.ethercat.frames import Command, Telegram, physical
 from drivers.ethercat.master import EtherCatMaster, MasterSettings, Slave
 from drivers.ethercat.ports import MemoryPort, RawPort
 from drivers.ethercat.registers import AlCode, AlState, Register, SyncManager
-from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings
+from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings, find_palm
 from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_settings import HandSettings
+from drivers.shadow.hand_setup import HandSetup
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.palm_codec import PalmCommand, PalmStatus
 from drivers.shadow.palm_images import PALMS
 from tactile_lab import rigs
 from tactile_lab.clock import MonotonicClock, VirtualClock
-from tactile_lab.errors import CodecError, DeviceError
+from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
 
 CALIBRATION = JointCalibration.load(Path(rigs.__file__).parent / "calibrations" / "simulated-hand" / "joints.yaml")
 MS = 1_000_000
@@ -76,6 +77,37 @@ def test_a_bare_hand_comes_into_operation_and_tells_who_it_is() -> None:
     found = wire.link.hand
     assert (found.serial, found.image.name, found.palm.vendor, found.bridge.product) == (1178, "0220", 0x530, 0)
     assert found.watchdog_s is None
+
+
+@pytest.mark.parametrize("palm", ["0220", "0230", "0240"])
+def test_the_product_code_tells_the_palm_without_touching_the_slaves(palm: Any) -> None:
+    wire = Wire(ChainSettings(palm=palm)).open()
+    assert find_palm(EthercatSettings(interface="memory"), wire.clock, MemoryPort(wire.hand.ring)) == palm
+    assert wire.states == [AlState.OP, AlState.OP]
+    assert wire.cycle() is not None
+
+
+def test_a_product_code_that_can_not_be_driven_is_told_with_what_to_do() -> None:
+    wire = Wire(ChainSettings(product=0x0A))
+    with pytest.raises(DeviceError, match=r"a board this program does not know \(product 0xa\)") as told:
+        find_palm(EthercatSettings(interface="memory"), wire.clock, wire.port)
+    assert "0220, 0230 and 0240 can be driven; ask Shadow Robot" in str(told.value)
+    with pytest.raises(DeviceError, match="not open"):
+        wire.port.send(b"")
+
+
+def test_a_stated_palm_is_not_looked_for() -> None:
+    stated = EthercatSettings(interface="nosuch0", palm="0240")
+    assert setup_of(EthercatSettings(interface="nosuch0"), palm="0230").known(VirtualClock()).hand.palm == "0230"
+    assert setup_of(stated).known(VirtualClock()).hand.palm == "0240"
+    with pytest.raises(DeviceError, match="nosuch0: no such network interface"):
+        setup_of(EthercatSettings(interface="nosuch0")).known(VirtualClock())
+    with pytest.raises(ConfigurationError, match="palm differ"):
+        setup_of(stated, palm="0230").link(VirtualClock())
+
+
+def setup_of(ethercat: EthercatSettings, **hand: Any) -> HandSetup:
+    return HandSetup(ethercat=ethercat, hand=HandSettings(**hand), joints=Path("joints.yaml"), motors=Path("m.yaml"))
 
 
 @pytest.mark.parametrize("palm", ["0220", "0230", "0240"])

@@ -70,11 +70,14 @@ def test_a_silent_motor_is_named(tmp_path: Path) -> None:
     assert "THJ2 (motor 5): silent" in findings["motors"].detail
 
 
-def test_another_palm_than_the_files_is_told_with_what_to_write(tmp_path: Path) -> None:
-    with cable("r") as (near, far), EmulatedHandProcess(far, JOINTS, ChainSettings(palm="0240")):
-        (finding,) = check_rig(str(rig_file(tmp_path, near)))
-    assert not finding.ok
-    assert 'a 0240 palm, not a 0220. Set hand.palm to "0240"' in finding.detail
+def test_the_palm_is_found_by_its_product_code_and_one_that_is_stated_is_verified(tmp_path: Path) -> None:
+    with cable("r") as (near, far), EmulatedHandProcess(far, JOINTS, ChainSettings(palm="0230")):
+        ring, _, motors, _ = check_rig(str(rig_file(tmp_path, near)))
+        (refusal,) = check_rig(str(rig_file(tmp_path, near, hand={"palm": "0220"})))
+    assert ring.detail.startswith("hand 634, palm 0230 revision 1, in operation")
+    assert "20 of 20 answer" in motors.detail
+    assert not refusal.ok
+    assert 'a 0230 palm, not a 0220. Set hand.palm to "0230"' in refusal.detail
 
 
 def test_a_missing_interface_is_told(tmp_path: Path) -> None:
@@ -89,7 +92,7 @@ def test_files_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     ):
         pass
     with pytest.raises(ConfigurationError, match=r"hand.palm and the cable's palm differ"):
-        check_rig(str(rig_file(tmp_path, "lo", ethercat={"interface": "lo", "palm": "0230"})))
+        check_rig(str(rig_file(tmp_path, "lo", ethercat={"interface": "lo", "palm": "0230"}, hand={"palm": "0220"})))
     missing = {"joints": "none.yaml", "motors": "none.yaml"}
     with pytest.raises(ConfigurationError, match=r"none.yaml"):
         check_rig(str(rig_file(tmp_path, "lo", calibration=missing)))
