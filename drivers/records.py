@@ -40,9 +40,9 @@ class Record:
     payload: bytes
 
 
-def encode_record(record: Record) -> bytes:
-    """A record's bytes."""
-    return _HEAD.pack(record.kind, len(record.payload), record.stamp_ns) + record.payload
+def encode_record(kind: RecordKind, stamp_ns: int, payload: bytes) -> bytes:
+    """A record's bytes; its parts as in :class:`Record`."""
+    return _HEAD.pack(kind, len(payload), stamp_ns) + payload
 
 
 class RecordReader:
@@ -102,7 +102,7 @@ class RecordPipe:
 
     def put(self, kind: RecordKind, stamp_ns: int, payload: bytes) -> None:
         """Add a record to the present block."""
-        self._block += encode_record(Record(kind, stamp_ns, payload))
+        self._block += encode_record(kind, stamp_ns, payload)
 
     def flush(self) -> None:
         """Hand the present block over, as far as the pipe takes it now."""

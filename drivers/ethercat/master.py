@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from pydantic import Field
 
@@ -101,7 +101,7 @@ class EtherCatMaster:
         """Send telegrams in one frame; :meth:`finish` takes the answer."""
         self._number = (self._number + 1) % _NUMBERS
         self._index = (self._index + 1) % _INDICES
-        numbered = tuple(replace(telegram, index=self._index) for telegram in telegrams)
+        numbered = tuple(Telegram(each.command, each.address, each.data, self._index) for each in telegrams)
         source = self._port.hardware_address[:3] + b"\0" + self._number.to_bytes(2, "little")
         self._waiting = (numbered, source)
         self.counts.sent += 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import select
 import socket
@@ -85,8 +84,6 @@ class RawPort:
     def receive(self, timeout_s: float) -> bytes | None:
         raw = self._opened()
         try:
-            with contextlib.suppress(BlockingIOError):
-                return raw.recv(_LARGEST_FRAME)
             if not select.select([raw], [], [], max(timeout_s, 0.0))[0]:  # poll() would round up to milliseconds
                 return None
             return raw.recv(_LARGEST_FRAME)

@@ -19,6 +19,7 @@ LARGEST_NUDGE = 250
 """Largest duty cycle of a nudge, counts: a quarter of full duty can not hurt a joint in a moment."""
 
 NO_DEMAND = np.zeros(MOTORS, dtype=np.int16)
+NO_DEMAND.flags.writeable = False  # shared by all who have none
 
 
 class HandMotion:
@@ -88,7 +89,9 @@ class HandMotion:
         """
         if self._nudge is not None:
             return self._nudge
-        if self._since_ns is None and self._control.active:
+        if not self._control.active:
+            return NO_DEMAND
+        if self._since_ns is None:
             self._since_ns = now_ns
         return self._control.demand(joints_rad, np.minimum(self._soft_start(now_ns), limit_share), now_ns)
 

@@ -12,10 +12,12 @@ import dataclasses
 import gc
 import json
 import sys
+import time
 
 from drivers.links import TappedLink
 from drivers.orders import Order, OrderReader
 from drivers.records import RecordKind, RecordPipe
+from drivers.shadow.cycle_pace import CyclePace
 from drivers.shadow.cycle_statistics import CycleStatistics
 from drivers.shadow.ethercat_link import EthercatLink
 from drivers.shadow.first_move import check_motor_map
@@ -61,11 +63,11 @@ class HandWorker:
     ) -> None:
         self._hand, self._link, self._motors = hand, link, motors
         self._pipe, self._orders, self._clock = pipe, orders, clock
-        self._cycle_ns, self._patience_ns = cycle_ns, patience_ns
-        self._statistics = CycleStatistics()
+        self._patience_ns = patience_ns
+        self._pace, self._statistics = CyclePace(clock, cycle_ns), CycleStatistics()
         self._trouble = ""
         self._moving_by_itself = self._ended = False
-        self._next_ns = self._heard_ns = self._flushed_ns = clock.now_ns()
+        self._heard_ns = self._flushed_ns = clock.now_ns()
 
     def run(self) -> None:
         """Cycle until the orders end."""
@@ -74,12 +76,7 @@ class HandWorker:
 
     def _turn(self) -> HandSample | None:
         """One cycle; its sample, None when the hand has stopped itself."""
-        self._next_ns += self._cycle_ns
-        self._clock.sleep_until_ns(self._next_ns)
-        late_ns = self._clock.now_ns() - self._next_ns
-        left_out = late_ns // self._cycle_ns
-        self._statistics.add(late_ns, left_out)
-        self._next_ns += self._cycle_ns * left_out
+        self._statistics.add(*self._pace.wait())
         sample = self._exchange()
         self._flush_when_due()
         for order in self._orders.waiting():
@@ -134,6 +131,7 @@ class HandWorker:
             "punctuality": dataclasses.asdict(self._statistics.summary()),
             "wire": dataclasses.asdict(self._link.counts),
             "hand": dataclasses.asdict(self._hand.counters),
+            "processor_s": time.process_time(),
             "dropped_blocks": self._pipe.dropped_blocks,
             "health": self._hand.health() + self._link.health(),
         }

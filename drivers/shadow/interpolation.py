@@ -5,6 +5,7 @@ Nothing here knows units: the calibration of the joints puts counts in and takes
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 
 import numpy as np
@@ -80,21 +81,17 @@ class Plane:
 
 
 class _Segments:
+    """Read in every cycle: bisecting two dozen short lists takes half the time of the same on arrays."""
+
     def __init__(self, curves: Sequence[tuple[Array, Array]]) -> None:
-        longest = max((len(x) for x, _ in curves), default=2) - 1
-        self._inner = np.full((len(curves), longest - 1), np.inf)
-        start_x, start_y, slope = np.zeros((3, len(curves), longest))
-        for row, (x, y) in enumerate(curves):
-            segments = len(x) - 1
-            self._inner[row, : segments - 1] = x[1:-1]
-            start_x[row, :segments], start_y[row, :segments] = x[:-1], y[:-1]
-            slope[row, :segments] = np.diff(y) / np.diff(x)
-        self._first = longest * np.arange(len(curves))
-        self._start_x, self._start_y, self._slope = start_x.ravel(), start_y.ravel(), slope.ravel()
+        self._curves = [(x[1:-1].tolist(), _lines(x, y)) for x, y in curves]
 
     def __call__(self, x: Array) -> Array:
-        segment = self._first + (x[:, None] >= self._inner).sum(axis=1)
-        return np.asarray(self._start_y[segment] + self._slope[segment] * (x - self._start_x[segment]))
+        values = []
+        for place, (knots, lines) in zip(x.tolist(), self._curves, strict=True):
+            start_x, start_y, slope = lines[bisect_right(knots, place)]
+            values.append(start_y + slope * (place - start_x))
+        return np.array(values)
 
 
 class _TriangleMap:
@@ -106,12 +103,17 @@ class _TriangleMap:
         self._beyond = beyond
 
     def __call__(self, point: Array) -> Array:
-        weights = (self._turn @ point).reshape(self._shift.shape) + self._shift
-        smallest = weights.min(axis=0)
+        weights = self._turn.dot(point).reshape(self._shift.shape) + self._shift
+        smallest = np.minimum(np.minimum(weights[0], weights[1]), weights[2])  # of three rows quicker than min(axis=0)
         triangle = smallest.argmax()
         if smallest[triangle] < _INSIDE:
             return np.asarray(point @ self._beyond[:2] + self._beyond[2])
         return np.asarray(weights[:, triangle] @ self._targets[triangle])
+
+
+def _lines(x: Array, y: Array) -> list[tuple[float, float, float]]:
+    """Start and slope of each piece."""
+    return list(zip(x[:-1].tolist(), y[:-1].tolist(), (np.diff(y) / np.diff(x)).tolist(), strict=True))
 
 
 def _swapped(table: Array) -> tuple[Array, Array]:

@@ -85,7 +85,7 @@ class JointCalibration:
         Returns:
             Angles, shape (24,), order of :data:`~drivers.shadow.kinematics.JOINTS`, radians.
         """
-        counts = _JOINT_FROM_SENSOR @ np.asarray(sensors, dtype=float)
+        counts = _JOINT_FROM_SENSOR.dot(np.asarray(sensors, dtype=float))
         angles_deg = np.empty(len(JOINTS))
         angles_deg[self._plain] = self._curves(counts[self._plain])
         for joints, plane in self._pairs:

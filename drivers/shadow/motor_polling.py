@@ -9,6 +9,7 @@ asked in every second turn after connecting, until all are known.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -189,6 +190,20 @@ class MotorReadings:
         return np.where(stamps_ns < 0, np.inf, (now_ns - stamps_ns) / NANOSECONDS)
 
 
+_UNITS: dict[int, Callable[[NDArray[np.uint16]], Array | NDArray[np.integer]]] = {
+    FromMotor.PWM: signed,
+    FromMotor.CURRENT: signed,
+    FromMotor.VOLTAGE: volts,
+    FromMotor.TEMPERATURE: celsius,
+}
+"""How the value of a type is read; of the others as it stands."""
+
+_NUMBERED = (FromMotor.SLOW_MISC, FromMotor.CONFIG_READBACK)
+"""Types whose torque word is a number of the data."""
+
+_KIND_COUNT = len(FromMotor)
+
+
 class MotorMemory:
     """Gathers the alternating answers into the latest known state of all motors."""
 
@@ -202,19 +217,19 @@ class MotorMemory:
     def update(self, status: PalmStatus, stamp_ns: int) -> None:
         """Take the answers of one status; motors that stayed silent or answered another type keep their values."""
         kind = status.motor_data_type
-        if not FromMotor.INVALID < kind < len(FromMotor):
+        if not FromMotor.INVALID < kind < _KIND_COUNT:
             return
-        motors = status.heard_motors
-        packets = motors >> 1
-        self._values[kind, motors] = _in_units(FromMotor(kind), status.misc[packets])
-        self._stamps_ns[kind, motors] = stamp_ns
-        if kind not in (FromMotor.SLOW_MISC, FromMotor.CONFIG_READBACK):  # their torque word is a type number
-            self._torque[motors] = status.torque[packets]
+        motors, packets = status.heard_places
+        torque, misc = status.torque[packets], status.misc[packets]
+        self._values[kind][motors] = _UNITS[kind](misc) if kind in _UNITS else misc
+        self._stamps_ns[kind][motors] = stamp_ns
+        if kind not in _NUMBERED:
+            self._torque[motors] = torque
             self._torque_stamps_ns[motors] = stamp_ns
         elif kind == FromMotor.SLOW_MISC:
-            known = (status.torque[packets] > 0) & (status.torque[packets] < len(SlowData))
+            known = (torque > 0) & (torque < len(SlowData))
             self._slow = self._slow.copy()  # readings that were given away keep theirs
-            self._slow[status.torque[packets][known], motors[known]] = status.misc[packets][known]
+            self._slow[torque[known], status.heard_motors[known]] = misc[known]
 
     def readings(self) -> MotorReadings:
         """A copy of what is known."""
@@ -225,11 +240,3 @@ class MotorMemory:
             self._stamps_ns.copy(),
             self._slow,
         )
-
-
-def _in_units(kind: FromMotor, misc: NDArray[np.uint16]) -> Array | NDArray[np.integer]:
-    if kind in (FromMotor.PWM, FromMotor.CURRENT):
-        return signed(misc)
-    if kind is FromMotor.VOLTAGE:
-        return volts(misc)
-    return celsius(misc) if kind is FromMotor.TEMPERATURE else misc

@@ -20,6 +20,8 @@ from tactile_lab.strict_yaml import StrictModel
 SILENT_AFTER_s = 0.5
 """A motor not heard for this long is called silent; each is asked every second cycle."""
 
+_SERIOUS_SETTLING = SERIOUS_FLAGS & ~int(MotorFlag.NO_DEMAND)
+
 SPARE_TIME_us = 50
 """A healthy palm has at least this much spare time in its cycle."""
 
@@ -94,11 +96,12 @@ class MotorWatch:
         return problems
 
     def _flag_fault(self, motors: NDArray[np.intp], flags: NDArray[np.uint16], settling: bool) -> Fault | None:
-        serious = flags & (SERIOUS_FLAGS & ~MotorFlag.NO_DEMAND if settling else SERIOUS_FLAGS)
-        if not serious.any():
+        looked_at = _SERIOUS_SETTLING if settling else SERIOUS_FLAGS
+        serious = [word & looked_at for word in flags.tolist()]
+        if not any(serious):
             return None
-        worst = int(serious.argmax())
-        words = ", ".join(describe_flags(int(serious[worst])))
+        worst = serious.index(max(serious))
+        words = ", ".join(describe_flags(serious[worst]))
         return Fault(f"stopped: {words}", self._name(int(motors[worst])), "Find the cause, then resume")
 
     def _heat_fault(self, motors: NDArray[np.intp], temperature_C: Array) -> Fault | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache
 from typing import Any
@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 MOTORS = 20
 MOTORS_PER_STATUS = 10
+
+Places = slice | NDArray[np.intp]
+"""An index into an array."""
 
 SENSORS: tuple[str, ...] = (
     *(f"{finger}J{number}" for finger in ("FF", "MF", "RF") for number in (1, 2, 3, 4)),
@@ -53,6 +56,9 @@ class CanFrame:
     data: bytes = bytes(8)
 
 
+NO_FRAME = CanFrame()
+
+
 @dataclass(frozen=True, eq=False)
 class PalmCommand:
     """One command to the palm; the default is the all-zero image, with which nothing moves.
@@ -76,7 +82,7 @@ class PalmCommand:
     to_motor_data_type: int = 0
     motor_data: Sequence[int] | NDArray[np.integer[Any]] = (0,) * MOTORS
     tactile_data_type: int = 0
-    can: CanFrame = field(default_factory=CanFrame)
+    can: CanFrame = NO_FRAME
     imu_command: int = 0
     imu_scales: tuple[int, int] = (0, 0)
     aux_data_type: int = 0
@@ -130,7 +136,7 @@ class PalmStatus:
     tactile_valid: int
     tactile: NDArray[np.uint8]
     idle_time_us: int
-    can: CanFrame = field(default_factory=CanFrame)
+    can: CanFrame = NO_FRAME
     auxiliary: PalmAuxiliary | None = None
 
     @property
@@ -144,6 +150,11 @@ class PalmStatus:
         return _marked_motors(self.arrived & ~self.had_errors, self.which_motors)
 
     @property
+    def heard_places(self) -> tuple[Places, Places]:
+        """Indices of :attr:`heard_motors` into arrays of motors, and into ``torque`` and ``misc``."""
+        return _places(self.arrived & ~self.had_errors, self.which_motors)
+
+    @property
     def silent_motors(self) -> NDArray[np.intp]:
         """Numbers of the asked motors that did not answer, or not with the stated type."""
         return _marked_motors(~self.arrived | self.had_errors, self.which_motors)
@@ -152,6 +163,14 @@ class PalmStatus:
     def not_fitted(self) -> tuple[int, ...]:
         """Optional channels without hardware: their value is their own index."""
         return tuple(channel for channel in OPTIONAL_CHANNELS if self.sensors[channel] == channel)
+
+
+@lru_cache(maxsize=64)
+def _places(mask: int, which_motors: int) -> tuple[Places, Places]:
+    motors = _marked_motors(mask, which_motors)
+    if len(motors) == MOTORS_PER_STATUS:  # nearly always: slices are far quicker than lists of numbers
+        return slice(which_motors, MOTORS, 2), slice(None)
+    return motors, motors >> 1
 
 
 @lru_cache(maxsize=64)

@@ -30,6 +30,9 @@ class PositionControl:
     Args:
         motors: which motor pulls which joint.
         gains: how hard.
+
+    Attributes:
+        active: whether any target or demand is set.
     """
 
     def __init__(self, motors: MotorMap, gains: GainTable) -> None:
@@ -37,6 +40,7 @@ class PositionControl:
         table = [gains.of(name) for name in motors.names]
         self._gain = np.array([each.pwm_per_rad for each in table])
         self._deadband_rad = np.array([each.deadband_rad for each in table])
+        self._minus_deadband_rad = -self._deadband_rad
         self._limit = np.array([each.max_pwm for each in table])
         self._damping = np.array([each.damping for each in table])
         self._integral_gain = np.array([each.integral for each in table])
@@ -44,6 +48,7 @@ class PositionControl:
         self._dynamic = bool(self._damping.any() or self._integral_gain.any())
         self._targets_rad, self._is_set = np.zeros(MOTORS), np.zeros(MOTORS, dtype=bool)
         self._direct, self._is_direct = np.zeros(MOTORS), np.zeros(MOTORS, dtype=bool)
+        self._choose()
         self._seen: tuple[int, Array] | None = None
         self._speed_rad_s, self._integral = np.zeros(MOTORS), np.zeros(MOTORS)
 
@@ -57,6 +62,7 @@ class PositionControl:
         lowest_rad, highest_rad = self._motors.limits_rad[numbers].T
         self._targets_rad[numbers] = np.minimum(np.maximum(wanted_rad, lowest_rad), highest_rad)
         self._is_set[numbers], self._is_direct[numbers] = True, False
+        self._choose()
 
     def set_demands(self, counts: Mapping[str, float]) -> None:
         """Set demands by driven joint in place of their position control, towards larger angles, clamped when sent.
@@ -67,17 +73,20 @@ class PositionControl:
         numbers, wanted = self._numbers_and_values(counts, "demand")
         self._direct[numbers] = wanted
         self._is_set[numbers], self._is_direct[numbers] = False, True
+        self._choose()
 
     def clear(self) -> None:
         """Forget all targets and demands: nothing moves until new ones are set."""
         self._is_set.fill(False)
         self._is_direct.fill(False)
         self._seen = None
+        self._choose()
 
-    @property
-    def active(self) -> bool:
-        """Whether any target or demand is set."""
-        return bool(self._is_set.any() or self._is_direct.any())
+    def _choose(self) -> None:
+        """What every cycle needs of the choice between targets, demands and nothing."""
+        self._idle = ~(self._is_set | self._is_direct)
+        self._any_direct = bool(self._is_direct.any())
+        self.active = not self._idle.all()
 
     @property
     def targets_rad(self) -> dict[str, float]:
@@ -96,17 +105,17 @@ class PositionControl:
         Returns:
             Counts, shape (20,), by motor number.
         """
-        angle_rad = self._motors.from_joints @ joints_rad
+        angle_rad = self._motors.from_joints.dot(joints_rad)
         error_rad = self._targets_rad - angle_rad
-        beyond_rad = error_rad - np.minimum(np.maximum(error_rad, -self._deadband_rad), self._deadband_rad)
+        beyond_rad = error_rad - np.minimum(np.maximum(error_rad, self._minus_deadband_rad), self._deadband_rad)
         wanted = self._gain * beyond_rad
         if self._dynamic:
             wanted = wanted + self._over_time(angle_rad, beyond_rad, now_ns)
-        if self._is_direct.any():
+        if self._any_direct:
             wanted = np.where(self._is_direct, self._direct, wanted)
         limit = self._limit * limit_share
         counts = np.rint(np.minimum(np.maximum(wanted, -limit), limit)) * self._motors.sign
-        counts[~(self._is_set | self._is_direct)] = 0.0
+        counts[self._idle] = 0.0
         return np.asarray(counts, dtype=np.int16)
 
     def _over_time(self, angle_rad: Array, beyond_rad: Array, now_ns: int) -> Array:

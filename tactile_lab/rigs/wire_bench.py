@@ -71,7 +71,7 @@ def measure_ethercat(seconds: float) -> list[WireRow]:
                 rows.append(WireRow(master, "not measured", None, None, "install tactile-lab[ethercat]"))
                 continue
             trial = Trial(near, far, master)
-            rows += [trial.steady(seconds), trial.losses(), trial.killed(), trial.watchdog(), trial.bare()]
+            rows += [*trial.steady(seconds), trial.losses(), trial.killed(), trial.watchdog(), trial.bare()]
     return rows
 
 
@@ -87,20 +87,23 @@ class Trial:
         self._near, self._far, self._master = near, far, master
         self._clock = MonotonicClock()
 
-    def steady(self, seconds: float) -> WireRow:
-        """Hold 1 kHz in a process of its own, with zero demands."""
+    def steady(self, seconds: float) -> list[WireRow]:
+        """Hold 1 kHz in a process of its own, with zero demands; and what a cycle costs."""
         with self._emulator("mapped") as emulator:
             process = HandProcess(self._setup(CYCLE_s))
             began_ns = self._clock.now_ns()
             process.connect()
             took_ms = self._since_ms(began_ns)
             try:
-                before = emulator.order()
+                first, before = process.report(), emulator.order()
                 self._drain(process, seconds)
                 report, after = process.report(), emulator.order()
             finally:
                 process.close()
-        return WireRow(self._master, f"1 kHz for {seconds:g} s", None, took_ms, _steady(report, before, after))
+        return [
+            WireRow(self._master, f"1 kHz for {seconds:g} s", None, took_ms, _steady(report, before, after)),
+            WireRow(self._master, "processor time of a cycle", None, None, _processor(first, report)),
+        ]
 
     def losses(self) -> WireRow:
         """Lose one frame in a hundred, and count."""
@@ -247,3 +250,9 @@ def _steady(report: Mapping[str, Any], before: Mapping[str, Any], after: Mapping
         f"(median, 99 %, worst); {hand['lost']} lost{stale}; the emulator saw "
         f"{after['frames'] - before['frames']} frames and lost {after['lost'] - before['lost']}"
     )
+
+
+def _processor(first: Mapping[str, Any], last: Mapping[str, Any]) -> str:
+    """Processor time of the hand's process for each cycle between two reports."""
+    cycles = last["punctuality"]["cycles"] - first["punctuality"]["cycles"]
+    return f"{1000.0 * (last['processor_s'] - first['processor_s']) / max(cycles, 1):.3f} ms in the hand's process"

@@ -34,7 +34,6 @@ from drivers.hardware.can_bus import CanFrame, decode_frame, encode_frame
 from drivers.hardware.tcp import MessageReader, framed
 from drivers.links import Datagram
 from drivers.positioner_codec import PositionerCommand, PositionerStatus
-from drivers.records import Record as HandRecord
 from drivers.records import RecordKind, RecordReader, encode_record
 from drivers.shadow.motor_can import MotorAnswer, MotorIdentifier
 from drivers.shadow.palm_codec import PalmCommand
@@ -100,7 +99,7 @@ CODECS: dict[str, Codec] = {
     "AL status": (lambda payload: str(AlStatus.decode(payload)), AlStatus(4, True, 0x1B).encode()),
     "hand records": (
         lambda payload: RecordReader().feed(payload),
-        b"".join(encode_record(HandRecord(kind, 7, b"\x01\x02")) for kind in RecordKind),
+        b"".join(encode_record(kind, 7, b"\x01\x02") for kind in RecordKind),
     ),
     "tcp messages": (lambda payload: MessageReader().feed(payload), framed(b"TRIGGER") + framed(b"")),
     "camera packet": (
