@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tactile_lab.clock import Clock
 
-CLOSEST = 0.85
+CLOSEST = 0.9
 """Share of the period that lies between two starts at least. A palm answers a command some 0.6 ms after it has come;
 one that comes sooner finds its buffer full and brings back an empty status, and the cycle is lost."""
 

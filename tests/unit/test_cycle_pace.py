@@ -31,7 +31,7 @@ def test_after_a_late_cycle_the_next_close_up_without_crowding_the_palm() -> Non
     pace = CyclePace(clock, 1000 * US)
     clock.sleep_until_ns(1400 * US)
     assert pace.wait() == (400 * US, 0)
-    assert starts(clock, pace, 4) == [2250, 3100, 4000, 5000]
+    assert starts(clock, pace, 4) == [2300, 3200, 4100, 5000]
 
 
 def test_only_whole_periods_are_left_out() -> None:
