@@ -21,6 +21,8 @@ def solve_closings(clock: Clock, settings: ConductorSettings, tip: TipEllipsoid,
     wanted = {(name, height_m) for name in plan.closings for height_m in heights_m}
     if dimension == 3:
         wanted.add((TAP.closing, TAP_HEIGHT_m))
+        if settings.exploration.policy:
+            wanted |= {(name, plan.side_height_m) for name in settings.exploration.side_closings}
     if settings.probing.enabled:
         wanted |= {(TAP.closing, TAP_HEIGHT_m), (ROW.closing, settings.cycle.touch.rake_height_m)}
     for name, height_m in sorted(wanted):

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from gtsam import Pose2
-from pydantic import Field
+from pydantic import Field, field_validator
 
-from drivers.shadow.closing import Closing
+from drivers.shadow.closing import LEANING, Closing
 from sessions.grasp_cycle import GraspPlan
 from sessions.motion import GraspFrame
 from tactile_lab.errors import ShapeError
@@ -40,6 +40,8 @@ class ExplorationSettings(StrictModel):
             reaches it (a round object can not tell its turn) it does not count.
         policy: name of the policy that chooses among everything the hand can do (:mod:`tactile_lab.exploration`);
             None for the reward of equation 4.20 alone, as above.
+        side_closings: closings with the hand leaning to one side that policies may choose besides, where a surface is
+            wanted.
         caution: standard deviations of the estimated surface that the open fingertips keep clear of besides, of at
             most the clearance each; for policies.
         clearance_m: distance from the estimated surface that the open fingertips' centres must keep.
@@ -51,10 +53,18 @@ class ExplorationSettings(StrictModel):
     least_contacts: int = Field(default=4, ge=0)
     least_observability: float = Field(default=0.15, ge=0.0)
     policy: str | None = None
+    side_closings: tuple[str, ...] = tuple(LEANING)
     caution: float = Field(default=0.5, ge=0.0)
     clearance_m: float = Field(default=0.012, ge=0.0)
     contour_resolution_m: float = Field(default=0.002, gt=0.0)
     mesh_resolution_m: float = Field(default=0.006, gt=0.0)
+
+    @field_validator("side_closings")
+    @classmethod
+    def _are_known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        if unknown := sorted(set(names) - set(LEANING)):
+            raise ValueError(f"closings {unknown} are not known; choose from {', '.join(LEANING)}")
+        return names
 
 
 @dataclass(frozen=True)

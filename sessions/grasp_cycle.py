@@ -22,7 +22,7 @@ class GraspPlan:
 
     Attributes:
         frame: the grasp frame in the world.
-        closing: a key of :data:`drivers.shadow.closing.PRESHAPES`.
+        closing: one of :data:`drivers.shadow.closing.CLOSINGS`.
         height_m: height of the fingertip centres above the table.
         tap: lay the fingertips on the top first.
         reason: why this one, for people.

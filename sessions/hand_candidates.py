@@ -1,9 +1,10 @@
 """What the hand can do next around an object as it is estimated now: the real candidates, and why others are none.
 
-A candidate is a grasp frame (every yaw of the arm's window, shifts across it), a closing, a height of
-the fingertips and, where a surface is wanted, perhaps a tap on the top before it. Its expected contacts follow from
-the kinematics: the closing's lines against the estimated surface. What the arm can not reach, where the open fingers
-would come down on the object or the palm rest on it, and what the hand has just landed on, is no candidate.
+A candidate is a grasp frame (every yaw of the arm's window, shifts across it), a closing, a height of the fingertips
+and, where a surface is wanted, perhaps a tap on the top before it, or a hand that leans to one side. Its expected
+contacts follow from the kinematics: the closing's lines against the estimated surface. What the arm can not reach,
+where the open fingers would come down on the object or the palm rest on it, and what the hand has just landed on, is no
+candidate.
 """
 
 from __future__ import annotations
@@ -83,6 +84,11 @@ class HandLimits:
         """Contact heights."""
         return self.plan.contour_heights_m if self.dimension == 2 else self.plan.surface_heights_m
 
+    @property
+    def side_closings(self) -> tuple[str, ...]:
+        """Closings with the hand leaning; none for a contour, which is one height's."""
+        return () if self.dimension == 2 else self.exploration.side_closings
+
 
 def offer(
     limits: HandLimits,
@@ -118,7 +124,10 @@ def offer(
 
 
 def _plans(limits: HandLimits, centre_world_m: Array) -> Iterator[GraspPlan]:
-    """Every combination; a tap only where the hand stands in the middle and at one height, as the rest changes none."""
+    """Every combination; a tap only where the hand stands in the middle and at one height, as the rest changes none.
+
+    A hand that leans has its fingers at several heights, so one height is enough.
+    """
     shifts, heights = limits.exploration.shifts_m, limits.heights_m
     for yaw in np.linspace(*limits.plan.yaw_window_rad, limits.exploration.yaws):
         for shift in shifts:
@@ -130,6 +139,8 @@ def _plans(limits: HandLimits, centre_world_m: Array) -> Iterator[GraspPlan]:
                     yield plan
                     if limits.dimension == 3 and shift == shifts[len(shifts) // 2] and height_m == heights[0]:
                         yield replace(plan, tap=True)
+            for name in limits.side_closings:
+                yield GraspPlan(frame, name, limits.plan.side_height_m)
 
 
 def table_of(plan: GraspPlan, tip: TipEllipsoid) -> Closing:

@@ -56,6 +56,11 @@ class PlanSettings(StrictModel):
             raise ValueError("the re-orientation's first value must be the smaller one, and not negative")
         return self
 
+    @property
+    def side_height_m(self) -> float:
+        """Of the lowest fingertip where the hand leans: in the middle, as from lower down it lifts what it grasps."""
+        return self.surface_heights_m[len(self.surface_heights_m) // 2]
+
 
 _OTHER_YAWS = 12
 _TYPICAL_HALF_WIDTH_m = 0.030  # between one side's contacts and the middle, where only one side touches

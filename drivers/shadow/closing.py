@@ -2,9 +2,9 @@
 
 A closing is described in the *grasp frame*: origin on the table below the middle of the grasp, z up, the four fingers
 on the +x side and the thumb on the -x side, the first finger towards +y. Every fingertip's centre runs along a
-straight horizontal line; the palm stands still above. The whole grasp is then three numbers (x, y, yaw of the grasp
-frame in the world) and one progress ``u`` in 0..1 for each finger, so that a contact is predicted by intersecting a
-line with a surface.
+straight line, horizontal where the hand is upright; the palm stands still above. The whole grasp is then three numbers
+(x, y, yaw of the grasp frame in the world) and one progress ``u`` in 0..1 for each finger, so that a contact is
+predicted by intersecting a line with a surface.
 
 The postures are solved once for each closing and height (:mod:`drivers.shadow.posture`, a fraction of a second) and
 kept in memory.
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from gtsam import Pose3
+from gtsam import Pose3, Rot3
 
 from drivers.shadow.posture import LONG_FINGERS, NODES, TipEllipsoid, finger_joints, solve_postures
 from tactile_lab.errors import ConfigurationError
@@ -60,8 +60,8 @@ class Closing:
     """One way to close the hand at one height.
 
     Attributes:
-        name: a key of :data:`PRESHAPES`.
-        height_m: height of the fingertip centres above the table.
+        name: a key of :data:`PRESHAPES` or :data:`LEANING`.
+        height_m: height of the fingertip centres above the table; where the hand leans, of the lowest one.
         grasp_T_palm: the palm in the grasp frame, wrist straight.
         paths: each finger's line.
         tables: each finger's joint angles along its line, shape (NODES, joints of the finger), radians, in the order
@@ -142,19 +142,47 @@ PRESHAPES: Mapping[str, Preshape] = {
 """The closings: four parallel fingers against the thumb, and first and little finger coming in from the sides."""
 
 
+@dataclass(frozen=True)
+class Leaning:
+    """A hand that comes from the side: an upright closing turned about the grasp frame's x axis, first finger down.
+
+    Attributes:
+        upright: a key of :data:`PRESHAPES`.
+        height_m: of that closing; its postures are those of a low grasp, however high the leaning hand stands.
+        lean_rad: how far it is turned.
+    """
+
+    upright: str
+    height_m: float
+    lean_rad: float
+
+
+LEANING: Mapping[str, Leaning] = {"aside": Leaning("pinch", 0.028, float(np.deg2rad(25.0)))}
+"""Closings with the fingers one above the other. A lean of 40 degrees brings the fingers so far above the thumb that
+they tip a box over by 6 degrees on the simulated rig, one of 25 degrees leaves it standing; a palm that stood upright
+could come no lower than 56 mm, as the forearm is 100 mm thick."""
+
+CLOSINGS = frozenset({*PRESHAPES, *LEANING})
+"""Names of all closings."""
+
+
 @lru_cache(maxsize=64)
 def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Closing:
     """The closing path table of one preshape at one height of the fingertip centres; kept in memory.
 
+    Where the hand leans it is the height of the lowest fingertip's centre.
+
     Raises:
         ConfigurationError: no such closing, or a height the hand can not work at.
     """
-    if name not in PRESHAPES:
-        raise ConfigurationError(f"no closing called {name!r}", hint=f"Choose from {', '.join(PRESHAPES)}")
+    if name not in CLOSINGS:
+        raise ConfigurationError(f"no closing called {name!r}", hint=f"Choose from {', '.join(sorted(CLOSINGS))}")
     if not 0.015 <= height_m <= 0.12:
         raise ConfigurationError(
             f"contact height {height_m * 1e3:.0f} mm is outside 15 to 120 mm", hint="Choose a height in that range"
         )
+    if name in LEANING:
+        return _leaning(name, height_m, tip)
     starts_m, ends_m = (
         np.array([(*points[finger], height_m) for finger in FINGERS])
         for points in (PRESHAPES[name].starts_m, PRESHAPES[name].ends_m)
@@ -164,6 +192,18 @@ def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Clos
         finger: TipPath(starts_m[index], ends_m[index], postures.valid[finger]) for index, finger in enumerate(FINGERS)
     }
     return Closing(name, height_m, postures.grasp_T_palm, paths, postures.tables_rad)
+
+
+def _leaning(name: str, height_m: float, tip: TipEllipsoid | None) -> Closing:
+    upright = closing(LEANING[name].upright, LEANING[name].height_m, tip)
+    turn, middle_m = Rot3.Rx(-LEANING[name].lean_rad), np.array([0.0, 0.0, upright.height_m])
+    lowest_m = min(float(turn.rotate(path.start_m - middle_m)[2]) for path in upright.paths.values())
+    lean = Pose3(turn, np.array([0.0, 0.0, height_m - lowest_m]) - turn.rotate(middle_m))
+    paths = {
+        finger: TipPath(lean.transformFrom(path.start_m), lean.transformFrom(path.end_m), path.valid)
+        for finger, path in upright.paths.items()
+    }
+    return Closing(name, height_m, lean * upright.grasp_T_palm, paths, upright.tables)
 
 
 _COUPLED = {f"{finger}{joint}": f"{finger}J0" for finger in LONG_FINGERS for joint in ("J1", "J2")}

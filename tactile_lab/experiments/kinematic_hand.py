@@ -160,10 +160,10 @@ class KinematicHand:
         return found
 
     def _coming_down(self, centres_world_m: Array, lowest_m: float) -> tuple[Array, Verdicts]:
-        """Places (n, 5, 3) of fingertips on their way down, and which of them touch there, (n, 5)."""
+        """Places (n, 5, 3) of fingertips on their way down, the lowest to ``lowest_m``, and which touch, (n, 5)."""
         heights_m = np.arange(self._cycle.lift_m + lowest_m, lowest_m - 1e-9, -_DESCENT_STEP_m)
         places = np.repeat(centres_world_m[None], len(heights_m), axis=0)
-        places[:, :, 2] = heights_m[:, None]
+        places[:, :, 2] += heights_m[:, None] - centres_world_m[:, 2].min()
         return places, self._distances(places) < self._radius_m
 
     # --- close -------------------------------------------------------------------------------------------------

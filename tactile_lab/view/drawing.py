@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from gtsam import Pose3
 
-from drivers.shadow.closing import PRESHAPES, closing
+from drivers.shadow.closing import CLOSINGS, closing
 from sessions import foxglove
 from tactile_lab.geometry.contacts import FINGERS, Array
 from tactile_lab.report.colours import viridis
@@ -182,7 +182,7 @@ class Drawing:
 
     def _plan(self, scene: Scene) -> None:
         plan = scene.next_plan
-        if plan.get("closing") not in PRESHAPES:
+        if plan.get("closing") not in CLOSINGS:
             self._replace("plan", [])
             return
         table = closing(plan["closing"], float(plan["height_m"]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gtsam import Pose3
 
-from drivers.shadow.closing import PRESHAPES, Closing, TipPath, closing, motor_targets
+from drivers.shadow.closing import LEANING, PRESHAPES, Closing, TipPath, closing, motor_targets
 from drivers.shadow.kinematics import JOINT_INDEX, JOINT_LIMITS_rad, joint_vector, palm_T_distal
 from drivers.shadow.posture import NODES, LEAN_rad, TipEllipsoid, finger_joints
 from tactile_lab.errors import ConfigurationError
@@ -165,3 +165,27 @@ def test_unknown_closing_is_refused_by_name() -> None:
 def test_impossible_height_is_refused(height_m: float) -> None:
     with pytest.raises(ConfigurationError, match="height"):
         closing("pinch", height_m)
+
+
+@pytest.mark.parametrize("height_m", [0.018, 0.034])
+def test_a_hand_that_leans_has_its_fingers_one_above_the_other_and_clear_of_the_table(height_m: float) -> None:
+    table = closing("aside", height_m)
+    starts_m = [table.path(finger).start_m[2] for finger in ("FF", "MF", "RF", "LF")]
+    assert starts_m[0] == pytest.approx(height_m)
+    assert np.all(np.diff(starts_m) > 0.008)
+    assert starts_m[0] < table.path("TH").start_m[2] < starts_m[2]
+    semi_axes_m = np.array(TipEllipsoid().semi_axes_m)
+    for finger in FINGERS:
+        for u in np.linspace(*table.path(finger).valid, 15):
+            tip = grasp_T_tip(table, finger, u)
+            assert np.linalg.norm(tip_centre_m(table, finger, u) - table.path(finger).centre_m(u)) < 0.020
+            reach_m = np.linalg.norm(tip.rotation().matrix()[2] * semi_axes_m)
+            assert tip_centre_m(table, finger, u)[2] - reach_m > 0.002
+
+
+def test_a_hand_that_leans_is_the_upright_one_turned() -> None:
+    table, upright = closing("aside", 0.018), closing(LEANING["aside"].upright, LEANING["aside"].height_m)
+    turn = table.grasp_T_palm * upright.grasp_T_palm.inverse()
+    assert np.allclose(turn.rotation().xyz(), [-LEANING["aside"].lean_rad, 0.0, 0.0])
+    for finger in FINGERS:
+        np.testing.assert_array_equal(table.tables[finger], upright.tables[finger])

@@ -11,6 +11,7 @@ from sessions import closing_tables
 from sessions.closing_tables import solve_closings
 from sessions.conductor_settings import ConductorSettings
 from tactile_lab.clock import Clock, MonotonicClock, VirtualClock
+from tactile_lab.errors import ConfigurationError
 from tactile_lab.strict_yaml import validate
 
 
@@ -34,6 +35,13 @@ def test_a_contour_needs_every_closing_at_its_height(solved: list[tuple[str, flo
 def test_a_surface_needs_every_height_and_the_taps(solved: list[tuple[str, float]]) -> None:
     solve(MonotonicClock(), 3, plan={"closings": ["pinch"], "surface_heights_m": [0.018, 0.026]})
     assert solved == [("pinch", 0.018), ("pinch", 0.026), ("radial", 0.022)]
+
+
+def test_a_policy_may_have_the_hand_lean_where_a_surface_is_wanted(solved: list[tuple[str, float]]) -> None:
+    solve(MonotonicClock(), 3, plan={"closings": ["pinch"], "surface_heights_m": [0.018]}, exploration={"policy": "kl"})
+    assert solved == [("aside", 0.018), ("pinch", 0.018), ("radial", 0.022)]
+    with pytest.raises(ConfigurationError, match=r"closings \['flat'\] are not known; choose from aside"):
+        solve(MonotonicClock(), 3, exploration={"side_closings": ["flat"]})
 
 
 def test_a_bounding_box_needs_the_row_of_fingers_too(solved: list[tuple[str, float]]) -> None:

@@ -27,7 +27,7 @@ from sessions.policy_decisions import PolicyDecisions, Proposal, everything_appr
 from sessions.safety import SafetySettings
 from sessions.thinker import Thinker
 from sessions.thinking import ThinkingHere
-from tactile_lab.exploration.candidates import Candidate, predict_contacts
+from tactile_lab.exploration.candidates import Candidate, ModelledObject, predict_contacts
 from tactile_lab.exploration.policies import POLICIES, make_policy
 from tactile_lab.exploration.policy import Belief, Decision, best_of, nothing_to_choose
 from tactile_lab.geometry.contacts import Contact, Grasp
@@ -88,13 +88,24 @@ def test_every_yaw_shift_and_closing_is_considered() -> None:
 
 def test_in_space_heights_and_taps_come_on_top() -> None:
     found = offer(limits(3), SOLID_BOX, Pose2())
-    assert len(found.usable) + sum(found.ruled_out.values()) == 12 * 3 * 2 * 3 + 12 * 2
+    assert len(found.usable) + sum(found.ruled_out.values()) == 12 * 3 * 2 * 3 + 12 * 2 + 12 * 3
     assert len({one.plan.height_m for one in found.usable}) == 3
     taps = [one for one in found.usable if one.plan.tap]
     assert taps
     assert len({len(one.candidate.rays.fingers) for one in found.usable}) == 1  # policies compare like with like
     plain = next(one for one in found.usable if not one.plan.tap and one.plan.frame == taps[0].plan.frame)
     assert taps[0].candidate.time_s > plain.candidate.time_s + 2.0
+
+
+def test_a_leaning_hand_is_offered_in_space_and_expected_to_touch_at_several_heights() -> None:
+    aside = [one for one in offer(limits(3), SOLID_BOX, Pose2()).usable if one.plan.closing == "aside"]
+    assert aside
+    assert not any(one.plan.tap for one in aside)
+    along = min(aside, key=lambda one: abs(abs(one.plan.frame.yaw_rad) - np.pi / 2))
+    known = ModelledObject(SOLID_BOX.field, 3, Pose2(), SOLID_BOX.origin_height_m)
+    heights_m = predict_contacts(along.candidate, known).points_object_m[:, 2]
+    assert len(heights_m) >= 3
+    assert np.ptp(heights_m) > 0.009
 
 
 def test_a_tap_is_expected_on_the_top() -> None:
