@@ -9,6 +9,7 @@ from tactile_lab.evaluation.comparison import Figure, MethodSummary
 from tactile_lab.report.svg import Scale, tick_label
 
 _WIDTH, _LEFT, _RIGHT, _LINE, _HEAD, _FOOT = 760.0, 170.0, 30.0, 24.0, 34.0, 26.0
+_LEGEND = "dot: mean; bar: its 95 % interval, from 0 on; tick: largest value"
 _STYLE = """
 :root { --page:#ffffff; --ink:#1b2330; --soft:#5a6678; --grid:#e6e9ee; --mark:#1d5fa8; }
 @media (prefers-color-scheme: dark) { :root { --page:#191f28; --ink:#e7ebf1; --soft:#9aa7b8; --grid:#2a323e;
@@ -21,7 +22,10 @@ text.title { fill:var(--ink); font-weight:600; }
 
 
 def comparison_svg(summaries: Sequence[MethodSummary]) -> str:
-    """Dots are means, bars their 95 % intervals, ticks the largest value; figures nobody has are left out."""
+    """Dots are means, bars their 95 % intervals, ticks the largest value; figures nobody has are left out.
+
+    No figure can be below zero: an interval that reaches there is cut off.
+    """
     count = len(summaries[0].figures)
     panels = [[(summary.method, summary.figures[index]) for summary in summaries] for index in range(count)]
     shown = [panel for panel in panels if any(figure.mean is not None for _, figure in panel)]
@@ -29,7 +33,8 @@ def comparison_svg(summaries: Sequence[MethodSummary]) -> str:
     for panel in shown:
         parts += _panel(panel, top)
         top += _HEAD + _LINE * len(panel) + _FOOT
-    height = top + 8.0
+    parts.append(f'<text x="{_LEFT:g}" y="{top + 14:g}">{_LEGEND}</text>')
+    height = top + 26.0
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH:g} {height:g}" width="{_WIDTH:g}">'
     page = '<rect class="page" width="100%" height="100%"/>'
     return "\n".join([head, f"<style>{_STYLE}</style>", page, *parts, "</svg>\n"])
@@ -37,8 +42,7 @@ def comparison_svg(summaries: Sequence[MethodSummary]) -> str:
 
 def _panel(panel: Sequence[tuple[str, Figure]], top: float) -> list[str]:
     values = [value for _, figure in panel for value in _values(figure)]
-    low, high = min(0.0, *values), max(values) or 1.0
-    scale = Scale(low, high + 0.05 * (high - low), _LEFT, _WIDTH - _RIGHT)
+    scale = Scale(0.0, 1.05 * (max(values) or 1.0), _LEFT, _WIDTH - _RIGHT)
     bottom = top + _HEAD + _LINE * len(panel)
     parts = [f'<text class="title" x="{_LEFT:g}" y="{top + 18:g}">{escape(panel[0][1].title)}</text>']
     for tick in scale.ticks():
@@ -57,7 +61,7 @@ def _line(method: str, figure: Figure, scale: Scale, y: float) -> list[str]:
     largest = scale(figure.spread.largest)
     parts.append(f'<line class="largest" x1="{largest:.1f}" y1="{y - 6:g}" x2="{largest:.1f}" y2="{y + 6:g}"/>')
     if figure.mean.low is not None and figure.mean.high is not None:
-        ends = scale(figure.mean.low), scale(figure.mean.high)
+        ends = scale(max(0.0, figure.mean.low)), scale(figure.mean.high)
         parts.append(f'<line class="bar" x1="{ends[0]:.1f}" y1="{y:g}" x2="{ends[1]:.1f}" y2="{y:g}"/>')
     parts.append(f'<circle class="dot" cx="{scale(figure.mean.mean):.1f}" cy="{y:g}" r="4.5"/>')
     return parts
@@ -66,5 +70,4 @@ def _line(method: str, figure: Figure, scale: Scale, y: float) -> list[str]:
 def _values(figure: Figure) -> list[float]:
     if figure.mean is None or figure.spread is None:
         return [0.0]
-    ends = [end for end in (figure.mean.low, figure.mean.high) if end is not None]
-    return [figure.mean.mean, figure.spread.largest, *ends]
+    return [figure.mean.mean, figure.spread.largest, figure.mean.high or 0.0]

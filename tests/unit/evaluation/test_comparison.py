@@ -87,4 +87,7 @@ def test_tables_and_plot_name_every_method() -> None:
     svg = comparison_svg(summaries)
     root = ElementTree.fromstring(svg)
     assert sum(element.tag.endswith("circle") for element in root.iter()) == 4
-    assert sum(element.get("class") == "bar" for element in root.iter()) == 4
+    bars = [element for element in root.iter() if element.get("class") == "bar"]
+    assert len(bars) == 4
+    assert min(figure.mean.low for one in summaries for figure in one.figures if figure.mean) < 0.0
+    assert min(float(bar.get("x1", "nan")) for bar in bars) == 170.0  # no error is below zero
