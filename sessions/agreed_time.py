@@ -21,19 +21,20 @@ class AgreedTime:
 
     def __init__(self) -> None:
         self.now_ns: int | None = None
-        self._links: set[str] = set()
+        self._sources: set[str | None] = set()
         self._doubted_ns: dict[str, int] = {}
 
     def stamped(self, stamp_ns: int) -> None:
         """The program stamped something."""
-        self.now_ns = stamp_ns if self.now_ns is None else max(self.now_ns, stamp_ns)
+        self._sources.add(None)
+        self._advance(stamp_ns)
 
     def received(self, link: str, stamp_ns: int) -> None:
         """Something of a link was stamped when it came."""
-        self._links.add(link)
+        self._sources.add(link)
         if self._is_believed(link, stamp_ns):
             self._doubted_ns.pop(link, None)
-            self.stamped(stamp_ns)
+            self._advance(stamp_ns)
         else:
             self._doubted_ns[link] = stamp_ns
 
@@ -42,8 +43,11 @@ class AgreedTime:
         now_ns = self.now_ns or 0
         return {link: stamp_ns - now_ns for link, stamp_ns in self._doubted_ns.items() if stamp_ns - now_ns > JUMP_ns}
 
+    def _advance(self, stamp_ns: int) -> None:
+        self.now_ns = stamp_ns if self.now_ns is None else max(self.now_ns, stamp_ns)
+
     def _is_believed(self, link: str, stamp_ns: int) -> bool:
-        if self.now_ns is None or len(self._links) == 1 or stamp_ns - self.now_ns <= JUMP_ns:
+        if self.now_ns is None or len(self._sources) == 1 or stamp_ns - self.now_ns <= JUMP_ns:
             return True
         others = (doubted_ns for other, doubted_ns in self._doubted_ns.items() if other != link)
         return any(abs(stamp_ns - doubted_ns) <= JUMP_ns for doubted_ns in others)

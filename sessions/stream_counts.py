@@ -52,7 +52,12 @@ class StreamCounts:
             self._time.stamped(stamp_ns)
         else:
             self._time.received(link, stamp_ns)
-        return (self._time.now_ns or 0) - stamp_ns
+        return self.now_ns - stamp_ns
+
+    @property
+    def now_ns(self) -> int:
+        """The session's time, which a link whose clock has jumped does not carry along; 0 before any message."""
+        return self._time.now_ns or 0
 
     def losses(self) -> dict[str, int]:
         """Everything that is not zero, by kind and topic, for a session's record."""

@@ -178,12 +178,13 @@ class TrafficWriter:
 
     def _tell_streams(self) -> None:
         """What was lost so far, once a second, so that a crash does not take it along."""
+        now_ns = self.streams.now_ns
         if self._told_ns is None:
-            self._told_ns = self._log_ns
-        if self._settings.tell_streams and self._log_ns - self._told_ns >= STREAMS_PERIOD_ns:
-            self._told_ns = self._log_ns
-            content = {"timestamp": foxglove.time(self._log_ns), "streams": self.streams.plain()}
-            self._append(schemas.STREAMS_TOPIC, schemas.encode(content), self._log_ns)
+            self._told_ns = now_ns
+        if self._settings.tell_streams and now_ns - self._told_ns >= STREAMS_PERIOD_ns:
+            self._told_ns = now_ns
+            content = {"timestamp": foxglove.time(now_ns), "streams": self.streams.plain()}
+            self._append(schemas.STREAMS_TOPIC, schemas.encode(content), now_ns)
 
     # --- chunks ------------------------------------------------------------------------------------------------
 

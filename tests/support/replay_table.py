@@ -23,7 +23,8 @@ from drivers.simulation.objects import CATALOGUE
 from sessions.interpreter import Interpreter
 from sessions.progress import NullProgress
 from sessions.session import Session
-from tactile_lab.errors import TactileLabError
+from sessions.session_outcome import Ending
+from tactile_lab.errors import SessionError, TactileLabError
 from tactile_lab.rigs import build, wired_bench
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.workflow import replaying
@@ -102,10 +103,12 @@ class Replayed:
 
 
 def compare(rig: str, object_name: str, grasps: int, root: Path) -> Replayed:
-    """Run a session and replay it. Raises TactileLabError."""
+    """Run a session and replay it. Raises TactileLabError, also for a session that ended early."""
     request = SessionRequest(rig, object_name, root, seed=1, grasps=grasps)
     with listening(_builder(rig)) as live:
         finished = run_session(request, NullProgress())
+    if finished.outcome is None or finished.outcome.ending is not Ending.COMPLETE:
+        raise SessionError(finished.outcome.reason if finished.outcome else finished.problem)
     session = Session.open(finished.folder)
     out = session.folder / "replay"
     with listening(replaying) as again:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -111,6 +111,7 @@ class Swept:
         ended: why it ended, when it ended because of the fault.
         after_s: how long after the first strike.
         told: what its events and its record say that those of a sound session do not.
+        lost: what its record counts as lost.
         replay: what a replay of the recording gave.
     """
 
@@ -119,6 +120,7 @@ class Swept:
     after_s: float | None
     told: tuple[str, ...] = ()
     replay: str = ""
+    lost: dict[str, int] = field(default_factory=dict)
 
     def check(self, link: str, fault: str) -> None:
         """Raises AssertionError for a session that took longer to end than its time-outs say."""
@@ -159,6 +161,7 @@ def run_with(rig: str, faulty: dict[str, str], root: Path, at_s: float = STRIKES
         after_s=None if struck_ns is None else _stopped_after_s(session, struck_ns),
         told=tuple(_told(session)),
         replay=_replayed(session),
+        lost=session.manifest.data_loss,
     )
 
 
@@ -195,13 +198,15 @@ def _stopped_after_s(session: Session, struck_ns: int) -> float | None:
 
 
 def _told(session: Session) -> Iterator[str]:
-    """Warnings of the devices with their last figures, and what the record counts as lost."""
+    """Warnings of the devices with their last figures, and what the record counts as lost beside them."""
     for _, level, words in _events(session):
         if level > 2 and "in all: " in words:
             yield words.replace("in all: ", "")
     lost: dict[str, list[tuple[str, int]]] = {}
     for name, number in session.manifest.data_loss.items():
         kind, _, topic = name.partition(" /")
+        if kind == "lost cycles hand":  # the hand's own warning has the same number
+            continue
         lost.setdefault(kind, []).append((topic, number))
     for kind, found in lost.items():
         where = f"/{found[0][0]}" if len(found) == 1 and found[0][0] else f"in {len(found)} topics"

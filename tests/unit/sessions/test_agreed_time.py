@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from drivers.links import Datagram
@@ -9,6 +11,7 @@ from sessions.agreed_time import AgreedTime, JUMP_ns
 from sessions.raw_frames import UNSTAMPED
 from sessions.recorder import NullTraffic, Recorder
 from sessions.stream_counts import StreamCounts
+from sessions.traffic import TrafficWriter
 from tests.unit.sessions.session_fakes import make_rig
 
 JUMPED_ns = 10_000_000_000
@@ -51,6 +54,16 @@ def test_the_messages_of_the_others_are_not_late_when_one_link_jumps() -> None:
     assert counts.losses() == {}
     counts.take("/link/ft/FF/rx", 10**9, UNSTAMPED)
     assert counts.losses() == {"late /link/ft/FF/rx": 1}
+
+
+def test_a_recording_blames_nobody_else_for_a_link_that_jumped(tmp_path: Path) -> None:
+    writer = TrafficWriter(tmp_path / "t.mcap")
+    for stamp_ns in range(0, 4_000_000_000, 10_000_000):
+        writer.write("/link/hand/tx", b"", stamp_ns)
+        writer.write("/link/hand/rx", b"", stamp_ns + JUMPED_ns * (stamp_ns > 10**9))
+    writer.close()
+    assert writer.streams.losses() == {}
+    assert writer.streams.messages["/recorder/streams"] == 3
 
 
 def test_a_bench_names_the_link_that_jumped_once_and_counts_what_its_hand_lost() -> None:
