@@ -14,7 +14,8 @@ from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.polyhedron_planes import Planes, weighted_contacts
 from tactile_lab.shape.polyhedron_regularity import regularise
 from tactile_lab.tracking.contact_map import ContactMap
-from tactile_lab.tracking.facet_smoothing import FacetSmoother, FlatFaces, flat_faces, tangents
+from tactile_lab.tracking.facet_smoothing import FacetSmoother
+from tactile_lab.tracking.flat_faces import FlatFaces, flat_faces, tangents
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.pose_rows import PLANAR
 

@@ -8,24 +8,18 @@ together where the field only binds neighbours, so that poses become as certain 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.choice import outlined
 from tactile_lab.shape.polygon_segmentation import price_of_face
-from tactile_lab.shape.polyhedron_planes import segment_planes
-from tactile_lab.shape.surface import extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.face_ends import overhang
+from tactile_lab.tracking.flat_faces import FlatFaces, Neighbours, flat_faces, tangents
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
-
-_ORDERING_RESOLUTION_m = 0.002
-"""Of the outline that only orders contacts along it."""
 
 _MOST_PLANES_SHARE = 0.25
 """Solids whose planes have less than four contacts each on average are not faceted."""
@@ -34,39 +28,6 @@ _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e6
 _LARGEST_FOLD = float(np.cos(np.deg2rad(35.0)))
 """Faces that meet at a larger angle are never one."""
-
-
-@dataclass(frozen=True)
-class FlatFaces:
-    """Faces ``u . x = offset`` in the object frame and the contacts on them.
-
-    Attributes:
-        labels: face of each contact, shape (n,).
-        normals: outward unit normals u, shape (s, d).
-        offsets_m: shape (s,).
-        leaning: contacts at corners, on their face but with a normal that is not the face's, shape (n,).
-    """
-
-    labels: NDArray[np.int64]
-    normals: Array
-    offsets_m: Array
-    leaning: NDArray[np.bool_]
-
-    @property
-    def count(self) -> int:
-        return len(self.offsets_m)
-
-    def merged(self, kept: int, dropped: int) -> FlatFaces:
-        """The same with two faces made one, in between by the number of their contacts."""
-        weights = np.bincount(self.labels, minlength=self.count)[[kept, dropped]].astype(float)
-        weights /= weights.sum()
-        normals, offsets = self.normals.copy(), self.offsets_m.copy()
-        between = weights @ normals[[kept, dropped]]
-        normals[kept], offsets[kept] = between / np.linalg.norm(between), weights @ offsets[[kept, dropped]]
-        labels = np.where(self.labels == dropped, kept, self.labels)
-        labels = labels - (labels > dropped)
-        normals, offsets = np.delete(normals, dropped, axis=0), np.delete(offsets, dropped)
-        return FlatFaces(labels, normals, offsets, self.leaning)
 
 
 @dataclass(frozen=True)
@@ -127,9 +88,7 @@ class FacetSmoother:
                 break
         return best
 
-    def simplified(
-        self, rows: Array, faces: FlatFaces, price: float, neighbours: Callable[[FlatFaces], list[tuple[int, int]]]
-    ) -> FacetedTrajectory:
+    def simplified(self, rows: Array, faces: FlatFaces, price: float, neighbours: Neighbours) -> FacetedTrajectory:
         """Merge neighbouring faces as long as that costs less than the price of a face, the poses giving way.
 
         What a merger would cost is foreseen from the joint covariance of all faces and poses, and then verified.
@@ -158,23 +117,26 @@ class FacetSmoother:
         return self._normal_equations(self._rated(rows, faces))[0]
 
     def _rated(self, rows: Array, faces: FlatFaces) -> FacetedTrajectory:
-        values, tilts = self._residuals(rows, faces)
-        chi_square = float(np.sum(values**2) + np.sum(tilts**2))
+        chi_square = float(np.sum(self._residuals(rows, faces) ** 2))
         return FacetedTrajectory(rows, faces, chi_square, self._motion.value(rows))
 
-    def _residuals(self, rows: Array, faces: FlatFaces) -> tuple[Array, Array]:
+    def _residuals(self, rows: Array, faces: FlatFaces) -> Array:
+        """Of values, of the normals' components one after the other, and in the plane beyond the faces' ends."""
         points, normals = self._space.to_object(rows[self._grasp_of], self._world.points_m, self._world.normals)
         outward = faces.normals[faces.labels]
         away = np.einsum("nd,nd->n", outward, points) - faces.offsets_m[faces.labels]
         tilts = np.where(faces.leaning[:, None], 0.0, normals - outward)
-        return away / self._world.point_sigma_m, tilts / self._world.normal_sigma_rad[:, None]
+        parts = [away / self._world.point_sigma_m, (tilts / self._world.normal_sigma_rad[:, None]).T.ravel()]
+        if points.shape[1] == 2:
+            over = overhang(points, faces.labels, faces.normals, faces.offsets_m)
+            parts.append(over.beyond_m * faces.bounded / self._world.point_sigma_m)
+        return np.concatenate(parts)
 
     def _normal_equations(self, at: FacetedTrajectory) -> tuple[Array, Array]:
         """Gauss-Newton information and gradient by all poses but the first, then by each face's tilt and offset."""
-        values, tilts = self._residuals(at.rows, at.faces)
         jacobian = self._jacobian(at)
         information = jacobian.T @ jacobian
-        gradient = jacobian.T @ np.concatenate([values, tilts.T.ravel()])
+        gradient = jacobian.T @ self._residuals(at.rows, at.faces)
         free = (len(at.rows) - 1) * self._space.size
         information[:free, :free] += self._motion.information(at.rows)
         gradient[:free] += self._motion.value_and_gradient(at.rows)[1][1:].ravel()
@@ -182,14 +144,15 @@ class FacetSmoother:
         return information, gradient
 
     def _jacobian(self, at: FacetedTrajectory) -> Array:
-        """Derivatives of the residuals: values, then the normals' components one after the other."""
+        """Derivatives of the residuals."""
         rows, faces, world = at.rows, at.faces, self._world
         points, normals = self._space.to_object(rows[self._grasp_of], world.points_m, world.normals)
         count, dimension = points.shape
         contact, still, each = np.arange(count), np.zeros_like(normals), rows[self._grasp_of]
         outward, along = faces.normals[faces.labels], tangents(faces.normals)[faces.labels]
-        by_poses = np.zeros(((dimension + 1) * count, len(rows), self._space.size))
-        by_faces = np.zeros(((dimension + 1) * count, faces.count, dimension))
+        blocks = 4 if dimension == 2 else dimension + 1
+        by_poses = np.zeros((blocks * count, len(rows), self._space.size))
+        by_faces = np.zeros((blocks * count, faces.count, dimension))
         value = self._space.by_row(each, points, normals, outward, still)
         by_poses[contact, self._grasp_of] = value / world.point_sigma_m[:, None]
         stiffness = ~faces.leaning / world.normal_sigma_rad
@@ -201,6 +164,11 @@ class FacetSmoother:
             turned = self._space.by_row(each, points, normals, still, unit)
             by_poses[lines, self._grasp_of] = turned * stiffness[:, None]
             by_faces[lines, faces.labels, :-1] = -along[:, axis] * stiffness[:, None]
+        if dimension == 2:
+            over, lines = overhang(points, faces.labels, faces.normals, faces.offsets_m), 3 * count + contact
+            strength = (faces.bounded / world.point_sigma_m)[:, None]
+            by_poses[lines, self._grasp_of] = self._space.by_row(each, points, normals, over.ways, still) * strength
+            by_faces[lines, :, 1] = over.by_offsets * strength
         free = by_poses[:, 1:].reshape(len(by_poses), -1)
         return np.hstack([free, by_faces.reshape(len(by_faces), -1)])
 
@@ -231,9 +199,6 @@ class FacetSmoother:
         return costs
 
 
-Neighbours = Callable[[FlatFaces], list[tuple[int, int]]]
-
-
 def smoothed_with_faces(contact_map: ContactMap, noise: MotionNoise, rounds: int = 3) -> FacetedTrajectory | None:
     """Divide a map's contacts into faces, and let poses, faces and the division settle.
 
@@ -255,51 +220,3 @@ def smoothed_with_faces(contact_map: ContactMap, noise: MotionNoise, rounds: int
             return best
         best, contact_map = found, contact_map.with_rows(found.rows)
     return best
-
-
-def flat_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
-    """The faces of a map's contacts, and which of them may be one.
-
-    Raises:
-        ShapeError: contacts in the plane whose faces enclose nothing.
-    """
-    return _outline_faces(contact_map) if contact_map.dimension == 2 else _solid_faces(contact_map)
-
-
-def _outline_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
-    """The faces of an outline; only those that follow each other along it may be one. Raises ShapeError."""
-    fitted, seen = contact_map.fit(), contact_map.contacts
-    polygon, leaning = outlined(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
-    found, order = polygon.faces, np.flatnonzero(~leaning)[polygon.faces.order]
-    away = np.abs(seen.points_m @ found.normals.T - found.offsets_m)
-    labels = np.where(seen.normals @ found.normals.T > 0, away, np.inf).argmin(axis=1)
-    labels[~leaning] = found.labels
-
-    def in_turn(faces: FlatFaces) -> list[tuple[int, int]]:
-        along = faces.labels[order]
-        borders = np.flatnonzero(along != np.roll(along, 1))
-        pairs = np.sort(np.column_stack([along[borders - 1], along[borders]]), axis=1)
-        return [(int(one), int(other)) for one, other in np.unique(pairs, axis=0)]
-
-    return FlatFaces(labels, found.normals, found.offsets_m, leaning), in_turn
-
-
-def _solid_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
-    """The planes of a solid; any two may be one."""
-    seen = contact_map.contacts
-    planes = segment_planes(seen.points_m, seen.normals, seen.point_sigma_m, seen.normal_sigma_rad)
-
-    def all_pairs(faces: FlatFaces) -> list[tuple[int, int]]:
-        return [(one, other) for other in range(faces.count) for one in range(other)]
-
-    return FlatFaces(planes.labels, planes.normals, planes.offsets_m, np.zeros(len(seen), dtype=bool)), all_pairs
-
-
-def tangents(normals: Array) -> Array:
-    """Orthonormal directions along each face, by which it tilts, shape (s, d, d - 1)."""
-    if normals.shape[1] == 2:
-        return np.stack([-normals[:, 1], normals[:, 0]], axis=1)[:, :, None]
-    helper = np.where(np.abs(normals[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    first = np.cross(normals, helper)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([first, np.cross(normals, first)], axis=2)

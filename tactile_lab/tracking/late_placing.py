@@ -1,8 +1,12 @@
-"""Grasps that could not be placed when they came: where they belong is looked for again, with more known.
+"""Grasps that could not be placed when they came, or not well: where they belong is looked for with more known.
 
 Two ways lead there: the motion model from the neighbouring grasps, and, if the object was lost, poses anywhere on the
-known object, which need no motion at all (relocation). Nothing is forced: a grasp stays aside unless the evidence
-for all contacts gets better with it.
+known object, which need no motion at all (relocation). Nothing is forced: a grasp stays where it is or aside unless
+the evidence for all contacts gets better.
+
+While the object is explored, and anywhere on it, a grasp needs most of its contacts to be placed. On a known object
+near where the motion leads, two of them with their normals can be enough: fingers with two or three wrong contacts of
+five else stayed aside, a centimetre off.
 """
 
 from __future__ import annotations
@@ -24,7 +28,12 @@ Relocate: TypeAlias = Callable[[ContactMap, ContactSet], Array]
 """Poses of a grasp's contacts anywhere on the object that a map describes, the best first, shape (m, size)."""
 
 _TRIED = 3
+_TRIED_NEAR = 8
+_SMOOTHED = 2
 _LEAST_CONTACTS = 3
+_LEAST_FITTING = 2
+_DOUBTFUL = 2
+"""So many contacts of a grasp have to be left out for its place to be looked for again."""
 
 
 def relocated(hypothesis: Hypothesis, relocate: Relocate, judge: Judge) -> list[Hypothesis]:
@@ -36,33 +45,41 @@ def relocated(hypothesis: Hypothesis, relocate: Relocate, judge: Judge) -> list[
         judge: rates them.
     """
     last = len(hypothesis.map.placed) - 1
-    return _placed_at(hypothesis, last, relocate(*_without(hypothesis.map, last)), judge, moved_freely=True)
+    others, contacts = _without(hypothesis.map, last)
+    anywhere = relocate(others, contacts)[:_TRIED]
+    return _placed_at(hypothesis, last, anywhere, judge, _most(contacts), moved_freely=True)
 
 
 def placed_late(
     hypothesis: Hypothesis, noise: MotionNoise, settings: ProposalSettings, relocate: Relocate | None, judge: Judge
 ) -> Hypothesis:
-    """The hypothesis with grasps that are aside placed, one after the other, where that is likelier.
+    """The hypothesis with grasps that are aside or fit badly placed anew, one after the other, where that is likelier.
 
     Args:
         hypothesis: to improve.
         noise: of the motion model.
         settings: of the search near the predicted pose.
-        relocate: proposes places anywhere; None for none.
+        relocate: proposes places anywhere for grasps that are aside; None for none.
         judge: rates them.
     """
-    for index, grasp in enumerate(hypothesis.map.placed):
-        if grasp.used or len(grasp.contacts_world) < _LEAST_CONTACTS:
+    for index, grasp in enumerate(hypothesis.map.placed[1:], start=1):
+        if len(grasp.left_out) < _DOUBTFUL or len(grasp.contacts_world) < _LEAST_CONTACTS:
             continue
         others, contacts = _without(hypothesis.map, index)
         space = hypothesis.map.space
         predicted = space.compose(grasp.motion, hypothesis.map.placed[index - 1].row)
         near, _ = propose(predicted, contacts, others.fit(), noise.accumulated(2), settings, space)
-        candidates = _placed_at(hypothesis, index, near, judge, moved_freely=False)
-        if relocate is not None:
-            candidates += _placed_at(hypothesis, index, relocate(others, contacts), judge, moved_freely=True)
+        fitting = max(_LEAST_FITTING, len(hypothesis.map.placed[index].kept) + 1)
+        candidates = _placed_at(hypothesis, index, near[:_TRIED_NEAR], judge, fitting, moved_freely=False)
+        if relocate is not None and not grasp.used:
+            anywhere = relocate(others, contacts)[:_TRIED]
+            candidates += _placed_at(hypothesis, index, anywhere, judge, _most(contacts), moved_freely=True)
         hypothesis = min([hypothesis, *candidates], key=cost)
     return hypothesis
+
+
+def _most(contacts: ContactSet) -> int:
+    return len(contacts) // 2 + 1
 
 
 def _without(contact_map: ContactMap, index: int) -> tuple[ContactMap, ContactSet]:
@@ -72,16 +89,17 @@ def _without(contact_map: ContactMap, index: int) -> tuple[ContactMap, ContactSe
 
 
 def _placed_at(
-    hypothesis: Hypothesis, index: int, rows: Array, judge: Judge, *, moved_freely: bool
+    hypothesis: Hypothesis, index: int, rows: Array, judge: Judge, fitting: int, *, moved_freely: bool
 ) -> list[Hypothesis]:
-    """The hypothesis with one grasp at the first few poses, smoothed, contacts that do not fit left out."""
+    """The hypothesis with one grasp at the likeliest poses that enough contacts fit, smoothed."""
     found = []
-    for row in rows[:_TRIED]:
+    for row in rows:
         grasp = replace(hypothesis.map.placed[index], row=row, left_out=frozenset(), moved_freely=moved_freely)
         cleaned, _ = judge.cleaned(_with(hypothesis.map, index, grasp), index)
-        if 2 * len(cleaned.placed[index].kept) > len(grasp.contacts_world):
-            found.append(_following(judge.smoothed(cleaned, 15), index, judge))
-    return found
+        if len(cleaned.placed[index].kept) >= fitting:
+            found.append(judge.rated(cleaned))
+    likeliest = sorted(found, key=cost)[:_SMOOTHED]
+    return [_following(judge.smoothed(one.map, 15), index, judge) for one in likeliest]
 
 
 def _following(hypothesis: Hypothesis, index: int, judge: Judge) -> Hypothesis:

@@ -15,7 +15,8 @@ from tactile_lab.shape.polyhedron import Polyhedron
 from tactile_lab.shape.prism import Prism
 from tactile_lab.shape.surface import extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
-from tactile_lab.tracking.facet_smoothing import flat_faces, smoothed_with_faces
+from tactile_lab.tracking.facet_smoothing import smoothed_with_faces
+from tactile_lab.tracking.flat_faces import flat_faces
 from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge
 from tactile_lab.tracking.motion import MotionNoise

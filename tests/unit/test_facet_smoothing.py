@@ -12,7 +12,8 @@ from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.sampling import distances_to_polygon
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.tracking.contact_map import ContactMap
-from tactile_lab.tracking.facet_smoothing import FacetSmoother, FlatFaces, flat_faces, smoothed_with_faces
+from tactile_lab.tracking.facet_smoothing import FacetSmoother, smoothed_with_faces
+from tactile_lab.tracking.flat_faces import FlatFaces, flat_faces
 from tactile_lab.tracking.hypotheses import Judge
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.pose_evidence import PoseEvidence
@@ -54,16 +55,16 @@ def test_smoothing_never_raises_the_cost_and_keeps_the_first_pose() -> None:
     angles = np.arctan2(*contact_map.contacts.normals.T[::-1])
     labels = np.digitize(angles, np.linspace(-np.pi, np.pi, 7)[1:-1])
     normals = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(-np.pi, np.pi, 13)[1::2]])
-    faces = FlatFaces(labels, normals, np.full(6, 0.035), np.zeros(len(labels), dtype=bool))
+    none = np.zeros(len(labels), dtype=bool)
+    faces = FlatFaces(labels, normals, np.full(6, 0.035), none, none)
     few, many = smoother.fitted(rows, faces, 1), smoother.fitted(rows, faces, 10)
     assert many.cost <= few.cost
     assert np.array_equal(many.rows[0], rows[0])
 
 
 def test_merged_faces_hold_the_contacts_of_both() -> None:
-    faces = FlatFaces(
-        np.array([0, 1, 2, 2, 1]), np.eye(3)[:, :2] + [[0, 0], [0, 0], [1, 0]], np.arange(3.0), np.zeros(5, dtype=bool)
-    )
+    normals, none = np.eye(3)[:, :2] + [[0, 0], [0, 0], [1, 0]], np.zeros(5, dtype=bool)
+    faces = FlatFaces(np.array([0, 1, 2, 2, 1]), normals, np.arange(3.0), none, none)
     merged = faces.merged(0, 1)
     assert merged.labels.tolist() == [0, 0, 1, 1, 0]
     assert merged.offsets_m.tolist() == [pytest.approx(2 / 3), 2.0]

@@ -20,7 +20,7 @@ from tactile_lab.shape.surface import SurfaceMesh
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.facet_certainty import FacetCertainty
-from tactile_lab.tracking.facet_smoothing import tangents
+from tactile_lab.tracking.flat_faces import tangents
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.pose_doubt import with_pose_doubt
 from tactile_lab.tracking.pose_evidence import PoseEvidence
