@@ -78,18 +78,18 @@ class Bench:
         self._devices = InstrumentSet(hand, base, self.wrench_devices, camera)
         self._losses = DeviceLosses(observer.interpreter, hand)
         self._state = StateRecording(observer, clock, truth, self._devices, self._losses)
-        self._observer = observer
+        self.observer = observer
         self._force_ranges_N = dict(force_ranges_N or {})
 
     @property
     def perception(self) -> Perception:
         """What is known of the hand."""
-        return self._observer.interpreter.perception
+        return self.observer.interpreter.perception
 
     @property
     def recorder(self) -> Recorder:
         """Where everything is recorded."""
-        return self._observer.recorder
+        return self.observer.recorder
 
     @property
     def fingertips(self) -> dict[str, FingertipSensor]:
@@ -187,7 +187,7 @@ class Bench:
 
     def situation(self) -> Situation:
         """What the last cycle looks like to a safety supervisor."""
-        seen, newest = self.perception, self._observer.interpreter.newest
+        seen, newest = self.perception, self.observer.interpreter.newest
         tips = {finger: newest.get(fingertip_link(finger)) for finger in self.wrench_devices}
         hand = newest.get(HAND_LINK)
         return Situation(
@@ -297,4 +297,4 @@ class Bench:
     def _mark(self, kind: MarkKind, fingers: tuple[str, ...] = FINGERS) -> Outcome | None:
         if unknown := set(fingers) - set(FINGERS):
             raise SessionError(f"no finger called {', '.join(sorted(unknown))}", hint=f"Fingers: {', '.join(FINGERS)}")
-        return self._observer.mark(Mark(kind, self.clock.now_ns(), fingers))
+        return self.observer.mark(Mark(kind, self.clock.now_ns(), fingers))

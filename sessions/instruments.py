@@ -160,6 +160,15 @@ class AskedInstrument(Protocol):
 
 
 @runtime_checkable
+class NamedInstrument(Protocol):
+    """A device that can tell who it is."""
+
+    @property
+    def identity(self) -> str:
+        """Serial number and firmware as it told when it was connected; empty for what it does not tell."""
+
+
+@runtime_checkable
 class CyclingInstrument(Protocol):
     """A device that another process keeps cycling, whatever the session does."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drivers.links import Link, link_health
-from sessions.instruments import AskedInstrument, Instrument
+from sessions.instruments import AskedInstrument, Instrument, NamedInstrument
 
 
 class SensorStream:
@@ -30,6 +30,11 @@ class SensorStream:
         self._link.receive()
         if isinstance(self._device, AskedInstrument):
             self._device.ask()
+
+    @property
+    def identity(self) -> str:
+        """See :class:`NamedInstrument`."""
+        return self._device.identity if isinstance(self._device, NamedInstrument) else ""
 
     def health(self) -> tuple[str, ...]:
         """What the link knows to be wrong; of the readings, the decoder that Perception has knows."""

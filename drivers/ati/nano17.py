@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -98,6 +99,15 @@ class Nano17(ForceTip):
             self._link.close()
             raise
         self._connected = True
+
+    @property
+    def identity(self) -> str:
+        """Serial number, and firmware where there is one to ask, as the wire told when connecting; else empty."""
+        told: Any = getattr(self.wire, "page", None) or getattr(self.wire, "calibration", None)
+        if told is None:
+            return ""
+        firmware = getattr(told, "firmware", "")
+        return f"{told.serial}, firmware {firmware}" if firmware else str(told.serial)
 
     def close(self) -> None:
         """End the stream and close the link; idempotent. A device that is gone already is no error."""

@@ -19,7 +19,8 @@ from drivers.ethercat.master import EtherCatMaster, MasterSettings, Slave
 from drivers.ethercat.ports import Port, RawPort
 from drivers.ethercat.registers import AlState, AlStatus, Register
 from drivers.links import Datagram
-from drivers.shadow.ethercat_ring import HandIdentity, HandRing, image_telegram
+from drivers.shadow.ethercat_ring import HandRing, image_telegram
+from drivers.shadow.hand_identity import HandIdentity
 from drivers.shadow.palm_images import PalmName
 from tactile_lab.clock import Clock
 from tactile_lab.errors import CodecError, DeviceError

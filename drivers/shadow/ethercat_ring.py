@@ -4,64 +4,20 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from drivers.ethercat.frames import Command, Telegram
 from drivers.ethercat.master import EtherCatMaster, Slave
 from drivers.ethercat.registers import FMMU_BYTES, SYNC_MANAGER_BYTES, AlState, Register
-from drivers.shadow.palm_images import (
-    BRIDGE_PRODUCT,
-    IMAGE_BASE,
-    SHADOW_VENDOR,
-    WHICH_PALMS,
-    PalmImage,
-    PalmName,
-    describe_product,
-    palm_of_product,
-)
+from drivers.shadow.hand_identity import SERIAL_WORD, BoardIdentity, HandIdentity, checked_image
+from drivers.shadow.palm_images import IMAGE_BASE, PalmImage, PalmName
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import DeviceError
-
-SERIAL_WORD = 0x0E
-"""Where in a board's EEPROM its serial number stands, in words of 16 bits."""
 
 _VENDOR, _PRODUCT, _REVISION = 0x08, 0x0A, 0x0C
 _ALL_REGISTERS = bytes(256)
 _FIRST_EXCHANGES = 20
 _LOOP_CONTROL_MASK = 0x3FFF
 _NANOSECONDS_PER_TICK = 40
-
-
-@dataclass(frozen=True)
-class BoardIdentity:
-    """Who a board is, from its EEPROM."""
-
-    vendor: int
-    product: int
-    revision: int
-    serial: int
-
-
-@dataclass(frozen=True)
-class HandIdentity:
-    """The hand found on the ring.
-
-    Attributes:
-        bridge, palm: its boards; the palm's serial number is the hand's.
-        image: the palm's process image.
-        watchdog_s: time without commands after which the palm would leave OP, as read back; None when nothing feeds
-            its watchdog, so that it never trips.
-    """
-
-    bridge: BoardIdentity
-    palm: BoardIdentity
-    image: PalmImage
-    watchdog_s: float | None
-
-    @property
-    def serial(self) -> int:
-        """The hand's serial number."""
-        return self.palm.serial
 
 
 class HandRing:
@@ -115,7 +71,7 @@ class HandRing:
         """
         self._check_ring()
         bridge, palm = self._identify(0), self._identify(1)
-        return bridge, palm, self._checked_image(bridge, palm)
+        return bridge, palm, checked_image(bridge, palm, self._palm, self._serial, self._master.where)
 
     def _check_ring(self) -> None:
         count = self._master.count_slaves()
@@ -128,30 +84,6 @@ class HandRing:
         words = [self._master.read_eeprom(slave, word) for word in (_PRODUCT, _REVISION, SERIAL_WORD, _VENDOR)]
         product, revision, serial, vendor = words
         return BoardIdentity(vendor, product, revision, serial)
-
-    def _checked_image(self, bridge: BoardIdentity, palm: BoardIdentity) -> PalmImage:
-        for name, board in (("first", bridge), ("second", palm)):
-            if board.vendor != SHADOW_VENDOR:
-                what = f"the {name} slave is of vendor 0x{board.vendor:X}, not of Shadow Robot (0x{SHADOW_VENDOR:X})"
-                raise self._wrong(what, "Plug the hand itself into this interface")
-        if bridge.product != BRIDGE_PRODUCT:
-            what = (
-                f"the first slave is {describe_product(bridge.product)} (product {bridge.product:#x}), not the bridge"
-            )
-            raise self._wrong(what, "Plug the cable into the input of the hand's bridge")
-        image = palm_of_product(palm.product)
-        if image is None:
-            what = f"the second slave is {describe_product(palm.product)} (product {palm.product:#x})"
-            raise self._wrong(what, WHICH_PALMS)
-        self._check_expected(image, palm)
-        return image
-
-    def _check_expected(self, image: PalmImage, palm: BoardIdentity) -> None:
-        if self._palm is not None and image.name != self._palm:
-            raise self._wrong(f"a {image.name} palm, not a {self._palm}", f'Set hand.palm to "{image.name}"')
-        if self._serial is not None and palm.serial != self._serial:
-            hint = "Use the rig file and the calibration of the hand that is plugged in"
-            raise self._wrong(f"hand {palm.serial}, not hand {self._serial}", hint)
 
     # --- set-up ------------------------------------------------------------------------------------------------
 

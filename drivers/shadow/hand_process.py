@@ -31,19 +31,20 @@ class HandReady:
 
     Attributes:
         scheduling: of the process, in words.
-        serial, palm: of the hand that was found; None where the master does not tell.
+        serial, palm, revision: of the hand that was found; the revision is its palm's.
         watchdog_s: time without commands after which the palm leaves operation, as read back; None when it never does.
     """
 
     scheduling: str
-    serial: int | None = None
-    palm: str | None = None
+    serial: int = 0
+    palm: str = ""
+    revision: int = 0
     watchdog_s: float | None = None
 
     def __str__(self) -> str:
         """In words."""
         watchdog = "no watchdog" if self.watchdog_s is None else f"watchdog reads back {1000 * self.watchdog_s:.1f} ms"
-        who = "hand in operation" if self.serial is None else f"hand {self.serial}, palm {self.palm}, in operation"
+        who = f"hand {self.serial}, palm {self.palm} revision {self.revision}, in operation"
         return f"{who}, {watchdog}, {self.scheduling}"
 
 

@@ -184,11 +184,10 @@ def main() -> None:
 
 
 def _identity(link: HandLink) -> dict[str, object]:
-    """Who was found; SOEM's link does not tell."""
-    if isinstance(link, PysoemLink):
-        return {}
+    """Who was found."""
     found = link.hand
-    return {"serial": found.serial, "palm": found.image.name, "watchdog_s": found.watchdog_s}
+    board = {"palm": found.image.name, "revision": found.palm.revision}
+    return {"serial": found.serial, **board, "watchdog_s": found.watchdog_s}
 
 
 if __name__ == "__main__":

@@ -23,8 +23,8 @@ from typing import Any
 from drivers.ethercat.registers import AL_ERROR, AL_STATE_MASK, AlState, AlStatus
 from drivers.links import Datagram
 from drivers.shadow.ethercat_link import EthercatCounts, EthercatSettings
-from drivers.shadow.ethercat_ring import SERIAL_WORD
-from drivers.shadow.palm_images import BRIDGE_PRODUCT, SHADOW_VENDOR, PalmImage, describe_product, palm_of_product
+from drivers.shadow.hand_identity import SERIAL_WORD, BoardIdentity, HandIdentity, checked_image
+from drivers.shadow.palm_images import PalmImage
 from tactile_lab.clock import Clock
 from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
 
@@ -52,7 +52,7 @@ class PysoemLink:
         self._soem = _pysoem(name)
         self._master: Any = None
         self._sockets: set[int] = set()
-        self._image: PalmImage | None = None
+        self._hand: HandIdentity | None = None
         self._sent: tuple[int, int] | None = None
         self._taken: tuple[int, int] | None = None
         self.counts = EthercatCounts()
@@ -73,7 +73,7 @@ class PysoemLink:
             for descriptor in self._sockets:
                 flags = fcntl.fcntl(descriptor, fcntl.F_GETFL)
                 fcntl.fcntl(descriptor, fcntl.F_SETFL, flags | os.O_NONBLOCK)
-            self._image = self._mapped(master)
+            self._hand = self._mapped(master)
             self._operate(master)
         except BaseException:
             master.close()
@@ -138,10 +138,19 @@ class PysoemLink:
         """What is wrong with the wire, in words; empty when all is well."""
         return self.counts.problems()
 
-    def _opened(self) -> PalmImage:
-        if self._master is None or self._image is None:
+    @property
+    def hand(self) -> HandIdentity:
+        """Who was found on the ring; SOEM leaves the palm's watchdog unused.
+
+        Raises:
+            DeviceError: the link is not open.
+        """
+        if self._master is None or self._hand is None:
             raise DeviceError("link is not open", where=self.name, hint="Connect the device first")
-        return self._image
+        return self._hand
+
+    def _opened(self) -> PalmImage:
+        return self.hand.image
 
     def _open_interface(self, master: Any) -> None:
         interface = self._settings.interface
@@ -154,33 +163,18 @@ class PysoemLink:
             hint = "pysoem needs the rights cap_net_raw and cap_net_admin"
             raise self._wrong(f"can not open {interface} ({error})", hint) from error
 
-    def _mapped(self, master: Any) -> PalmImage:
+    def _mapped(self, master: Any) -> HandIdentity:
         count = master.config_init()
         if count != 2:
             raise self._wrong(f"{max(count, 0)} EtherCAT slaves instead of 2", "Check the hand's cable and power")
-        bridge, palm = master.slaves
-        image = self._checked_image(bridge, palm)
+        first, palm = master.slaves
+        bridge, board = _board(first, 0), _board(palm, int.from_bytes(palm.eeprom_read(SERIAL_WORD)[:4], "little"))
+        image = checked_image(bridge, board, self._settings.palm, self._settings.serial, self.name)
         master.config_map()
         if (len(palm.output), len(palm.input)) != (image.command_bytes, image.status_bytes):
             what = f"its EEPROM describes {len(palm.output)} + {len(palm.input)} bytes of process data"
             raise self._wrong(what, "Use our own master, which knows the palm's process image")
-        return image
-
-    def _checked_image(self, bridge: Any, palm: Any) -> PalmImage:
-        image = palm_of_product(palm.id)
-        if bridge.man != SHADOW_VENDOR or bridge.id != BRIDGE_PRODUCT:
-            what = f"the first slave, of vendor 0x{bridge.man:X}, product {bridge.id:#x}, is not the hand's bridge"
-            raise self._wrong(what, "Plug the cable into the input of the hand's bridge")
-        if palm.man != SHADOW_VENDOR or image is None:
-            what = f"the second slave is {describe_product(palm.id)} of vendor 0x{palm.man:X}"
-            raise self._wrong(what, "Palms 0220, 0230 and 0240 can be driven")
-        if self._settings.palm is not None and image.name != self._settings.palm:
-            raise self._wrong(f"a {image.name} palm, not a {self._settings.palm}", f'Set hand.palm to "{image.name}"')
-        serial = int.from_bytes(palm.eeprom_read(SERIAL_WORD)[:4], "little")
-        if self._settings.serial not in (None, serial):
-            hint = "Use the rig file and the calibration of the hand that is plugged in"
-            raise self._wrong(f"hand {serial}, not hand {self._settings.serial}", hint)
-        return image
+        return HandIdentity(bridge, board, image, None)
 
     def _operate(self, master: Any) -> None:
         master.state_check(self._soem.SAFEOP_STATE, _STATE_us)
@@ -208,6 +202,10 @@ class PysoemLink:
 
     def _wrong(self, what: str, hint: str) -> DeviceError:
         return DeviceError(what, where=self.name, hint=hint)
+
+
+def _board(slave: Any, serial: int) -> BoardIdentity:
+    return BoardIdentity(slave.man, slave.id, slave.rev, serial)
 
 
 def _pysoem(name: str) -> Any:

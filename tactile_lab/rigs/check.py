@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -15,13 +16,14 @@ from drivers.biotac import units
 from drivers.biotac.biotac import BioTac
 from drivers.biotac.slot_codec import Channel
 from drivers.camera.camera import Camera
-from drivers.fingertip import FingertipSensor
 from drivers.positioner import Positioner
 from drivers.shadow.ethercat_link import EthercatCounts
 from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_process import HandProcess
+from drivers.shadow.motor_polling import load_rates
 from drivers.simulation.objects import CATALOGUE
 from sessions.bench import Bench
+from sessions.instruments import NamedInstrument
 from sessions.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, fingertip_link
 from sessions.recorder import Recorder
 from tactile_lab.calibration_file import is_stored
@@ -30,7 +32,7 @@ from tactile_lab.errors import ConfigurationError, DeviceError
 from tactile_lab.geometry.contacts import FINGERS
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.check_fingertips import check_fingertips
-from tactile_lab.rigs.check_hand import check_hand
+from tactile_lab.rigs.check_hand import asked_once, check_hand, firmware
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.findings import Finding, told_losses
 from tactile_lab.rigs.fingertip_rig import is_fingertip_rig, load_fingertip_rig
@@ -66,7 +68,7 @@ def check_rig(name: str, seed: int = 0, *, move: bool = False) -> list[Finding]:
 def _devices(rig: Rig, seed: int, move: bool) -> list[Finding]:
     watch = StreamWatch()
     try:
-        with open_laboratory(rig, seed, next(iter(CATALOGUE))) as laboratory:
+        with open_laboratory(_asking_who(rig), seed, next(iter(CATALOGUE))) as laboratory:
             bench = laboratory.bench(Recorder(watch), first_move=move)
             try:
                 bench.connect()
@@ -76,6 +78,14 @@ def _devices(rig: Rig, seed: int, move: bool) -> list[Finding]:
                 bench.close()
     except DeviceError as error:
         return [Finding(error.where or "rig", False, str(error))]
+
+
+def _asking_who(rig: Rig) -> Rig:
+    """The same rig, whose motors are also asked for what never changes, such as their firmware."""
+    hand, files = rig.description.hand, dict(rig.files)
+    polling = load_rates(rates) if (rates := files.pop("rates", None)) is not None else hand.polling
+    asking = hand.model_copy(update={"polling": asked_once(polling)})
+    return replace(rig, description=rig.description.model_copy(update={"hand": asking}), files=files)
 
 
 # --- calibrations --------------------------------------------------------------------------------------------------
@@ -110,7 +120,7 @@ def _age(file: Path, now: datetime) -> tuple[str, Figures]:
 def _findings(bench: Bench, watch: StreamWatch) -> list[Finding]:
     bench.tare()
     findings = [_hand(bench, watch), _base(bench, watch)]
-    findings += [_fingertip(finger, bench.fingertips.get(finger), watch) for finger in FINGERS]
+    findings += [_fingertip(finger, bench, watch) for finger in FINGERS]
     if bench.camera is not None:
         findings.append(_camera(bench, watch))
     return findings
@@ -125,7 +135,7 @@ def _hand(bench: Bench, watch: StreamWatch) -> Finding:
         losses = EthercatCounts(**report["wire"]).problems()
         figures |= {"start_late_p50_us": punctual["median_us"], "start_late_p99_us": punctual["p99_us"]}
         words += [str(bench.hand.ready), f"starts late by {punctual['p99_us']:.0f} us (99 %)"]
-        figures |= {"serial": str(bench.hand.ready.serial or ""), "palm": str(bench.hand.ready.palm or "")}
+        figures |= {"serial": str(bench.hand.ready.serial), "palm": bench.hand.ready.palm}
         figures["lost_share"] = counts["lost"] / max(counts["cycles"], 1)
     elif isinstance(bench.hand, ShadowHand):
         counters = bench.hand.counters
@@ -135,6 +145,9 @@ def _hand(bench: Bench, watch: StreamWatch) -> Finding:
     if (warmest_C := bench.situation().warmest_C) is not None:
         figures["warmest_C"] = warmest_C
         words.append(f"warmest motor {warmest_C:.0f} C")
+    if revisions := firmware(bench.observer.interpreter.newest[HAND_LINK].sample):
+        figures["firmware"] = revisions
+        words.append(f"firmware revision {revisions}")
     share = float(figures.get("lost_share", 0.0))
     words.append(f"{100 * share:.1f} % of cycles lost")
     problems, remarks = told_losses(health, share, losses)
@@ -151,14 +164,16 @@ def _base(bench: Bench, watch: StreamWatch) -> Finding:
     return _finding("base", problems, [f"at {place} m", in_words(figures), *remarks], figures)
 
 
-def _fingertip(finger: str, tip: FingertipSensor | None, watch: StreamWatch) -> Finding:
+def _fingertip(finger: str, bench: Bench, watch: StreamWatch) -> Finding:
     """A finger without a sensor is allowed, but nobody should have to notice it by themselves."""
-    if tip is None:
+    if (tip := bench.fingertips.get(finger)) is None:
         return Finding(f"fingertip {finger}", True, "none: the fingertip calibration does not name it")
     figures = watch.figures(fingertip_link(finger))
-    words, problems = ["tared", in_words(figures)], list(tip.health())
+    device = bench.wrench_devices.get(finger)
+    identity = device.identity if isinstance(device, NamedInstrument) else ""
+    words, problems = [identity, "tared", in_words(figures)], list(tip.health())
     if isinstance(tip, ForceTip):
-        figures |= _force(tip)
+        figures |= {"identity": identity, **_force(tip)}
         words.append(
             f"{figures['lost']:.0f} lost, noise {figures['noise_mN']:.1f} mN (expected {figures['expected_mN']:.1f}), "
             f"bias {figures['bias_N']:.2f} N"

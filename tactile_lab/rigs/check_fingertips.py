@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from drivers.ati import controller_wire, digital_wire
@@ -66,7 +64,7 @@ def _figures(tip: Nano17, samples: list[WrenchSample], usable: Array) -> dict[st
     intervals_s = np.diff([sample.stamp_ns for sample in samples]) / NANOSECONDS
     noise, bias = usable.std(axis=0), np.abs(usable.mean(axis=0))
     return {
-        "identity": _serial(tip),
+        "identity": tip.identity,
         "rate_Hz": float(1.0 / intervals_s.mean()) if intervals_s.sum() > 0 else 0.0,
         "jitter_ms": float(1e3 * intervals_s.std()),
         "lost": float(tip.sequences.lost),
@@ -83,21 +81,11 @@ def _words(tip: Nano17, samples: list[WrenchSample], usable: Array) -> str:
     span_s = (samples[-1].stamp_ns - samples[0].stamp_ns) / NANOSECONDS
     rate = f"{(len(samples) - 1) / span_s:.0f} samples/s" if span_s > 0 else f"{len(samples)} samples"
     noise, bias = usable.std(axis=0), np.abs(usable.mean(axis=0))
-    serial = _serial(tip)
     return (
-        f"{serial + ', ' if serial else ''}{rate}, {tip.sequences.lost} lost, "
+        f"{tip.identity + ', ' if tip.identity else ''}{rate}, {tip.sequences.lost} lost, "
         f"noise {1e3 * noise[:3].max():.0f} mN and {1e3 * noise[3:].max():.2f} N mm, "
         f"untared reading {bias[:3].max():.2f} N and {1e3 * bias[3:].max():.1f} N mm"
     )
-
-
-def _serial(tip: Nano17) -> str:
-    """The sensor's serial number where its wire has told it."""
-    told: Any = getattr(tip.wire, "page", None) or getattr(tip.wire, "calibration", None)
-    if told is None:
-        return ""
-    firmware = getattr(told, "firmware", "")
-    return f"{told.serial}, firmware {firmware}" if firmware else str(told.serial)
 
 
 def _noise_problem(tip: Nano17, usable: Array) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivers.links import Link
 from drivers.shadow.cycle_statistics import CycleStatistics
 from drivers.shadow.ethercat_link import EthercatLink
 from drivers.shadow.first_move import check_motor_map
@@ -12,6 +11,7 @@ from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_samples import HandSample
 from drivers.shadow.hand_setup import HandSetup
 from drivers.shadow.motor_data import SlowData
+from drivers.shadow.motor_polling import PollingRates
 from drivers.shadow.motors import MotorMap
 from drivers.shadow.palm_codec import SENSORS
 from drivers.shadow.pysoem_link import PysoemLink
@@ -52,7 +52,7 @@ def _findings(setup: HandSetup, clock: Clock, *, move: bool) -> list[Finding]:
         hand.connect()
         sample, statistics = _listen(hand, clock, round(setup.hand.cycle_s * NANOSECONDS))
         motors = setup.motor_map()
-        found = [_ring(link, setup), _cycle(hand, link, statistics), _motors(hand, sample, motors), _joints(sample)]
+        found = [_ring(link), _cycle(hand, link, statistics), _motors(hand, sample, motors), _joints(sample)]
         return [*found, _motor_map(hand, motors, clock, setup.hand.cycle_s)] if move else found
     finally:
         _close(hand)
@@ -61,8 +61,13 @@ def _findings(setup: HandSetup, clock: Clock, *, move: bool) -> list[Finding]:
 def _asking_who(setup: HandSetup) -> HandSetup:
     """The same hand, whose motors are also asked once for what never changes, such as their firmware."""
     settings = setup.settings()
-    polling = settings.polling.model_copy(update={"slow_data": _ONCE})
-    return setup.model_copy(update={"hand": settings.model_copy(update={"polling": polling}), "rates": None})
+    asking = settings.model_copy(update={"polling": asked_once(settings.polling)})
+    return setup.model_copy(update={"hand": asking, "rates": None})
+
+
+def asked_once(rates: PollingRates) -> PollingRates:
+    """The same rates, with the motors' slow data asked for once, after connecting."""
+    return rates.model_copy(update={"slow_data": _ONCE})
 
 
 def _motor_map(hand: ShadowHand, motors: MotorMap, clock: Clock, cycle_s: float) -> Finding:
@@ -93,9 +98,7 @@ def _listen(hand: ShadowHand, clock: Clock, cycle_ns: int) -> tuple[HandSample, 
     return sample, statistics
 
 
-def _ring(link: Link, setup: HandSetup) -> Finding:
-    if not isinstance(link, EthercatLink):
-        return Finding("ring", True, f"bridge and palm {setup.hand.palm}, in operation")
+def _ring(link: EthercatLink | PysoemLink) -> Finding:
     found = link.hand
     watchdog = "no watchdog" if found.watchdog_s is None else f"watchdog {1000 * found.watchdog_s:.0f} ms"
     words = f"hand {found.serial}, palm {found.image.name} revision {found.palm.revision}, in operation, {watchdog}"
@@ -121,7 +124,7 @@ def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
     figures = f"{int(heard.sum())} of 20 answer, warmest {motors.names[hottest]} {temperature[hottest]:.0f} C"
     if np.isfinite(supply).any():
         figures += f", supply {np.nanmin(supply):.1f} V"
-    revisions = _firmware(sample)
+    revisions = firmware(sample)
     figures += f", firmware revision {revisions}" if revisions else ""
     told: dict[str, float | str] = {
         "firmware": revisions,
@@ -132,8 +135,8 @@ def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
     return Finding("motors", not problems and bool(heard.all()), "; ".join((*problems, figures)), told)
 
 
-def _firmware(sample: HandSample) -> str:
-    """Revisions of the motors' firmware, which should be one."""
+def firmware(sample: HandSample) -> str:
+    """Revisions of the motors' firmware, which should be one; empty while none has told."""
     revisions = sample.motor.slow[SlowData.SVN_REVISION]
     return ", ".join(f"{revision:.0f}" for revision in np.unique(revisions[np.isfinite(revisions)]))
 

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
+from drivers.links import ReplayLink
 from drivers.shadow.ethercat_link import EthercatCounts
+from sessions.sensor_stream import SensorStream
 from tactile_lab.rigs.check import check_rig
 from tactile_lab.rigs.findings import told_losses
 
@@ -21,8 +25,16 @@ def test_rare_losses_are_told_apart_from_what_is_wrong(share: float, problems: i
     assert "FFJ3 (motor 1): silent" in wrong
 
 
-def test_the_check_tells_the_warmest_motor() -> None:
+def test_the_check_tells_the_warmest_motor_and_the_motors_firmware() -> None:
     hand = next(finding for finding in check_rig("sim") if finding.device == "hand")
     assert hand.ok
     assert float(hand.figures["warmest_C"]) > 15.0
     assert "warmest motor" in hand.detail
+    assert "firmware revision 1200" in hand.detail
+
+
+def test_a_stream_passes_on_who_its_device_is() -> None:
+    named: Any = SimpleNamespace(connect=None, close=None, identity="FT12345, firmware 2.1")
+    assert SensorStream(named, ReplayLink("ft/FF", ())).identity == "FT12345, firmware 2.1"
+    unnamed: Any = SimpleNamespace(connect=None, close=None)
+    assert SensorStream(unnamed, ReplayLink("ft/FF", ())).identity == ""

@@ -111,7 +111,7 @@ def test_too_much_force(rig: Running, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_hot_motor(rig: Running) -> None:
     motors = rig.world._devices[0]
     motors._celsius[5] = 57.0  # type: ignore[attr-defined]
-    heard = rig.bench._observer.interpreter.newest  # type: ignore[attr-defined]
+    heard = rig.bench.observer.interpreter.newest
     told_ns = []
 
     def look(cycle: int) -> None:

@@ -105,7 +105,7 @@ def test_the_watchdog_is_told_as_it_reads_back(ends: tuple[str, str]) -> None:
         process.connect()
         process.close()
     assert process.ready.watchdog_s == pytest.approx(1.0, abs=1e-3)
-    assert "hand 634, palm 0220, in operation, watchdog reads back 1000.0 ms" in str(process.ready)
+    assert "hand 634, palm 0220 revision 1, in operation, watchdog reads back 1000.0 ms" in str(process.ready)
 
 
 def test_a_hand_that_dies_is_told_once_and_the_process_goes_on(ends: tuple[str, str]) -> None:

@@ -89,6 +89,7 @@ def test_a_box_is_found_set_read_and_left_silent(box: NetBoxServer) -> None:
     tip = device(box_wiring(box, serial="FT00001"))
     tip.connect()
     assert box.unit.rate_hz == 500
+    assert tip.identity == "FT00001, firmware emulated"
     samples = listen(tip, 200)
     np.testing.assert_allclose(np.mean([sample.wrench for sample in samples], axis=0), PRESSED, atol=COUNT[0])
     assert (tip.sequences.lost, tip.sequences.skipped, tip.sequences.disordered) == (0, 0, 0)

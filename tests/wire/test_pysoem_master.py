@@ -106,8 +106,8 @@ def test_a_palm_that_is_cut_off_while_running_is_told(ends: tuple[str, str]) -> 
 @pytest.mark.parametrize(
     ("chain", "settings", "words"),
     [
-        (ChainSettings(vendor=0x2), {}, "first slave, of vendor 0x2, product 0x0, is not the hand's bridge"),
-        (ChainSettings(product=77), {}, "second slave is .* of vendor 0x530"),
+        (ChainSettings(vendor=0x2), {}, "first slave is of vendor 0x2, not of Shadow Robot"),
+        (ChainSettings(product=77), {}, r"second slave is .* \(product 0x4d\)"),
         (ChainSettings(serial=3), {"serial": 4}, "hand 3, not hand 4"),
     ],
 )
