@@ -3,7 +3,8 @@
 A field alone rounds what it has not touched: walls curl inward below the lowest contacts, and the rim of a flat top is
 blunt. Here walls go on to the table where the lowest contacts are on upright walls: the field is fitted to mirror
 images of them below the table as well, a little inward, and cut there. A level top is treated likewise, as far as its
-contacts are better explained by one height than by the field.
+contacts are better explained by one height than by the field. Where the walls are upright all the way and their upper
+edge was felt to be round, as that of a tin or a carton is, the edge at the foot is taken to be as round.
 """
 
 from __future__ import annotations
@@ -28,6 +29,16 @@ _LEAST_UPRIGHT_SHARE = 0.8
 _INSET_SLOPE, _LARGEST_INSET_m = 0.2, 0.006
 """Mirror images lie inward by this share of their distance from the end: edges at the foot are often rounded, and
 walls that were not touched near it should end between a sharp and a rounded one."""
+_ROUND_SHARE, _LEAST_ROUND_CONTACTS = 0.15, 4
+"""A round edge at the top is felt by so many contacts, all within this share of the height, between level and upright:
+noise alone turns hardly any contact so far."""
+_UPRIGHT_DOWN_SHARE = 0.9
+"""So many of the contacts below the edge must be upright."""
+_LARGEST_RETREAT = 0.10
+"""So far inside of the walls below it, as a share of the height, an edge may lie; a neck lies farther inside."""
+_EDGE_TILTS_rad = np.deg2rad([20.0, 50.0])
+_VAGUENESS = 2.0
+"""A foot's edge is drawn by two rows of places, where normals fall by so much, known so much less than contacts."""
 _LEAST_TOP_CONTACTS = 3
 _KERNEL_STEPS = 10
 _SAME_HEIGHT_SIGMAS = 4.0
@@ -142,23 +153,84 @@ def _gaps(contacts: WeightedContacts, rest: Indices, ends_m: list[float]) -> tup
     return tuple((end_m, float(away.min())) for end_m, away in gaps if len(away))
 
 
+def _edge_radius_m(gpis: Gpis, contacts: WeightedContacts, rest: Indices, floor_m: float) -> float:
+    """Radius of the upper edge of walls that are upright down to the table; zero where it is sharp or they are not.
+
+    Least squares over the contacts on the edge: one whose normal rises by an angle t lies ``radius (1 - sin t)`` below
+    the top.
+    """
+    heights, up = contacts.points_m[rest, 2], contacts.normals[rest, 2]
+    level = contacts.points_m[contacts.normals[:, 2] > _LEVEL_COSINE, 2]
+    if len(level) == 0:
+        return 0.0
+    top_m = float(np.median(level))
+    tall_m = top_m - floor_m
+    below = top_m - heights > _ROUND_SHARE * tall_m
+    edge = ~below & (up > _UPRIGHT_SINE) & (up < _LEVEL_COSINE)
+    upright = np.abs(up[below]) < _UPRIGHT_SINE
+    if edge.sum() < _LEAST_ROUND_CONTACTS or upright.sum() < _UPRIGHT_DOWN_SHARE * len(upright):
+        return 0.0
+    at_half_height = contacts.points_m[rest[edge]] * [1, 1, 0] + [0, 0, (top_m + floor_m) / 2]
+    if gpis.mean(at_half_height).min() < -_LARGEST_RETREAT * tall_m:
+        return 0.0
+    lever = 1 - up[edge]
+    return float(np.clip(lever @ (top_m - heights[edge]) / (lever @ lever), 0.0, _ROUND_SHARE * tall_m))
+
+
+@dataclass(frozen=True)
+class _Image:
+    """What stands for a wall beyond its contacts: which of these, where they appear, how much less is known there."""
+
+    source: Indices
+    points_m: Array
+    normals: Array
+    vagueness: float
+
+    @classmethod
+    def mirrored(cls, contacts: WeightedContacts, walls: Indices, end_m: float) -> _Image:
+        """Contacts on walls seen in a mirror at the end, a little inward."""
+        points, normals = contacts.points_m[walls], contacts.normals[walls]
+        inset_m = np.minimum(_INSET_SLOPE * np.abs(points[:, 2] - end_m), _LARGEST_INSET_m)
+        inward = points - inset_m[:, None] * normals
+        return cls(walls, inward * [1, 1, -1] + [0, 0, 2 * end_m], normals * [1, 1, -1], 1.0)
+
+    @classmethod
+    def rounded(cls, contacts: WeightedContacts, walls: Indices, floor_m: float, radius_m: float) -> list[_Image]:
+        """Below contacts on walls, on an edge of a radius at the foot."""
+        level = contacts.normals[walls] * [1.0, 1.0, 0.0]
+        level /= np.linalg.norm(level, axis=1, keepdims=True)
+        feet = contacts.points_m[walls] * [1.0, 1.0, 0.0] + [0.0, 0.0, floor_m]
+        images = []
+        for tilt in _EDGE_TILTS_rad:
+            across, down = np.cos(tilt), np.sin(tilt)
+            points = feet - radius_m * (1 - across) * level + [0.0, 0.0, radius_m * (1 - down)]
+            images.append(cls(walls, points, across * level - [0.0, 0.0, down], _VAGUENESS))
+        return images
+
+
+def _images(gpis: Gpis, contacts: WeightedContacts, rest: Indices, ends_m: list[float]) -> list[_Image]:
+    """What stands for the walls' ends, the first of which is the table."""
+    images: list[_Image] = []
+    for index, end_m in enumerate(ends_m):
+        walls = _walls_near(contacts, rest, end_m, ends_m)
+        radius_m = _edge_radius_m(gpis, contacts, rest, end_m) if index == 0 else 0.0
+        if radius_m > 0:
+            images += _Image.rounded(contacts, walls, end_m, radius_m)
+        else:
+            images.append(_Image.mirrored(contacts, walls, end_m))
+    return images
+
+
 def _fitted(gpis: Gpis, contacts: WeightedContacts, rest: Indices, ends_m: list[float]) -> Gpis:
     """The field of some contacts and of their mirror images at the ends, with the kernel of another field."""
-    sources, mirrored = [rest], [contacts.points_m[rest]]
-    turned = [contacts.normals[rest]]
-    for end_m in ends_m:
-        walls = _walls_near(contacts, rest, end_m, ends_m)
-        sources.append(walls)
-        inset_m = np.minimum(_INSET_SLOPE * np.abs(contacts.points_m[walls, 2] - end_m), _LARGEST_INSET_m)
-        inward = contacts.points_m[walls] - inset_m[:, None] * contacts.normals[walls]
-        mirrored.append(inward * [1, 1, -1] + [0, 0, 2 * end_m])
-        turned.append(contacts.normals[walls] * [1, 1, -1])
-    source = np.concatenate(sources)
+    images = _images(gpis, contacts, rest, ends_m)
+    source = np.concatenate([rest, *(image.source for image in images)])
+    vagueness = np.concatenate([np.ones(len(rest)), *(np.full(len(one.source), one.vagueness) for one in images)])
     field = Gpis.fit(
-        np.vstack(mirrored),
-        np.vstack(turned),
-        contacts.point_weights[source] ** -0.5,
-        contacts.normal_weights[source] ** -0.5,
+        np.vstack([contacts.points_m[rest], *(image.points_m for image in images)]),
+        np.vstack([contacts.normals[rest], *(image.normals for image in images)]),
+        vagueness * contacts.point_weights[source] ** -0.5,
+        vagueness * contacts.normal_weights[source] ** -0.5,
         gpis.settings,
     )
     return field.with_log_parameters(gpis.kernel.log_parameters)

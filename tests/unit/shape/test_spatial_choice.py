@@ -13,7 +13,7 @@ from tactile_lab.shape.choice import best_shape
 from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.metrics import mesh_errors
 from tactile_lab.shape.prism import Prism, ear_triangles
-from tactile_lab.shape.sampling import polygon_area
+from tactile_lab.shape.sampling import nearest_on_mesh, polygon_area
 from tactile_lab.shape.standing_field import StandingField
 from tactile_lab.shape.surface import SurfaceMesh, extract_mesh, supported
 
@@ -81,6 +81,39 @@ def test_walls_of_a_standing_field_reach_the_table_and_a_level_top_has_a_sharp_r
     assert closed(surface)
     alone = mesh_errors(extract_mesh(field, floor_m=0.0), cylinder_mesh())
     assert mesh_errors(surface, cylinder_mesh()).mean_distance_m < alone.mean_distance_m
+
+
+def tin(radius_m: float = 0.034, height_m: float = 0.1, edge_m: float = 0.009) -> trimesh.Trimesh:
+    """A tin on the table whose edges are round above and below."""
+    turn = np.linspace(0.0, np.pi / 2, 12)
+    reach, lift = radius_m - edge_m + edge_m * np.sin(turn), edge_m * (1 - np.cos(turn))
+    outline = np.column_stack([np.append(reach, reach[::-1]), np.append(lift, height_m - lift[::-1])])
+    mesh: trimesh.Trimesh = trimesh.creation.revolve(np.vstack([[0.0, 0.0], outline, [0.0, height_m]]), sections=72)
+    return mesh
+
+
+def field_above_foot(mesh: trimesh.Trimesh, seed: int) -> Gpis:
+    """Fitted to contacts on all but the lowest fifth."""
+    points, normals = contacts_on(mesh, 150, seed)
+    felt = points[:, 2] > 0.2 * mesh.extents[2]
+    return Gpis.fit(points[felt], normals[felt], POINT_SIGMA_m, NORMAL_SIGMA_rad).optimise(max_iterations=10)
+
+
+def test_a_foot_that_was_not_touched_is_as_round_as_the_top() -> None:
+    surface = StandingField.fit(field_above_foot(tin(), seed=3), 0.0).mesh()
+    assert closed(surface)
+    foot = surface.vertices[surface.vertices[:, 2] < 0.02]
+    away, _ = nearest_on_mesh(foot, tin())
+    assert away.max() < 0.0025  # 3.0 mm with walls down to the table
+
+
+def test_the_neck_of_a_bottle_is_not_its_foot() -> None:
+    body, neck = tin(), tin(radius_m=0.015, height_m=0.04)
+    corners = np.vstack([body.vertices, neck.vertices + np.array([0.0, 0.0, 0.1])])
+    bottle = trimesh.Trimesh(corners, np.vstack([body.faces, neck.faces + len(body.vertices)]))
+    foot = StandingField.fit(field_above_foot(bottle, seed=2), 0.0).mesh()
+    low = foot.vertices[(foot.vertices[:, 2] > 0.005) & (foot.vertices[:, 2] < 0.02)]
+    assert np.hypot(low[:, 0], low[:, 1]).min() > 0.022
 
 
 def test_a_prism_needs_walls() -> None:
