@@ -57,7 +57,7 @@ def status(folder: Path) -> str:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_one_request_to_end_finishes_the_grasp_and_judges_what_there_is(tmp_path, number):
     process = start(tmp_path)
-    read_until(process, r"^ +2/8 ")
+    read_until(process, r"^ +1/8 ")
     process.send_signal(number)
     told = finish(process)
     assert process.returncode == 130
@@ -65,12 +65,12 @@ def test_one_request_to_end_finishes_the_grasp_and_judges_what_there_is(tmp_path
     folder = only_session(tmp_path)
     assert status(folder) == "interrupted"
     evaluation = json.loads((folder / "results" / "evaluation.json").read_text())
-    assert 2 <= evaluation["grasps"] <= 3
+    assert 1 <= evaluation["grasps"] <= 2
 
 
 def test_two_requests_end_at_once_and_the_recording_replays(tmp_path, inside):
     process = start(tmp_path)
-    read_until(process, r"^ +2/8 ")
+    read_until(process, r"^ +1/8 ")
     process.send_signal(signal.SIGINT)
     time.sleep(0.1)
     process.send_signal(signal.SIGINT)
@@ -81,7 +81,7 @@ def test_two_requests_end_at_once_and_the_recording_replays(tmp_path, inside):
     assert f"tactile-lab session replay {folder}" in told
     answer = inside("session", "replay", folder, "--json")
     assert answer.code in (0, 3)
-    assert json.loads(answer.out)["grasps"] >= 2
+    assert json.loads(answer.out)["grasps"] >= 1
 
 
 def test_a_killed_session_is_open_and_replays_up_to_the_end(tmp_path, inside):
