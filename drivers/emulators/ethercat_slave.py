@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from drivers.emulators.ethercat_eeprom import EepromInterface
 from drivers.emulators.ethercat_states import StateMachine
-from drivers.emulators.slave_application import Application, Block, SlaveCounts
+from drivers.emulators.slave_application import Application, Block, Service, SlaveCounts
 from drivers.ethercat.frames import Command, Telegram, physical
 from drivers.ethercat.registers import FMMU_BYTES, SYNC_MANAGER_BYTES, AlState, AlStatus, Register
 from tactile_lab.clock import Clock
@@ -57,7 +57,7 @@ class SlaveController:
         self._fmmus: list[tuple[int, int, int, int]] = []
         self._load_blocks(())
         self._states = StateMachine(self._setup_error)
-        self._pending_since_ns: int | None = None
+        self._service: Service | None = None
         self._fed_ns = 0
 
     def power_cycle(self) -> None:
@@ -184,7 +184,7 @@ class SlaveController:
         now_ns = self._clock.now_ns()
         if block.number == 0:
             self.counts.commands += 1
-            self._pending_since_ns = now_ns
+            self._service = Service(self.application, now_ns)
         if block.watched:
             self._fed_ns = now_ns
 
@@ -252,7 +252,7 @@ class SlaveController:
         self._states.request(self._memory[Register.AL_CONTROL])
         now = self._states.status.state
         if before < AlState.SAFEOP <= now:
-            self._pending_since_ns = None
+            self._service = None
             self._publish(self.application.start())
         if now == AlState.OP and before != AlState.OP:
             self._fed_ns = self._clock.now_ns()
@@ -269,28 +269,30 @@ class SlaveController:
 
     @property
     def due_ns(self) -> int | None:
-        """When the application will have finished with the last command; None when it has."""
-        return None if self._pending_since_ns is None else self._pending_since_ns + self.application.service_ns
+        """When there is something to do about the last command; None when all is done."""
+        return None if self._service is None else self._service.due_ns
 
     def work(self) -> None:
         """What the slave has done since the last frame: the application's turn, the watchdog."""
         now_ns = self._clock.now_ns()
-        if self._pending_since_ns is not None and now_ns >= self._pending_since_ns + self.application.service_ns:
-            self._pending_since_ns = None
-            self._serve()
+        if self._service is not None:
+            self._serve(self._service, now_ns)
         if self._watchdog_ns and now_ns - self._fed_ns > self._watchdog_ns and self._states.status.state == AlState.OP:
             self.counts.watchdog_trips += 1
             self._states.watchdog()
 
-    def _serve(self) -> None:
+    def _serve(self, service: Service, now_ns: int) -> None:
         state = self._states.status.state
-        if state < AlState.SAFEOP:
+        if not service.computed and state >= AlState.SAFEOP:
+            taken = tuple(bytes(self._memory[block.start : block.end]) for block in self._inward)
+            service.compute(taken, operating=state == AlState.OP)
+        if now_ns < service.over_ns:
             return
-        taken = tuple(bytes(self._memory[block.start : block.end]) for block in self._inward)
+        self._service = None
         for block in self._inward:
             block.full = False
-        if (answer := self.application.serve(taken, operating=state == AlState.OP)) is not None:
-            self._publish(answer)
+        if service.answer is not None:
+            self._publish(service.answer)
 
     def _publish(self, contents: tuple[bytes, ...]) -> None:
         for block, content in zip(self._outward, contents, strict=True):

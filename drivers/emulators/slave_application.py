@@ -44,6 +44,42 @@ class NoApplication:
         return None
 
 
+class Service:
+    """A command in the application's hands.
+
+    The answer is computed at once and shown when the application's time is over: what this program needs to compute
+    is part of the time that a real processor takes, and does not add to it.
+
+    Args:
+        application: has the command.
+        begun_ns: when it came.
+
+    Attributes:
+        computed: whether the application has looked at it.
+        answer: what it made of it; None for nothing.
+    """
+
+    def __init__(self, application: Application, begun_ns: int) -> None:
+        self._application, self._begun_ns = application, begun_ns
+        self.computed = False
+        self.answer: tuple[bytes, ...] | None = None
+
+    @property
+    def over_ns(self) -> int:
+        """When the answer may be seen."""
+        return self._begun_ns + self._application.service_ns
+
+    @property
+    def due_ns(self) -> int:
+        """When there is something to do."""
+        return self.over_ns if self.computed else self._begun_ns
+
+    def compute(self, blocks: tuple[bytes, ...], *, operating: bool) -> None:
+        """See :meth:`Application.serve`."""
+        self.answer = self._application.serve(blocks, operating=operating)
+        self.computed = True
+
+
 @dataclass
 class SlaveCounts:
     """What happened to process data.
