@@ -1,6 +1,7 @@
 """Both EtherCAT masters on the emulated two-slave hand, over a virtual cable: punctuality, losses, and recoveries.
 
-Losses are set against what the emulator itself counts. Times are this machine's; run it when the machine is quiet.
+Losses are set against what the emulator itself counts, and punctuality against a loop of the same priority that does
+nothing but wait: what that leaves out, nobody on this machine could have kept. Run it when the machine is quiet.
 """
 
 from __future__ import annotations
@@ -18,11 +19,14 @@ from drivers.emulators.ethercat_server import EmulatedHandProcess
 from drivers.emulators.shadow_chain import ChainSettings
 from drivers.emulators.wired.virtual_cable import virtual_cable
 from drivers.ethercat.master import MasterSettings
+from drivers.shadow.cycle_pace import CyclePace
+from drivers.shadow.cycle_statistics import CycleStatistics, Punctuality
 from drivers.shadow.ethercat_link import EthercatSettings
 from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_process import HandProcess
 from drivers.shadow.hand_settings import HandSettings
 from drivers.shadow.hand_setup import HandSetup, Master
+from drivers.shadow.real_time import PRIORITY, preferred
 from tactile_lab.clock import NANOSECONDS, MonotonicClock
 from tactile_lab.errors import DeviceError
 
@@ -39,7 +43,7 @@ class WireRow:
     """One measurement.
 
     Attributes:
-        master: ours, or pysoem.
+        master: ours, pysoem, or none.
         what: was done.
         noticed_ms: until the hand told of it; None where there is nothing to tell.
         back_ms: until the hand was in operation again, or for the first time.
@@ -63,7 +67,7 @@ def measure_ethercat(seconds: float) -> list[WireRow]:
         DeviceError: no virtual cable can be made, or no raw socket opened; says what to do.
     """
     near, far = f"tlb{os.getpid()}", f"tlc{os.getpid()}"
-    rows: list[WireRow] = []
+    rows = [_nothing_but_waiting(seconds)]
     masters: tuple[Master, ...] = ("own", "pysoem")
     with virtual_cable(near, far):
         for master in masters:
@@ -233,6 +237,16 @@ class Trial:
         return (self._clock.now_ns() - began_ns) / 1e6
 
 
+def _nothing_but_waiting(seconds: float) -> WireRow:
+    """How well this machine keeps a cycle of 1 kHz for a program with nothing to do in it."""
+    clock, statistics = MonotonicClock(), CycleStatistics()
+    with preferred(PRIORITY):
+        pace, until_ns = CyclePace(clock, round(CYCLE_s * NANOSECONDS)), clock.now_ns() + round(seconds * NANOSECONDS)
+        while clock.now_ns() < until_ns:
+            statistics.add(*pace.wait())
+    return WireRow("none", f"1 kHz for {seconds:g} s, only waiting", None, None, str(statistics.summary()))
+
+
 def _closed(hand: ShadowHand) -> None:
     """Close it; a hand that is gone already, as these trials make it, is no error."""
     try:
@@ -242,12 +256,10 @@ def _closed(hand: ShadowHand) -> None:
 
 
 def _steady(report: Mapping[str, Any], before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
-    punctual, hand, wire = report["punctuality"], report["hand"], report["wire"]
-    late = ", ".join(f"{punctual[name]:.0f}" for name in ("median_us", "p99_us", "worst_us"))
+    hand, wire = report["hand"], report["wire"]
     stale = f", {wire['stale']} came back late and were left out" if wire else ""
     return (
-        f"{punctual['cycles']} cycles, {punctual['left_out']} left out; started late by {late} us "
-        f"(median, 99 %, worst); {hand['lost']} lost{stale}; the emulator saw "
+        f"{Punctuality(**report['punctuality'])}; {hand['lost']} lost{stale}; the emulator saw "
         f"{after['frames'] - before['frames']} frames and lost {after['lost'] - before['lost']}"
     )
 
