@@ -171,9 +171,7 @@ class Trial:
         return EmulatedHandProcess(self._far, CALIBRATION / "joints.yaml", ChainSettings(eeprom=eeprom))
 
     def _setup(self, cycle_s: float, watchdog_s: float | None = None, **hand: Any) -> HandSetup:
-        settings = EthercatSettings(
-            interface=self._near, watchdog_s=watchdog_s, poll_every=5, master=MasterSettings(answer_s=0.01)
-        )
+        settings = EthercatSettings(interface=self._near, watchdog_s=watchdog_s, master=MasterSettings(answer_s=0.01))
         return HandSetup(
             ethercat=settings,
             master=self._master,
