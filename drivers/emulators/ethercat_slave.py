@@ -77,7 +77,7 @@ class SlaveController:
 
     def process(self, telegram: Telegram) -> Telegram:
         """A telegram as it leaves this slave."""
-        self.work()
+        self._catch_up()
         command = telegram.command
         if command in _LOGICAL:
             return self._logical(telegram) if self._fmmus else telegram
@@ -273,21 +273,29 @@ class SlaveController:
         return None if self._service is None else self._service.due_ns
 
     def work(self) -> None:
-        """What the slave has done since the last frame: the application's turn, the watchdog."""
+        """Between two frames: the application looks at its command, the watchdog at the time."""
+        if self._service is not None and not self._service.computed:
+            self._compute(self._service)
+        self._catch_up()
+
+    def _catch_up(self) -> None:
+        """What is over by now: the application's turn, the watchdog's time."""
         now_ns = self._clock.now_ns()
-        if self._service is not None:
-            self._serve(self._service, now_ns)
+        if self._service is not None and now_ns >= self._service.over_ns:
+            self._show(self._service)
         if self._watchdog_ns and now_ns - self._fed_ns > self._watchdog_ns and self._states.status.state == AlState.OP:
             self.counts.watchdog_trips += 1
             self._states.watchdog()
 
-    def _serve(self, service: Service, now_ns: int) -> None:
+    def _compute(self, service: Service) -> None:
         state = self._states.status.state
-        if not service.computed and state >= AlState.SAFEOP:
+        if state >= AlState.SAFEOP:
             taken = tuple(bytes(self._memory[block.start : block.end]) for block in self._inward)
             service.compute(taken, operating=state == AlState.OP)
-        if now_ns < service.over_ns:
-            return
+
+    def _show(self, service: Service) -> None:
+        if not service.computed:
+            self._compute(service)
         self._service = None
         for block in self._inward:
             block.full = False
