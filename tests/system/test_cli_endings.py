@@ -54,11 +54,10 @@ def status(folder: Path) -> str:
     return re.findall(r"^status: (\w+)$", (folder / "session.yaml").read_text(), re.M)[0]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_one_request_to_end_finishes_the_grasp_and_judges_what_there_is(tmp_path, number):
+def test_one_request_to_end_finishes_the_grasp_and_judges_what_there_is(tmp_path):
     process = start(tmp_path)
     read_until(process, r"^ +1/8 ")
-    process.send_signal(number)
+    process.send_signal(signal.SIGTERM)  # Ctrl+C goes the same way, see below
     told = finish(process)
     assert process.returncode == 130
     assert "interrupted" in told
@@ -99,7 +98,7 @@ def test_a_killed_session_is_open_and_replays_up_to_the_end(tmp_path, inside):
     assert inside("report", folder).code == 0
 
 
-@pytest.mark.parametrize("delay_s", [0.3, 1.0, 2.0])
+@pytest.mark.parametrize("delay_s", [0.3, 2.0])
 def test_ctrl_c_at_the_beginning(tmp_path, delay_s):
     process = start(tmp_path)
     time.sleep(delay_s)
@@ -117,7 +116,8 @@ def test_ctrl_c_while_the_result_is_judged_keeps_the_session(tmp_path, inside):
     told = finish(process)
     assert process.returncode == 130 or "report" in told  # it may have been ready already
     assert status(folder) == "closed"
-    assert inside("session", "replay", folder).code == 0
+    shown = json.loads(inside("session", "show", folder, "--json").out)
+    assert (shown["counts"]["grasps"], shown["data_loss"]) == (1, {})
 
 
 def test_a_full_disk_ends_the_session_and_the_recorded_part_replays(tmp_path, inside, monkeypatch):
