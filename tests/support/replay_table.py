@@ -1,7 +1,7 @@
 """Sessions of all rigs and objects of the catalogue, replayed: the same samples, the same results, and how fast.
 
 python -m tests.support.replay_table --into docs/results.md
-python -m tests.support.replay_table --into docs/results.md --rigs sim-wire --objects box-10x6x4,cylinder --grasps 3
+python -m tests.support.replay_table --into docs/results.md --rigs sim-wire --objects cylinder,sphere --grasps 1
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from tactile_lab.workflow.judging import differing_files
 from tactile_lab.workflow.running import SessionRequest, run_session
 from tests.support.results_section import GrowingTable
 
-RIGS = "sim,sim-biotac,sim-wire"
+RIGS = "sim,sim-biotac,sim-wire,sim-wire-biotac"
 HEAD = """## Replay of all rigs and objects
 
 `python -m tests.support.replay_table --into docs/results.md`: a session of two grasps, seed 1, for every rig and
-object (on `sim-wire` of three, in real time: `--rigs sim-wire --objects NAMES --grasps 3`), and its replay as fast as
-possible. Samples: all that the decoders gave, in order, compared bit by bit. Results: trajectory, contacts, contour or
+object (on wires of one, the box of three, in real time: `--rigs sim-wire,sim-wire-biotac --grasps 1`), and its replay
+as fast as possible. Samples: all that the decoders gave, in order, compared bit by bit. Results: trajectory, contacts, contour or
 surface, and the estimation's own record, compared byte by byte.
 
 | Rig | Object | Samples | Are the same | Results | Bytes read, times the original pace |

@@ -13,7 +13,7 @@ import pexpect
 from pexpect import fdpexpect
 
 PROGRAM = Path(__file__).with_name("warm_program.py")
-PATIENCE_s = 200
+PATIENCE_s = 100
 INTERRUPT = "\x03"
 ENVIRONMENT = {
     **os.environ,
@@ -41,6 +41,9 @@ class WarmProgram:
 
     def terminal(self, folder: Path, *words: object) -> Terminal:
         """``tactile-lab`` with some words, in a folder, on a new terminal. One at a time."""
+        if self._terminal is not None and not self._terminal.gone:
+            self._terminal.hang_up()  # a failed test has left it, and nobody would ever answer
+            self.answer()
         ours, its = os.openpty()
         order = {"terminal": os.ttyname(its), "folder": str(folder), "words": [str(word) for word in words]}
         self.tell(json.dumps(order))
@@ -69,6 +72,8 @@ class Terminal:
         self._child = fdpexpect.fdspawn(descriptor, timeout=PATIENCE_s, encoding="utf-8")
         self.told = ""
         """What it has said, up to the last text that was waited for."""
+        self.gone = False
+        """Whether the call has ended and its exit code was taken."""
 
     def until(self, text: str, then: str = "") -> None:
         """Wait for a text, then type something."""
@@ -89,6 +94,7 @@ class Terminal:
         self._child.expect(pexpect.EOF)
         self._child.close()
         told = self.told + str(self._child.before)
+        self.gone = True
         assert self._program.answer() == str(code), told
         assert "Traceback" not in told, told
         return told
