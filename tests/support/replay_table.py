@@ -37,8 +37,8 @@ HEAD = """## Replay of all rigs and objects
 
 `python -m tests.support.replay_table --into docs/results.md`: a session of two grasps, seed 1, for every rig and
 object (on wires of one, the box of three, in real time: `--rigs sim-wire,sim-wire-biotac --grasps 1`), and its replay
-as fast as possible. Samples: all that the decoders gave, in order, compared bit by bit. Results: trajectory, contacts, contour or
-surface, and the estimation's own record, compared byte by byte.
+as fast as possible. Samples: all that the decoders gave, in order, compared bit by bit. Results: trajectory, contacts,
+contour or surface, and the estimation's own record, compared byte by byte.
 
 | Rig | Object | Samples | Are the same | Results | Bytes read, times the original pace |
 |---|---|---:|---|---|---:|
