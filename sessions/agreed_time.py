@@ -16,11 +16,11 @@ class AgreedTime:
     """Follows the newest stamp that is not one link's word alone.
 
     Attributes:
-        now_ns: the time agreed on; None before the first stamp.
+        now_ns: the time agreed on; 0 before the first stamp.
     """
 
     def __init__(self) -> None:
-        self.now_ns: int | None = None
+        self.now_ns = 0
         self._sources: set[str | None] = set()
         self._doubted_ns: dict[str, int] = {}
 
@@ -40,14 +40,14 @@ class AgreedTime:
 
     def ahead_ns(self) -> dict[str, int]:
         """Links whose stamps have jumped ahead of everybody else's, and how far; once each link has been heard."""
-        now_ns = self.now_ns or 0
-        return {link: stamp_ns - now_ns for link, stamp_ns in self._doubted_ns.items() if stamp_ns - now_ns > JUMP_ns}
+        ahead_ns = {link: stamp_ns - self.now_ns for link, stamp_ns in self._doubted_ns.items()}
+        return {link: far_ns for link, far_ns in ahead_ns.items() if far_ns > JUMP_ns}
 
     def _advance(self, stamp_ns: int) -> None:
-        self.now_ns = stamp_ns if self.now_ns is None else max(self.now_ns, stamp_ns)
+        self.now_ns = max(self.now_ns, stamp_ns)
 
     def _is_believed(self, link: str, stamp_ns: int) -> bool:
-        if self.now_ns is None or len(self._sources) == 1 or stamp_ns - self.now_ns <= JUMP_ns:
+        if len(self._sources) == 1 or stamp_ns - self.now_ns <= JUMP_ns:
             return True
         others = (doubted_ns for other, doubted_ns in self._doubted_ns.items() if other != link)
         return any(abs(stamp_ns - doubted_ns) <= JUMP_ns for doubted_ns in others)

@@ -84,7 +84,7 @@ class Interpreter:
     def received(self, link: str, payload: bytes, stamp_ns: int) -> None:
         """Take one received datagram. Bytes that break the protocol are counted; links not known are left alone."""
         self.time.received(link, stamp_ns)
-        self._set_clock()
+        self.clock.sleep_until_ns(self.time.now_ns)
         route = self._routes.get(link)
         if route is None:
             return
@@ -96,12 +96,8 @@ class Interpreter:
     def mark(self, mark: Mark) -> Outcome | None:
         """Take one mark; see :meth:`Perception.mark`."""
         self.time.stamped(mark.stamp_ns)
-        self._set_clock()
+        self.clock.sleep_until_ns(self.time.now_ns)
         return self.perception.mark(mark)
-
-    def _set_clock(self) -> None:
-        if self.time.now_ns is not None:
-            self.clock.sleep_until_ns(self.time.now_ns)
 
     def _route(self, link: str, decoder: Decoder[Any], take: Callable[[Any], None]) -> Callable[[Datagram], None]:
         def route(datagram: Datagram) -> None:

@@ -59,7 +59,7 @@ class StreamCounts:
     @property
     def now_ns(self) -> int:
         """The session's time, which a link whose clock has jumped does not carry along; 0 before any message."""
-        return self._time.now_ns or 0
+        return self._time.now_ns
 
     def losses(self) -> dict[str, int]:
         """Everything that is not zero, by kind and topic, for a session's record."""

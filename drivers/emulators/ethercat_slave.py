@@ -274,7 +274,7 @@ class SlaveController:
 
     def work(self) -> None:
         """Between two frames: the application looks at its command, the watchdog at the time."""
-        if self._service is not None and not self._service.computed:
+        if self._service is not None:
             self._compute(self._service)
         self._catch_up()
 
@@ -289,13 +289,12 @@ class SlaveController:
 
     def _compute(self, service: Service) -> None:
         state = self._states.status.state
-        if state >= AlState.SAFEOP:
+        if state >= AlState.SAFEOP and not service.computed:
             taken = tuple(bytes(self._memory[block.start : block.end]) for block in self._inward)
             service.compute(taken, operating=state == AlState.OP)
 
     def _show(self, service: Service) -> None:
-        if not service.computed:
-            self._compute(service)
+        self._compute(service)
         self._service = None
         for block in self._inward:
             block.full = False

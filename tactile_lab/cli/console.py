@@ -41,23 +41,23 @@ def told_to(onlooker: Onlooker) -> Iterator[None]:
 
 def say(text: str, style: str = "") -> None:
     """One line for people, shown as it is (no markup, never broken)."""
-    people.print(Text(text, style=style), soft_wrap=True)
-    for onlooker in _onlookers:
-        onlooker.line(text, style)
+    _tell(Text(text, style=style), style)
 
 
 def complain(text: str) -> None:
     """One error line for people."""
-    people.print(Text.assemble(("error: ", "bold red"), text), soft_wrap=True)
-    for onlooker in _onlookers:
-        onlooker.line(f"error: {text}", "bold red")
+    _tell(Text.assemble(("error: ", "bold red"), text), "bold red")
 
 
 def warn(text: str) -> None:
     """One warning line for people."""
-    people.print(Text.assemble(("warning: ", "bold yellow"), text), soft_wrap=True)
+    _tell(Text.assemble(("warning: ", "bold yellow"), text), "bold yellow")
+
+
+def _tell(line: Text, style: str) -> None:
+    people.print(line, soft_wrap=True)
     for onlooker in _onlookers:
-        onlooker.line(f"warning: {text}", "bold yellow")
+        onlooker.line(line.plain, style)
 
 
 def emit_json(document: Any) -> None:

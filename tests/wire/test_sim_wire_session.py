@@ -85,6 +85,16 @@ def run(
     return running._record(session, rig, laboratory, slam, request, progress, running.ALONE), session.folder
 
 
+def run_killing(rig: Rig, laboratory: WiredLaboratory, root: Path, device: str) -> tuple[SessionOutcome, Path]:
+    """The same, with a device's stand-in killed while the hand comes down, and started again for the next session."""
+    station = stations(laboratory).stations[device]
+    try:
+        return run(rig, laboratory, root, At("descend", station.kill))
+    finally:
+        station.start()
+        station.await_ready()
+
+
 def test_a_session_is_completed_and_replays_to_the_same_grasp(
     rig: Rig, laboratory: WiredLaboratory, tmp_path: Path
 ) -> None:
@@ -117,12 +127,7 @@ def test_a_session_is_completed_and_replays_to_the_same_grasp(
 def test_a_device_that_dies_ends_the_session_in_order(
     rig: Rig, laboratory: WiredLaboratory, tmp_path: Path, device: str, words: str
 ) -> None:
-    station = stations(laboratory).stations[device]
-    try:
-        outcome, folder = run(rig, laboratory, tmp_path, At("descend", station.kill))
-    finally:
-        station.start()
-        station.await_ready()
+    outcome, folder = run_killing(rig, laboratory, tmp_path, device)
     assert outcome.ending is Ending.STOPPED
     assert words in outcome.reason
     check_ended_in_order(folder, words)
@@ -131,12 +136,7 @@ def test_a_device_that_dies_ends_the_session_in_order(
 def test_a_world_that_stands_still_ends_the_session_in_order(
     rig: Rig, laboratory: WiredLaboratory, tmp_path: Path
 ) -> None:
-    plant = stations(laboratory).stations["plant"]
-    try:
-        outcome, folder = run(rig, laboratory, tmp_path, At("descend", plant.kill))
-    finally:
-        plant.start()
-        plant.await_ready()
+    outcome, folder = run_killing(rig, laboratory, tmp_path, "plant")
     assert outcome.ending is Ending.STOPPED
     seen = "does not follow" if "does not follow" in outcome.reason else "the emulated laboratory stands still"
     check_ended_in_order(folder, seen)
