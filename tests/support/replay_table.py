@@ -7,9 +7,10 @@ python -m tests.support.replay_table --into docs/results.md --rigs sim-wire --ob
 from __future__ import annotations
 
 import argparse
+import gc
 import struct
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from hashlib import sha256
@@ -32,11 +33,15 @@ from tactile_lab.workflow.judging import differing_files
 from tactile_lab.workflow.running import SessionRequest, run_session
 from tests.support.results_section import GrowingTable
 
+Listener = Callable[[str, Any], None]
+
+_UNTRACKED = 1000
+"""Samples after which the garbage collector is told to leave alone what there is."""
 RIGS = "sim,sim-biotac,sim-wire,sim-wire-biotac"
 HEAD = """## Replay of all rigs and objects
 
 `python -m tests.support.replay_table --into docs/results.md`: a session of two grasps, seed 1, for every rig and
-object (on wires of one, the box of three, in real time: `--rigs sim-wire,sim-wire-biotac --grasps 1`), and its replay
+object (on wires of one, the first box of two, in real time: `--rigs sim-wire,sim-wire-biotac --grasps 1`), and its replay
 as fast as possible. Samples: all that the decoders gave, in order, compared bit by bit. Results: trajectory, contacts,
 contour or surface, and the estimation's own record, compared byte by byte.
 
@@ -56,8 +61,8 @@ def bits(value: Any) -> bytes:
     return struct.pack("<d", value) if isinstance(value, float) else repr(value).encode()
 
 
-class SampleDigest:
-    """Number and digest of the samples of a session, by the order in which they were understood."""
+class Digest:
+    """Number and digest of samples, by the order in which they were understood."""
 
     def __init__(self) -> None:
         self.count, self._digest = 0, sha256()
@@ -73,18 +78,42 @@ class SampleDigest:
         return self.count, self._digest.hexdigest()
 
 
+class Kept:
+    """The samples of a running session, digested when it is over: a session on wires has no time to spare for it.
+
+    A replay's samples are digested one by one, so that a sample which changed after it was given shows as a difference.
+    """
+
+    def __init__(self) -> None:
+        self._samples: list[tuple[str, Any]] = []
+
+    def take(self, link: str, sample: Any) -> None:
+        """One sample of a link."""
+        self._samples.append((link, sample))
+        if len(self._samples) % _UNTRACKED == 0:
+            gc.freeze()  # or the collector would go through all of them again and again, in the middle of a cycle
+
+    def digested(self) -> Digest:
+        """The digest of all of them, which are let go."""
+        gc.unfreeze()
+        digest, samples, self._samples = Digest(), self._samples, []
+        for link, sample in samples:
+            digest.take(link, sample)
+        return digest
+
+
 @contextmanager
-def listening(module: Any) -> Iterator[SampleDigest]:
+def listening(module: Any, take: Listener) -> Iterator[None]:
     """Hear all samples of the interpreters that a module builds meanwhile."""
-    digest, make = SampleDigest(), module.build_interpreter
+    make = module.build_interpreter
 
     def heard(*arguments: Any) -> Interpreter:
         interpreter: Interpreter = make(*arguments)
-        interpreter.listener = digest.take
+        interpreter.listener = take
         return interpreter
 
     with patch.object(module, "build_interpreter", heard):
-        yield digest
+        yield
 
 
 @dataclass(frozen=True)
@@ -105,13 +134,14 @@ class Replayed:
 def compare(rig: str, object_name: str, grasps: int, root: Path) -> Replayed:
     """Run a session and replay it. Raises TactileLabError, also for a session that ended early."""
     request = SessionRequest(rig, object_name, root, seed=1, grasps=grasps)
-    with listening(_builder(rig)) as live:
+    kept, again = Kept(), Digest()
+    with listening(_builder(rig), kept.take):
         finished = run_session(request, NullProgress())
     if finished.outcome is None or finished.outcome.ending is not Ending.COMPLETE:
         raise SessionError(finished.outcome.reason if finished.outcome else finished.problem)
-    session = Session.open(finished.folder)
+    live, session = kept.digested(), Session.open(finished.folder)
     out = session.folder / "replay"
-    with listening(replaying) as again:
+    with listening(replaying, again.take):
         replayed = replaying.replay_session(
             session, replaying.recorded_slam(session), replaying.recorded_seed(session), out
         )
