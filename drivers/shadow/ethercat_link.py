@@ -63,6 +63,7 @@ class EthercatCounts:
         refused: the palm had not taken the command before, so this one did not reach it.
         empty: the palm had not written a new status.
         openings: how often the ring was brought up.
+        misread: looks at the ring, while it was brought up, that did not show the hand; SOEM alone has such.
     """
 
     cycles: int = 0
@@ -72,6 +73,7 @@ class EthercatCounts:
     refused: int = 0
     empty: int = 0
     openings: int = 0
+    misread: int = 0
 
     def problems(self) -> tuple[str, ...]:
         """What was lost or late, in words; empty when nothing was."""
@@ -81,6 +83,7 @@ class EthercatCounts:
             f"{self.damaged} frames came back damaged": self.damaged,
             f"{self.refused} commands not taken by a late palm": self.refused,
             f"{self.empty} cycles without a new status": self.empty,
+            f"the hand was not seen in the first {self.misread} of the looks at its ring": self.misread,
         }
         return tuple(words for words, count in remarks.items() if count)
 

@@ -4,10 +4,13 @@ SOEM's licence is the GPL with an exception, or a commercial one: that is why it
 from the slaves' EEPROMs; a hand whose EEPROM holds its identity alone needs our own master
 (:class:`~drivers.shadow.ethercat_link.EthercatLink`), and is refused here with that advice.
 
-Three weaknesses of SOEM are made good. A lost frame blocks it for several milliseconds, unless its socket is set not
+Four weaknesses of SOEM are made good. A lost frame blocks it for several milliseconds, unless its socket is set not
 to block. Then it asks the socket over and over until the answer is there, at the cost of a core: so the answer is
-waited for before SOEM looks. And it tells answers apart by an index of sixteen values only, so that after a stall it
-can go on with old data for ever: a status is used only when it echoes the last command that the palm had taken before.
+waited for before SOEM looks. It tells answers apart by an index of sixteen values only, so that after a stall it can go
+on with old data for ever: a status is used only when it echoes the last command that the palm had taken before. And a
+frame that gets lost while it looks at the ring leaves it with fewer slaves, or with zeros in place of their names or
+their process data: so it is given the patience of the settings, and nothing is refused that was not seen in several
+looks.
 """
 
 from __future__ import annotations
@@ -17,6 +20,8 @@ import importlib
 import os
 import select
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +32,9 @@ from drivers.shadow.hand_identity import SERIAL_WORD, BoardIdentity, HandIdentit
 from drivers.shadow.palm_images import PalmImage
 from tactile_lab.clock import Clock
 from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
+
+LOOKS = 3
+"""So often the ring is looked at before what was seen counts as what is there."""
 
 _STATE_us, _OP_TRIES = 50_000, 40
 _WRITTEN, _READ = 2, 1
@@ -67,20 +75,21 @@ class PysoemLink:
             return
         master = self._soem.Master()
         before = _packet_sockets()
+        self.counts = EthercatCounts()
         try:
             self._open_interface(master)
             self._sockets = _packet_sockets() - before
             for descriptor in self._sockets:
                 flags = fcntl.fcntl(descriptor, fcntl.F_GETFL)
                 fcntl.fcntl(descriptor, fcntl.F_SETFL, flags | os.O_NONBLOCK)
-            self._hand = self._mapped(master)
+            with self._patience():
+                self._hand = self._seen(master)
             self._operate(master)
         except BaseException:
             master.close()
             raise
         self._master = master
         self._sent = self._taken = None
-        self.counts = EthercatCounts()
 
     def close(self) -> None:
         """Bring the slaves to INIT and release the interface. Idempotent."""
@@ -163,7 +172,28 @@ class PysoemLink:
             hint = "pysoem needs the rights cap_net_raw and cap_net_admin"
             raise self._wrong(f"can not open {interface} ({error})", hint) from error
 
+    @contextmanager
+    def _patience(self) -> Iterator[None]:
+        """While it looks at the ring, SOEM waits for a frame as long as the settings say, in place of its 2 ms."""
+        timeouts = self._soem.settings.timeouts
+        usual_us, timeouts.ret = timeouts.ret, round(self._settings.master.setup_answer_s * 1e6)
+        try:
+            yield
+        finally:
+            timeouts.ret = usual_us
+
+    def _seen(self, master: Any) -> HandIdentity:
+        """The hand, mapped; looks that did not show it are counted."""
+        while True:
+            try:
+                return self._mapped(master)
+            except DeviceError as error:
+                self.counts.misread += 1
+                if self.counts.misread == LOOKS:
+                    raise self._wrong(f"{error.what}, in each of {LOOKS} looks at the ring", error.hint) from error
+
     def _mapped(self, master: Any) -> HandIdentity:
+        """One look: who is there, with process data as SOEM maps them."""
         count = master.config_init()
         if count != 2:
             raise self._wrong(f"{max(count, 0)} EtherCAT slaves instead of 2", "Check the hand's cable and power")

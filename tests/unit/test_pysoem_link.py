@@ -1,0 +1,127 @@
+"""The hand's link over SOEM where SOEM itself is absent, or stands in: how often it looks before it refuses."""
+
+from __future__ import annotations
+
+import sys
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from drivers.ethercat.master import MasterSettings
+from drivers.shadow.ethercat_link import EthercatSettings
+from drivers.shadow.palm_images import PALMS
+from drivers.shadow.pysoem_link import LOOKS, PysoemLink
+from tactile_lab.clock import VirtualClock
+from tactile_lab.errors import ConfigurationError, DeviceError
+
+OP, USUAL_us = 8, 2000
+SIZES = PALMS["0220"].command_bytes, PALMS["0220"].status_bytes
+
+
+def board(product: int, serial: int = 0, vendor: int = 0x530, sizes: tuple[int, int] = (0, 0)) -> Any:
+    """A slave as SOEM shows it."""
+    words = serial.to_bytes(4, "little")
+    output, images = bytes(sizes[0]), bytes(sizes[1])
+    return SimpleNamespace(
+        man=vendor,
+        id=product,
+        rev=1,
+        eeprom_read=lambda word: words,
+        output=output,
+        input=images,
+        state=OP,
+        al_status=0,
+    )
+
+
+HAND = (board(0), board(6, 634, sizes=SIZES))
+NAMELESS = (board(0, vendor=0), board(0, vendor=0))
+UNMAPPED = (board(0), board(6, 634))
+WITHOUT_SERIAL = (board(0), board(6, sizes=SIZES))
+
+
+class Soem:
+    """Stands in for the module: each look at the ring shows what is next in line, the last for ever."""
+
+    INIT_STATE, SAFEOP_STATE, OP_STATE = 1, 4, OP
+
+    def __init__(self, *looks: tuple[Any, ...]) -> None:
+        self._looks, self.patience_us = looks, list[int]()
+        self.settings = SimpleNamespace(timeouts=SimpleNamespace(ret=USUAL_us))
+        self.slaves: tuple[Any, ...] = ()
+        self.is_open, self.state = False, 0
+
+    @property
+    def looked(self) -> int:
+        """How often the ring was looked at."""
+        return len(self.patience_us)
+
+    def Master(self) -> Soem:
+        return self
+
+    def open(self, interface: str) -> None:
+        self.is_open = True
+
+    def close(self) -> None:
+        self.is_open = False
+
+    def config_init(self) -> int:
+        self.slaves = self._looks[min(self.looked, len(self._looks) - 1)]
+        self.patience_us.append(self.settings.timeouts.ret)
+        return len(self.slaves) or -1
+
+    def config_map(self) -> None:
+        """The process data are those of the look."""
+
+    def write_state(self) -> None:
+        """Slaves obey."""
+
+    def state_check(self, state: int, timeout_us: int) -> int:
+        return state
+
+    def send_processdata(self) -> None:
+        """Nothing moves."""
+
+    def receive_processdata(self, timeout_us: int) -> int:
+        return 3
+
+
+def opened(monkeypatch: pytest.MonkeyPatch, soem: Soem, **settings: Any) -> PysoemLink:
+    monkeypatch.setitem(sys.modules, "pysoem", soem)
+    link = PysoemLink("hand", EthercatSettings(interface="lo", **settings), VirtualClock())
+    link.open()
+    return link
+
+
+def test_without_pysoem_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pysoem", None)
+    with pytest.raises(ConfigurationError, match=r"pysoem is not installed. Install it with.*\[ethercat\]"):
+        PysoemLink("hand", EthercatSettings(interface="lo"), VirtualClock())
+
+
+@pytest.mark.parametrize("misread", [NAMELESS, UNMAPPED, (), HAND[:1], WITHOUT_SERIAL])
+def test_a_hand_that_was_misread_is_looked_at_again_and_that_is_told(
+    monkeypatch: pytest.MonkeyPatch, misread: tuple[Any, ...]
+) -> None:
+    soem = Soem(misread, HAND)
+    link = opened(monkeypatch, soem, serial=634)
+    assert (link.hand.serial, link.counts.misread, soem.looked) == (634, 1, 2)
+    assert link.health() == ("the hand was not seen in the first 1 of the looks at its ring",)
+
+
+def test_a_hand_that_is_read_rightly_is_looked_at_once_with_the_patience_of_the_settings(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    soem = Soem(HAND)
+    link = opened(monkeypatch, soem, master=MasterSettings(setup_answer_s=0.03))
+    assert (soem.patience_us, soem.settings.timeouts.ret) == ([30_000], USUAL_us)
+    assert link.health() == ()
+
+
+def test_what_is_foreign_in_every_look_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    soem = Soem(NAMELESS)
+    with pytest.raises(DeviceError, match=r"vendor 0x0, not of Shadow Robot \(0x530\), in each of 3 looks at the ring"):
+        opened(monkeypatch, soem)
+    assert soem.looked == LOOKS
+    assert not soem.is_open
