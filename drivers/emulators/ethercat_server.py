@@ -21,40 +21,64 @@ from typing import Any
 from drivers.child_process import ChildProcess, errors_said, say
 from drivers.emulators.motor_can import MotorCanBuses
 from drivers.emulators.shadow_chain import ChainSettings, EmulatedHand, emulated_hand
-from drivers.ethercat.ports import Port, RawPort
+from drivers.emulators.stamped_port import StampedPort
 from drivers.ethercat.registers import AlState
 from drivers.shadow.joint_calibration import JointCalibration
 from drivers.shadow.palm_codec import CanFrame
 from drivers.shadow.real_time import request_real_time
-from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock
+from tactile_lab.clock import NANOSECONDS, Clock, MonotonicClock, VirtualClock
 
 _IDLE_s, _LOOK_ns = 0.02, 5_000_000
 _START_s, _ANSWER_s = 30.0, 5.0
 
 
 class HandServer:
-    """Serves frames and orders until its orders end."""
+    """Serves frames and orders until its orders end.
 
-    def __init__(self, hand: EmulatedHand, port: Port, can: MotorCanBuses, clock: Clock) -> None:
-        self._hand, self._port, self._can, self._clock = hand, port, can, clock
+    The hand's time is that of its wire: a frame is taken at the time of its arrival, however late this program gets to
+    it, and between two frames it is the time up to which none has come. A real palm is not put aside by its computer;
+    so its motors halt, and its watchdog trips, for a master's pause and never for one of this program.
+
+    Args:
+        hand: what is served; no time passes for it but here.
+        time: the hand's.
+        port: at its end of the cable.
+        can: the motors' buses.
+        clock: that of the port's stamps.
+    """
+
+    def __init__(
+        self, hand: EmulatedHand, time: VirtualClock, port: StampedPort, can: MotorCanBuses, clock: Clock
+    ) -> None:
+        self._hand, self._time, self._port, self._can, self._clock = hand, time, port, can, clock
         self._look_ns = clock.now_ns()
 
     def run(self) -> None:
         """Serve. Raises DeviceError when the interface goes."""
         while True:
-            if (frame := self._port.receive(self._patience_s())) is not None:
+            now_ns = self._clock.now_ns()
+            if (frame := self._port.receive(self._patience_s(now_ns))) is not None:
+                self._pass_to(self._port.arrived_ns)
                 for answer in self._hand.ring.process(frame):
                     self._port.send(answer)
                 continue
+            self._pass_to(now_ns)
             self._hand.ring.work()
             if self._asked():
                 if not (line := sys.stdin.readline()):
                     return
                 say(self._obey(json.loads(line)))
 
-    def _patience_s(self) -> float:
+    def _pass_to(self, stamp_ns: int) -> None:
+        """Let the hand's time pass, and what is due until then be done when it is due."""
+        while (due_ns := self._hand.ring.due_ns) is not None and due_ns <= stamp_ns:
+            self._time.sleep_until_ns(due_ns)
+            self._hand.ring.work()
+        self._time.sleep_until_ns(stamp_ns)
+
+    def _patience_s(self, now_ns: int) -> float:
         due_ns = self._hand.ring.due_ns
-        return _IDLE_s if due_ns is None else max(due_ns - self._clock.now_ns(), 0) / NANOSECONDS
+        return _IDLE_s if due_ns is None else max(due_ns - now_ns, 0) / NANOSECONDS
 
     def _asked(self) -> bool:
         """Whether there is an order, or no one left to give one; looked at now and then, as it costs a system call."""
@@ -97,12 +121,12 @@ def main() -> None:
     with errors_said():
         calibration = JointCalibration.load(Path(start["joints"]))
         can = MotorCanBuses()
-        hand = emulated_hand(clock, calibration, ChainSettings(**start["settings"]), can=can)
-        port = RawPort(start["interface"])
+        time, port = VirtualClock(clock.now_ns()), StampedPort(start["interface"], clock)
+        hand = emulated_hand(time, calibration, ChainSettings(**start["settings"]), can=can)
         port.open()
         say({"ready": True})
         request_real_time()
-        HandServer(hand, port, can, clock).run()
+        HandServer(hand, time, port, can, clock).run()
 
 
 class EmulatedHandProcess:

@@ -55,13 +55,13 @@ class Service:
         begun_ns: when it came.
 
     Attributes:
-        computed: whether the application has looked at it.
+        looked_at: whether the application has looked at it, or did not run.
         answer: what it made of it; None for nothing.
     """
 
     def __init__(self, application: Application, begun_ns: int) -> None:
         self._application, self._begun_ns = application, begun_ns
-        self.computed = False
+        self.looked_at = False
         self.answer: tuple[bytes, ...] | None = None
 
     @property
@@ -72,12 +72,12 @@ class Service:
     @property
     def due_ns(self) -> int:
         """When there is something to do."""
-        return self.over_ns if self.computed else self._begun_ns
+        return self.over_ns if self.looked_at else self._begun_ns
 
-    def compute(self, blocks: tuple[bytes, ...], *, operating: bool) -> None:
-        """See :meth:`Application.serve`."""
-        self.answer = self._application.serve(blocks, operating=operating)
-        self.computed = True
+    def look(self, blocks: tuple[bytes, ...] | None, *, operating: bool) -> None:
+        """See :meth:`Application.serve`; without blocks the application does not run."""
+        self.answer = None if blocks is None else self._application.serve(blocks, operating=operating)
+        self.looked_at = True
 
 
 @dataclass
@@ -97,16 +97,3 @@ class SlaveCounts:
     statuses: int = 0
     empty: int = 0
     watchdog_trips: int = 0
-
-
-@dataclass
-class Block:
-    """Memory guarded by an active SyncManager; ``full`` while the other side has not taken it."""
-
-    number: int
-    start: int
-    end: int
-    to_slave: bool
-    watched: bool
-    one_buffer: bool
-    full: bool = False

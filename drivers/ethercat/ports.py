@@ -11,7 +11,9 @@ from typing import Protocol
 from drivers.ethercat.frames import ETHERTYPE
 from tactile_lab.errors import DeviceError
 
-_LARGEST_FRAME = 1600
+LARGEST_FRAME = 1600
+"""Room for any Ethernet frame, bytes."""
+
 _NEEDS_RIGHT = (
     "Grant it once with: sudo setcap cap_net_raw+ep PATH, for the python that runs this program, or run it as root"
 )
@@ -86,11 +88,15 @@ class RawPort:
         try:
             if not select.select([raw], [], [], max(timeout_s, 0.0))[0]:  # poll() would round up to milliseconds
                 return None
-            return raw.recv(_LARGEST_FRAME)
+            return self._next(raw)
         except BlockingIOError:
             return None
         except OSError as error:
             raise self._failed(error) from error
+
+    def _next(self, raw: socket.socket) -> bytes:
+        """The frame that waits. Raises OSError."""
+        return raw.recv(LARGEST_FRAME)
 
     def _opened(self) -> socket.socket:
         if self._socket is None:

@@ -96,7 +96,7 @@ class UdpLink:
     def receive(self) -> list[Datagram]:
         """All datagrams of the device that wait, oldest first, never blocking. Raises DeviceError."""
         wire, taken = self._open_socket(), list[Datagram]()
-        behind_ns = _wall_offset_ns(self._clock)
+        behind_ns = wall_offset_ns(self._clock)
         for _ in range(_BATCHES):
             try:
                 batch = self._batches.receive() if self._batches else _singly(wire)
@@ -165,7 +165,7 @@ def _enabled(made: socket.socket, option: int) -> bool:
     return True
 
 
-def _wall_offset_ns(clock: Clock) -> int:
+def wall_offset_ns(clock: Clock) -> int:
     """How far the wall clock, in which the kernel stamps, is ahead of the session's.
 
     Between two readings the program may be put aside for milliseconds: the pair closest together is taken.
