@@ -15,7 +15,7 @@ from sessions.motion import Motion
 from sessions.next_grasp import FixedRule
 from sessions.planner import Planner
 from sessions.policy_decisions import Approve, PolicyDecisions, chooser_for, everything_approved, recorded_by
-from sessions.safety import SafetySupervisor
+from sessions.safety import InterruptGuard, SafetySupervisor
 from sessions.thinker import Thinker
 from sessions.thinker_process import thinking_for
 from sessions.touching import Toucher
@@ -49,11 +49,12 @@ def autonomous_crew(
     cycle = GraspCycle(motion, settings.cycle, tip, window)
     planner = planner_for(slam, settings, tip, seed, dimension)
     thinking = thinking_for(bench.clock, Thinker(slam, planner), cycle.idle)
-    decisions = PolicyDecisions(thinking, recorded_by(bench), approve)
+    guard = InterruptGuard()
+    decisions = PolicyDecisions(thinking, recorded_by(bench), approve, guard)
     if not settings.probing.enabled:
-        return Crew(supervisor, cycle, decisions, thinking)
+        return Crew(supervisor, cycle, decisions, thinking, guard=guard)
     prober = BoxProber(Toucher(motion, settings.cycle, tip), settings.probing, window, settings.plan.start_m)
-    return Crew(supervisor, cycle, decisions, thinking, prober.feel)
+    return Crew(supervisor, cycle, decisions, thinking, prober.feel, guard)
 
 
 def planner_for(

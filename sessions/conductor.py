@@ -25,7 +25,6 @@ from sessions.grasp_cycle import GraspPlan
 from sessions.planner import Reorientation
 from sessions.progress import GraspReport, NullProgress, Progress
 from sessions.recorder import Level
-from sessions.safety import InterruptGuard
 from sessions.session_outcome import Ending, SessionOutcome
 from sessions.thinker import Estimate
 from sessions.view_messages import plan_message
@@ -53,9 +52,8 @@ class Conductor:
         self._bench, self._settings = bench, settings
         self._progress = progress or NullProgress()
         self._supervisor, self._cycle, self._decisions = crew.supervisor, crew.performer, crew.decisions
-        self._survey = crew.survey
+        self._survey, self._guard = crew.survey, crew.guard
         self._estimation = Estimation(bench, crew.thinking)
-        self._guard = InterruptGuard()
         self._thought_of: int | None = None
         self._paused = False
         self._interruption_told = False
@@ -108,6 +106,8 @@ class Conductor:
         """Ask what to do next, and do it."""
         self._number = index + 1
         self._consider(index)
+        if self._guard.requested:
+            return None
         decision = self._decisions.decide(index)
         self._pause(decision if isinstance(decision, Pause) else None)
         match decision:

@@ -7,7 +7,7 @@ the grasps are done by a performer, which follows the plan by itself or leads a 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
 from gtsam import Pose3
@@ -15,7 +15,7 @@ from gtsam import Pose3
 from sessions.bounding_box import BoundingBox
 from sessions.grasp_cycle import GraspPlan
 from sessions.planner import Reorientation
-from sessions.safety import SafetySupervisor
+from sessions.safety import InterruptGuard, SafetySupervisor
 from sessions.thinker import Thinker, Thought
 from sessions.thinking import Thinking
 from tactile_lab.errors import TactileLabError
@@ -138,6 +138,7 @@ class Crew:
         thinking: where estimation and planner are asked; open while the session runs.
         survey: feels the object's bounding box before the first grasp; asked in between whether to leave the rest out.
             None for a session that begins without.
+        guard: hears Ctrl+C while the session runs; whoever waits for a person looks at it.
     """
 
     supervisor: SafetySupervisor
@@ -145,6 +146,7 @@ class Crew:
     decisions: DecisionMaker
     thinking: Thinking
     survey: Callable[[Callable[[], bool]], BoundingBox] | None = None
+    guard: InterruptGuard = field(default_factory=InterruptGuard)
 
 
 class AutonomousDecisions:

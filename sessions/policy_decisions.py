@@ -17,7 +17,7 @@ from sessions.hand_candidates import HandLimits
 from sessions.next_grasp import PlanSettings
 from sessions.policy_choice import Choice, PolicyChooser
 from sessions.recorder import Level
-from sessions.safety import SafetySettings
+from sessions.safety import InterruptGuard, SafetySettings
 from sessions.thinker import Thinker
 from sessions.thinking import Thinking
 from tactile_lab.exploration.policies import make_policy
@@ -32,11 +32,13 @@ class Proposal:
         number: from 1.
         plan: what would be done, and why.
         vetoed: how many plans for this grasp have been refused already.
+        withdrawn: whether the answer does not matter any more: Ctrl+C ends the session.
     """
 
     number: int
     plan: GraspPlan
     vetoed: int = 0
+    withdrawn: Callable[[], bool] = lambda: False
 
 
 Approve = Callable[[Proposal], bool]
@@ -55,19 +57,24 @@ class PolicyDecisions(AutonomousDecisions):
         thinking: where a planner with or without a policy is asked.
         tell: told every decision of the policy once.
         approve: asked before every grasp; what it refuses is replaced by the next best.
+        guard: hears Ctrl+C, which withdraws what was asked.
     """
 
     def __init__(
-        self, thinking: Thinking, tell: Callable[[Choice], None], approve: Approve = everything_approved
+        self,
+        thinking: Thinking,
+        tell: Callable[[Choice], None],
+        approve: Approve = everything_approved,
+        guard: InterruptGuard | None = None,
     ) -> None:
         super().__init__(thinking)
-        self._tell, self._approve = tell, approve
+        self._tell, self._approve, self._guard = tell, approve, guard or InterruptGuard()
         self._untold: Choice | None = None
 
     def think(self, index: int) -> None:
         super().think(index)
         vetoed = 0
-        while not self._is_over and not self._is_approved(index, vetoed):
+        while not (self._is_over or self._is_approved(index, vetoed) or self._guard.requested):
             self._thought, vetoed = self.thinking.ask(Thinker.vetoed, index), vetoed + 1
         self._untold = self._choice
 
@@ -75,7 +82,7 @@ class PolicyDecisions(AutonomousDecisions):
         """Whether a person, where one is asked, lets the grasp be done that has been thought of."""
         if self._thought is None or self._approve is everything_approved:
             return True
-        proposal = Proposal(index + 1, self._thought.plan, vetoed)
+        proposal = Proposal(index + 1, self._thought.plan, vetoed, lambda: self._guard.requested)
         return self.thinking.beside(lambda: self._approve(proposal))
 
     def decide(self, index: int) -> Decision:

@@ -219,8 +219,9 @@ class SafetySupervisor:
 class InterruptGuard:
     """Ctrl+C once: finish the step and close the session. Twice: now.
 
-    A context; while it is open the first SIGINT only sets :attr:`requested`, every later one raises
-    KeyboardInterrupt in the main thread. Signals belong to the main thread: elsewhere the guard does nothing.
+    A context; while it is open the first SIGINT only sets :attr:`requested`, every later one does what it did before,
+    or raises KeyboardInterrupt where it did nothing. Signals belong to the main thread: elsewhere the guard does
+    nothing.
     """
 
     def __init__(self) -> None:
@@ -242,6 +243,9 @@ class InterruptGuard:
             self._active = False
 
     def _interrupted(self, number: int, frame: FrameType | None) -> None:
-        if self.requested:
+        if not self.requested:
+            self.requested = True
+        elif callable(self._previous):
+            self._previous(number, frame)  # it knows where an interruption would be lost
+        else:
             raise KeyboardInterrupt
-        self.requested = True

@@ -8,6 +8,7 @@ from sessions.decisions import Decision, End, Pause, UndoGrasp
 from sessions.guided.operator import Ask, Operator
 from sessions.policy_choice import Choice
 from sessions.policy_decisions import Approve, PolicyDecisions
+from sessions.safety import InterruptGuard
 from sessions.thinking import Thinking
 
 
@@ -19,6 +20,7 @@ class AttendedDecisions(PolicyDecisions):
         tell: told every decision of the policy that is not overtaken by what the person asks for.
         approve: asked before every grasp.
         operator: the person; is heard between grasps.
+        guard: hears Ctrl+C.
         wait: called in every cycle of a pause; makes a simulated rig wait for the person.
     """
 
@@ -28,9 +30,10 @@ class AttendedDecisions(PolicyDecisions):
         tell: Callable[[Choice], None],
         approve: Approve,
         operator: Operator,
+        guard: InterruptGuard | None = None,
         wait: Callable[[], None] = lambda: None,
     ) -> None:
-        super().__init__(thinking, tell, approve)
+        super().__init__(thinking, tell, approve, guard)
         self._operator, self._wait = operator, wait
         self._paused = False
 

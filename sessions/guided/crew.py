@@ -21,7 +21,7 @@ from sessions.guided.motion import GuidedMotion
 from sessions.guided.operator import Operator
 from sessions.next_grasp import FixedRule
 from sessions.planner import Planner
-from sessions.safety import SafetySupervisor
+from sessions.safety import InterruptGuard, SafetySupervisor
 from sessions.thinker import Thinker
 from sessions.thinker_process import thinking_for
 from tactile_lab.slam import TactileSlam
@@ -50,10 +50,10 @@ def guided_crew(
         dimension: the estimation's, 2 or 3.
         pace: see :class:`Desk`.
     """
-    supervisor = SafetySupervisor(bench, settings.safety, bench.cycle_ns)
+    supervisor, guard = SafetySupervisor(bench, settings.safety, bench.cycle_ns), InterruptGuard()
     tip, cycle, guided = tip_shape(bench), settings.cycle, settings.guided
     solve_closings(bench.clock, settings, tip, dimension)
-    desk = Desk(bench, operator, guided, Attachments(session_folder), cycle.touch_force_N, pace)
+    desk = Desk(bench, operator, guided, Attachments(session_folder), cycle.touch_force_N, guard, pace)
     motion = GuidedMotion(bench, supervisor, desk)
     performer: Performer = (
         GraspByHand(motion, cycle, desk, tip)
@@ -63,4 +63,4 @@ def guided_crew(
     rule = FixedRule(settings.plan, np.random.default_rng(seed), dimension)
     planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension)
     thinking = thinking_for(bench.clock, Thinker(slam, planner), performer.idle)
-    return Crew(supervisor, performer, GuidedDecisions(thinking, desk), thinking)
+    return Crew(supervisor, performer, GuidedDecisions(thinking, desk), thinking, guard=guard)

@@ -12,6 +12,7 @@ from sessions.guided.operator import Ask, Operator, Panel, Request, Stage
 from sessions.guided.settings import GuidedSettings
 from sessions.guided.sight import Sight, Watcher
 from sessions.recorder import Level
+from sessions.safety import InterruptGuard
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import TactileLabError
 
@@ -27,6 +28,7 @@ class Desk:
         settings: of the guided session.
         attachments: where notes, pictures and files go.
         touch_force_N: force from which a finger touches.
+        guard: hears Ctrl+C, which ends the session as the person may, even where he is waited for.
         pace: called with the session clock after every cycle; makes a simulated rig wait for the person.
     """
 
@@ -37,10 +39,11 @@ class Desk:
         settings: GuidedSettings,
         attachments: Attachments,
         touch_force_N: float,
+        guard: InterruptGuard,
         pace: Callable[[int], None] = lambda stamp_ns: None,
     ) -> None:
         self._bench, self._operator, self.settings = bench, operator, settings
-        self._attachments, self._pace = attachments, pace
+        self._attachments, self._guard, self._pace = attachments, guard, pace
         self._watcher = Watcher(bench.perception, settings, touch_force_N)
         self.sight = Sight({})
         self.automatic = settings.automatic
@@ -120,6 +123,8 @@ class Desk:
         for request in self._operator.requests():
             self._heard_ns = now_ns
             self._sort(request)
+        if self._guard.requested:
+            self._leave("interrupted by the operator")
         self._heard_ns = now_ns if self._heard_ns is None else self._heard_ns
         if now_ns - self._heard_ns > self.settings.attention_s * NANOSECONDS:
             self._leave(f"nobody there for {self.settings.attention_s:g} s")

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
-import sys
+from collections import deque
 
 from sessions.policy_decisions import Proposal
 from tactile_lab.cli.console import people, say
+from tactile_lab.cli.terminal_input import LineInput
+
+_LOOK_s = 0.05
 
 
 class TerminalApproval:
     """Shows the grasp that would come next and takes a veto: Enter or y does it, n asks for the next best.
 
-    When standard input ends nobody is there any more, and the session goes on by itself.
+    When standard input ends nobody is there any more, and the session goes on by itself. Ctrl+C ends the question.
     """
 
     def __init__(self) -> None:
+        self._input = LineInput()
+        self._typed: deque[str] = deque()
         self._alone = False
 
     def __call__(self, proposal: Proposal) -> bool:
@@ -23,12 +28,16 @@ class TerminalApproval:
             return True
         say(_in_words(proposal), "bold")
         people.print("do it? [Y/n] ", end="")
-        answer = sys.stdin.readline()
-        if not answer:
+        while not (self._typed or self._input.closed or proposal.withdrawn()):
+            self._input.wait(_LOOK_s)
+            self._typed.extend(self._input.lines())
+        if self._typed:
+            return self._typed.popleft().strip().lower() not in {"n", "no"}
+        say("")
+        if not proposal.withdrawn():
             self._alone = True
             say("standard input has ended: the session goes on without asking", "yellow")
-            return True
-        return answer.strip().lower() not in {"n", "no"}
+        return True
 
 
 def _in_words(proposal: Proposal) -> str:

@@ -13,6 +13,8 @@ from tactile_lab.geometry.contacts import FINGERS
 STEPS = (Stage.PLACE, Stage.GUIDE, Stage.CLOSE, Stage.HOLD, Stage.CAPTURE, Stage.ROTATE, Stage.RELEASE)
 KEYS = "SPACE next · g go · u undo · x give up · p pause · e end · a automatic · n note · m marker"
 _BAR_N, _BAR_WIDTH = 1.0, 8
+_SAID = {Stage.PLACE: ("object", "suggested"), Stage.HOLD: ("stability", "observability")}
+"""Facts that plain lines tell at a step, beside the contacts."""
 
 
 def as_panel(panel: Panel, typing: str = "") -> RenderableType:
@@ -44,8 +46,10 @@ def facts(panel: Panel) -> list[tuple[str, str]]:
 
 
 def as_lines(panel: Panel) -> list[str]:
-    """The same for a terminal without abilities: the prompt, and what is seen."""
-    return [f"[{panel.grasp} {panel.stage}] {panel.prompt}", f"  {panel.sight.words()}"]
+    """The same for a terminal without abilities: the prompt, what is seen, and what the step is decided by."""
+    told, names = dict(facts(panel)), _SAID.get(panel.stage, ())
+    said = [f"  {name}: {told[name]}" for name in names if name in told]
+    return [f"[{panel.grasp} {panel.stage}] {panel.prompt}", f"  {panel.sight.words()}", *said]
 
 
 def _steps(stage: Stage) -> Text:

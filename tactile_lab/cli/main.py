@@ -7,11 +7,10 @@ ready, 130 interrupted.
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from collections.abc import Sequence
-from types import FrameType
 
+from tactile_lab.cli.interruptions import interruptions_heeded
 from tactile_lab.errors import TactileLabError
 
 INTERRUPTED = 130
@@ -30,11 +29,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Raises:
         SystemExit: always, with the exit code.
     """
-    signal.signal(signal.SIGTERM, _end_like_ctrl_c)
     try:
-        from tactile_lab.cli.app import app  # here, so that Ctrl+C while it loads ends without a traceback
+        with interruptions_heeded():
+            from tactile_lab.cli.app import app  # here, so that Ctrl+C while it loads ends without a traceback
 
-        app(arguments, prog_name="tactile-lab")
+            app(arguments, prog_name="tactile-lab")
     except TactileLabError as error:
         from tactile_lab.cli.console import complain
 
@@ -42,11 +41,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
-
-
-def _end_like_ctrl_c(number: int, frame: FrameType | None) -> None:
-    """Whoever asks the program to end gets the same careful ending as a person at the keyboard."""
-    signal.raise_signal(signal.SIGINT)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.loading import interruptions_held
 from tactile_lab.cli.options import METHOD_HELP, SHAPE_HELP, Json, Method, NoInput, Root, Shape
 
 
@@ -44,10 +43,9 @@ def reconstruct(
 
     The truth in a log or session is read by the evaluation alone; only known-pose is given its poses.
     """
-    with interruptions_held():
-        from tactile_lab.cli.progress import LiveProgress
-        from tactile_lab.cli.results import conclude
-        from tactile_lab.workflow.reconstructing import Wishes, reconstruct
+    from tactile_lab.cli.progress import LiveProgress
+    from tactile_lab.cli.results import conclude
+    from tactile_lab.workflow.reconstructing import Wishes, reconstruct
 
     del no_input
     wishes = Wishes(

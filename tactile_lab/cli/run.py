@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from tactile_lab.cli.loading import interruptions_held
 from tactile_lab.cli.options import METHOD_HELP, AllowUncalibrated, Json, Method, NoInput, RigName
 from tactile_lab.cli.page_address import PORT, Listen, PageAddress, Port, Token
 
@@ -80,13 +79,12 @@ def run(
 
     Ctrl+C once finishes the step in hand and closes the session; twice ends at once. Both leave a readable session.
     """
-    with interruptions_held():
-        from tactile_lab.cli.approval import TerminalApproval
-        from tactile_lab.cli.attending import GuidedWay, attendance
-        from tactile_lab.cli.progress import LiveProgress
-        from tactile_lab.cli.results import conclude
-        from tactile_lab.cli.session_tables import tell_left_open
-        from tactile_lab.workflow.running import SessionRequest, run_session
+    from tactile_lab.cli.approval import TerminalApproval
+    from tactile_lab.cli.attending import GuidedWay, attendance
+    from tactile_lab.cli.progress import LiveProgress
+    from tactile_lab.cli.results import conclude
+    from tactile_lab.cli.session_tables import tell_left_open
+    from tactile_lab.workflow.running import SessionRequest, run_session
 
     guided = mode is Mode.GUIDED
     if confirm and (no_input or guided):

@@ -12,6 +12,7 @@ from sessions.listing import SessionSummary, left_open
 from sessions.manifest import Manifest
 from sessions.recovery import Recovery
 from sessions.session import TRAFFIC, Session
+from sessions.traffic_reader import segment_paths
 from tactile_lab.cli.console import say, show_facts, show_table, warn
 
 NEVER_CLOSED = "open: still running, or killed before it was closed"
@@ -83,8 +84,9 @@ def show_session(session: Session) -> None:
     manifest = session.manifest
     slam = manifest.settings.get("slam")
     estimation = slam if isinstance(slam, dict) else {}
-    traffic = session.folder / TRAFFIC
-    size = f", {traffic.stat().st_size / 1e6:.1f} MB" if traffic.is_file() else ", traffic.mcap is missing"
+    files = [path.stat().st_size for path in segment_paths(session.folder / TRAFFIC) if path.is_file()]
+    several = f" in {len(files)} files" if len(files) > 1 else ""
+    size = f", {sum(files) / 1e6:.1f} MB{several}" if files else f", {TRAFFIC} is missing"
     facts = [
         ("folder", str(session.folder)),
         ("status", _status(manifest)),

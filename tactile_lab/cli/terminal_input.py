@@ -63,34 +63,41 @@ class KeyInput:
 
 
 class LineInput:
-    """Whole lines from standard input: a terminal without abilities, or a pipe.
+    """Whole lines from standard input: a terminal without abilities, or a pipe. None where there is no such input.
 
     Args:
         descriptor: where to read; standard input unless given.
     """
 
     def __init__(self, descriptor: int | None = None) -> None:
-        self._descriptor = sys.stdin.fileno() if descriptor is None else descriptor
         self._decoder = codecs.getincrementaldecoder("utf-8")("replace")
         self._rest = ""
         self.closed = False
         """The end of the input was reached."""
+        try:
+            self._descriptor = sys.stdin.fileno() if descriptor is None else descriptor
+        except (AttributeError, OSError, ValueError):  # closed before the program began
+            self.closed = True
 
-    def wait(self, seconds: float | None) -> None:
-        """Until something can be read, for so long at most; for ever with None. Without an input, so long."""
+    def wait(self, seconds: float) -> None:
+        """Until something can be read, for so long at most. Without an input, so long.
+
+        Never for ever: a Ctrl+C that comes between Python's last look at its signals and the system's wait does not
+        end that wait.
+        """
         if not self.closed:
             select.select([self._descriptor], [], [], seconds)
         elif seconds:
             time.sleep(seconds)
 
     def lines(self) -> list[str]:
-        """Complete lines that were typed since the last call."""
+        """Lines that were typed since the last call: complete ones, and in the end what is left."""
         if self.closed:
             return []
         data = _waiting_bytes(self._descriptor)
         self.closed = data is None
         *lines, self._rest = (self._rest + self._decoder.decode(data or b"")).split("\n")
-        return lines
+        return [*lines, self._rest] if self.closed and self._rest else lines
 
 
 def _waiting_bytes(descriptor: int) -> bytes | None:

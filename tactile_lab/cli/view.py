@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.loading import interruptions_held
 from tactile_lab.cli.options import Root, SessionName
 from tactile_lab.cli.page_address import PORT, Listen, PageAddress, Port, Token
 
@@ -25,12 +24,11 @@ def view(
     Reading disturbs nobody: a running session does not know that it is watched. Its buttons are on the page of
     ``tactile-lab run --view``.
     """
-    with interruptions_held():
-        from sessions.listing import find_session
-        from tactile_lab.cli.console import say
-        from tactile_lab.clock import MonotonicClock
-        from tactile_lab.view.page import Page
-        from tactile_lab.view.recorded import follow, play
+    from sessions.listing import find_session
+    from tactile_lab.cli.console import say
+    from tactile_lab.clock import MonotonicClock
+    from tactile_lab.view.page import Page
+    from tactile_lab.view.recorded import follow, play
 
     address, port, token = PageAddress(listen, view_port, token).checked()
     found, clock = find_session(root, session), MonotonicClock()

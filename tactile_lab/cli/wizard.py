@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tactile_lab.cli.page_address import PageAddress
 
 _LOOK_s, _RENEW = 0.05, 20
-"""How often the page is looked at for an answer, and after how many looks it is shown everything again."""
+"""How often one looks for an answer, and after how many looks the page is shown everything again."""
 
 
 class Asker:
@@ -103,13 +103,13 @@ class Asker:
     def _answer(self, known: Mapping[str, str], usual: str) -> str:
         """Wait for what is typed, or pressed; what was pressed is shown in the terminal too."""
         looks = 0
-        while (answer := self._next(_LOOK_s if self._page else None)) is None:
+        while (answer := self._next(_LOOK_s)) is None:
             looks += 1
             if self._page is not None and looks % _RENEW == 0:
                 self._page.renew()
         return answer or usual
 
-    def _next(self, seconds: float | None) -> str | None:
+    def _next(self, seconds: float) -> str | None:
         """What was typed or pressed next; None when nothing was within a time. Raises InterruptionError."""
         if self._page is not None and (pressed := self._page.answer()) is not None:
             people.print("(on the page)")
@@ -118,11 +118,8 @@ class Asker:
             self._typed.extend(self._lines(seconds))
         return self._typed.popleft().strip().lower() if self._typed else None
 
-    def _lines(self, seconds: float | None) -> list[str]:
-        try:
-            self._input = self._input or LineInput()
-        except (AttributeError, OSError, ValueError) as error:  # closed before the program began
-            raise self._nobody() from error
+    def _lines(self, seconds: float) -> list[str]:
+        self._input = self._input or LineInput()
         self._input.wait(seconds)
         lines = self._input.lines()
         if not lines and self._input.closed and self._page is None:

@@ -28,6 +28,8 @@ FORMAT = "tactile-experiment/1"
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 """What keeps the libraries of a worker to one thread: small matrices are faster so, and sums come out the same."""
 
+_LOOK_s = 0.5
+"""A wait is never longer: a Ctrl+C that comes just before it would be heard when the next run is done."""
 _ROOT = Path(__file__).resolve().parents[2]
 _PARTS = ("tactile_lab", "calibration", "drivers", "sessions")
 _WITHOUT = ("cli", "workflow", "view", "report")
@@ -109,7 +111,7 @@ def _in_processes(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]
     try:
         waiting = {pool.submit(execute, cell, work) for cell in cells}
         while waiting:
-            ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+            ready, waiting = wait(waiting, _LOOK_s, return_when=FIRST_COMPLETED)
             for future in ready:
                 yield future.result()
     except BrokenProcessPool as error:

@@ -75,7 +75,7 @@ def crew_for(
         return crew
     pace = _pace(bench, attendance)
     decisions = AttendedDecisions(
-        crew.thinking, recorded_by(bench), attendance.approve, operator, lambda: pace(bench.clock.now_ns())
+        crew.thinking, recorded_by(bench), attendance.approve, operator, crew.guard, lambda: pace(bench.clock.now_ns())
     )
     return replace(crew, decisions=decisions)
 

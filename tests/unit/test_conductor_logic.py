@@ -262,6 +262,23 @@ def test_interrupt_before_the_capture_lets_go_without_a_grasp() -> None:
     assert watcher.phases[-1] == "lift"
 
 
+def test_interrupt_while_the_next_grasp_is_thought_of_ends_without_it() -> None:
+    """As at the question of --confirm, which the planner's answer is taken for here."""
+
+    class Interrupted(AutonomousDecisions):
+        def think(self, index: int) -> None:
+            super().think(index)
+            if index == 1:
+                os.kill(os.getpid(), signal.SIGINT)
+
+    world, wanted = DiscWorld(disc()), settings(5)
+    crew = autonomous_crew(world, TactileSlam(SlamSettings(particles=200), seed=1), wanted)  # type: ignore[arg-type]
+    crew = replace(crew, decisions=Interrupted(crew.thinking))
+    outcome = Conductor(world, wanted, crew).run()  # type: ignore[arg-type]
+    assert (outcome.ending, len(outcome.grasps)) == (Ending.INTERRUPTED, 1)
+    assert world.mark_counts[MarkKind.CAPTURE_END] == 1
+
+
 def test_two_interrupts_stop_at_once() -> None:
     def interrupt(world: DiscWorld) -> None:
         if world.cycles in (200, 201):

@@ -6,6 +6,7 @@ import os
 import pty
 import termios
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -132,5 +133,8 @@ def test_panel_says_prompt_contacts_and_what_is_silent() -> None:
     assert told["stability"] == "2 more fingers have to touch"
     assert told["observability"].startswith("0.31")
     assert as_lines(panel)[0] == "[2 hold] Hold still"
+    assert "  stability: 2 more fingers have to touch" in as_lines(panel)
+    beginning = replace(panel, stage=Stage.PLACE, unknown="40 % of the surface is known", suggestion="pinch")
+    assert as_lines(beginning)[2:] == ["  object: 40 % of the surface is known", "  suggested: pinch"]
     assert as_panel(panel) is not None
     assert panel.content()["stage"] == "hold"

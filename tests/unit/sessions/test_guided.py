@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -139,6 +141,31 @@ def test_session_ends_when_asked_twice(tmp_path: Path) -> None:
     script = [Cue(at(Stage.PLACE, 2), ask(Ask.END)), Cue(at(Stage.PLACE, 2), ask(Ask.END))]
     run = Run(tmp_path, DiscWorld(disc()), SimulatedOperator(script), grasps=5)
     assert (run.outcome.ending, run.outcome.reason) == (Ending.COMPLETE, "ended by the operator after 1 grasps")
+
+
+class Leaving(SimulatedOperator):
+    """Plays the script and then asks for nothing any more."""
+
+    def show(self, panel: Panel) -> None:
+        if self._script:
+            super().show(panel)
+
+
+@pytest.mark.parametrize("stage", [Stage.GUIDE, Stage.CLOSE, Stage.HOLD, Stage.ROTATE])
+def test_ctrl_c_ends_a_session_that_waits_for_its_person(tmp_path: Path, stage: Stage) -> None:
+    leaving = Leaving([Cue(at(stage), act=lambda: os.kill(os.getpid(), signal.SIGINT))])
+    run = Run(tmp_path, DiscWorld(disc()), leaving, grasps=3, attention_s=20.0)
+    assert run.outcome.ending is Ending.INTERRUPTED
+    assert len(run.outcome.grasps) == (stage is Stage.ROTATE)
+    assert "interrupted by the operator" in run.told
+
+
+@pytest.mark.parametrize("stage", [Stage.PLACE, Stage.HOLD])
+def test_ctrl_c_ends_a_pause_and_the_session(tmp_path: Path, stage: Stage) -> None:
+    interrupt = Cue(at(stage, paused=True), act=lambda: os.kill(os.getpid(), signal.SIGINT))
+    leaving = Leaving([Cue(at(stage), ask(Ask.PAUSE)), interrupt])
+    run = Run(tmp_path, DiscWorld(disc()), leaving, grasps=3, attention_s=20.0)
+    assert (run.outcome.ending, run.outcome.grasps) == (Ending.INTERRUPTED, ())
 
 
 def test_asking_once_for_the_end_and_then_for_another_thing_goes_on(tmp_path: Path) -> None:
