@@ -1,7 +1,6 @@
 """Plots of experiments: error against something, and spreads of methods side by side; one SVG file each.
 
-The file carries its own style, for light and dark pages. Medians are dots, the nearby band or thick line reaches
-to the ninetieth percentile, the thin line to the maximum.
+The file carries its own style, for light and dark pages, and a line that says what its marks mean.
 """
 
 from __future__ import annotations
@@ -21,6 +20,9 @@ from tactile_lab.report.svg import Chart, Frame, tick_label
 WIDTH = 920.0
 _GAP, _TITLE_HEIGHT, _LEGEND_HEIGHT, _PANEL_TITLE = 18.0, 30.0, 24.0, 20.0
 _LEGEND_LETTER = 6.7
+_KEY_HEIGHT, _BESIDE = 20.0, 9.0
+_CURVES_KEY = "dot: median; band: up to the 90th percentile"
+_RANGES_KEY = "dot: median; thick line: up to the 90th percentile; thin line: up to the largest value"
 _LARGEST_mm = 300.0
 """Axes end here: what is farther off is simply wrong."""
 
@@ -125,7 +127,7 @@ def curves_svg(title: str, panels: Sequence[CurvePanel], columns: int = 2) -> st
     reached = [values for panel in panels for series in panel.series for values in (series.median, series.p90)]
     limits = _log_limits(np.concatenate(reached))
     charts = [_curves(panel, names, limits, _panel_width(columns)) for panel in panels]
-    return _sheet(title, charts, [panel.title for panel in panels], columns, names)
+    return _sheet(title, charts, [panel.title for panel in panels], columns, names, _CURVES_KEY)
 
 
 def ranges_svg(title: str, panels: Sequence[RangePanel], columns: int = 2) -> str:
@@ -135,7 +137,7 @@ def ranges_svg(title: str, panels: Sequence[RangePanel], columns: int = 2) -> st
     known = [group.spread(panel.key) for panel in panels for _, group in panel.groups]
     limits = _log_limits(np.array([value for spread in known for value in (spread.median, spread.largest)]))
     charts = [_ranges(panel, names, limits, _panel_width(columns)) for panel in panels]
-    return _sheet(title, charts, [panel.title for panel in panels], columns, [])
+    return _sheet(title, charts, [panel.title for panel in panels], columns, [], _RANGES_KEY)
 
 
 def _log_limits(values: Array) -> tuple[float, float]:
@@ -194,7 +196,7 @@ def _curve_axes(chart: Chart, panel: CurvePanel, limits: tuple[float, float]) ->
 
 def _ranges(panel: RangePanel, names: list[str], limits: tuple[float, float], width: float) -> Chart:
     count = len(panel.groups)
-    frame = Frame(width, 48.0 + 24.0 * count, left=132.0, right=62.0, top=8.0)
+    frame = Frame(width, 48.0 + 24.0 * count, left=132.0 + _BESIDE, right=62.0 + _BESIDE, top=8.0)
     chart = Chart(frame, limits, (count - 0.5, -0.5))
     for value in _decade_ticks(limits):
         chart.segment(np.array([math.log10(value), count - 0.5]), np.array([math.log10(value), -0.5]), "grid")
@@ -207,15 +209,13 @@ def _ranges(panel: RangePanel, names: list[str], limits: tuple[float, float], wi
 
 def _range(chart: Chart, line: int, name: str, group: Group, key: str, colour: str) -> None:
     spread = group.spread(key)
-    median, p90, largest = (
-        float(np.clip(np.log10(value), chart.x.low, chart.x.high))
-        for value in (spread.median, spread.p90, spread.largest)
-    )
-    chart.label(chart.x.low, line, name, "name", "end", dy=4)
+    values = np.array([spread.median, spread.p90, spread.largest])
+    median, p90, largest = _log(values, (chart.x.low, chart.x.high)).tolist()
+    chart.label(chart.x.low, line, name, "name", "end", dx=-_BESIDE, dy=4)
     for end, kind in ((largest, "reach"), (p90, "p90")):
         chart.segment(np.array([median, line]), np.array([end, line]), kind, f"stroke:{colour}")
     chart.dot((median, line), "dot", radius=5, tip=f"{name}: {spread.text()}", style=f"fill:{colour}")
-    chart.label(chart.x.high, line, f"{100 * group.failed_share:.0f} % fail", "tick", "start", dy=4)
+    chart.label(chart.x.high, line, f"{100 * group.failed_share:.0f} % fail", "tick", "start", dx=_BESIDE, dy=4)
 
 
 def _decade_ticks(limits: tuple[float, float]) -> list[float]:
@@ -232,8 +232,10 @@ def _colour(name: str, names: list[str]) -> str:
     return f"var(--s{index})"
 
 
-def _sheet(title: str, charts: Sequence[Chart], titles: Sequence[str], columns: int, legend: list[str]) -> str:
-    """All charts on one page, row by row."""
+def _sheet(
+    title: str, charts: Sequence[Chart], titles: Sequence[str], columns: int, legend: list[str], key: str
+) -> str:
+    """All charts on one page, row by row, and below them what the marks mean."""
     parts = [f'<text class="title" x="{_GAP}" y="22">{escape(title)}</text>', *_legend(legend)]
     top = _TITLE_HEIGHT + (_legend_lines(legend) * _LEGEND_HEIGHT if legend else 6.0)
     for first in range(0, len(charts), columns):
@@ -243,6 +245,8 @@ def _sheet(title: str, charts: Sequence[Chart], titles: Sequence[str], columns: 
             parts.append(f'<text class="panel" x="{left:.0f}" y="{top + 14:.0f}">{escape(name)}</text>')
             parts.append(_placed(chart, name, left, top + _PANEL_TITLE))
         top += _PANEL_TITLE + max(chart.frame.height for chart, _ in row) + _GAP
+    parts.append(f'<text x="{_GAP:.0f}" y="{top:.0f}">{escape(key)}</text>')
+    top += _KEY_HEIGHT
     size = f'viewBox="0 0 {WIDTH:.0f} {top:.0f}" width="{WIDTH:.0f}" height="{top:.0f}"'
     page = f'<rect class="page" width="{WIDTH:.0f}" height="{top:.0f}"/>'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size}><style>{STYLE}</style>{page}{"".join(parts)}</svg>\n'

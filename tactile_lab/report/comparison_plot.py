@@ -8,7 +8,8 @@ from html import escape
 from tactile_lab.evaluation.comparison import Figure, MethodSummary
 from tactile_lab.report.svg import Scale, tick_label
 
-_WIDTH, _LEFT, _RIGHT, _LINE, _HEAD, _FOOT = 760.0, 170.0, 30.0, 24.0, 34.0, 26.0
+_PLOT, _RIGHT, _LINE, _HEAD, _FOOT = 560.0, 30.0, 24.0, 34.0, 26.0
+_LEAST_LEFT, _LETTER = 170.0, 7.0
 _LEGEND = "dot: mean; bar: its 95 % interval, from 0 on; tick: largest value"
 _STYLE = """
 :root { --page:#ffffff; --ink:#1b2330; --soft:#5a6678; --grid:#e6e9ee; --mark:#1d5fa8; }
@@ -29,22 +30,23 @@ def comparison_svg(summaries: Sequence[MethodSummary]) -> str:
     count = len(summaries[0].figures)
     panels = [[(summary.method, summary.figures[index]) for summary in summaries] for index in range(count)]
     shown = [panel for panel in panels if any(figure.mean is not None for _, figure in panel)]
+    left = max(_LEAST_LEFT, 20.0 + _LETTER * max(len(summary.method) for summary in summaries))
     parts, top = [], 8.0
     for panel in shown:
-        parts += _panel(panel, top)
+        parts += _panel(panel, left, top)
         top += _HEAD + _LINE * len(panel) + _FOOT
-    parts.append(f'<text x="{_LEFT:g}" y="{top + 14:g}">{_LEGEND}</text>')
-    height = top + 26.0
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH:g} {height:g}" width="{_WIDTH:g}">'
+    parts.append(f'<text x="{left:g}" y="{top + 14:g}">{_LEGEND}</text>')
+    width, height = left + _PLOT + _RIGHT, top + 26.0
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" width="{width:g}">'
     page = '<rect class="page" width="100%" height="100%"/>'
     return "\n".join([head, f"<style>{_STYLE}</style>", page, *parts, "</svg>\n"])
 
 
-def _panel(panel: Sequence[tuple[str, Figure]], top: float) -> list[str]:
+def _panel(panel: Sequence[tuple[str, Figure]], left: float, top: float) -> list[str]:
     values = [value for _, figure in panel for value in _values(figure)]
-    scale = Scale(0.0, 1.05 * (max(values) or 1.0), _LEFT, _WIDTH - _RIGHT)
+    scale = Scale(0.0, 1.05 * (max(values) or 1.0), left, left + _PLOT)
     bottom = top + _HEAD + _LINE * len(panel)
-    parts = [f'<text class="title" x="{_LEFT:g}" y="{top + 18:g}">{escape(panel[0][1].title)}</text>']
+    parts = [f'<text class="title" x="{left:g}" y="{top + 18:g}">{escape(panel[0][1].title)}</text>']
     for tick in scale.ticks():
         x = scale(tick)
         parts.append(f'<line class="grid" x1="{x:.1f}" y1="{top + 26:g}" x2="{x:.1f}" y2="{bottom:g}"/>')
@@ -55,7 +57,7 @@ def _panel(panel: Sequence[tuple[str, Figure]], top: float) -> list[str]:
 
 
 def _line(method: str, figure: Figure, scale: Scale, y: float) -> list[str]:
-    parts = [f'<text x="{_LEFT - 10:g}" y="{y + 4:g}" text-anchor="end">{escape(method)}</text>']
+    parts = [f'<text x="{scale.start_px - 10:g}" y="{y + 4:g}" text-anchor="end">{escape(method)}</text>']
     if figure.mean is None or figure.spread is None:
         return parts
     largest = scale(figure.spread.largest)

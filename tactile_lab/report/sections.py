@@ -77,8 +77,8 @@ def key_figures(content: ReportContent) -> Markup:
 
 
 def _tile(name: str, value: str, unit: str, under: str) -> Markup:
-    number = element("dd", value, *([element("small", unit)] if unit and value != UNKNOWN else []))
-    return element("div", element("dt", name), number, element("dd", under, class_="hint"))
+    figure_with_unit = element("dd", value, *([element("small", unit)] if unit and value != UNKNOWN else []))
+    return element("div", element("dt", name), figure_with_unit, element("dd", under, class_="hint"))
 
 
 def _at_end(pose: Mapping[str, Any], key: str) -> str:

@@ -129,9 +129,11 @@ class Chart:
         place = f'x="{x:.2f}" y="{y:.2f}" width="{right - x:.2f}" height="{bottom - y:.2f}" rx="2"'
         self.add(f'<rect class="{kind}" {place}{_style(style)}><title>{escape(tip)}</title></rect>')
 
-    def label(self, x: float, y: float, text: str, kind: str = "note", anchor: str = "start", dy: float = 0.0) -> None:
-        """A short text at a place in data units."""
-        self.add(_text(self.x(x), self.y(y) + dy, text, kind, anchor))
+    def label(
+        self, x: float, y: float, text: str, kind: str = "note", anchor: str = "start", dx: float = 0.0, dy: float = 0.0
+    ) -> None:
+        """A short text at a place in data units, moved by some pixels."""
+        self.add(_text(self.x(x) + dx, self.y(y) + dy, text, kind, anchor))
 
     def trace(self, points: Array, closed: bool = False) -> str:
         """Points of shape (n, 2) as SVG path data."""
