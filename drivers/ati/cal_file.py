@@ -64,6 +64,7 @@ class AtiCalibration:
         ranges: calibrated range of each axis, file's units, shape (6,).
         output_range_V: span of the amplifier's output, so that +-10 V is 20; None for a Net F/T box.
         temperature: how the gauges follow the temperature, or None where the file does not say.
+        calibrated: the date, in the file's own words.
     """
 
     serial: str
@@ -76,6 +77,7 @@ class AtiCalibration:
     ranges: Array
     output_range_V: float | None = None
     temperature: TemperatureTerms | None = None
+    calibrated: str = ""
 
     @property
     def working_matrix(self) -> Array:
@@ -150,6 +152,7 @@ def _daq_sensor(root: ET.Element) -> AtiCalibration:
         ranges=np.array([_number(axes[n].attrib["max"]) for n in AXES]),
         output_range_V=_number(calibration.attrib.get("OutputRange", "20")),
         temperature=_temperature_terms(calibration),
+        calibrated=calibration.attrib.get("CalDate", ""),
     )
 
 

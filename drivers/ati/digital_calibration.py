@@ -30,6 +30,7 @@ class DigitalCalibration:
         force_unit, torque_unit: of the counts per unit.
         counts_per_force, counts_per_torque: scale.
         ratings: calibrated range of each axis, in those units, shape (6,).
+        calibrated: the date, in the sensor's own words.
     """
 
     serial: str
@@ -40,6 +41,7 @@ class DigitalCalibration:
     counts_per_force: int
     counts_per_torque: int
     ratings: Array
+    calibrated: str = ""
 
     @property
     def working_matrix(self) -> Array:
@@ -83,11 +85,14 @@ def decode_block(block: bytes) -> DigitalCalibration:
     """
     if len(block) != BLOCK.size:
         raise CodecError(f"{len(block)} bytes where {BLOCK.size} belong", where="ATI calibration block")
-    serial, part, _, _, *rest = BLOCK.unpack(block)
+    serial, part, _, time, *rest = BLOCK.unpack(block)
     matrix, (force_code, torque_code), ratings = np.array(rest[:36]).reshape(6, 6), rest[36:38], np.array(rest[38:44])
     force_unit, torque_unit = unit_names(force_code, torque_code)
     check_matrix(matrix, rest[44], rest[45], "ATI calibration block")
-    return DigitalCalibration(_text(serial), _text(part), matrix, force_unit, torque_unit, rest[44], rest[45], ratings)
+    scale = rest[44], rest[45]
+    return DigitalCalibration(
+        _text(serial), _text(part), matrix, force_unit, torque_unit, *scale, ratings, calibrated=_text(time)
+    )
 
 
 def encode_block(calibration: DigitalCalibration) -> bytes:
@@ -97,7 +102,7 @@ def encode_block(calibration: DigitalCalibration) -> bytes:
             calibration.serial.encode("ascii"),
             calibration.part_number.encode("ascii"),
             b"",
-            b"",
+            calibration.calibrated.encode("ascii"),
             *calibration.matrix.ravel().tolist(),
             FORCE_UNITS.index(calibration.force_unit) + 1,
             TORQUE_UNITS.index(calibration.torque_unit) + 1,

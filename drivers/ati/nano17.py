@@ -102,12 +102,12 @@ class Nano17(ForceTip):
 
     @property
     def identity(self) -> str:
-        """Serial number, and firmware where there is one to ask, as the wire told when connecting; else empty."""
+        """Serial number, firmware and date of calibration as far as the wire told when connecting; else empty."""
         told: Any = getattr(self.wire, "page", None) or getattr(self.wire, "calibration", None)
         if told is None:
             return ""
-        firmware = getattr(told, "firmware", "")
-        return f"{told.serial}, firmware {firmware}" if firmware else str(told.serial)
+        known = ((name, getattr(told, name, "")) for name in ("firmware", "calibrated"))
+        return ", ".join([str(told.serial), *(f"{name} {words}" for name, words in known if words)])
 
     def close(self) -> None:
         """End the stream and close the link; idempotent. A device that is gone already is no error."""

@@ -90,6 +90,11 @@ class ElectrodeLayout:
     skin: Skin
 
 
+def electrodes_of(serial: str) -> ElectrodeCount:
+    """How many electrodes the sensor with this serial number has (protocols A.10)."""
+    return 24 if serial.startswith(("BTSP", "BTTB")) else 19
+
+
 def electrode_layout(electrodes: ElectrodeCount, skin: Skin | None = None) -> ElectrodeLayout:
     """The layout of the 19- or 24-electrode model, with its own skin unless another is given."""
     if electrodes == 19:

@@ -56,16 +56,19 @@ class Slot:
 def decode_slot(payload: bytes, request: int) -> Slot:
     """One slot of 16 bytes, the answer to ``request``.
 
-    Readings outside the converter's range are given as they are: a socket without a sensor shows such values.
+    Readings outside the converter's range are given as they are: a socket without a sensor shows such values. Answers
+    to questions beyond the channels, such as a name, hold no readings.
 
     Raises:
         CodecError: wrong length.
     """
     if len(payload) != SLOT_BYTES:
         raise CodecError(f"{len(payload)} bytes where a slot has {SLOT_BYTES}", where="BioTac slot")
+    if request > LAST_CHANNEL:
+        return Slot((), {})
     pac0, pac1, first, valid, second = _SLOT.unpack(payload)
     values: dict[int, int] = {}
-    if valid & _FIRST and Channel.PDC <= request <= LAST_CHANNEL:
+    if valid & _FIRST and request >= Channel.PDC:
         values[request] = first
     if valid & _SECOND and Channel.PDC <= request < LAST_CHANNEL:
         values[request + 1] = second

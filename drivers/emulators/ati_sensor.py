@@ -11,6 +11,7 @@ from tactile_lab.geometry.contacts import Array
 
 _COUNTS_PER_N, _LEVER_m = 1500.0, 0.006
 _AHEAD = 256
+_CALIBRATED = "2026-01-01"
 RANGES = (12.0, 12.0, 17.0, 0.12, 0.12, 0.12)
 """Nano17 SI-12-0.12, newtons and newton metres."""
 
@@ -23,7 +24,8 @@ def emulated_calibration(serial: str = "FT00001") -> DigitalCalibration:
         rows.append([0.0, 0.0, 1.0, -sine / _LEVER_m, cosine / _LEVER_m, 0.0])
         rows.append([-sine, cosine, 0.0, 0.0, 0.0, 1.0 / _LEVER_m])
     matrix: Array = np.linalg.inv(_COUNTS_PER_N / 3.0 * np.array(rows)).astype(np.float64) * 1e6
-    return DigitalCalibration(serial, "SI-12-0.12", matrix, "N", "Nm", 1_000_000, 1_000_000, np.array(RANGES))
+    counts = (1_000_000, 1_000_000)
+    return DigitalCalibration(serial, "SI-12-0.12", matrix, "N", "Nm", *counts, np.array(RANGES), _CALIBRATED)
 
 
 class EmulatedSensor:

@@ -249,6 +249,7 @@ class ShadowHand:
                 continue
             if sample is not None:
                 newest = sample
+                self._dialogue.answered(sample.stamp_ns)
                 self._guard.look(sample.status, settling=self._dialogue.settling)
         return newest
 

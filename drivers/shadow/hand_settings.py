@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from drivers.shadow.gains import GainTable
-from drivers.shadow.motor_data import MAX_PWM
+from drivers.shadow.motor_data import MAX_PWM, MOTOR_PATIENCE_s
 from drivers.shadow.motor_load import LoadLimits
 from drivers.shadow.motor_polling import PollingRates
 from drivers.shadow.motor_watch import HeatLimits
@@ -22,11 +22,12 @@ class HandSettings(StrictModel):
 
     Attributes:
         palm: which palm the hand has; on a cable the product code tells where this is left out (:attr:`palm_stated`).
-        cycle_s: period of the exchanges while connecting and closing, seconds.
+        cycle_s: period of the exchanges, seconds; below the 20 ms after which motors halt for want of a demand.
         demand: what the motors are told: a duty cycle, or a torque that they keep by themselves at 5 kHz.
         gains: position control, in counts of that demand.
         polling: how often the motors are asked for what.
         tactile: kind of fingertip asked for data through the palm.
+        tactile_names: ask the fingertips, after connecting, who they are as well; ``rig check`` does.
         lost_limit: so many cycles in a row without a valid status stop the hand.
         blind_after: so many lost cycles in a row already take the demands away, until a status comes again.
         soft_start_s: after connecting, a resume or a loss the duty cycle limit rises from zero in this time.
@@ -39,11 +40,12 @@ class HandSettings(StrictModel):
     """
 
     palm: PalmName = USUAL_PALM
-    cycle_s: float = Field(default=0.01, gt=0.0)
+    cycle_s: float = Field(default=0.01, gt=0.0, lt=MOTOR_PATIENCE_s)
     demand: Literal["pwm", "torque"] = "pwm"
     gains: GainTable = GainTable()
     polling: PollingRates = PollingRates()
     tactile: TactileKind = "none"
+    tactile_names: bool = False
     lost_limit: int = Field(default=10, ge=1)
     blind_after: int = Field(default=2, ge=1)
     soft_start_s: float = Field(default=0.5, ge=0.0)

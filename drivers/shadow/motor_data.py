@@ -113,6 +113,9 @@ SERIOUS_FLAGS = int(
 )
 """Flags with which a motor halts itself."""
 
+MOTOR_PATIENCE_s = 0.02
+"""A motor that has seen no demand for so long halts itself."""
+
 _FLAG_WORDS = {
     MotorFlag.EEPROM_WRITING: "writing its memory",
     MotorFlag.CONFIG_CRC_MISMATCH: "last configuration failed its checksum",

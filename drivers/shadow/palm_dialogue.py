@@ -6,16 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.shadow.hand_settings import HandSettings
-from drivers.shadow.motor_data import ToMotor
+from drivers.shadow.motor_data import MOTOR_PATIENCE_s, ToMotor
 from drivers.shadow.motor_polling import MotorPolling
 from drivers.shadow.palm_codec import EdcCommand, PalmCommand
 from drivers.shadow.palm_images import PALMS
 from drivers.shadow.tactile_requests import TactileRotation
 from tactile_lab.clock import NANOSECONDS, Clock
 
-MOTOR_PATIENCE_ns = 20_000_000
-"""A motor halts itself when it has seen no demand for 20 ms."""
-
+_MOTOR_PATIENCE_ns = round(MOTOR_PATIENCE_s * NANOSECONDS)
 _DEMANDS = (ToMotor.DEMAND_PWM, ToMotor.DEMAND_TORQUE)
 
 
@@ -32,7 +30,9 @@ class PalmDialogue:
         self._image = PALMS[settings.palm]
         self._usual = ToMotor.DEMAND_TORQUE if settings.demand == "torque" else ToMotor.DEMAND_PWM
         self._grace_ns = settings.demand_grace_s * NANOSECONDS
-        self._polling, self._tactile = MotorPolling(settings.polling), TactileRotation(settings.tactile)
+        self._polling = MotorPolling(settings.polling)
+        self._tactile = TactileRotation(settings.tactile, names=settings.tactile_names)
+        self._before_ns: int | None = None
         self._sent_ns: int | None = None
         self._demands_since_ns = clock.now_ns()
 
@@ -44,11 +44,10 @@ class PalmDialogue:
         """The next command, with these words for the motors: demands unless another type is named."""
         to_motor = self._usual if to_motor is None else to_motor
         now_ns = self._clock.now_ns()
-        silent = self._sent_ns is None or now_ns - self._sent_ns > MOTOR_PATIENCE_ns
-        if silent or to_motor not in _DEMANDS:
+        if self._sent_ns is None or to_motor not in _DEMANDS:
             self._demands_since_ns = now_ns
         which_motors, kind = self._polling.next(now_ns)
-        self._sent_ns = now_ns
+        self._before_ns, self._sent_ns = self._sent_ns, now_ns
         command = PalmCommand(
             edc_command=EdcCommand.SENSOR_DATA,
             from_motor_data_type=kind,
@@ -58,6 +57,11 @@ class PalmDialogue:
             tactile_data_type=self._tactile.next(),
         )
         return self._image.encode_command(command)
+
+    def answered(self, stamp_ns: int) -> None:
+        """The command was answered. It reached the palm between then and now: so long the motors may have waited."""
+        if self._before_ns is not None and stamp_ns - self._before_ns > _MOTOR_PATIENCE_ns:
+            self._demands_since_ns = stamp_ns
 
     def interrupted(self) -> None:
         """A cycle was lost: the motors may have missed their demand."""

@@ -30,9 +30,10 @@ _REST_PAC, _PAC_NOISE = 2042.0, 10.0
 _REST_TAC, _REST_TDC = 1998.0, 2283.0
 _PDC_NOISE, _HEAT_NOISE = 0.5, 1.0
 
-_PROTOCOL, _FREQUENCY = 0xFFF9, 0xFFFA
-_TEXTS = {0xFFFB: b"SynTouch", 0xFFFC: b"BTSIMULATED", 0xFFFD: b"2.3", 0xFFFE: b"1.0"}
-_BIOTAC_PROTOCOL, _SAMPLE_Hz = 2, 100
+_PROTOCOL, _FREQUENCY, _SERIAL = 0xFFF9, 0xFFFA, 0xFFFC
+_WORDS = {_PROTOCOL: 2, _FREQUENCY: 100}  # BioTac; samples in a second
+_TEXTS = {0xFFFB: b"SynTouch", 0xFFFD: b"2.3", 0xFFFE: b"1.0"}
+_SERIALS = {19: b"BTSIM-", 24: b"BTSP-SIM-"}
 
 
 class BiotacSkin:
@@ -53,6 +54,7 @@ class BiotacSkin:
         count = len(self._electrodes_m)
         heat = (_REST_TAC, _REST_TDC)
         self._rest = np.array([rng.uniform(*_REST_PDC), *heat, *rng.uniform(*_REST_ELECTRODE, count)])
+        self.electrodes = count
         self._noise = np.array([_PDC_NOISE, _HEAT_NOISE, _HEAT_NOISE, *[settings.noise_counts] * count])
 
     def channels(self, world_T_distal: Pose3, contacts: Sequence[TrueContact]) -> Array:
@@ -119,13 +121,18 @@ class BiotacSection:
 
     def answer(self, data_type: int) -> tuple[int, NDArray[np.uint8]]:
         """All five sensors answer every request they know; to others none is valid."""
-        if data_type in _TEXTS or data_type in (_PROTOCOL, _FREQUENCY):
-            return _ALL_VALID, np.tile(np.frombuffer(_identity(data_type), np.uint8), (len(FINGERS), 1))
+        if data_type == _SERIAL or data_type in _WORDS or data_type in _TEXTS:
+            return _ALL_VALID, _slots([self._name(finger, data_type) for finger in FINGERS])
         if not Channel.PDC <= data_type <= electrode_channel(24):
             return 0, np.zeros((len(FINGERS), SLOT_BYTES), np.uint8)
         contacts = self._plant.contacts()
-        slots = b"".join(self._slot(finger, data_type, contacts) for finger in FINGERS)
-        return _ALL_VALID, np.frombuffer(slots, np.uint8).reshape(len(FINGERS), SLOT_BYTES)
+        return _ALL_VALID, _slots([self._slot(finger, data_type, contacts) for finger in FINGERS])
+
+    def _name(self, finger: str, question: int) -> bytes:
+        """The answer to a question about the sensor itself."""
+        if question == _SERIAL:
+            return _SERIALS[self._skins[finger].electrodes] + finger.encode()
+        return _WORDS[question].to_bytes(2, "little") if question in _WORDS else _TEXTS[question]
 
     def _slot(self, finger: str, data_type: int, contacts: tuple[TrueContact, ...]) -> bytes:
         skin = self._skins[finger]
@@ -134,8 +141,7 @@ class BiotacSection:
         return skin.slot(data_type)
 
 
-def _identity(data_type: int) -> bytes:
-    """The 16 bytes of a question about the sensor itself."""
-    words = {_PROTOCOL: _BIOTAC_PROTOCOL, _FREQUENCY: _SAMPLE_Hz}
-    content = words[data_type].to_bytes(2, "little") if data_type in words else _TEXTS[data_type]
-    return content.ljust(SLOT_BYTES, b"\0")
+def _slots(answers: Sequence[bytes]) -> NDArray[np.uint8]:
+    """The answers as they stand in the palm's status, shape (5, 16)."""
+    together = b"".join(answer.ljust(SLOT_BYTES, b"\0") for answer in answers)
+    return np.frombuffer(together, np.uint8).reshape(len(answers), SLOT_BYTES)

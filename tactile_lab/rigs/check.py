@@ -2,44 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from calibration.admission import objections
-from calibration.store import read_record
 from drivers.ati.force_tip import ForceTip
-from drivers.biotac import units
 from drivers.biotac.biotac import BioTac
-from drivers.biotac.slot_codec import Channel
 from drivers.camera.camera import Camera
 from drivers.positioner import Positioner
 from drivers.shadow.ethercat_link import EthercatCounts
 from drivers.shadow.hand import ShadowHand
 from drivers.shadow.hand_process import HandProcess
 from drivers.shadow.motor_polling import load_rates
+from drivers.shadow.tactile_names import TactileNames
 from drivers.simulation.objects import CATALOGUE
 from sessions.bench import Bench
 from sessions.instruments import NamedInstrument
 from sessions.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, fingertip_link
 from sessions.recorder import Recorder
-from tactile_lab.calibration_file import is_stored
 from tactile_lab.clock import MonotonicClock
 from tactile_lab.errors import ConfigurationError, DeviceError
 from tactile_lab.geometry.contacts import FINGERS
 from tactile_lab.rigs.build import check_calibration
+from tactile_lab.rigs.check_calibrations import check_borrowed, check_calibrations
 from tactile_lab.rigs.check_fingertips import check_fingertips
 from tactile_lab.rigs.check_hand import asked_once, check_hand, firmware
+from tactile_lab.rigs.check_tactile import biotac_figures, biotac_words, contradictions
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.findings import Finding, told_losses
-from tactile_lab.rigs.fingertip_rig import is_fingertip_rig, load_fingertip_rig
-from tactile_lab.rigs.hand_rig import is_hand_rig, load_hand_rig
+from tactile_lab.rigs.fingertip_rig import FingertipRig, is_fingertip_rig, load_fingertip_rig
+from tactile_lab.rigs.hand_rig import HandRig, is_hand_rig, load_hand_rig
 from tactile_lab.rigs.laboratory import open_laboratory
 from tactile_lab.rigs.stream_watch import StreamWatch, in_words
-from tactile_lab.strict_yaml import load
 
 LISTEN_ns = 500_000_000
 _NOISY = 6.0
@@ -54,15 +51,34 @@ def check_rig(name: str, seed: int = 0, *, move: bool = False) -> list[Finding]:
     Raises:
         ConfigurationError: the rig file, or a calibration file it names.
     """
-    if Path(name).suffix in {".yaml", ".yml"} and is_fingertip_rig(Path(name)):
-        return check_fingertips(load_fingertip_rig(Path(name)), MonotonicClock())
-    if Path(name).suffix in {".yaml", ".yml"} and is_hand_rig(Path(name)):
-        return check_hand(load_hand_rig(Path(name)), MonotonicClock(), move=move)
+    path = Path(name)
+    is_file = path.suffix in {".yaml", ".yml"}
+    if is_file and is_hand_rig(path):
+        return _hand_rig(load_hand_rig(path), move)
+    if is_file and is_fingertip_rig(path):
+        _refuse_to_move(name, move)
+        return _fingertip_rig(load_fingertip_rig(path))
     rig = load_rig(name)
     check_calibration(rig)
-    if move and rig.description.kind == "simulated":
+    _refuse_to_move(name, move and rig.description.kind == "simulated")
+    return check_calibrations(rig.files, rig.installation) + _devices(rig, seed, move)
+
+
+def _refuse_to_move(name: str, move: bool) -> None:
+    if move:
         raise ConfigurationError("has no real motors to move", where=name, hint="Leave --move out")
-    return _calibrations(rig) + _devices(rig, seed, move)
+
+
+def _fingertip_rig(rig: FingertipRig) -> list[Finding]:
+    found = check_fingertips(rig, MonotonicClock())
+    named = {fingertip_link(finger): getattr(wire, "serial", "") for finger, wire in rig.description.wires.items()}
+    serials = {device: serial for device, serial in named.items() if serial}
+    return check_borrowed({"fingertips": rig.folder / rig.description.calibration}, serials) + found
+
+
+def _hand_rig(rig: HandRig, move: bool) -> list[Finding]:
+    found, serial = check_hand(rig, MonotonicClock(), move=move), rig.description.ethercat.serial
+    return check_borrowed(rig.files, {} if serial is None else {HAND_LINK: str(serial)}) + found
 
 
 def _devices(rig: Rig, seed: int, move: bool) -> list[Finding]:
@@ -70,10 +86,11 @@ def _devices(rig: Rig, seed: int, move: bool) -> list[Finding]:
     try:
         with open_laboratory(_asking_who(rig), seed, next(iter(CATALOGUE))) as laboratory:
             bench = laboratory.bench(Recorder(watch), first_move=move)
+            names = _names_told(bench)
             try:
                 bench.connect()
                 bench.run(LISTEN_ns)
-                return _findings(bench, watch)
+                return _findings(bench, watch, names, rig.description.devices)
             finally:
                 bench.close()
     except DeviceError as error:
@@ -81,46 +98,36 @@ def _devices(rig: Rig, seed: int, move: bool) -> list[Finding]:
 
 
 def _asking_who(rig: Rig) -> Rig:
-    """The same rig, whose motors are also asked for what never changes, such as their firmware."""
+    """The same rig, whose motors and fingertips are also asked for what never changes, such as firmware and names."""
     hand, files = rig.description.hand, dict(rig.files)
     polling = load_rates(rates) if (rates := files.pop("rates", None)) is not None else hand.polling
-    asking = hand.model_copy(update={"polling": asked_once(polling)})
+    asking = hand.model_copy(update={"polling": asked_once(polling), "tactile_names": True})
     return replace(rig, description=rig.description.model_copy(update={"hand": asking}), files=files)
-
-
-# --- calibrations --------------------------------------------------------------------------------------------------
-
-
-def _calibrations(rig: Rig) -> list[Finding]:
-    """Age of every calibration, and what would keep a session from using it."""
-    now = datetime.now(UTC)
-    against = {each.role: each for each in objections(rig.files, rig.installation, now)}
-    findings = []
-    for role, file in rig.files.items():
-        objection = against.get(role)
-        words, figures = _age(file, now)
-        detail = f"{objection.reason}. {objection.hint}" if objection else words
-        findings.append(Finding(f"calibration {role}", objection is None, detail, figures))
-    return findings
-
-
-def _age(file: Path, now: datetime) -> tuple[str, Figures]:
-    if not is_stored(load(file)):
-        return "plain figures, of unknown age", {}
-    record = read_record(file)
-    days = (now - record.created).total_seconds() / 86400.0
-    until = "for ever" if record.valid_until_utc is None else f"until {record.valid_until_utc}"
-    figures: Figures = {"age_days": days, "valid_until_utc": record.valid_until_utc or "", "verdict": record.verdict}
-    return f"{days:.1f} days old, valid {until}, {record.method}", figures
 
 
 # --- devices -------------------------------------------------------------------------------------------------------
 
 
-def _findings(bench: Bench, watch: StreamWatch) -> list[Finding]:
+def _names_told(bench: Bench) -> TactileNames:
+    """What the fingertips say through the palm from now on."""
+    names = TactileNames()
+
+    def take(link: str, sample: Any) -> None:
+        if link == HAND_LINK:
+            names.take(sample)
+
+    bench.observer.interpreter.listener = take
+    return names
+
+
+def _findings(bench: Bench, watch: StreamWatch, names: TactileNames, serials: Mapping[str, str]) -> list[Finding]:
     bench.tare()
     findings = [_hand(bench, watch), _base(bench, watch)]
-    findings += [_fingertip(finger, bench, watch) for finger in FINGERS]
+    for finger in FINGERS:
+        if isinstance(tip := bench.fingertips.get(finger), BioTac):
+            findings.append(_biotac(tip, names, serials.get(fingertip_link(finger), "")))
+        else:
+            findings.append(_fingertip(finger, bench, watch))
     if bench.camera is not None:
         findings.append(_camera(bench, watch))
     return findings
@@ -171,7 +178,8 @@ def _fingertip(finger: str, bench: Bench, watch: StreamWatch) -> Finding:
     figures = watch.figures(fingertip_link(finger))
     device = bench.wrench_devices.get(finger)
     identity = device.identity if isinstance(device, NamedInstrument) else ""
-    words, problems = [identity, "tared", in_words(figures)], list(tip.health())
+    problems = list(tip.health())
+    words = [identity, _tared(problems), in_words(figures)]
     if isinstance(tip, ForceTip):
         figures |= {"identity": identity, **_force(tip)}
         words.append(
@@ -180,10 +188,19 @@ def _fingertip(finger: str, bench: Bench, watch: StreamWatch) -> Finding:
         )
         if float(figures["noise_mN"]) > _NOISY * float(figures["expected_mN"]):
             problems.append("noisier than its calibration says: is it touched, or is a cable loose?")
-    if isinstance(tip, BioTac):
-        figures |= _biotac(tip)
-        words.append(f"core {figures['core_C']:.0f} C, pressure at rest {figures['pdc_counts']:.0f} counts")
     return _finding(f"fingertip {finger}", tuple(problems), words, figures)
+
+
+def _biotac(tip: BioTac, names: TactileNames, serial: str) -> Finding:
+    """A BioTac, whose data come with the hand's."""
+    problems = (*tip.health(), *contradictions(names, tip.finger, tip.calibration.electrodes, serial))
+    who, figures = names.words(tip.finger), biotac_figures(tip)
+    words = [who, _tared(problems), biotac_words(figures)]
+    return _finding(f"fingertip {tip.finger}", problems, words, {"identity": who, **figures})
+
+
+def _tared(problems: Sequence[str]) -> str:
+    return "" if "not tared" in problems else "tared"
 
 
 def _force(tip: ForceTip) -> Figures:
@@ -197,17 +214,6 @@ def _force(tip: ForceTip) -> Figures:
         "expected_mNm": float(1e3 * tip.calibration.moment_sigma_Nm),
         "bias_N": float(np.abs(bias[:3]).max()),
         "bias_mNm": float(1e3 * np.abs(bias[3:]).max()),
-    }
-
-
-def _biotac(tip: BioTac) -> Figures:
-    core = units.core_temperature_degC(tip.channels.newest((Channel.TDC,)))[0]
-    rest = tip.channels.recent(Channel.PDC)
-    return {
-        "core_C": float(core),
-        "pdc_counts": float(rest.mean()),
-        "pdc_spread_counts": float(np.ptp(rest)),
-        "electrodes": float(tip.calibration.electrodes),
     }
 
 

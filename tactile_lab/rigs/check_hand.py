@@ -1,4 +1,4 @@
-"""Is a real hand fit to work? Connect it, listen for a second with zero demands, and tell. Nothing moves."""
+"""Is a real hand fit to work? Connect it, listen for a moment with zero demands, and tell. Nothing moves."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from drivers.shadow.palm_codec import SENSORS
 from drivers.shadow.pysoem_link import PysoemLink
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import DeviceError
+from tactile_lab.rigs.check_tactile import TactileLook
 from tactile_lab.rigs.findings import TOLERATED_LOSS, Finding
 from tactile_lab.rigs.hand_rig import HandRig
 
@@ -50,18 +51,20 @@ def _findings(setup: HandSetup, clock: Clock, *, move: bool) -> list[Finding]:
     hand = setup.device(link, clock, set_up_boards=False)
     try:
         hand.connect()
-        sample, statistics = _listen(hand, clock, round(setup.hand.cycle_s * NANOSECONDS))
+        tips = TactileLook(setup.hand.tactile)
+        sample, statistics = _listen(hand, tips, clock, round(setup.hand.cycle_s * NANOSECONDS))
         motors = setup.motor_map()
         found = [_ring(link), _cycle(hand, link, statistics), _motors(hand, sample, motors), _joints(sample)]
+        found += tips.findings()
         return [*found, _motor_map(hand, motors, clock, setup.hand.cycle_s)] if move else found
     finally:
         _close(hand)
 
 
 def _asking_who(setup: HandSetup) -> HandSetup:
-    """The same hand, whose motors are also asked once for what never changes, such as their firmware."""
+    """The same hand, whose motors and fingertips are also asked once for what never changes: firmware, names."""
     settings = setup.settings()
-    asking = settings.model_copy(update={"polling": asked_once(settings.polling)})
+    asking = settings.model_copy(update={"polling": asked_once(settings.polling), "tactile_names": True})
     return setup.model_copy(update={"hand": asking, "rates": None})
 
 
@@ -87,7 +90,7 @@ def _close(hand: ShadowHand) -> None:
         return  # it failed while it was listened to, which has been told
 
 
-def _listen(hand: ShadowHand, clock: Clock, cycle_ns: int) -> tuple[HandSample, CycleStatistics]:
+def _listen(hand: ShadowHand, tips: TactileLook, clock: Clock, cycle_ns: int) -> tuple[HandSample, CycleStatistics]:
     """Each cycle from the start of the one before: a late one must not leave the palm less time for the next."""
     statistics, start_ns = CycleStatistics(), clock.now_ns()
     while clock.now_ns() - start_ns < LISTEN_ns:
@@ -95,6 +98,7 @@ def _listen(hand: ShadowHand, clock: Clock, cycle_ns: int) -> tuple[HandSample, 
         clock.sleep_until_ns(next_ns)
         statistics.add(clock.now_ns() - next_ns)
         sample = hand.exchange()
+        tips.take(sample)
     return sample, statistics
 
 

@@ -65,19 +65,17 @@ class HandRig:
     source: str
 
     @property
+    def files(self) -> dict[str, Path]:
+        """The files of this hand where they lie, by role."""
+        named = self.description.calibration.model_dump(exclude_none=True)
+        return {role: self.folder / file for role, file in named.items()}
+
+    @property
     def setup(self) -> HandSetup:
-        """The hand, with its files where they lie."""
-        description, files = self.description, self.description.calibration
-        return HandSetup(
-            ethercat=description.ethercat,
-            master=description.master,
-            hand=description.hand,
-            joints=self.folder / files.joints,
-            motors=self.folder / files.motors,
-            boards=self.folder / files.boards if files.boards else None,
-            rates=self.folder / files.rates if files.rates else None,
-            gains=self.folder / files.gains if files.gains else None,
-        )
+        """The hand, with its files."""
+        description = self.description
+        ways = {"ethercat": description.ethercat, "master": description.master, "hand": description.hand}
+        return HandSetup.model_validate(ways | self.files)
 
 
 def is_hand_rig(path: Path) -> bool:

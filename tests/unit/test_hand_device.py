@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from drivers.shadow.motor_data import FromMotor, MotorFlag, ToMotor
 from drivers.shadow.motor_polling import MotorMemory, MotorPolling
 from drivers.shadow.motors import MotorMap
 from drivers.shadow.palm_codec import PalmCommand, PalmStatus
-from drivers.shadow.tactile_requests import BIOTAC_ROTATION, TactileRotation
+from drivers.shadow.tactile_requests import BIOTAC_ROTATION, TactileQuestion, TactileRotation
 from tactile_lab import rigs
 from tactile_lab.clock import VirtualClock
 from tactile_lab.errors import CodecError, DeviceError
@@ -45,6 +46,7 @@ class FakePalm:
         self.commands: list[PalmCommand] = []
         self.flags, self.temperature_C = np.zeros(20, np.uint16), np.full(20, 30)
         self.silent: set[int] = set()
+        self.delay_ns = 0
         self.mute = self.unwritten = self.frozen = False
         self.garbage = b""
         self._waiting: list[Datagram] = []
@@ -55,6 +57,7 @@ class FakePalm:
         return list(self.commands[-1].motor_data)
 
     def write(self, payload: bytes) -> None:
+        self.clock.sleep_until_ns(self.clock.now_ns() + self.delay_ns)
         previous = self.commands[-1] if self.commands else PalmCommand()
         self.commands.append(palm_codec.decode_command(payload))
         duty = np.array(self.commands[-1].motor_data, int) * self.motors.sign
@@ -339,6 +342,11 @@ def test_biotacs_are_asked_in_their_rotation_of_fourteen() -> None:
     assert BIOTAC_ROTATION[:2] == (1, 3)
     assert BIOTAC_ROTATION[2:] == tuple(range(5, 28, 2))
     assert TactileRotation("none").next() == 0
+    asking = TactileRotation("biotac", names=True)
+    first = [asking.next() for _ in range(2 * 3 * len(TactileQuestion))]
+    assert first[0::2] == list((BIOTAC_ROTATION * 2)[: len(first) // 2])
+    assert first[1::2] == [*TactileQuestion] * 3
+    assert {asking.next() for _ in range(28)} == set(BIOTAC_ROTATION)
     rig.hand.close()
 
 
@@ -427,6 +435,19 @@ def test_motors_that_halted_before_the_demands_began_are_forgiven_at_first_only(
     with pytest.raises(DeviceError, match="no demand for 20 ms"):
         rig.run(40)
     rig.hand.close()
+
+
+@pytest.mark.parametrize(("way_ms", "forgiven"), [(12, True), (8, False)])
+def test_a_pause_of_the_host_and_one_of_the_wire_that_add_up_let_motors_report_that_they_had_halted(
+    rig: Rig, way_ms: int, forgiven: bool
+) -> None:
+    rig.run(40)
+    rig.palm.delay_ns = way_ms * 1_000_000
+    rig.run(1)  # 10 ms after the command before it
+    rig.palm.delay_ns = 0
+    rig.palm.flags[:] = MotorFlag.NO_DEMAND
+    with nullcontext() if forgiven else pytest.raises(DeviceError, match="no demand for 20 ms"):
+        rig.run(8)
 
 
 def test_a_pause_of_the_host_lets_motors_report_that_they_had_halted(rig: Rig) -> None:

@@ -79,17 +79,19 @@ def found(rig: Path) -> dict[str, Finding]:
 def test_every_sensor_is_found_and_described(rig: Path) -> None:
     with emulated(load_fingertip_rig(rig)) as places:
         findings = found(rig)
+    assert findings.pop("calibration fingertips").figures["verdict"] == "PASS"
     assert set(places) == set(findings) == {"FF", "MF", "TH"}
     assert all(finding.ok for finding in findings.values()), findings
     assert "FT20001" in findings["FF"].detail
     assert "0 lost" in findings["FF"].detail
-    assert "FT00002" in findings["MF"].detail
+    assert "FT00002, calibrated 2026-01-01" in findings["MF"].detail
     assert "samples/s" in findings["TH"].detail
     assert not Path(places["MF"].removeprefix("port ")).is_symlink()  # the made port is taken away again
 
 
 def test_sensors_that_are_not_there_are_told_each_in_its_words(rig: Path) -> None:
     findings = found(rig)
+    del findings["calibration fingertips"]
     assert not any(finding.ok for finding in findings.values())
     assert "no web page from the box" in findings["FF"].detail
     assert "there is no serial port" in findings["MF"].detail
@@ -203,7 +205,8 @@ def test_the_command_tells_what_is_wrong_and_ends_with_its_code(rig: Path, capsy
     assert ended.value.code == 4
     told = json.loads(capsys.readouterr().out)
     assert not told["ready"]
-    assert [device["device"] for device in told["devices"]] == ["fingertip FF", "fingertip MF", "fingertip TH"]
+    names = ["calibration fingertips", "fingertip FF", "fingertip MF", "fingertip TH"]
+    assert [device["device"] for device in told["devices"]] == names
     with emulated(load_fingertip_rig(rig)), pytest.raises(SystemExit) as ended:
         main(["rig", "check", str(rig)])
     assert ended.value.code == 0

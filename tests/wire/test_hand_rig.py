@@ -12,9 +12,12 @@ from ethercat_wire import JOINTS, cable
 from drivers.emulators.ethercat_server import EmulatedHandProcess
 from drivers.emulators.shadow_chain import ChainSettings
 from tactile_lab.errors import ConfigurationError
+from tactile_lab.geometry.contacts import FINGERS
 from tactile_lab.rigs.check import check_rig
 from tactile_lab.rigs.emulate import emulated_hand
 from tactile_lab.rigs.hand_rig import load_hand_rig
+
+CALIBRATIONS = ("calibration joints", "calibration motors")
 
 
 def rig_file(folder: Path, interface: str, **changes: Any) -> Path:
@@ -32,11 +35,13 @@ def rig_file(folder: Path, interface: str, **changes: Any) -> Path:
 
 def test_a_sound_hand_is_told_part_by_part(tmp_path: Path) -> None:
     with cable("r") as (near, far):
-        file = rig_file(tmp_path, near, far_end=far)
+        file = rig_file(tmp_path, near, far_end=far, hand={"cycle_s": 0.002, "tactile": "biotac"})
         with emulated_hand(load_hand_rig(file)) as places:
             assert places == {"hand": f"hand 634 at {far}"}
             findings = {finding.device: finding for finding in check_rig(str(file))}
-    assert set(findings) == {"ring", "cycle", "motors", "joint sensors"}
+    tips = [findings.pop(f"fingertip {finger}") for finger in FINGERS]
+    assert set(findings) == {*CALIBRATIONS, "ring", "cycle", "motors", "joint sensors"}
+    assert tips[1].detail.startswith("BioTac, SynTouch, serial BTSIM-MF, software 2.3, board 1.0, 100 Hz; core ")
     assert findings["ring"].detail == "hand 634, palm 0220 revision 1, in operation, no watchdog"
     assert "20 of 20 answer, warmest" in findings["motors"].detail
     assert "supply 24.0 V, firmware revision 1200" in findings["motors"].detail
@@ -72,8 +77,8 @@ def test_a_silent_motor_is_named(tmp_path: Path) -> None:
 
 def test_the_palm_is_found_by_its_product_code_and_one_that_is_stated_is_verified(tmp_path: Path) -> None:
     with cable("r") as (near, far), EmulatedHandProcess(far, JOINTS, ChainSettings(palm="0230")):
-        ring, _, motors, _ = check_rig(str(rig_file(tmp_path, near)))
-        (refusal,) = check_rig(str(rig_file(tmp_path, near, hand={"palm": "0220"})))
+        _, _, ring, _, motors, _ = check_rig(str(rig_file(tmp_path, near)))
+        *_, refusal = check_rig(str(rig_file(tmp_path, near, hand={"palm": "0220"})))
     assert ring.detail.startswith("hand 634, palm 0230 revision 1, in operation")
     assert "20 of 20 answer" in motors.detail
     assert not refusal.ok
@@ -81,7 +86,7 @@ def test_the_palm_is_found_by_its_product_code_and_one_that_is_stated_is_verifie
 
 
 def test_a_missing_interface_is_told(tmp_path: Path) -> None:
-    (finding,) = check_rig(str(rig_file(tmp_path, "nosuch0")))
+    *_, finding = check_rig(str(rig_file(tmp_path, "nosuch0")))
     assert "nosuch0: no such network interface" in finding.detail
 
 
