@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
+from drivers.ati.patience import Patience
 from drivers.links import Datagram, Link
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import CodecError
@@ -42,12 +43,12 @@ class Conversation:
 
     def until(self, look: Callable[[], Answer | None], seconds: float) -> Answer | None:
         """Listen until ``look`` gives something; None when it has not in time. Raises DeviceError."""
-        end_ns = self._clock.now_ns() + round(seconds * NANOSECONDS)
+        patience = Patience(seconds, self._clock.now_ns())
         while True:
             self._hear()
             if (answer := look()) is not None:
                 return answer
-            if (now_ns := self._clock.now_ns()) >= end_ns:
+            if patience.over(now_ns := self._clock.now_ns()):
                 return None
             self._clock.sleep_until_ns(now_ns + _STEP_ns)
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from drivers.ati.conversation import Conversation
 from drivers.ati.force_tip import WrenchSample
+from drivers.ati.patience import Patience
 from drivers.links import Datagram, Link
-from tactile_lab.clock import NANOSECONDS
 from tactile_lab.geometry.contacts import Array
 
 GAUGES = 6
@@ -148,23 +148,23 @@ class Turn:
 
     def __init__(self, patience_s: float) -> None:
         self.unanswered = 0
-        self._patience_ns = round(patience_s * NANOSECONDS)
-        self._asked_ns: int | None = None
+        self._patience_s = patience_s
+        self._waiting: Patience | None = None
 
     def restart(self) -> None:
         """Nothing is asked, as after connecting."""
-        self._asked_ns = None
+        self._waiting = None
 
     def answered(self) -> None:
         """An answer has come."""
-        self._asked_ns = None
+        self._waiting = None
 
     def mine(self, now_ns: int) -> bool:
         """Whether to ask now; then the question counts as asked."""
-        if self._asked_ns is not None and now_ns - self._asked_ns < self._patience_ns:
+        if self._waiting is not None and not self._waiting.over(now_ns):
             return False
-        self.unanswered += self._asked_ns is not None
-        self._asked_ns = now_ns
+        self.unanswered += self._waiting is not None
+        self._waiting = Patience(self._patience_s, now_ns)
         return True
 
     def health(self) -> tuple[str, ...]:

@@ -33,16 +33,20 @@ class Background(Closing):
 
 
 class Pace:
-    """How many messages of a stream are due. What a busy machine has missed is made up, half a second at most."""
+    """How many messages of a stream are due. What a busy machine has missed is made up, for a time at most.
 
-    def __init__(self) -> None:
-        self._last_s = time.monotonic()
+    Args:
+        longest_s: that time: what the line to the reader holds.
+    """
+
+    def __init__(self, longest_s: float = 0.5) -> None:
+        self._longest_s, self._last_s = longest_s, time.monotonic()
         self._owed = 0.0
 
     def due(self, rate_hz: float) -> int:
         """Messages due since the last call."""
         now_s = time.monotonic()
-        self._owed += min(now_s - self._last_s, 0.5) * rate_hz
+        self._owed += min(now_s - self._last_s, self._longest_s) * rate_hz
         self._last_s = now_s
         count = int(self._owed)
         self._owed -= count

@@ -18,6 +18,7 @@ from drivers.emulators.unit import Unit
 _TCGETS2 = 0x802C542A
 _SPEED_OFFSET = 40  # of the output speed in struct termios2
 _POLL_s = 0.002
+_HELD_s = 0.05  # of the fastest stream; a terminal holds 4 KiB
 
 
 class PtyPort(Closing):
@@ -37,7 +38,7 @@ class PtyPort(Closing):
 
     def __init__(self, unit: Unit, baud: int) -> None:
         self.unit, self.overruns = unit, 0
-        self._baud, self._pace = baud, Pace()
+        self._baud, self._pace = baud, Pace(_HELD_s)
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
