@@ -12,8 +12,8 @@ TactileLabError                exit 1
  `- InterruptionError          exit 130 a person ended the work before it was done
 
 Each message says what happened, where (which device or file), and what to do next.
-Exit codes are those of the command line: 0 done, 1 failed, 2 usage, 3 done with data loss,
-4 hardware not ready, 130 interrupted.
+Exit codes are those of the command line: 0 done, 1 failed, 2 usage, 3 done with data loss or
+outside a limit, 4 hardware not ready, 130 interrupted.
 """
 
 from __future__ import annotations

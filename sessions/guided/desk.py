@@ -176,7 +176,7 @@ class Desk:
     def _until_capture(self) -> str:
         missing = self.settings.least_contacts - len(self.sight.touching)
         if missing > 0:
-            return f"{missing} more fingers have to touch"
+            return "1 more finger has to touch" if missing == 1 else f"{missing} more fingers have to touch"
         if not self.sight.is_steady:
             return f"hold still: steady for {self.sight.steady_s:.1f} of {self.settings.steady_s:g} s"
         return "steady"

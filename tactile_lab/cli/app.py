@@ -23,7 +23,8 @@ from tactile_lab.cli import (
 
 app = typer.Typer(
     help="Tactile SLAM in the laboratory: the shape and pose of an unknown object from a few fingertip contacts.",
-    epilog="Exit codes: 0 done, 1 failed, 2 usage, 3 done with data loss, 4 hardware not ready, 130 interrupted.",
+    epilog="Exit codes: 0 done, 1 failed, 2 usage, 3 done with data loss or outside a limit, 4 hardware not ready, "
+    "130 interrupted.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

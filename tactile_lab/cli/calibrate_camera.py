@@ -61,10 +61,8 @@ def camera(
     from tactile_lab.strict_yaml import validate
     from tactile_lab.workflow.calibrating_camera import LENS_COMMENT, gather_views, lens_record
 
-    file, page = (
-        out or Path("calibrations") / station / "camera.yaml",
-        PageAddress.wanted(view, listen, view_port, token),
-    )
+    file = out or Path("calibrations") / station / "camera.yaml"
+    page = PageAddress.wanted(view, listen, view_port, token)
     with wizard("calibrate camera", no_input, page) as asker:
         may_write(file, replace, asker, no_input)
         shown = load_board(board) if board is not None else _usual_board()
@@ -80,7 +78,7 @@ def camera(
         result = calibrate_lens(found.views, limits, third_radial=third_radial)
         _show(found, result)
         record = lens_record(result, station, shown, limits, serial, notes)
-        store_result(file, record, True, asker, no_input, as_json, LENS_COMMENT)
+        store_result(file, record, asker, as_json, LENS_COMMENT)
 
 
 def _usual_board() -> AnyBoard:

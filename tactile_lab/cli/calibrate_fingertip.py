@@ -72,7 +72,7 @@ def fingertip(
         fit = fit_fingertip(data, tips[data.finger], wanted.noise)
         _show(data, fit, wanted.limits)
         found = fingertip_record(data, fit, tips, here, notes, wanted.limits)
-        store_result(file, found, True, asker, no_input, as_json)
+        store_result(file, found, asker, as_json)
 
 
 def _settings(path: Path | None) -> FingertipSettings:

@@ -98,7 +98,7 @@ def forearm(
             show_result(result)
             found = record_of(result, here, notes=notes, valid_days=valid_days)
         comment = "Forearm to world: pose of the positioner's mount in the world frame."
-        store_result(file, found, True, asker, no_input, as_json, comment)
+        store_result(file, found, asker, as_json, comment)
 
 
 def _stated(sigma_mm: float | None, sigma_deg: float | None) -> tuple[float, float]:

@@ -59,13 +59,15 @@ def joints(
     from calibration.joints import joints_record, judge_joints
     from calibration.recordings import save_data
     from tactile_lab.cli.calibrate_steps import store_result
-    from tactile_lab.cli.wizard import wizard
+    from tactile_lab.cli.wizard import may_write, wizard
     from tactile_lab.rigs.description import load_rig
     from tactile_lab.workflow.calibrating_joints import JointRequest, from_file, from_touches, load_settings
 
     described, wanted = load_rig(rig), load_settings(settings)
     here, page = described.installation, PageAddress.wanted(view, listen, view_port, token)
+    file = out or Path("calibrations") / here.rig / "joints.yaml"
     with wizard(f"calibrate joints, rig {rig}", no_input, page) as asker:
+        may_write(file, replace, asker, no_input)
         if source is not None:
             found = from_file(source, described, wanted)
         else:
@@ -86,8 +88,7 @@ def joints(
             offsets=found.offsets,
             covariance=found.covariance,
         )
-        file = out or Path("calibrations") / here.rig / "joints.yaml"
-        store_result(file, stored, replace, asker, no_input, as_json)
+        store_result(file, stored, asker, as_json)
 
 
 def _touched(request: JointRequest, rig: Rig, asker: Asker) -> ForearmData:

@@ -95,13 +95,13 @@ def _motion_table(report: MotionReport) -> tuple[list[str], list[list[str]], tup
 def store_result(
     file: Path,
     record: CalibrationRecord,
-    replace: bool,
     asker: Asker,
-    no_input: bool,
     as_json: bool,
     comment: str = "",
 ) -> None:
     """Tell the verdict, ask, and write (a failed result beside the file).
+
+    Whether an older file may be replaced was asked before anything was measured, see :func:`may_write`.
 
     Args:
         comment: at the head of the file.
@@ -115,12 +115,9 @@ def store_result(
     from tactile_lab.calibration_file import plain
     from tactile_lab.cli.calibration_tables import tell_verdict
     from tactile_lab.cli.console import emit_json, say
-    from tactile_lab.cli.wizard import may_write
 
     tell_verdict(record)
     target = target_file(file, record)
-    if target == file:
-        may_write(file, replace, asker, no_input)
     if not asker.agree(f"Store it as {target}?"):
         raise asker.ended()
     write_record(target, record, comment)

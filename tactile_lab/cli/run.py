@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -50,8 +51,11 @@ def run(
     ] = False,
     pedal: Annotated[str, typer.Option(help="Guided: a further key that captures, as a foot pedal sends it.")] = "",
     pace: Annotated[
-        float, typer.Option(min=0.0, help="Guided, simulated rig: its seconds for a real one; 0: as fast as it goes.")
-    ] = 1.0,
+        float | None,
+        typer.Option(
+            min=0.0, help="Guided, simulated rig: its seconds for a real one; 0: as fast as it goes.", show_default="1"
+        ),
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Show the session live in a browser.")] = False,
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
@@ -59,7 +63,9 @@ def run(
     policy: Annotated[
         str | None,
         typer.Option(
-            help="Exploration policy that chooses the grasps (docs/exploration.md).", show_default="the rig's"
+            help="Exploration policy that chooses the grasps: information, or one to compare with it "
+            "(docs/exploration.md).",
+            show_default="the rig's",
         ),
     ] = None,
     bounding_box: Annotated[
@@ -89,8 +95,17 @@ def run(
     guided = mode is Mode.GUIDED
     if confirm and (no_input or guided):
         raise typer.BadParameter("asks before every grasp of an autonomous session", param_hint="'--confirm'")
+    if not guided:
+        _refuse_guided_options(
+            {
+                "--led-by": led_by is not None,
+                "--automatic-capture": automatic_capture,
+                "--pedal": bool(pedal),
+                "--pace": pace is not None,
+            }
+        )
     page = PageAddress.wanted(view, listen, view_port, token)
-    way = GuidedWay(_led_by(led_by), automatic_capture or None, pedal, pace, no_input)
+    way = GuidedWay(_led_by(led_by), automatic_capture or None, pedal, 1.0 if pace is None else pace, no_input)
     tell_left_open(out)
     request = SessionRequest(
         rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy, bounding_box
@@ -102,6 +117,13 @@ def run(
     ):
         finished = run_session(request, progress, replace(present, approve=TerminalApproval()) if confirm else present)
     conclude(finished, as_json)
+
+
+def _refuse_guided_options(given: Mapping[str, bool]) -> None:
+    """Whoever means to lead the hand must not meet one that moves by itself. Raises BadParameter."""
+    for option, is_given in given.items():
+        if is_given:
+            raise typer.BadParameter("belongs to --mode guided", param_hint=f"'{option}'")
 
 
 def _led_by(chosen: LedBy | None) -> Literal["keys", "hand"] | None:

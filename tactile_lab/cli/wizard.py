@@ -45,7 +45,7 @@ class Asker:
         return self._page or NullTraffic()
 
     def choose(self, question: str, answers: Mapping[str, str], usual: str) -> str:
-        """One of some keys; Enter takes the usual one.
+        """One of some keys, or the word for it; Enter takes the usual one.
 
         Raises:
             InterruptionError: the person quits, or there is nobody to ask.
@@ -58,9 +58,9 @@ class Asker:
             self._page.ask(question, known, usual)
         while True:
             people.print(Text.assemble((question, "bold"), f"  [{words}] "), end="")
-            answer = self._answer(known, usual)
-            if answer in known:
-                return self._taken(answer)
+            answer = self._answer(usual)
+            if (key := _key_of(answer, known)) is not None:
+                return self._taken(key)
             warn(f"{answer!r} is none of the answers")
 
     def agree(self, question: str, usual: bool = True) -> bool:
@@ -76,7 +76,8 @@ class Asker:
     def taken(self) -> str | None:
         """What is typed or pressed now of what is offered. Raises InterruptionError when the person quits."""
         answer = None if self._silent else self._next(0.0)
-        return self._taken(answer) if answer is not None and answer in self._offered else None
+        key = None if answer is None else _key_of(answer, self._offered)
+        return None if key is None else self._taken(key)
 
     def show_beside(self, title: str, columns: list[str], rows: list[list[str]], right: tuple[int, ...]) -> None:
         """A table that changes all the time: on the page, where it takes the place of the older one."""
@@ -100,7 +101,7 @@ class Asker:
             self._page.settled()
         return answer
 
-    def _answer(self, known: Mapping[str, str], usual: str) -> str:
+    def _answer(self, usual: str) -> str:
         """Wait for what is typed, or pressed; what was pressed is shown in the terminal too."""
         looks = 0
         while (answer := self._next(_LOOK_s)) is None:
@@ -168,6 +169,11 @@ def _until_read(asker: Asker, feed: WizardFeed) -> Iterator[None]:
         asker.part()
         raise
     asker.part()
+
+
+def _key_of(answer: str, known: Mapping[str, str]) -> str | None:
+    """The key that was meant: typed as such, or the word that stands for it ("yes" as well as "y")."""
+    return next((key for key, meaning in known.items() if answer in (key, meaning)), None)
 
 
 def may_write(out: Path, replace: bool, asker: Asker, silent: bool) -> None:

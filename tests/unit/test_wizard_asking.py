@@ -126,6 +126,6 @@ def test_the_verdict_is_shown_before_anybody_is_asked_to_store(page: Shown, type
     record = new_record("forearm", rig="lab", method="touch", parameters={}, verdict="PASS")
     os.write(typed, b"q\n")
     with told_to(page), pytest.raises(InterruptionError):
-        store_result(tmp_path / "f.yaml", record, False, Asker(False, "test", page), False, False)
+        store_result(tmp_path / "f.yaml", record, Asker(False, "test", page), False)
     assert "PASS" in told_html(page.scene)
     assert not list(tmp_path.iterdir())
