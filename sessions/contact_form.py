@@ -82,7 +82,7 @@ class ObjectTruth(StrictModel):
     @model_validator(mode="after")
     def _in_metres(self) -> Self:
         if self.polygon_m and (extent := float(np.ptp(self.polygon_m, axis=0).max())) > _LARGEST_OBJECT_m:
-            raise ValueError(f"its polygon is {extent:.4g} m wide; are the lengths in millimetres?")
+            raise ValueError(f"its polygon is {extent:.4g} m wide, as if its lengths were in millimetres")
         return self
 
 
@@ -148,13 +148,14 @@ def _check_sizes(grasps: Sequence[GraspEntry]) -> None:
     """Lengths that no hand and no workspace has are in another unit."""
     for index, grasp in enumerate(grasps):
         if len(grasp.contacts) and (extent := _extent_m(grasp.points_m)) > LARGEST_GRASP_m:
-            raise ValueError(f"contacts of grasp {index} lie {extent:.4g} m apart; are the lengths in millimetres?")
+            raise ValueError(f"contacts of grasp {index} lie {extent:.4g} m apart, as if lengths were in millimetres")
     together = np.concatenate([grasp.points_m for grasp in grasps])
     if (extent := _extent_m(together)) > _LARGEST_WORKSPACE_m:
-        raise ValueError(f"the grasps lie {extent:.4g} m apart; are the lengths in millimetres?")
+        raise ValueError(f"the grasps lie {extent:.4g} m apart, as if lengths were in millimetres")
     for index, (before, grasp) in enumerate(pairwise(grasps), start=1):
         if (carried := _carried_m(before, grasp)) > _LARGEST_OBJECT_m:
-            raise ValueError(f"the hand moved by {carried:.4g} m before grasp {index}; are the lengths in millimetres?")
+            moved = f"the hand moved by {carried:.4g} m before grasp {index}"
+            raise ValueError(f"{moved}, as if lengths were in millimetres")
 
 
 def _extent_m(points_m: Array) -> float:

@@ -27,6 +27,7 @@ COLUMNS = (
     *(f"tool_{part}" for part in POSE_PARTS),
     *(f"object_{part}" for part in POSE_PARTS),
 )
+SIGMAS = ("point_sigma_m", "normal_sigma_rad")
 _TEXTS = {"finger"}
 _WRONG_UNIT = re.compile(r"_(?:mm|cm|um|deg|degrees|ms|us|ns|mN|kg|g)$")
 _LARGEST_FORCE_N = 1000.0
@@ -74,8 +75,12 @@ def read_json(path: Path) -> dict[str, Any]:
     rows = document.get("contacts")
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
         raise ConfigurationError("contacts: must be a list of objects", where=str(path))
-    if unknown := set(document) - {"format", "contacts", "object", "point_sigma_m", "normal_sigma_rad", "note"}:
+    if unknown := set(document) - {"format", "contacts", "object", "note", *SIGMAS}:
         raise ConfigurationError(f"unknown key {sorted(unknown)[0]!r}", where=str(path), hint="See docs/sessions.md")
+    for name in SIGMAS:
+        value = document.get(name, 1.0)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
+            raise ConfigurationError(f"{name} is {value!r}", where=str(path), hint="Give a number above 0")
     return dict(document)
 
 
@@ -87,6 +92,8 @@ def check_columns(names: Iterable[str], path: Path) -> None:
         stem = _WRONG_UNIT.sub("", name)
         proper = [column for column in COLUMNS if stem != name and column.startswith(stem + "_")]
         hint = f"Convert it and call it {proper[0]}" if proper else f"Columns are {', '.join(COLUMNS)}"
+        if ";" in name or "\t" in name:
+            hint = "Separate the columns by commas, and write decimals with a point"
         what = f"column {name!r} is in another unit" if proper else f"unknown column {name!r}"
         raise ConfigurationError(what, where=str(path), hint=hint)
     for needed in ("time_s", "x_m", "y_m"):
@@ -151,6 +158,9 @@ class TimedTable:
         needed = ["time_s", "x_m", "y_m", *(["z_m"] if self.dimension == 3 else [])]
         if missing := [name for name in needed if name not in row]:
             raise refused(self.path, number, f"has no {missing[0]}", "Give every contact a time and a place")
+        for name in SIGMAS:
+            if row.get(name, 1.0) <= 0.0:
+                raise refused(self.path, number, f"{name} is {row[name]:g}", "Give a number above 0, or nothing")
         direction = self.direction(row)
         length = float(np.linalg.norm(direction))
         if self.by_force and not 0.0 < length < _LARGEST_FORCE_N:

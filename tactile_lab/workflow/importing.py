@@ -32,27 +32,31 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
         raise SessionError("exists already", where=str(log), hint="Choose another name with --out")
     if mesh is not None:
         settings = replace(settings, object_name=mesh.stem, mesh=log.with_suffix(mesh.suffix).name)
-    contacts = read_timed_contacts(file, settings)
-    if mesh is not None:
-        read_mesh(mesh)
-        _copy(mesh, log.with_suffix(mesh.suffix))
+    contacts, made = read_timed_contacts(file, settings), [log]
     try:
+        if mesh is not None:
+            read_mesh(mesh)
+            made += _copied(mesh, log.with_suffix(mesh.suffix))
         write_contact_log(log, contacts)
         read_contact_log(log)  # refuses normals that point inward
     except TactileLabError as error:
-        with suppress(OSError):
-            log.unlink(missing_ok=True)
+        for path in made:
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
         if isinstance(error, ConfigurationError):
             raise ConfigurationError(error.what, where=str(file), hint=error.hint) from error
         raise
     return contacts
 
 
-def _copy(mesh: Path, copy: Path) -> None:
+def _copied(mesh: Path, copy: Path) -> list[Path]:
+    """The file that was made: none where the mesh is in its place already. Raises SessionError."""
     if copy.exists() and copy.resolve() != mesh.resolve():
         raise SessionError("exists already", where=str(copy), hint="Choose another name with --out")
-    if not copy.exists():
-        try:
-            write_whole(copy, mesh.read_bytes())
-        except OSError as error:
-            raise SessionError(f"can not be read ({error.strerror})", where=str(mesh), hint="Check the path") from error
+    if copy.exists():
+        return []
+    try:
+        write_whole(copy, mesh.read_bytes())
+    except OSError as error:
+        raise SessionError(f"can not be read ({error.strerror})", where=str(mesh), hint="Check the path") from error
+    return [copy]

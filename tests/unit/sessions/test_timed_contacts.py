@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 
 from sessions.contact_log import read_contact_log
 from sessions.timed_contacts import ImportSettings, read_timed_contacts
@@ -100,6 +101,8 @@ def test_an_imported_log_is_read_back_as_it_was(tmp_path):
         ("time_s,x_m,y_m,nx,ny,tool_x_m,tool_y_m,tool_yaw_rad\n0,0,0,1,0,0,0,90\n", "radians, not degrees"),
         ("time_s,x_m,y_m,x_m,nx,ny\n0,0,0,0,1,0\n", "two columns have one name"),
         ("time_s,x_m,y_m,nx,ny\n", "holds no contact"),
+        ("time_s;x_m;y_m;nx;ny\n0;0,05;0;1;0\n", "Separate the columns by commas"),
+        ("time_s,x_m,y_m,nx,ny,point_sigma_m\n0,0,0,1,0,-1\n", "contact 1: point_sigma_m is -1"),
         ("time_s,x_m,y_m,nx,ny\n0,50,0,1,0\n9,-50,0,-1,0\n", "millimetres"),
     ],
 )
@@ -110,6 +113,14 @@ def test_a_table_that_does_not_fit_is_refused_by_line_or_column(tmp_path, text, 
     assert not (tmp_path / "log.json").exists()
 
 
+def test_nothing_is_left_of_contacts_that_make_no_sense(tmp_path):
+    trimesh.creation.box((0.1, 0.06, 0.04)).export(tmp_path / "box.ply")
+    source = table(tmp_path, "time_s,x_m,y_m,nx,ny\n0,50,0,1,0\n9,-50,0,-1,0\n")
+    with pytest.raises(ConfigurationError, match="as if lengths were in millimetres"):
+        import_contacts(source, tmp_path / "log.json", ImportSettings(), tmp_path / "box.ply")
+    assert {path.name for path in tmp_path.iterdir()} == {"box.ply", "contacts.csv"}
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -117,6 +128,8 @@ def test_a_table_that_does_not_fit_is_refused_by_line_or_column(tmp_path, text, 
         ('{"format": "tactile-contacts/1"}', "needs no import"),
         (f'{{"format": "{FORMAT}", "contacts": 3}}', "must be a list"),
         (f'{{"format": "{FORMAT}", "contacts": [], "x": 1}}', "unknown key 'x'"),
+        (f'{{"format": "{FORMAT}", "contacts": [], "point_sigma_m": "two"}}', "point_sigma_m is 'two'"),
+        (f'{{"format": "{FORMAT}", "contacts": [], "normal_sigma_rad": 0}}', "Give a number above 0"),
         ("{", "is not JSON"),
     ],
 )
