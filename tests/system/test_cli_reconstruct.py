@@ -104,7 +104,9 @@ def test_results_of_shape_models_lie_beside_each_other(inside, planar_log):
 
 
 def test_a_spatial_log_gets_a_mesh_with_its_uncertainty(inside, spatial_log, tmp_path):
-    words = ("--method", "known-pose", "--largest-sigma", 1e6, "--out", tmp_path / "out", "--json")
+    (tmp_path / "coarse.yaml").write_text("mesh_resolution_m: 0.006\n")
+    settings = ("--settings", tmp_path / "coarse.yaml", "--largest-sigma", 1e6)
+    words = ("--method", "known-pose", *settings, "--out", tmp_path / "out", "--json")
     answer = inside("reconstruct", spatial_log, *words)
     assert answer.code == 0, answer.err
     document = json.loads(answer.out)
