@@ -59,7 +59,10 @@ class FingertipSensor(Protocol):
         """Take the newest samples as "nothing touches". Raises DeviceError when they do not allow it."""
 
     def load_N(self, world_R_distal: Array) -> float:
-        """Contact force from the newest sample, for the stop threshold."""
+        """Contact force from the newest sample, for the stop threshold; infinite where it tells none."""
+
+    def void(self) -> str:
+        """Why the newest sample tells no force, in words; "" while it does."""
 
     def begin_capture(self) -> None:
         """From here on samples are gathered for :meth:`contact`."""

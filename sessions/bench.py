@@ -198,6 +198,7 @@ class Bench:
             tip_stamps_ns={finger: None if heard is None else heard.stamp_ns for finger, heard in tips.items()},
             force_ranges_N=self._force_ranges_N,
             warmest_C=None if hand is None else warmest_C(hand.sample),
+            void_tips=seen.void_tips(),
         )
 
     def run(self, duration_ns: int) -> None:

@@ -21,11 +21,12 @@ class Situation:
         stamp_ns: when the cycle began to look at its devices, session clock. What came before that has been seen,
             however long the look took.
         hand_stamp_ns: arrival of the newest fresh hand status; None before the first.
-        loads_N: contact force on each fingertip.
+        loads_N: contact force on each fingertip; infinite where its readings tell none.
         palm_world_m: origin of the palm, shape (3,), world; None before the first status.
         tip_stamps_ns: arrival of the newest reading of each fingertip that has a link of its own; None before it.
         force_ranges_N: calibrated range of the fingertips' sensors, smallest axis.
         warmest_C: temperature of the hand's warmest motor; None while none is known.
+        void_tips: why fingertips tell no force, in words, by finger.
     """
 
     stamp_ns: int
@@ -35,6 +36,7 @@ class Situation:
     tip_stamps_ns: Mapping[str, int | None] = field(default_factory=dict)
     force_ranges_N: Mapping[str, float] = field(default_factory=dict)
     warmest_C: float | None = None
+    void_tips: Mapping[str, str] = field(default_factory=dict)
 
     def plain(self) -> dict[str, Any]:
         """As plain data; ages in milliseconds."""
@@ -42,6 +44,7 @@ class Situation:
             "stamp_ns": self.stamp_ns,
             "hand_age_ms": self._age_ms(self.hand_stamp_ns),
             "load_N": dict(self.loads_N),
+            "void": dict(self.void_tips),
             "palm_world_m": None if self.palm_world_m is None else self.palm_world_m.tolist(),
             "tip_age_ms": {finger: self._age_ms(stamp_ns) for finger, stamp_ns in self.tip_stamps_ns.items()},
             "warmest_C": self.warmest_C,

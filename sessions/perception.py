@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from math import isinf
 from typing import Any
 
 import numpy as np
@@ -174,6 +175,10 @@ class Perception:
             rotations = dict(zip(FINGERS, self._placement.current().world_T_distal[:, :3, :3], strict=True))
             self._loads_N = {finger: tip.load_N(rotations[finger]) for finger, tip in self.fingertips.items()}
         return dict(self._loads_N)
+
+    def void_tips(self) -> dict[str, str]:
+        """Why the newest sample of a fingertip tells no force, in words, by finger; without those that tell one."""
+        return {finger: self.fingertips[finger].void() for finger, load_N in self.loads_N().items() if isinf(load_N)}
 
     @property
     def dropped(self) -> dict[str, str]:

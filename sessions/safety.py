@@ -13,6 +13,7 @@ import signal
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from math import isfinite
 from types import FrameType, TracebackType
 from typing import Any, Protocol
 
@@ -137,12 +138,14 @@ class SafetySupervisor:
         over = {f: load_N for f, load_N in situation.loads_N.items() if not load_N <= limits_N[f]}  # NaN is over
         self._over_limit = {finger: self._over_limit.get(finger, 0) + 1 for finger in over}
         for finger, cycles in self._over_limit.items():
-            if cycles >= self.settings.force_cycles:
-                raise SafetyError(
-                    f"fingertip force {over[finger]:.1f} N is over the limit of {limits_N[finger]:.1f} N",
-                    where=finger,
-                    hint="Look at the hand and the object before going on",
-                )
+            if cycles < self.settings.force_cycles:
+                continue
+            if not isfinite(over[finger]):
+                what = f"its readings tell no force: {situation.void_tips.get(finger) or 'they are no numbers'}"
+                hint = "Take the hand off the object, then look at the sensor: tactile-lab rig check"
+                raise SafetyError(what, where=finger, hint=hint)
+            what = f"fingertip force {over[finger]:.1f} N is over the limit of {limits_N[finger]:.1f} N"
+            raise SafetyError(what, where=finger, hint="Look at the hand and the object before going on")
 
     def force_limit_N(self, range_N: float | None) -> float:
         """Largest force on a fingertip whose sensor has this range; None where it has none."""

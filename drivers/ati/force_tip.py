@@ -33,6 +33,8 @@ AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 CAPTURE_LIMIT = 1000
 """Samples a capture keeps, the newest: a capture that nobody ends must not grow without bound."""
 
+_STUCK = "the sensor has stopped measuring: its readings do not move"
+
 
 class ForceTip:
     """Bias, weight, load, contact and health of one force fingertip (a :class:`FingertipSensor`)."""
@@ -117,6 +119,15 @@ class ForceTip:
         force_N = self.load(self.newest.wrench, world_R_distal)[:3]
         return math.sqrt(force_N @ force_N)
 
+    def void(self) -> str:
+        """Why the newest sample tells no force: what is wrong with it, or how near its range's end it is."""
+        if self.newest is None:
+            return ""
+        if self._newest_usable:
+            return self.overload
+        told = [*self._reported(self.newest), *([_STUCK] if self.sequences.stuck else []), self.overload]
+        return "; ".join(filter(None, told)) or "its readings are no numbers"
+
     @property
     def overload(self) -> str:
         """Which axis of the newest sample is beyond its limit, in words; empty when none is."""
@@ -159,9 +170,7 @@ class ForceTip:
 
     def health(self) -> tuple[str, ...]:
         """What is wrong with the sensor, in words; empty when all is well."""
-        problems = list(describe_status(self.newest.status).messages) if self.newest else ["no sample received yet"]
-        if self.newest:
-            problems += self.newest.faults
+        problems = self._reported(self.newest) if self.newest else ["no sample received yet"]
         if self.newest and np.any(np.abs(self.newest.wrench) > self._range):
             problems.append("reading beyond the calibration range")
         elif overload := self.overload:
@@ -185,7 +194,7 @@ class ForceTip:
     def _sequence_problems(self) -> list[str]:
         monitor, problems = self.sequences, []
         if monitor.stuck:
-            problems.append("the sensor has stopped measuring: its readings do not move")
+            problems.append(_STUCK)
         if monitor.lost > self._settings.lost_share * (monitor.seen + monitor.lost):
             problems.append(f"{monitor.lost} of {monitor.seen + monitor.lost} records lost")
         if monitor.skipped > self._settings.lost_share * (monitor.seen + monitor.skipped):
@@ -195,6 +204,11 @@ class ForceTip:
         if monitor.disordered:
             problems.append(f"{monitor.disordered} records out of order or twice")
         return problems
+
+    @staticmethod
+    def _reported(sample: WrenchSample) -> list[str]:
+        """What the sensor's box and its wire say of a sample."""
+        return [*describe_status(sample.status).messages, *sample.faults]
 
     def _sound(self, sample: WrenchSample) -> bool:
         healthy = describe_status(sample.status).severity < Severity.FAULT if sample.status else True

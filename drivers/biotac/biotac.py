@@ -23,6 +23,8 @@ from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
 from tactile_lab.geometry.contacts import FINGERS, Array
 
+_NOT_FITTED = "no sensor fitted: readings outside the converter's range"
+
 __all__ = ["BioTac", "BioTacCalibration", "BioTacSettings", "EllipsoidSkinSettings", "TactileReading", "load_biotacs"]
 
 
@@ -143,6 +145,10 @@ class BioTac:
             return math.inf
         return self._force_N(self._pdc_rise(), self.channels.newest(self._electrodes) - self._tare_electrodes)
 
+    def void(self) -> str:
+        """Why the newest readings tell no force, in words; "" while they do."""
+        return _NOT_FITTED if self.channels.heard and not self.channels.fitted else ""
+
     def begin_capture(self) -> None:
         """From here on readings are averaged for :meth:`contact`."""
         self.channels.begin_capture()
@@ -178,7 +184,7 @@ class BioTac:
         if not self.channels.heard:
             return ("no reading received yet",)
         if not self.channels.fitted:
-            return ("no sensor fitted: readings outside the converter's range",)
+            return (_NOT_FITTED,)
         problems = [] if self._tare_pdc is not None else ["not tared"]
         if silent := self.channels.older_than(self._settings.stale_ms):
             problems.append(f"{silent} channels not heard for more than {self._settings.stale_ms:.0f} ms")

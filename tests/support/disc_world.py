@@ -71,6 +71,9 @@ class DiscTip:
     def load_N(self, world_R_distal: Array) -> float:
         return self._world.load_N(self.finger)
 
+    def void(self) -> str:
+        return ""
+
     def begin_capture(self) -> None:
         """Nothing is gathered."""
 

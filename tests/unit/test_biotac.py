@@ -250,8 +250,10 @@ def test_an_empty_socket_is_told_apart_and_stops_motion(tip: BioTac) -> None:
         tip.tare(UPRIGHT)
     finger.feed(REST)
     tip.tare(UPRIGHT)
+    assert tip.void() == ""
     finger.feed(dict.fromkeys(REST, 0), rotations=1)
     assert tip.load_N(UPRIGHT) == math.inf
+    assert "no sensor fitted" in tip.void()
 
 
 @pytest.mark.parametrize(("channel", "complaint"), [(Channel.PDC, "pressure moves"), (7, "electrode moves")])

@@ -242,10 +242,12 @@ def test_void_samples_stop_motion_and_never_reach_a_contact(tip: Nano17, calibra
     tip.begin_capture()
     stream.feed(np.full(6, 0.05), status=0x80020000)
     assert tip.load_N(np.eye(3)) == math.inf
+    assert tip.void() == "sensor saturated or disconnected"
     assert tip.contact(np.eye(3)) is None
     assert "sensor saturated or disconnected" in tip.health()
     stream.feed(np.array([0, 0, 18.0, 0, 0, 0]), n=1)
     assert tip.load_N(np.eye(3)) == math.inf
+    assert tip.void() == "Fz at 106 % of the calibration range"
     assert "reading beyond the calibration range" in tip.health()
     assert "21 void samples left out" in tip.health()
     with pytest.raises(DeviceError, match="0 usable samples"):
@@ -263,8 +265,10 @@ def test_a_stuck_sensor_loop_is_noticed(tip: Nano17) -> None:
     stream.feed(np.zeros(6), stuck=True)
     assert any("stopped measuring" in problem for problem in tip.health())
     assert tip.load_N(np.eye(3)) == math.inf
+    assert "stopped measuring" in tip.void()
     stream.feed(np.zeros(6), n=1)
     assert math.isfinite(tip.load_N(np.eye(3)))
+    assert tip.void() == ""
 
 
 def test_silence_is_noticed_by_the_clock(calibration: FingertipCalibration) -> None:

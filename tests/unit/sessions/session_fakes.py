@@ -91,6 +91,9 @@ class FakeTip:
     def load_N(self, world_R_distal):
         return float(np.linalg.norm(self.samples[-1] - self.bias + 0.01 * world_R_distal[2])) if self.samples else 0.0
 
+    def void(self):
+        return self.fault
+
     def begin_capture(self):
         self.capture = []
 

@@ -231,6 +231,15 @@ def test_loads_are_known_for_every_fingertip():
     assert perception.loads_N() == dict.fromkeys(FINGERS, 0.0)
     perception.on_wrench("RF", [np.array([3.0, 0.0, 4.0])])
     assert perception.loads_N()["RF"] == pytest.approx(5.0, abs=0.011)
+    assert perception.void_tips() == {}
+
+
+def test_a_fingertip_that_tells_no_force_says_why():
+    perception = make_perception()
+    hear(perception)
+    perception.fingertips["RF"].fault = "saturated"
+    perception.on_wrench("RF", [np.full(3, np.inf)])
+    assert perception.void_tips() == {"RF": "saturated"}
 
 
 def test_problems_name_the_finger():
