@@ -16,7 +16,8 @@ import numpy as np
 from gtsam import Pose3
 from pydantic import Field
 
-from calibration.hand_chain import HandNoise, LinkMotion, joints_of, link_motion, mount_T_link
+from calibration.board_chain import BoardChain, by_camera
+from calibration.hand_chain import HandNoise, joints_of, link_motion, mount_T_link
 from calibration.hand_eye import solve_ax_xb, solve_ax_zb
 from calibration.observations import View
 from calibration.pose_residuals import PoseResidual
@@ -40,8 +41,7 @@ from drivers.camera.glass import Glass
 from drivers.camera.markers import MarkerSettings, marker_poses
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import rotation_angle_rad, transform_points
-from tactile_lab.geometry.rotations import skew
+from tactile_lab.geometry.poses import rotate, rotation_angle_rad, transform_points
 
 _ROUNDS = 2
 _FIXED_UNKNOWNS = 18  # mount, board and camera
@@ -52,12 +52,16 @@ class BoardNoise(HandNoise):
 
     Attributes:
         corner_px: of a detected corner, per axis.
-        corner_bias_px: what is the same in every picture of a standing marker, per corner and axis: sides that bow in
-            the lens, and a print that is not exactly as large as its bar says.
+        corner_bias_px: what moves all corners of a standing marker alike in every picture, per axis: sides that bow in
+            the lens.
+        corner_own_px: what stays of each of its corners alone.
+        print_share: how well the size of each print is known: a bar of 100 mm measured to 0.03 mm.
     """
 
     corner_px: float = Field(default=0.05, gt=0.0)
     corner_bias_px: float = Field(default=0.03, ge=0.0)
+    corner_own_px: float = Field(default=0.012, ge=0.0)
+    print_share: float = Field(default=3e-4, gt=0.0)
 
 
 class BoardProblem:
@@ -107,7 +111,7 @@ class BoardProblem:
         return self._solution(measured, values, len(chosen))
 
     def _solution(self, measured: Sequence[Measurement], values: gtsam.Values, views: int) -> Solution:
-        factor = variance_factor(measured, values, _FIXED_UNKNOWNS + len(self.joints))
+        factor = variance_factor(measured, values, _FIXED_UNKNOWNS + len(self._prior_sigmas))
         offsets, spread = values.atVector(OFFSETS), np.sqrt(np.diag(marginal(measured, values, OFFSETS)))
         prior = self.noise.joint_offset_rad
         return Solution(
@@ -118,6 +122,7 @@ class BoardProblem:
             },
             variance_factor=factor,
             values=values,
+            numbers={"board_larger_share": float(offsets[-1])},
             others={f"{self._link}_T_board": values.atPose3(BOARD), "world_T_camera": values.atPose3(CAMERA)},
             outliers=outliers(measured[:views], values),
         )
@@ -133,7 +138,7 @@ class BoardProblem:
         values.insert(MOUNT, world_T_camera * best.mount_T_camera.inverse())
         values.insert(BOARD, best.hand_T_target)
         values.insert(CAMERA, world_T_camera)
-        values.insert(OFFSETS, np.zeros(len(self.joints)))
+        values.insert(OFFSETS, np.zeros(len(self._prior_sigmas)))
         return values
 
     def _world_T_camera(self) -> Pose3:
@@ -153,23 +158,33 @@ class BoardProblem:
     def _measurements(self, chosen: Sequence[int], values: gtsam.Values) -> list[Measurement]:
         """Board factors first, then the world marker's, then the prior of the joint offsets."""
         boards = [self._board_measurement(self.views[index], values) for index in chosen]
-        prior = prior_of_offsets(np.full(len(self.joints), self.noise.joint_offset_rad))
-        return [*boards, self._world_measurement(values), prior]
+        return [*boards, self._world_measurement(values), prior_of_offsets(self._prior_sigmas)]
+
+    @property
+    def _prior_sigmas(self) -> Array:
+        """Of all small unknowns: the joints' offsets, and by which share the board is larger than it should be."""
+        return np.append(np.full(len(self.joints), self.noise.joint_offset_rad), self.noise.print_share)
 
     def _world_measurement(self, values: gtsam.Values) -> Measurement:
-        points = self._glass.apparent(self._world_m, np.asarray(values.atPose3(CAMERA).translation()))
+        camera: Pose3 = values.atPose3(CAMERA)
+        points = self._glass.apparent(self._world_m, np.asarray(camera.translation()))
 
         def evaluate(values: gtsam.Values) -> tuple[Array, list[Array]]:
             camera: Pose3 = values.atPose3(CAMERA)
             seen, slopes = self._projected(transform_points(camera.inverse(), points))
-            return (seen - self._world_px).ravel(), [_rows(slopes @ _by_camera(camera, points))]
+            return (seen - self._world_px).ravel(), [_rows(slopes @ by_camera(camera, points))]
 
-        variance = self.noise.corner_px**2 / self._world_seen + self.noise.corner_bias_px**2
-        return Measurement((CAMERA,), variance * np.eye(2 * len(points)), evaluate, robust=False)
+        _, slopes = self._projected(transform_points(camera.inverse(), points))
+        larger = rotate(camera.inverse(), points - points.mean(axis=0))
+        size = self.noise.print_share * np.einsum("nij,nj->ni", slopes, larger).ravel()
+        alike = self.noise.corner_bias_px * np.tile(np.eye(2), (len(points), 1))
+        own = self.noise.corner_px**2 / self._world_seen + self.noise.corner_own_px**2
+        covariance = own * np.eye(2 * len(points)) + alike @ alike.T + np.outer(size, size)
+        return Measurement((CAMERA,), covariance, evaluate, robust=False)
 
     def _board_measurement(self, view: View, values: gtsam.Values) -> Measurement:
-        about = values.atVector(OFFSETS)
-        chain = _Chain(link_motion(view.pose, self._link, self.joints, about), about, view.board_m)
+        about = values.atVector(OFFSETS)[:-1]
+        chain = BoardChain(link_motion(view.pose, self._link, self.joints, about), about, view.board_m)
         shift = self._glass_shift(chain, values)
 
         def evaluate(values: gtsam.Values) -> tuple[Array, list[Array]]:
@@ -178,16 +193,16 @@ class BoardProblem:
             seen, slopes = self._projected(transform_points(camera.inverse(), places))
             turned = camera.rotation().matrix().T
             by_mount, by_board, by_offset = (turned @ part for part in chain.derivatives(values))
-            parts = (by_mount, by_board, _by_camera(camera, places), by_offset)
+            parts = (by_mount, by_board, by_camera(camera, places), by_offset)
             return (seen - view.board_px).ravel(), [_rows(slopes @ part) for part in parts]
 
         _, (by_mount, _, _, by_offset) = evaluate(values)
         base = self.noise.base_sigma_m * by_mount[:, 3:]  # as if the mount had moved
-        joints = self.noise.joint_noise_rad * by_offset
+        joints = self.noise.joint_noise_rad * by_offset[:, :-1]
         covariance = base @ base.T + joints @ joints.T + self.noise.corner_px**2 * np.eye(2 * len(view.board_px))
         return Measurement((MOUNT, BOARD, CAMERA, OFFSETS), covariance, evaluate)
 
-    def _glass_shift(self, chain: _Chain, values: gtsam.Values) -> Array:
+    def _glass_shift(self, chain: BoardChain, values: gtsam.Values) -> Array:
         places = chain.world_m(values)
         return self._glass.apparent(places, np.asarray(values.atPose3(CAMERA).translation())) - places
 
@@ -206,7 +221,8 @@ class BoardProblem:
 
     def _residual(self, index: int, view: View, solution: Solution) -> PoseResidual:
         values = solution.values
-        chain = _Chain(link_motion(view.pose, self._link, self.joints, values.atVector(OFFSETS)), None, view.board_m)
+        offsets = values.atVector(OFFSETS)[:-1]
+        chain = BoardChain(link_motion(view.pose, self._link, self.joints, offsets), None, view.board_m)
         places = chain.world_m(values) + self._glass_shift(chain, values)
         camera: Pose3 = values.atPose3(CAMERA)
         expected_px, _ = self._projected(transform_points(camera.inverse(), places))
@@ -234,51 +250,6 @@ def standing_corners(views: Sequence[View], moved_px: float) -> tuple[Array, int
         what = f"the world marker or the camera was bumped: {away.max():.1f} px from its place in picture {worst}"
         raise ConfigurationError(what, where="marker method", hint="Fasten both and take the pictures again")
     return np.asarray(corners.mean(axis=0)), len(numbers)
-
-
-class _Chain:
-    """A board's corners in the world as a function of all unknowns, linear in the joint offsets."""
-
-    def __init__(self, motion: LinkMotion, about_rad: Array | None, board_m: Array) -> None:
-        self._motion, self._about, self._board_m = motion, about_rad, board_m
-
-    @property
-    def mount_T_link(self) -> Array:
-        """At the offsets it was made for."""
-        return self._motion.mount_T_link
-
-    def _link(self, values: gtsam.Values) -> Array:
-        if self._about is None:
-            return self._motion.mount_T_link
-        return self._motion.at(values.atVector(OFFSETS) - self._about)
-
-    def world_m(self, values: gtsam.Values) -> Array:
-        """Corners, shape (n, 3)."""
-        whole = values.atPose3(MOUNT).matrix() @ self._link(values) @ values.atPose3(BOARD).matrix()
-        return np.asarray(self._board_m @ whole[:3, :3].T + whole[:3, 3])
-
-    def derivatives(self, values: gtsam.Values) -> tuple[Array, Array, Array]:
-        """Of the corners in the world by mount (n, 3, 6), board (n, 3, 6) and offsets (n, 3, m)."""
-        world_R_mount = values.atPose3(MOUNT).rotation().matrix()
-        link, board = self._link(values), values.atPose3(BOARD)
-        on_link = np.column_stack([transform_points(board, self._board_m), np.ones(len(self._board_m))])
-        in_mount = on_link @ link[:3].T
-        world_R_board = world_R_mount @ link[:3, :3] @ board.rotation().matrix()
-        by_mount, by_board = _by_pose(world_R_mount, in_mount), _by_pose(world_R_board, self._board_m)
-        moves = np.einsum("kij,nj->nik", self._motion.derivatives[:, :3], on_link)
-        return by_mount, by_board, world_R_mount @ moves
-
-
-def _by_pose(rotation: Array, points_m: Array) -> Array:
-    """Derivatives of points (n, 3) of a body by a small motion of it on its own side, shape (n, 3, 6)."""
-    turns = -rotation @ skew(points_m)
-    return np.concatenate([turns, np.broadcast_to(rotation, turns.shape)], axis=2)
-
-
-def _by_camera(world_T_camera: Pose3, points_world_m: Array) -> Array:
-    """Derivatives of points (n, 3) in the camera's frame by a small motion of the camera, shape (n, 3, 6)."""
-    turns = skew(transform_points(world_T_camera.inverse(), points_world_m))
-    return np.concatenate([turns, np.broadcast_to(-np.eye(3), turns.shape)], axis=2)
 
 
 def _rows(derivatives: Array) -> Array:

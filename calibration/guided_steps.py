@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
+from tactile_lab.errors import DeviceError
+
 
 class Instructed(Protocol):
     """Something planned that can be told in words."""
@@ -64,6 +66,20 @@ class GuidedSteps(Generic[PlannedT, ObservedT]):
         self._taken = [(number, old) for number, old in self._taken if number != step.number]
         self._taken.append((step.number, observation))
         return observation
+
+    def measure_all(self, station: Station[PlannedT, ObservedT]) -> int:
+        """Do every step without asking, as ``--no-input`` does; gives how many did not come off and were left out.
+
+        Raises:
+            SafetyError: a limit was passed.
+        """
+        left_out = 0
+        for step in self.steps():
+            try:
+                self.measure(step, station)
+            except DeviceError:
+                left_out += 1
+        return left_out
 
     def undo(self) -> int | None:
         """Take the last observation back; gives its step's number, None when there is none."""

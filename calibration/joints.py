@@ -44,11 +44,19 @@ class JointLimits(StrictModel):
 
 
 class JointPose(StrictModel):
-    """One pose: angles of some joints as known (by a jig, a plate) and as measured, degrees."""
+    """One pose: angles of some joints as known (by a jig, a plate) and as measured, degrees.
+
+    Without measured angles it is still to be read from the hand.
+    """
 
     name: str = ""
     known_deg: dict[str, float] = Field(min_length=1)
-    measured_deg: dict[str, float]
+    measured_deg: dict[str, float] = Field(default_factory=dict)
+
+    @property
+    def unread(self) -> bool:
+        """Whether nobody has stated measured angles."""
+        return "measured_deg" not in self.model_fields_set
 
 
 class JointPoses(StrictModel):
@@ -87,7 +95,7 @@ def load_poses(path: Path, here: Installation) -> JointPoses:
         names = set(pose.known_deg) | set(pose.measured_deg)
         if unknown := sorted(names - set(JOINT_INDEX)):
             raise ConfigurationError(f"pose {index + 1} names unknown joints {', '.join(unknown)}", where=str(path))
-        if missing := sorted(set(pose.known_deg) - set(pose.measured_deg)):
+        if not pose.unread and (missing := sorted(set(pose.known_deg) - set(pose.measured_deg))):
             raise ConfigurationError(f"pose {index + 1} has no measured {', '.join(missing)}", where=str(path))
     return poses
 

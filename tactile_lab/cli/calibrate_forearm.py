@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from calibration.forearm_wizard import ForearmResult, ForearmWizard
     from calibration.recordings import ForearmData
     from tactile_lab.cli.wizard import Asker
-    from tactile_lab.workflow.calibrating import CalibrationSettings
+    from tactile_lab.rigs.calibrating import CalibrationSettings
 
 
 class ForearmMethod(StrEnum):
@@ -114,8 +114,8 @@ def _stated(sigma_mm: float | None, sigma_deg: float | None) -> tuple[float, flo
 
 
 def _settings(path: Path | None) -> CalibrationSettings:
+    from tactile_lab.rigs.calibrating import CalibrationSettings
     from tactile_lab.strict_yaml import load_model
-    from tactile_lab.workflow.calibrating import CalibrationSettings
 
     return CalibrationSettings() if path is None else load_model(path, CalibrationSettings)
 
@@ -145,9 +145,10 @@ def _measured(
     pictures: int | None,
 ) -> ForearmData:
     from tactile_lab.cli.calibrate_steps import measure_all
-    from tactile_lab.workflow.calibrating import ForearmRequest, forearm_wizard
+    from tactile_lab.rigs.calibrating import ForearmRequest, forearm_wizard
+    from tactile_lab.rigs.description import load_rig
 
-    request = ForearmRequest(rig, method.value, seed, geometry, board, fingers, touches, pictures, settings)
+    request = ForearmRequest(load_rig(rig), method.value, seed, geometry, board, fingers, touches, pictures, settings)
     with forearm_wizard(request, asker.onlooker) as (wizard, station):
         _tell_plan(rig, wizard)
         asker.choose("The hand will move. Is its way clear?", {"y": "begin"}, "y")

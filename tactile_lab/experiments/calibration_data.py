@@ -28,8 +28,10 @@ SAMPLES = 20
 CONTACT_SIGMA_m = 1e-3
 YIELD_m_N = 3e-4
 FORCES_N = (0.2, 1.0)
-CORNER_SIGMA_px, CORNER_BIAS_px = 0.05, 0.03
-"""As measured on pictures of the simulated rig's camera; the bias is that of a standing marker."""
+CORNER_SIGMA_px, CORNER_BIAS_px, CORNER_OWN_px = 0.05, 0.03, 0.012
+"""As measured on pictures of the simulated rig's camera; bias of a standing marker: all corners alike, each alone."""
+PRINT_SHARE = 3e-4
+"""How far prints are from the size that their bars say: one standard deviation of the share."""
 BASE_SIGMA_m = 1e-4
 
 CAMERA = CameraCalibration(
@@ -101,19 +103,23 @@ def _touch(planned: PlannedTouch, shift_m: float, rig: TrueRig, rng: np.random.G
 
 
 def views_of(plan: Sequence[PlannedView], rig: TrueRig, rng: np.random.Generator) -> list[View]:
-    """Every planned picture as the camera would give it, with the board glued on a little askew."""
+    """Every planned picture as the camera would give it, with the board glued on a little askew, both prints off."""
     askew = Pose3.Expmap(np.concatenate([0.03 * rng.standard_normal(3), 0.003 * rng.standard_normal(3)]))
-    bias_px = CORNER_BIAS_px * rng.standard_normal((4, 2))
-    return [_view(planned, rig, PALM_T_BOARD.pose() * askew, bias_px, rng) for planned in plan]
+    bias_px = CORNER_BIAS_px * rng.standard_normal(2) + CORNER_OWN_px * rng.standard_normal((4, 2))
+    board_size, world_size = 1.0 + PRINT_SHARE * rng.standard_normal(2)
+    on_palm = transform_points(PALM_T_BOARD.pose() * askew, board_size * BOARD_m)
+    world = transform_points(MARKERS.world_T_worldmarker.pose(), world_size * MARKERS.world_corners_m)
+    return [_view(planned, rig, on_palm, world, bias_px, rng) for planned in plan]
 
 
-def _view(planned: PlannedView, rig: TrueRig, palm_T_board: Pose3, bias_px: Array, rng: np.random.Generator) -> View:
+def _view(
+    planned: PlannedView, rig: TrueRig, on_palm_m: Array, world_m: Array, bias_px: Array, rng: np.random.Generator
+) -> View:
     base_q = planned.base_q(Pose3())
     mount_T_palm = Pose3(mount_T_link(HandPose(base_q, planned.joints_rad), "palm"))
-    board = transform_points(rig.world_T_mount * mount_T_palm * palm_T_board, BOARD_m)
-    world = transform_points(MARKERS.world_T_worldmarker.pose(), MARKERS.world_corners_m)
+    board = transform_points(rig.world_T_mount * mount_T_palm, on_palm_m)
     pose = rig.measured(base_q, planned.joints_rad, rng)
-    return View(pose, BOARD_m, _seen(board, rng), _seen(world, rng) + bias_px)
+    return View(pose, BOARD_m, _seen(board, rng), _seen(world_m, rng) + bias_px)
 
 
 def _seen(points_world_m: Array, rng: np.random.Generator) -> Array:

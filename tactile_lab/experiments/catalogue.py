@@ -28,6 +28,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         laboratory.CAMERA_TRUTH,
         laboratory.GRAPH_STRESS,
         laboratory.CALIBRATE_FOREARM,
+        laboratory.FOREARM_ON_RIG,
         laboratory.CALIBRATE_FINGERTIP,
         laboratory.CRASH_RECOVERY,
     )

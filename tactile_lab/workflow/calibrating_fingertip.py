@@ -18,10 +18,10 @@ from sessions.fingertip_station import FingertipStation, FingertipStationSetting
 from sessions.recorder import Recorder, TrafficSink
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.build import check_calibration
+from tactile_lab.rigs.calibrating import cleared, tip_shapes
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.laboratory import open_laboratory
 from tactile_lab.strict_yaml import StrictModel
-from tactile_lab.workflow.calibrating import cleared, tip_shapes
 
 
 class FingertipSettings(StrictModel):

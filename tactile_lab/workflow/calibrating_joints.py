@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +15,8 @@ from calibration.forearm import load_forearm
 from calibration.forearm_record import check_origin
 from calibration.forearm_wizard import solve_forearm
 from calibration.geometry import Block
-from calibration.joints import JointCorrection, JointLimits, from_contacts, from_poses, load_poses
+from calibration.joints import JointCorrection, JointLimits, JointPose, from_contacts, from_poses, load_poses
+from calibration.pose_steps import PlannedPose, PoseSteps
 from calibration.quality import Judgement
 from calibration.recordings import FORMAT, ForearmData, load_data
 from calibration.refinement import JointOffset
@@ -24,13 +25,14 @@ from drivers.shadow.posture import LONG_FINGERS
 from drivers.simulation.objects import object_model
 from drivers.simulation.settings import ObjectStart
 from sessions.calibration_station import CalibrationStation, StationSettings
+from sessions.held_hand import HeldHand
 from sessions.recorder import Recorder, TrafficSink
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.build import check_calibration
+from tactile_lab.rigs.calibrating import cleared, tip_shapes
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.laboratory import open_laboratory
 from tactile_lab.strict_yaml import StrictModel, load, load_model
-from tactile_lab.workflow.calibrating import cleared, tip_shapes
 
 BLOCK = "box-12x6x6"
 """The object that a simulated rig has for a block."""
@@ -100,16 +102,59 @@ def load_settings(path: Path | None) -> JointSettings:
 
 
 def from_file(source: Path, rig: Rig, settings: JointSettings) -> FoundJoints:
-    """Corrections from known poses or recorded touches. Raises ConfigurationError."""
-    here, content = rig.installation, load(source)
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        return FoundJoints("known poses", from_poses(load_poses(source, here).poses))
+    """Corrections from known poses that were measured, or recorded touches. Raises ConfigurationError."""
+    here = rig.installation
+    if not _holds_touches(source):
+        return from_known(load_poses(source, here).poses)
     data = load_data(source)
     check_origin(data, here, str(source))
     if not data.touches:
         hint = "Record touches: tactile-lab calibrate joints --record FILE"
         raise ConfigurationError("holds pictures, which tell no finger's joints", where=str(source), hint=hint)
     return from_touches(data, rig, settings)
+
+
+def _holds_touches(source: Path) -> bool:
+    content = load(source)
+    return isinstance(content, dict) and content.get("format") == FORMAT
+
+
+def from_known(poses: Sequence[JointPose]) -> FoundJoints:
+    """Corrections from known poses that were measured. Raises ConfigurationError when there is none."""
+    if not poses:
+        raise ConfigurationError("no pose was read", where="joints", hint="Hold the hand in the poses of the file")
+    return FoundJoints("known poses", from_poses(poses))
+
+
+def known_poses(source: Path, rig: Rig) -> tuple[JointPose, ...]:
+    """Known poses of a file some of which are still to be read from the hand; none when all were measured.
+
+    Raises:
+        ConfigurationError: the file can not be used.
+    """
+    poses = () if _holds_touches(source) else load_poses(source, rig.installation).poses
+    return poses if any(pose.unread for pose in poses) else ()
+
+
+@contextmanager
+def pose_wizard(
+    rig: Rig, poses: Sequence[JointPose], limits: JointLimits, seed: int, onlooker: TrafficSink
+) -> Iterator[tuple[PoseSteps, HeldHand]]:
+    """The poses that are still to be read, with a connected hand that a person holds in them.
+
+    Raises:
+        ConfigurationError: the rig can not be used.
+        DeviceError: it is not ready.
+    """
+    check_calibration(rig)
+    plan = [PlannedPose(pose) for pose in poses if pose.unread]
+    with open_laboratory(rig, seed, BLOCK) as laboratory:
+        bench = laboratory.bench(Recorder(onlooker), first_move=False)
+        bench.connect()
+        try:
+            yield PoseSteps(plan, limits), HeldHand(bench)
+        finally:
+            bench.close()
 
 
 def from_touches(data: ForearmData, rig: Rig, settings: JointSettings) -> FoundJoints:

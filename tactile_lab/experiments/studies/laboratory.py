@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from calibration.fingertip_model import PARTS
-from tactile_lab.experiments import calibration_runs, camera_runs, crash_runs, fingertip_runs, graph_runs
+from tactile_lab.experiments import (
+    calibration_runs,
+    camera_runs,
+    crash_runs,
+    fingertip_runs,
+    forearm_on_rig,
+    graph_runs,
+)
 from tactile_lab.experiments.cells import grid
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.graph_stress import stock_solvers
@@ -56,6 +63,29 @@ CALIBRATE_FOREARM = Experiment(
         Column("rotation, °: median / p95", "errors_deg", 2, kind="pooled"),
         Column("inside the 95 % region", "inside", 1, kind="percent"),
         Column("noise found, of that stated", "noise", 2, kind="median"),
+    ),
+    ranges("method", "position error, mm", "error_mm", lambda cell: f"{cell['poses']} poses"),
+)
+
+FOREARM_ON_RIG = Experiment(
+    "forearm-on-rig",
+    "The forearm's wizard on the simulated rig, physics and all: every joint off by 0.6°, contacts by a further 1 mm.",
+    lambda grasps: (
+        grid(method=[calibration_runs.TOUCH], poses=[40]) + grid(method=[calibration_runs.MARKER], poses=[10, 20])
+    ),
+    forearm_on_rig.calibrate_on_rig,
+    (
+        Column("position, mm: median / p95", "errors_mm", 2, kind="pooled"),
+        Column("rotation, °: median / p95", "errors_deg", 2, kind="pooled"),
+        Column("stated, mm", "stated_mm", 2, kind="median"),
+        Column("stated, °", "stated_deg", 2, kind="median"),
+        Column("inside the 95 % region", "inside", 0, kind="percent"),
+        Column("PASS", "passed", 0, kind="percent"),
+        Column("noise found, of that stated", "noise", 2, kind="median"),
+        Column("steps left out", "left_out", 0, kind="sum"),
+        Column("contacts as felt, mm", "felt_errors_mm", 2, kind="pooled"),
+        Column("°", "felt_errors_deg", 2, kind="pooled"),
+        Column("inside", "felt_inside", 0, kind="percent"),
     ),
     ranges("method", "position error, mm", "error_mm", lambda cell: f"{cell['poses']} poses"),
 )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.experiments.catalogue import EXPERIMENTS, experiment
+from tactile_lab.experiments.cells import Row
 from tactile_lab.experiments.experiment import REPORTED_SEEDS, Experiment
 from tactile_lab.experiments.reporting import write_report
 from tactile_lab.experiments.runner import execute
@@ -31,24 +33,40 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "exploration-kinematic": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
     "camera-truth": ({"condition": ["sharp"]}, None),
     "calibrate-forearm": ({"method": ["touch"], "poses": ["20"]}, None),
+    "forearm-on-rig": ({"method": ["marker"], "poses": ["10"]}, None),
     "calibrate-fingertip": ({"presses": ["6"]}, None),
     "crash-recovery": ({"fault": ["kill -9"]}, None),
     "graph-stress": ({"solver": ["Cauchy", "ours"]}, None),
 }
 
 
+@cache
+def tiny_rows(name: str) -> list[Row]:
+    """An experiment's tiny configuration with one seed, run once for all tests here."""
+    study, (only, grasps) = EXPERIMENTS[name], TINY[name]
+    return [execute(cell, study.work) for cell in study.cells([0], only, grasps)]
+
+
 @pytest.mark.parametrize("study", EXPERIMENTS.values(), ids=lambda study: study.name)
 def test_every_experiment_runs_and_is_reported(study: Experiment, tmp_path: Path) -> None:
-    only, grasps = TINY[study.name]
-    cells = study.cells([0], only, grasps)
-    assert 0 < len(cells) <= 6
-    rows = [execute(cell, study.work) for cell in cells]
+    rows = tiny_rows(study.name)
+    assert 0 < len(rows) <= 6
     assert [row.problem for row in rows] == [""] * len(rows)
     for column in study.columns:
         assert any(column.key in (row.figures or {}) for row in rows)
     write_report(study, rows, tmp_path, jobs=1)
     ElementTree.fromstring((tmp_path / "plot.svg").read_text())
     assert (tmp_path / "results.md").read_text().count("| --- ") >= 1
+
+
+def test_the_forearms_wizard_finds_a_displaced_mount_through_the_physics() -> None:
+    (row,) = tiny_rows("forearm-on-rig")
+    assert row.figures is not None
+    assert row.figures["left_out"] == 0
+    assert row.figures["error_mm"] < 1.0
+    assert row.figures["errors_deg"][0] < 0.3
+    assert row.figures["inside"] == 1.0
+    assert 0.5 < row.figures["noise"] < 1.5
 
 
 def test_the_same_cell_gives_the_same_figures() -> None:

@@ -28,7 +28,7 @@ from sessions.calibration_station import Board, CalibrationStation, StationSetti
 from sessions.recorder import Recorder, TrafficSink
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.build import check_calibration
-from tactile_lab.rigs.description import Rig, load_rig
+from tactile_lab.rigs.description import Rig
 from tactile_lab.rigs.laboratory import open_laboratory
 from tactile_lab.strict_yaml import StrictModel, load_model
 
@@ -57,7 +57,7 @@ class ForearmRequest:
     """What a person asks for.
 
     Attributes:
-        rig: name of a shipped rig, or a rig file.
+        rig: the one to calibrate.
         method: touch or marker.
         seed: of a simulated rig.
         geometry, board: files instead of the rig's.
@@ -67,7 +67,7 @@ class ForearmRequest:
         settings: see there.
     """
 
-    rig: str
+    rig: Rig
     method: str
     seed: int = 0
     geometry: Path | None = None
@@ -92,9 +92,8 @@ def forearm_wizard(
         ConfigurationError: the rig lacks what the method needs.
         DeviceError: the rig is not ready.
     """
-    rig = load_rig(request.rig)
-    check_calibration(rig)
-    rig = _prepared(rig, request)
+    check_calibration(request.rig)
+    rig = _prepared(request)
     plan, data = _plan(rig, request), _data(rig, request.method)
     wizard = ForearmWizard("touch" if request.method == "touch" else "marker", plan, data, request.settings.wizard)
     with open_laboratory(rig, request.seed, "box-10x6x4") as laboratory:
@@ -168,9 +167,9 @@ def _data(rig: Rig, method: str) -> ForearmData:
     return replace(data, camera=load_camera(rig.files["camera"]), markers=markers)
 
 
-def _prepared(rig: Rig, request: ForearmRequest) -> Rig:
+def _prepared(request: ForearmRequest) -> Rig:
     """A simulated rig with its object out of the way, and with a board glued on a little askew."""
-    changes: dict[str, object] = {}
+    rig, changes = request.rig, dict[str, object]()
     if request.method == "marker" and rig.description.simulation.hand_board is None:
         board = hand_board(rig, request)
         if isinstance(board, GridBoard):
