@@ -11,9 +11,9 @@ from tactile_lab.cli.options import Json, NoInput, RigName
 from tactile_lab.cli.page_address import PORT, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
-    from calibration.joints import JointCorrection
+    from calibration.joints import JointCorrection, JointLimits, JointPose
     from calibration.recordings import ForearmData
     from tactile_lab.cli.wizard import Asker
     from tactile_lab.rigs.description import Rig
@@ -33,7 +33,7 @@ def joints(
     fingers: Annotated[str, typer.Option(help="Long fingers that press the block.")] = "FF,MF,RF",
     rounds: Annotated[int, typer.Option(min=1, help="How often every face is pressed in every posture.")] = 1,
     settings: Annotated[Path | None, typer.Option(help="Settings: limits, errors, speeds.")] = None,
-    record: Annotated[Path | None, typer.Option(help="Keep the measured touches in this file too.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Keep the measured touches or poses in this file too.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
     out: Annotated[
         Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/joints.yaml")
@@ -51,7 +51,8 @@ def joints(
 
     Several fingers press one rigid block at a known place, stretched and bent; the forearm has to be calibrated. Those
     joints are corrected whose offset the contacts tell, the others are named. Or --from: poses whose angles are known
-    (tactile-joint-poses/1: by a jig or a plate), or touches as --record here or in calibrate forearm writes them.
+    (tactile-joint-poses/1: by a jig or a plate), or touches as --record here or in calibrate forearm writes them. Poses
+    without measured angles are read from the hand, step by step, while you hold it in them.
 
     Exit code 0: PASS; 2: the data can not be used; 3: FAIL, outside a limit (kept as NAME.failed.yaml, which sessions
     refuse); 4: a device; 130: ended by the operator.
@@ -61,14 +62,23 @@ def joints(
     from tactile_lab.cli.calibrate_steps import store_result
     from tactile_lab.cli.wizard import may_write, wizard
     from tactile_lab.rigs.description import load_rig
-    from tactile_lab.workflow.calibrating_joints import JointRequest, from_file, from_touches, load_settings
+    from tactile_lab.workflow.calibrating_joints import (
+        JointRequest,
+        from_file,
+        from_known,
+        from_touches,
+        known_poses,
+        load_settings,
+    )
 
     described, wanted = load_rig(rig), load_settings(settings)
     here, page = described.installation, PageAddress.wanted(view, listen, view_port, token)
     file = out or Path("calibrations") / here.rig / "joints.yaml"
     with wizard(f"calibrate joints, rig {rig}", no_input, page) as asker:
         may_write(file, replace, asker, no_input)
-        if source is not None:
+        if source is not None and (poses := known_poses(source, described)):
+            found = from_known(_read(poses, described, wanted.limits, seed, record, asker))
+        elif source is not None:
             found = from_file(source, described, wanted)
         else:
             names = tuple(name.strip() for name in fingers.split(","))
@@ -104,6 +114,25 @@ def _touched(request: JointRequest, rig: Rig, asker: Asker) -> ForearmData:
         asker.choose("The hand will move. Stands the block in its place?", {"y": "begin"}, "y")
         measure_all(wizard, station, asker)
         return ForearmData(here.rig, dict(here.devices), touches=wizard.touches)
+
+
+def _read(
+    poses: Sequence[JointPose], rig: Rig, limits: JointLimits, seed: int, record: Path | None, asker: Asker
+) -> list[JointPose]:
+    """All poses measured: those that were not are read from the hand, step by step. Raises TactileLabError."""
+    from calibration.pose_steps import save_poses
+    from tactile_lab.cli.calibrate_steps import measure_all
+    from tactile_lab.cli.console import say
+    from tactile_lab.workflow.calibrating_joints import pose_wizard
+
+    with pose_wizard(rig, poses, limits, seed, asker.onlooker) as (steps, hand):
+        say(f"Joints on rig {rig.description.name}: {len(steps.plan)} known poses to hold the hand in", "bold")
+        say("Its motors stay without demands: put it into each pose by hand", "dim")
+        measure_all(steps, hand, asker)
+        measured = [*(pose for pose in poses if not pose.unread), *steps.poses]
+    if record is not None and measured:
+        save_poses(record, measured, rig.installation.rig)
+    return measured
 
 
 def _show_joints(found: FoundJoints, faults: Mapping[str, tuple[str, ...]]) -> None:

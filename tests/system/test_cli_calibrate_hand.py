@@ -49,6 +49,25 @@ def test_joints_are_corrected_from_a_recorded_table_and_the_file_is_used(inside,
     assert (again.code, "exists already" in again.err) == (2, True)
 
 
+def test_poses_without_measured_angles_are_read_from_the_hand(inside, tmp_path):
+    entries = [{"name": "on the plate", "known_deg": {"FFJ3": 0.0, "MFJ3": 0.0}}] * 2
+    (tmp_path / "jig.yaml").write_text(
+        yaml.safe_dump({"format": "tactile-joint-poses/1", "rig": "simulated-hand", "poses": entries})
+    )
+    out, kept = tmp_path / "joints.yaml", tmp_path / "read.yaml"
+    answer = inside(
+        "calibrate", "joints", "--from", tmp_path / "jig.yaml", "--record", kept, "--out", out, "--no-input"
+    )
+    assert answer.code == 0, answer.err
+    assert "hold the hand on the plate (FFJ3 0, MFJ3 0 deg): done" in answer.err
+    read = [pose["measured_deg"] for pose in yaml.safe_load(kept.read_text())["poses"]]
+    details = read_record(out).details
+    for joint in ("FFJ3", "MFJ3"):
+        first, second = (pose[joint] for pose in read)
+        assert 0.05 < abs(first) < 4.0  # nobody holds the simulated hand: it sinks a little from flat
+        assert details[joint]["shift_deg"] == pytest.approx(-(first + second) / 2, abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("measured", "words"),
     [({0.0: 1.0}, "1 pose, 2 needed"), ({0.0: 3.0, 10.0: 7.0, 15.0: 18.0}, "deg left, limit 1.00")],
