@@ -120,7 +120,7 @@ GOOD = "time_s,x_m,y_m,nx,ny\n0,0.05,0,1,0\n1,-0.05,0,-1,0\n"
     ("text", "words"),
     [
         (GOOD.replace("x_m", "x_mm"), ("'x_mm' is in another unit", "call it x_m")),
-        (GOOD.replace("0.05", "50"), ("millimetres?",)),
+        (GOOD.replace("0.05", "50"), ("millimetres",)),
         (GOOD.replace("0,0.05", "3,0.05"), ("contact 2", "before that of the contact before", "Sort the lines")),
         ("", ("no column",)),
     ],

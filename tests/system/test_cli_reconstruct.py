@@ -228,7 +228,7 @@ def to_millimetres(index: int, contact: dict) -> None:
         (lambda log: log.update(grasp=[]), ("grasp: unknown key (did you mean grasps?)",)),
         (lambda log: log["grasps"][2].pop("hand_motion_world"), ("grasps.2.hand_motion_world: is missing",)),
         (lambda log: log["grasps"][1]["contacts"][0]["point_world_m"].__setitem__(0, float("nan")), ("finite number",)),
-        (lambda log: each_contact(log, to_millimetres), ("millimetres?",)),
+        (lambda log: each_contact(log, to_millimetres), ("millimetres",)),
         (lambda log: each_contact(log, negate), ("normals point into the object", "negate them")),
         (lambda log: log.update(format="tactile-contacts/9"), ("'tactile-contacts/9'",)),
         (lambda log: log["grasps"][0]["contacts"][0].update(normal_world=[0, 0, 0]), ("a normal has length 1",)),
