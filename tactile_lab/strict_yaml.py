@@ -145,8 +145,16 @@ def _problem(item: ErrorDetails, model: type[BaseModel]) -> str:
         return f"{place}: is missing"
     if item["type"] in {"model_type", "model_attributes_type", "dict_type"}:
         return f"{place}: must be keys with values"
-    words = re.sub(r"^[A-Z]\w+ should", "must", item["msg"].removeprefix("Value error, "))
-    return f"{place}: {words.removesuffix(_UNPARSED)}{_given(item['input'])}"
+    words = re.sub(r"^[A-Z]\w+ should", "must", item["msg"].removeprefix("Value error, ")).removesuffix(_UNPARSED)
+    own = item["type"] == "value_error"
+    if own and not item["loc"]:
+        return words
+    return f"{place}: {words}{'' if own and _names(words, item['input']) else _given(item['input'])}"
+
+
+def _names(words: str, value: Any) -> bool:
+    """Whether words of our own tell the offending value already."""
+    return (f"{value:g}" if isinstance(value, (int, float)) else str(value)) in words
 
 
 def _given(value: Any) -> str:

@@ -7,7 +7,7 @@ one outline, so that no viewer shows hairlines between them.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -71,8 +71,13 @@ class _Piece:
     title: str
 
 
-def sheet_of(prints: Sequence[AnyBoard], paper: str = "A4") -> Sheet:
+def sheet_of(prints: Sequence[AnyBoard], paper: str = "A4", places: Sequence[str] = ()) -> Sheet:
     """A sheet with the prints one below or beside another, a check bar and their names.
+
+    Args:
+        prints: what is printed.
+        paper: its format.
+        places: where each is to be glued, for its caption; none where anybody may use it anywhere.
 
     Raises:
         ConfigurationError: no such paper, or the prints do not fit on it.
@@ -81,10 +86,12 @@ def sheet_of(prints: Sequence[AnyBoard], paper: str = "A4") -> Sheet:
         hint = f"There are {', '.join(PAPERS_mm)}"
         raise ConfigurationError(f"no paper called {paper!r}", where="markers", hint=hint)
     pieces = [_piece(each) for each in prints]
+    if places:
+        pieces = [replace(piece, title=f"{piece.title}  {at}") for piece, at in zip(pieces, places, strict=True)]
     portrait = PAPERS_mm[paper]
     for size in (portrait, portrait[::-1]):
-        if (places := _places(pieces, size)) is not None:
-            return _sheet(pieces, places, size)
+        if (corners := _places(pieces, size)) is not None:
+            return _sheet(pieces, corners, size)
     widest, highest = max(piece.width_mm for piece in pieces), max(piece.height_mm for piece in pieces)
     room = f"{portrait[0] - 2 * _MARGIN_mm:.0f} x {portrait[1] - 2 * _MARGIN_mm - _FOOT_mm:.0f} mm"
     raise ConfigurationError(

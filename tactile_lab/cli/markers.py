@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +15,13 @@ if TYPE_CHECKING:
     from drivers.camera.boards import AnyBoard
     from tactile_lab.workflow.printing import PrintedSheet
 
-KINDS = ("single", "grid", "charuco", "rig")
+KINDS = {
+    "single": {"number", "dictionary", "side_m"},
+    "grid": {"dictionary", "columns", "rows", "side_m", "gap_m"},
+    "charuco": {"dictionary", "columns", "rows", "square_m", "marker_m"},
+    "rig": set[str](),
+}
+"""What can be printed, and which options say how; a rig's file says it all."""
 
 
 def markers(
@@ -50,27 +57,22 @@ def markers(
     if what not in KINDS:
         problem = f"{what!r} is none of {', '.join(KINDS)}, and no .yaml file"
         raise typer.BadParameter(problem, param_hint="'WHAT'")
-    given = {
-        "single": {"dictionary": dictionary, "side_m": _m(side_mm)},
-        "grid": {
-            "dictionary": dictionary,
-            "columns": columns,
-            "rows": rows,
-            "side_m": _m(side_mm),
-            "gap_m": _m(gap_mm),
-        },
-        "charuco": {
-            "dictionary": dictionary,
-            "columns": columns,
-            "rows": rows,
-            "square_m": _m(square_mm),
-            "marker_m": _m(marker_mm),
-        },
+    typed: dict[str, Any] = {
+        "number": number,
+        "dictionary": dictionary,
+        "columns": columns,
+        "rows": rows,
+        "side_m": _m(side_mm),
+        "gap_m": _m(gap_mm),
+        "square_m": _m(square_mm),
+        "marker_m": _m(marker_mm),
     }
+    given = {name: value for name, value in typed.items() if value is not None}
+    _refuse_others(what, given)
     if what == "rig":
         sheet = _rig_sheet(rig, out, paper, measured_mm)
     else:
-        sheet = _board_sheet(what, number or [0], given[what], out, paper, measured_mm)
+        sheet = _board_sheet(what, given.pop("number", [0]), given, out, paper, measured_mm)
     if measured_mm is None and (length := _ask(no_input)) is not None:
         from tactile_lab.workflow.printing import measure
 
@@ -80,6 +82,13 @@ def markers(
             for description in sheet.descriptions:
                 measure(description, length)
     _tell(sheet, as_json)
+
+
+def _refuse_others(what: str, given: Mapping[str, object]) -> None:
+    """A size that would not be printed must not be taken in silence. Raises BadParameter."""
+    for name in given.keys() - KINDS[what]:
+        option = "--" + name.removesuffix("_m") + ("-mm" if name.endswith("_m") else "")
+        raise typer.BadParameter(f"does not belong to {what}", param_hint=f"'{option}'")
 
 
 def _rig_sheet(rig: str, out: Path, paper: str, measured_mm: float | None) -> PrintedSheet:
@@ -98,7 +107,7 @@ def _board_sheet(
 ) -> PrintedSheet:
     from tactile_lab.workflow.printing import print_sheet
 
-    content = {key: value for key, value in {**given, "measured_bar_mm": measured_mm}.items() if value is not None}
+    content = given if measured_mm is None else {**given, "measured_bar_mm": measured_mm}
     if kind == "single":
         boards = {f"single-{number}": _board("single", {**content, "number": number}) for number in numbers}
     else:

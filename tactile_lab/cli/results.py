@@ -11,6 +11,7 @@ from sessions.session_outcome import Ending, SessionOutcome
 from sessions.stream_counts import LATE_ns
 from tactile_lab.cli.console import complain, emit_json, say, warn
 from tactile_lab.cli.evaluation_table import show_evaluation
+from tactile_lab.cli.session_tables import losses_in_words
 from tactile_lab.workflow.judging import FinishedSession
 
 FILES = (
@@ -75,7 +76,7 @@ def _tell_files(finished: FinishedSession) -> None:
 
 def _tell_losses(finished: FinishedSession) -> None:
     if finished.data_loss:
-        losses = ", ".join(f"{number} {kind.replace('_', ' ')}" for kind, number in finished.data_loss.items())
+        losses = losses_in_words(finished.data_loss)
         warn(f"not recorded as it happened (lost, or late beyond {LATE_ns // 1_000_000} ms): {losses}")
     if finished.unread:
         warn(f"the recording is damaged: {finished.unread}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
@@ -16,6 +16,8 @@ from sessions.traffic_reader import segment_paths
 from tactile_lab.cli.console import say, show_facts, show_table, warn
 
 NEVER_CLOSED = "open: still running, or killed before it was closed"
+_FLAGS = {"truncated": "the file ends too early", "traffic_cut_short": "the recording was cut short"}
+"""Losses that are there or not, and have no number."""
 
 
 def show_sessions(root: Path, summaries: Sequence[SessionSummary]) -> None:
@@ -90,7 +92,7 @@ def show_session(session: Session) -> None:
     facts = [
         ("folder", str(session.folder)),
         ("status", _status(manifest)),
-        ("lost", ", ".join(f"{number} {kind.replace('_', ' ')}" for kind, number in manifest.data_loss.items())),
+        ("lost", losses_in_words(manifest.data_loss)),
         ("object", manifest.object_name),
         ("rig", manifest.rig),
         ("notes", manifest.notes),
@@ -105,14 +107,28 @@ def show_session(session: Session) -> None:
         ("recorded", f"{_messages(manifest)}{size}"),
         ("results", ", ".join(sorted(path.name for path in session.results.iterdir())) or "none yet"),
         ("versions", ", ".join(f"{name} {number}" for name, number in manifest.versions.items())),
-        ("calibration", "\n".join(f"{copy.file}  {copy.sha256[:12]}" for copy in manifest.calibration.values())),
+        ("calibration", _calibration(manifest)),
     ]
     show_facts(manifest.name, facts)
+
+
+def losses_in_words(data_loss: Mapping[str, int]) -> str:
+    """What a session lost: how much of each kind."""
+    return ", ".join(_FLAGS.get(kind, f"{number} {kind.replace('_', ' ')}") for kind, number in data_loss.items())
+
+
+def _calibration(manifest: Manifest) -> str:
+    """Each file with the beginning of its hash."""
+    copies = list(manifest.calibration.values())
+    width = max((len(copy.file) for copy in copies), default=0)
+    return "\n".join(f"{copy.file:<{width}}  {copy.sha256[:12]}" for copy in copies)
 
 
 def _status(manifest: Manifest) -> str:
     if manifest.status == "open":
         return NEVER_CLOSED
+    if manifest.problem.startswith(manifest.status):
+        return manifest.problem
     return manifest.status + (f": {manifest.problem}" if manifest.problem else "")
 
 

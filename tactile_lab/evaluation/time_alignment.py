@@ -62,7 +62,7 @@ def clock_offset(palm: Track, stamps_s: Array, places_m: Array, holds_s: Sequenc
         if (count := sum(map(len, groups))) >= _FEWEST:
             break
     if count < _FEWEST:
-        return ClockOffset(None, None, count, f"the camera saw the moving object in {count} pictures, not {_FEWEST}")
+        return ClockOffset(None, None, count, f"{count} pictures of the moving object, {_FEWEST} are needed")
     if max(float(np.ptp(places_m[rows], axis=0).max()) for rows in groups) < _LEAST_MOTION_m:
         return ClockOffset(None, None, count, "the object hardly moved while it was held")
     offsets = np.arange(-range_s, range_s + _STEP_s / 2, _STEP_s)

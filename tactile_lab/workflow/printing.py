@@ -54,7 +54,8 @@ def print_rig_markers(markers_file: Path, out: Path, paper: str, measured_mm: fl
     settings = load_parameters(markers_file, MarkerSettings)
     sides = {settings.world_id: settings.world_side_m, settings.object_id: settings.object_side_m}
     boards = [_single(settings.dictionary, number, side, measured_mm) for number, side in sides.items()]
-    pdf, svg = _write_vectors(sheet_of(boards, paper), out, "rig-markers")
+    sheet = sheet_of(boards, paper, ("on the table", "under the object"))
+    pdf, svg = _write_vectors(sheet, out, "rig-markers")
     true_size = settings.model_copy(update={"print_scale": boards[0].scale})
     description = _write(out / "rig-markers.yaml", _text(true_size, _RIG_HEAD))
     return PrintedSheet(pdf, svg, (description,), boards[0].scale, measured_mm is not None)

@@ -68,6 +68,8 @@ def test_the_rigs_markers_are_printed_with_the_true_scale(inside: Any, tmp_path:
     assert "true scale 1.0020" in answer.err
     settings = load_parameters(tmp_path / "rig-markers.yaml", MarkerSettings)
     assert settings.print_scale == pytest.approx(1.002)
+    printed = (tmp_path / "rig-markers.svg").read_text()
+    assert ("id 0  50 mm  on the table" in printed, "id 7  35 mm  under the object" in printed) == (True, True)
 
 
 @pytest.mark.parametrize("answer_mm", ["99,8", ""])
@@ -89,7 +91,8 @@ def test_a_person_is_asked_for_the_bar_and_may_answer_later(
         (("charuco", "--paper", "A9"), 2, "no paper called 'A9'"),
         (("charuco", "--square-mm", 60, "--marker-mm", 40), 2, "do not fit on A4"),
         (("charuco", "--square-mm", 20, "--marker-mm", 20), 2, "marker"),
-        (("single", "--dictionary", "DICT_9X9_50"), 2, "no dictionary"),
+        (("charuco", "--side-mm", 20), 2, "'--side-mm': does not belong to charuco"),
+        (("single", "--dictionary", "DICT_9X9_50"), 2, "'DICT_9X9_50' is no dictionary of OpenCV. Change"),
         (("single", "--number", 50), 2, "50"),
         (("single", "--side-mm", -4), 2, "side_m"),
         (("single", "--measured-mm", 99.2), 2, "at most 0.5 % are allowed"),

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pydantic import Field
+from pydantic import Field, field_validator, model_validator
 
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.strict_yaml import StrictModel, load, load_model, validate
@@ -140,6 +140,38 @@ def test_a_document_that_does_not_fit_is_explained_by_its_keys(content, words):
         validate(content, Settings, where="mine.yaml")
     assert str(caught.value).startswith(f"mine.yaml: {words}")
     assert caught.value.exit_code == 2
+
+
+class Span(StrictModel):
+    low: float = 0.0
+    unit: str = "m"
+
+    @model_validator(mode="after")
+    def _positive(self) -> Span:
+        if self.low < 0:
+            raise ValueError("low and high are one way round")
+        return self
+
+    @field_validator("unit")
+    @classmethod
+    def _known(cls, unit: str) -> str:
+        if unit != "m":
+            raise ValueError(f"{unit!r} is no unit" if unit == "inch" else "must be m")
+        return unit
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"low": -1.0}, "low and high are one way round. C"),
+        ({"unit": "inch"}, "unit: 'inch' is no unit. C"),
+        ({"unit": "feet"}, "unit: must be m, not 'feet'. C"),
+    ],
+)
+def test_words_of_a_model_s_own_stand_without_what_they_say_already(content, words):
+    with pytest.raises(ConfigurationError) as caught:
+        validate(content, Span, where="mine.yaml")
+    assert str(caught.value).startswith(f"mine.yaml: {words}")
 
 
 def test_all_problems_are_told_at_once_but_not_without_end():
