@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
 import signal
@@ -72,13 +73,25 @@ def call_inside(*arguments: object) -> Answer:
 
 @pytest.fixture(scope="session")
 def recorded_root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with one finished session of three grasps; only to be read."""
-    root = tmp_path_factory.mktemp("recorded") / "runs"
-    answer = call("run", "--grasps", 3, "--seed", 1, "--notes", "for the tests", "--out", root, "--json")
+    """A folder with one finished session of three grasps, the same for all workers of a run; only to be read."""
+    shared = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared = shared.parent
+    folder = shared / "recorded"
+    with (shared / "recorded.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (folder / "run.json").is_file():
+            record(folder)
+    return folder / "runs"
+
+
+def record(folder: Path) -> None:
+    """Run the session; what it said on standard error and, last of all, on standard output, is kept beside it."""
+    folder.mkdir(exist_ok=True)
+    answer = call("run", "--grasps", 3, "--seed", 1, "--notes", "for the tests", "--out", folder / "runs", "--json")
     assert answer.code == 0, answer.err
-    (root.parent / "run.json").write_text(answer.out)
-    (root.parent / "run.err").write_text(answer.err)
-    return root
+    (folder / "run.err").write_text(answer.err)
+    (folder / "run.json").write_text(answer.out)
 
 
 @pytest.fixture(scope="session")

@@ -16,33 +16,13 @@ import pytest
 
 from sessions import traffic_disk
 from tests.support.interruptible import interruptible
+from tests.support.warm_terminal import Piped, WarmProgram
 
-COMMAND = [sys.executable, "-m", "tactile_lab.cli.main", "run"]
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
-def start(root: Path, grasps: int = 8) -> subprocess.Popen[str]:
-    words = [*COMMAND, "--grasps", str(grasps), "--seed", "1", "--out", str(root)]
-    return subprocess.Popen(
-        interruptible(words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT
-    )
-
-
-def read_until(process: subprocess.Popen[str], pattern: str) -> str:
-    assert process.stderr is not None
-    told = ""
-    for line in process.stderr:
-        told += line
-        if re.search(pattern, line):
-            return told
-    raise AssertionError(told)
-
-
-def finish(process: subprocess.Popen[str]) -> str:
-    out, told = process.communicate(timeout=120)
-    assert "Traceback" not in told
-    assert out == ""
-    return told
+def start(program: WarmProgram, root: Path, grasps: int = 8) -> Piped:
+    return program.pipes(root, "run", "--grasps", grasps, "--seed", 1, "--out", root)
 
 
 def only_session(root: Path) -> Path:
@@ -50,45 +30,51 @@ def only_session(root: Path) -> Path:
     return folder
 
 
+def await_more(recording: Path) -> None:
+    size = recording.stat().st_size
+    while recording.stat().st_size == size:
+        time.sleep(0.005)
+
+
 def status(folder: Path) -> str:
     return re.findall(r"^status: (\w+)$", (folder / "session.yaml").read_text(), re.M)[0]
 
 
-def test_one_request_to_end_finishes_the_grasp_and_judges_what_there_is(tmp_path):
-    process = start(tmp_path)
-    read_until(process, r"^ +1/8 ")
+def test_one_request_to_end_finishes_the_grasp_and_judges_what_there_is(program, tmp_path):
+    process = start(program, tmp_path)
+    process.until(r"^ +1/8 ")
     process.send_signal(signal.SIGTERM)  # Ctrl+C goes the same way, see below
-    told = finish(process)
-    assert process.returncode == 130
-    assert "interrupted" in told
+    assert process.ended() == 130
+    assert "interrupted" in process.told
     folder = only_session(tmp_path)
     assert status(folder) == "interrupted"
     evaluation = json.loads((folder / "results" / "evaluation.json").read_text())
     assert 1 <= evaluation["grasps"] <= 2
 
 
-def test_two_requests_end_at_once_and_the_recording_replays(tmp_path, inside):
-    process = start(tmp_path)
-    read_until(process, r"^ +1/8 ")
+def test_two_requests_end_at_once_and_the_recording_replays(program, tmp_path, inside):
+    process = start(program, tmp_path)
+    process.until(r"^ +1/8 ")
     process.send_signal(signal.SIGINT)
     time.sleep(0.1)
     process.send_signal(signal.SIGINT)
-    told = finish(process)
-    assert process.returncode == 130
+    assert process.ended() == 130
     folder = only_session(tmp_path)
     assert status(folder) == "interrupted"
-    assert f"tactile-lab session replay {folder}" in told
+    assert f"tactile-lab session replay {folder}" in process.told
     answer = inside("session", "replay", folder, "--json")
     assert answer.code in (0, 3)
     assert json.loads(answer.out)["grasps"] >= 1
 
 
-def test_a_killed_session_is_open_and_replays_up_to_the_end(tmp_path, inside):
-    process = start(tmp_path)
-    read_until(process, r"^ +2/8 ")
-    process.kill()
-    process.communicate()
+def test_a_killed_session_is_open_and_replays_up_to_the_end(program, tmp_path, inside):
+    process = start(program, tmp_path)
+    process.until(r"^ +1/8 ")
     folder = only_session(tmp_path)
+    for _ in range(3):  # pieces of the recording, so that the first grasp is in one of them
+        await_more(folder / "traffic.mcap")
+    process.send_signal(signal.SIGKILL)
+    assert process.ended() == -signal.SIGKILL
     (listed,) = json.loads(inside("session", "list", "--root", tmp_path, "--json").out)
     assert listed["status"] == "damaged"
     answer = inside("session", "replay", folder)
@@ -100,21 +86,24 @@ def test_a_killed_session_is_open_and_replays_up_to_the_end(tmp_path, inside):
 
 @pytest.mark.parametrize("delay_s", [0.3, 2.0])
 def test_ctrl_c_at_the_beginning(tmp_path, delay_s):
-    process = start(tmp_path)
-    time.sleep(delay_s)
-    process.send_signal(signal.SIGINT)
-    finish(process)
+    """While it loads, and when it has just begun: in a process that loads everything itself."""
+    words = [sys.executable, "-m", "tactile_lab.cli.main", "run", "--seed", "1", "--out", str(tmp_path)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(interruptible(words), env=ENVIRONMENT, **pipes) as process:
+        time.sleep(delay_s)
+        process.send_signal(signal.SIGINT)
+        out, told = process.communicate(timeout=120)
+    assert ("Traceback" in told, out) == (False, "")
     assert process.returncode in (130, -signal.SIGINT)  # Python's own ending, which a shell calls 130 too
 
 
-def test_ctrl_c_while_the_result_is_judged_keeps_the_session(tmp_path, inside):
-    process = start(tmp_path, grasps=1)
-    read_until(process, r"^ +1/1 ")
+def test_ctrl_c_while_the_result_is_judged_keeps_the_session(program, tmp_path, inside):
+    process = start(program, tmp_path, grasps=1)
+    process.until(r"^ +1/1 ")
     while status(folder := only_session(tmp_path)) == "open":
         time.sleep(0.005)
     process.send_signal(signal.SIGINT)
-    told = finish(process)
-    assert process.returncode == 130 or "report" in told  # it may have been ready already
+    assert process.ended() == 130 or "report" in process.told  # it may have been ready already
     assert status(folder) == "closed"
     shown = json.loads(inside("session", "show", folder, "--json").out)
     assert (shown["counts"]["grasps"], shown["data_loss"]) == (1, {})
