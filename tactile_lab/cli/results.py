@@ -63,7 +63,8 @@ def _tell_outcome(outcome: SessionOutcome | None) -> None:
     elif outcome.ending is Ending.COMPLETE:
         say(f"session complete: {outcome.reason}", "bold")
     else:
-        warn(f"session ended early, {outcome.ending}: {outcome.reason}")
+        what = "object lost: " if outcome.ending is Ending.OBJECT_LOST else ""
+        warn(f"session ended early: {what}{outcome.reason}")
 
 
 def _tell_files(finished: FinishedSession) -> None:
