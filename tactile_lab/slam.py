@@ -28,10 +28,10 @@ from gtsam import Pose3
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tactile_lab.errors import ConfigurationError, ShapeError, TrackingError
+from tactile_lab.errors import ShapeError, TrackingError
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.graph.back_end import BackEnd, BackEndSettings
-from tactile_lab.graph.relocation import relocation_candidates
+from tactile_lab.graph.relocation import relocated_rows
 from tactile_lab.one_thread import on_one_thread
 from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.models import ShapeName, fit_shape
@@ -49,6 +49,7 @@ from tactile_lab.tracking.trackers import (
     Tracker,
     TrackingSettings,
     make_tracker,
+    poses_to_be_told,
 )
 
 
@@ -94,7 +95,7 @@ class TactileSlam:
             ConfigurationError: the method needs poses and has none, or is given poses that it must not know.
         """
         self._settings = settings or SlamSettings()
-        self._known_poses = _only_for_known_pose(self._settings.method, known_poses)
+        self._known_poses = poses_to_be_told(self._settings.method, known_poses)
         self._seed = seed
         self._rng = np.random.default_rng(seed)
         back_end = self._settings.back_end
@@ -290,18 +291,3 @@ class TactileSlam:
             return None, mesh
         except ShapeError:  # contacts that enclose nothing: the trajectory is still a result
             return None, None
-
-
-def _only_for_known_pose(method: str, poses: Sequence[Pose3 | None] | None) -> tuple[Pose3 | None, ...] | None:
-    """Truth reaches the one method that is about it, and no other."""
-    if method == "known-pose" and (poses is None or all(pose is None for pose in poses)):
-        hint = "Take data with the true poses, or another method"
-        raise ConfigurationError("needs the object's true poses, and there are none", where="known-pose", hint=hint)
-    if method != "known-pose" and poses is not None:
-        raise ConfigurationError("must not be given the true poses", where=method)
-    return None if poses is None else tuple(poses)
-
-
-def relocated_rows(contact_map: ContactMap, contacts: ContactSet) -> Array:
-    """Poses of contacts anywhere on a known object on the table, the best first, shape (m, 3)."""
-    return relocation_candidates(contact_map, contacts).rows

@@ -10,6 +10,7 @@ from gtsam import Pose3
 from pydantic import Field as Limit
 from pydantic import model_validator
 
+from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import FieldGrid
 from tactile_lab.shape.settings import GpisSettings
@@ -163,6 +164,20 @@ def make_tracker(
             return KnownPoseTracker(start, settings.motion, known_poses or ())
         case _:
             return _particle_tracker(settings, start, rng)
+
+
+def poses_to_be_told(method: Method, poses: Sequence[Pose3 | None] | None) -> tuple[Pose3 | None, ...] | None:
+    """Truth reaches the one method that is about it, and no other.
+
+    Raises:
+        ConfigurationError: the method needs poses and has none, or is given poses that it must not know.
+    """
+    if method == "known-pose" and (poses is None or all(pose is None for pose in poses)):
+        hint = "Take data with the true poses, or another method"
+        raise ConfigurationError("needs the object's true poses, and there are none", where="known-pose", hint=hint)
+    if method != "known-pose" and poses is not None:
+        raise ConfigurationError("must not be given the true poses", where=method)
+    return None if poses is None else tuple(poses)
 
 
 def _particle_tracker(settings: TrackingSettings, start: ContactMap, rng: np.random.Generator) -> ParticleTracker:
