@@ -17,12 +17,17 @@ from drivers.shadow.tactile_requests import TactileKind
 from tactile_lab.strict_yaml import StrictModel
 
 
+WIRE_CYCLE_s = 0.002
+"""Period of a hand on its cable that nobody has stated; Shadow's own host has 1 ms."""
+
+
 class HandSettings(StrictModel):
     """How the host drives the hand.
 
     Attributes:
         palm: which palm the hand has; on a cable the product code tells where this is left out (:attr:`palm_stated`).
-        cycle_s: period of the exchanges, seconds; below the 20 ms after which motors halt for want of a demand.
+        cycle_s: period of the exchanges, seconds; below the 20 ms after which motors halt for want of a demand. On a
+            cable it is :data:`WIRE_CYCLE_s` where it is left out (:attr:`on_wire`).
         demand: what the motors are told: a duty cycle, or a torque that they keep by themselves at 5 kHz.
         gains: position control, in counts of that demand.
         polling: how often the motors are asked for what.
@@ -61,6 +66,13 @@ class HandSettings(StrictModel):
     def palm_stated(self) -> bool:
         """Whether someone named the palm, so that another one is refused."""
         return "palm" in self.model_fields_set
+
+    @property
+    def on_wire(self) -> HandSettings:
+        """The same on a cable, where the hand keeps a quicker cycle by itself unless another is stated."""
+        if "cycle_s" in self.model_fields_set:
+            return self
+        return self.model_copy(update={"cycle_s": WIRE_CYCLE_s})
 
     @model_validator(mode="after")
     def _duty_cycles_exist(self) -> HandSettings:

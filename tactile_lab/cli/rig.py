@@ -16,15 +16,15 @@ app = typer.Typer(help="Rigs: the devices of a laboratory, and their calibration
 @app.command("list")
 def list_rigs(
     ports: Annotated[bool, typer.Option("--ports", help="List serial ports and CAN interfaces instead.")] = False,
-    watch: Annotated[float, typer.Option(min=0.0, help="With --ports: wait so many seconds for one to change.")] = 0.0,
+    watch: Annotated[float, typer.Option(min=0.0, help="List ports; wait so many seconds for a change.")] = 0.0,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
     """List the rigs that come with the program, or what a sensor could be plugged into.
 
-    Unplug an adapter while "--ports --watch 30" waits, and it tells which port that was.
+    Unplug an adapter while "--watch 30" waits, and it tells which port that was.
     """
-    if ports:
+    if ports or watch:
         _list_ports(watch, as_json)
         return
     from tactile_lab.cli.console import emit_json, show_table
@@ -109,19 +109,14 @@ def emulate(
     loopback ones; a hand is served at the interface that far_end names.
     """
     import time
-    from pathlib import Path
 
     from tactile_lab.cli.console import emit_json, say
-    from tactile_lab.rigs.emulate import emulated, emulated_hand
-    from tactile_lab.rigs.fingertip_rig import load_fingertip_rig
-    from tactile_lab.rigs.hand_rig import is_hand_rig, load_hand_rig
+    from tactile_lab.rigs.emulate import emulated_rig
 
     del no_input
-    path = Path(rig)
-    of_hand = is_hand_rig(path)
-    with emulated_hand(load_hand_rig(path)) if of_hand else emulated(load_fingertip_rig(path)) as places:
+    with emulated_rig(rig) as places:
         if as_json:
-            emit_json({"rig": rig, "devices" if of_hand else "fingertips": places})
+            emit_json({"rig": rig, "devices": places})
         for finger, place in places.items():
             say(f"{finger}: {place}")
         say(f"tactile-lab rig check {rig}  in another terminal; Ctrl+C ends this")

@@ -80,10 +80,11 @@ def _figures(tip: Nano17, samples: list[WrenchSample], usable: Array) -> dict[st
 def _words(tip: Nano17, samples: list[WrenchSample], usable: Array) -> str:
     span_s = (samples[-1].stamp_ns - samples[0].stamp_ns) / NANOSECONDS
     rate = f"{(len(samples) - 1) / span_s:.0f} samples/s" if span_s > 0 else f"{len(samples)} samples"
-    noise, bias = usable.std(axis=0), np.abs(usable.mean(axis=0))
+    noise, bias, known = usable.std(axis=0), np.abs(usable.mean(axis=0)), tip.calibration
     return (
         f"{tip.identity + ', ' if tip.identity else ''}{rate}, {tip.sequences.lost} lost, "
-        f"noise {1e3 * noise[:3].max():.0f} mN and {1e3 * noise[3:].max():.2f} N mm, "
+        f"noise {1e3 * noise[:3].max():.1f} mN and {1e3 * noise[3:].max():.3f} N mm "
+        f"(expected {1e3 * known.force_sigma_N:.1f} and {1e3 * known.moment_sigma_Nm:.3f}), "
         f"untared reading {bias[:3].max():.2f} N and {1e3 * bias[3:].max():.1f} N mm"
     )
 

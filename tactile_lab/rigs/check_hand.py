@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from drivers.shadow.cycle_pace import CyclePace
 from drivers.shadow.cycle_statistics import CycleStatistics
 from drivers.shadow.ethercat_link import EthercatLink
 from drivers.shadow.first_move import check_motor_map
@@ -15,16 +16,19 @@ from drivers.shadow.motor_polling import PollingRates
 from drivers.shadow.motors import MotorMap
 from drivers.shadow.palm_codec import SENSORS
 from drivers.shadow.pysoem_link import PysoemLink
+from drivers.shadow.real_time import PRIORITY, preferred
 from tactile_lab.clock import NANOSECONDS, Clock
 from tactile_lab.errors import DeviceError
 from tactile_lab.rigs.check_tactile import TactileLook
-from tactile_lab.rigs.findings import TOLERATED_LOSS, Finding
+from tactile_lab.rigs.findings import LOSSY, TOLERATED_LOSS, Finding
 from tactile_lab.rigs.hand_rig import HandRig
 
 LISTEN_ns = 1_500_000_000
 _ONCE = -2.0  # in the words of motor_data_polling.yaml
 _COUNTS = range(1, 4095)
 _JOINT_CHANNELS = 26
+_HALTED = "halted, no demand for 20 ms"  # the hand goes on: it knows that it made a pause
+_PAUSED = "the cycle paused until motors halted: close other programs, or permit real-time scheduling (limits.conf)"
 
 
 def check_hand(rig: HandRig, clock: Clock, *, move: bool = False) -> list[Finding]:
@@ -51,14 +55,20 @@ def _findings(setup: HandSetup, clock: Clock, *, move: bool) -> list[Finding]:
     hand = setup.device(link, clock, set_up_boards=False)
     try:
         hand.connect()
-        tips = TactileLook(setup.hand.tactile)
-        sample, statistics = _listen(hand, tips, clock, round(setup.hand.cycle_s * NANOSECONDS))
-        motors = setup.motor_map()
-        found = [_ring(link), _cycle(hand, link, statistics), _motors(hand, sample, motors), _joints(sample)]
-        found += tips.findings()
-        return [*found, _motor_map(hand, motors, clock, setup.hand.cycle_s)] if move else found
+        with preferred(PRIORITY):
+            return _heard(setup, link, hand, clock, move=move)
     finally:
         _close(hand)
+
+
+def _heard(
+    setup: HandSetup, link: EthercatLink | PysoemLink, hand: ShadowHand, clock: Clock, *, move: bool
+) -> list[Finding]:
+    tips, motors = TactileLook(setup.hand.tactile), setup.motor_map()
+    sample, statistics = _listen(hand, tips, clock, round(setup.hand.cycle_s * NANOSECONDS))
+    found = [_ring(link), _cycle(hand, link, statistics), _motors(hand, sample, motors), _joints(sample)]
+    found += tips.findings()
+    return [*found, _motor_map(hand, motors, clock, setup.hand.cycle_s)] if move else found
 
 
 def _asking_who(setup: HandSetup) -> HandSetup:
@@ -91,12 +101,10 @@ def _close(hand: ShadowHand) -> None:
 
 
 def _listen(hand: ShadowHand, tips: TactileLook, clock: Clock, cycle_ns: int) -> tuple[HandSample, CycleStatistics]:
-    """Each cycle from the start of the one before: a late one must not leave the palm less time for the next."""
-    statistics, start_ns = CycleStatistics(), clock.now_ns()
-    while clock.now_ns() - start_ns < LISTEN_ns:
-        next_ns = clock.now_ns() + cycle_ns
-        clock.sleep_until_ns(next_ns)
-        statistics.add(clock.now_ns() - next_ns)
+    """As many cycles as fit the time, however long a busy computer takes for them."""
+    statistics, pace = CycleStatistics(), CyclePace(clock, cycle_ns)
+    for _ in range(LISTEN_ns // cycle_ns):
+        statistics.add(*pace.wait())
         sample = hand.exchange()
         tips.take(sample)
     return sample, statistics
@@ -115,11 +123,13 @@ def _cycle(hand: ShadowHand, link: EthercatLink | PysoemLink, statistics: CycleS
     words = f"{statistics.summary()}; {counters.lost} of {counters.cycles} without a status"
     punctual = statistics.summary()
     figures = {"start_late_p50_us": punctual.median_us, "start_late_p99_us": punctual.p99_us, "lost_share": share}
-    return Finding("cycle", share < TOLERATED_LOSS, "; ".join((words, *remarks)), figures)
+    advice = () if share < TOLERATED_LOSS else (LOSSY,)
+    advice += (_PAUSED,) if any(words.endswith(_HALTED) for words in hand.health()) else ()
+    return Finding("cycle", not advice, "; ".join((*advice, words, *remarks)), figures)
 
 
 def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
-    problems = [words for words in hand.health() if "cycles lost" not in words]
+    problems = [words for words in hand.health() if "cycles lost" not in words and not words.endswith(_HALTED)]
     temperature, supply = sample.motor.temperature_C, sample.motor.voltage_V
     heard = np.isfinite(temperature)
     if not heard.any():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ipaddress
 import socket
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 
 import can
@@ -27,11 +27,33 @@ from drivers.emulators.pty_port import PtyPort
 from drivers.emulators.shadow_chain import ChainSettings
 from drivers.shadow.palm_images import USUAL_PALM
 from tactile_lab.errors import ConfigurationError
-from tactile_lab.rigs.fingertip_rig import FingertipRig, place_of
-from tactile_lab.rigs.hand_rig import HandRig
+from tactile_lab.rigs.description import shipped_rigs
+from tactile_lab.rigs.fingertip_rig import FingertipRig, is_fingertip_rig, load_fingertip_rig, place_of
+from tactile_lab.rigs.hand_rig import HandRig, is_hand_rig, load_hand_rig
 
 _EMULATED_SERIAL = 634
+_NO_NEED = "Only those can be emulated by themselves; simulated rigs and those with stand_ins start what they need"
 _VOLTS_RATE_Hz = 1000.0
+
+
+def emulated_rig(name: str) -> AbstractContextManager[dict[str, str]]:
+    """Stand-ins for what a rig file of kind fingertips or hand names.
+
+    Args:
+        name: the file's path.
+
+    Raises:
+        ConfigurationError: another kind of rig; and as :func:`emulated` and :func:`emulated_hand`.
+        DeviceError: as :func:`emulated_hand`.
+    """
+    path = Path(name)
+    if name in shipped_rigs():
+        raise ConfigurationError("is a rig that comes with the program", where=name, hint=_NO_NEED)
+    if is_hand_rig(path):
+        return emulated_hand(load_hand_rig(path))
+    if is_fingertip_rig(path):
+        return emulated(load_fingertip_rig(path))
+    raise ConfigurationError("is no rig of kind fingertips or hand", where=name, hint=_NO_NEED)
 
 
 @contextmanager

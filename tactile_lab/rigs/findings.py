@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 TOLERATED_LOSS = 0.01
 """A driver bridges single lost cycles; a device that loses a larger share is not fit to work."""
 
+LOSSY = "more than 1 % of its cycles are lost: close other programs on this computer, then check its cable"
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -35,4 +37,5 @@ def told_losses(health: Sequence[str], share: float, losses: Sequence[str] = ())
         losses: which of these words are about losses, besides those that count lost cycles.
     """
     minor = [words for words in health if share < TOLERATED_LOSS and (words in losses or words.endswith("cycles lost"))]
-    return tuple(words for words in health if words not in minor), minor
+    wrong = tuple(words for words in health if words not in minor)
+    return (*wrong, LOSSY) if share >= TOLERATED_LOSS else wrong, minor

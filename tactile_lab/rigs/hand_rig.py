@@ -52,7 +52,7 @@ class HandRigDescription(StrictModel):
     calibration: HandFiles
     ethercat: EthercatSettings
     master: Master = "own"
-    hand: HandSettings = HandSettings(cycle_s=0.002)
+    hand: HandSettings = HandSettings()
     far_end: str | None = None
 
 
@@ -74,7 +74,7 @@ class HandRig:
     def setup(self) -> HandSetup:
         """The hand, with its files."""
         description = self.description
-        ways = {"ethercat": description.ethercat, "master": description.master, "hand": description.hand}
+        ways = {"ethercat": description.ethercat, "master": description.master, "hand": description.hand.on_wire}
         return HandSetup.model_validate(ways | self.files)
 
 

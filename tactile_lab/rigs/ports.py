@@ -33,7 +33,7 @@ def list_all_ports() -> list[PortFound]:
     """Serial ports, then CAN interfaces of the kernel."""
     stable = {str(link.resolve()): str(link) for link in _STABLE_NAMES.glob("*")}
     serial_ports = [
-        PortFound("serial", stable.get(port.device, port.device), port.description or "")
+        PortFound("serial", stable.get(port.device, port.device), (port.description or "").replace("n/a", ""))
         for port in sorted(list_ports.comports())
     ]
     buses = can.detect_available_configs(interfaces="socketcan")

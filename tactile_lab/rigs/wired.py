@@ -35,7 +35,7 @@ def hand_setup(rig: Rig) -> HandSetup:
         name=HAND_LINK,
         ethercat=wiring.ethercat,
         master=wiring.master,
-        hand=description.hand.model_copy(update={"tactile": tactile}),
+        hand=description.hand.on_wire.model_copy(update={"tactile": tactile}),
         joints=files["joints"].resolve(),
         motors=files["motors"].resolve(),
         boards=_whole(files.get("boards")),
@@ -45,12 +45,13 @@ def hand_setup(rig: Rig) -> HandSetup:
 
 
 def with_palm(rig: Rig, clock: Clock) -> Rig:
-    """A rig on wires with its palm named, so that a session keeps by which process image its bytes are read.
+    """A rig on wires with its palm and its cycle named, so that a session keeps how its hand was read and driven.
 
     Raises:
         DeviceError: the rig file leaves it to the ring, which does not tell.
     """
-    hand = rig.description.hand.model_copy(update={"palm": hand_setup(rig).known(clock).hand.palm})
+    found = hand_setup(rig).known(clock).hand
+    hand = rig.description.hand.model_copy(update={"palm": found.palm, "cycle_s": found.cycle_s})
     return replace(rig, description=rig.description.model_copy(update={"hand": hand}))
 
 

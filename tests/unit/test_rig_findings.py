@@ -12,17 +12,18 @@ from drivers.links import ReplayLink
 from drivers.shadow.ethercat_link import EthercatCounts
 from sessions.sensor_stream import SensorStream
 from tactile_lab.rigs.check import check_rig
-from tactile_lab.rigs.findings import told_losses
+from tactile_lab.rigs.findings import LOSSY, TOLERATED_LOSS, told_losses
 
 COUNTS = EthercatCounts(cycles=1000, lost=2, empty=3)
 HEALTH = ("5 of 1000 cycles lost", *COUNTS.problems(), "FFJ3 (motor 1): silent")
 
 
-@pytest.mark.parametrize(("share", "problems"), [(0.005, 1), (0.05, 4)])
-def test_rare_losses_are_told_apart_from_what_is_wrong(share: float, problems: int) -> None:
+@pytest.mark.parametrize("share", [0.005, 0.05])
+def test_rare_losses_are_told_apart_from_what_is_wrong(share: float) -> None:
     wrong, told = told_losses(HEALTH, share, EthercatCounts(**asdict(COUNTS)).problems())
-    assert (len(wrong), len(told)) == (problems, 4 - problems)
+    assert (len(wrong), len(told)) == ((1, 3) if share < TOLERATED_LOSS else (5, 0))
     assert "FFJ3 (motor 1): silent" in wrong
+    assert (LOSSY in wrong) is (share >= TOLERATED_LOSS)
 
 
 def test_the_check_tells_the_warmest_motor_and_the_motors_firmware() -> None:

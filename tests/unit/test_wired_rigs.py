@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -16,6 +17,7 @@ from drivers.emulators.wired import virtual_cable as cables
 from drivers.emulators.wired.plant_mirror import PlantMirror
 from drivers.emulators.wired.stand_ins import StandIns
 from drivers.emulators.wired.virtual_cable import virtual_cable
+from drivers.shadow.hand_settings import HandSettings
 from tactile_lab.clock import MonotonicClock
 from tactile_lab.errors import ConfigurationError, DeviceError
 from tactile_lab.rigs.build import build_interpreter, check_calibration
@@ -41,6 +43,8 @@ def test_the_shipped_rig_is_sound() -> None:
     assert sorted(plan.boxes) == ["FF", "LF", "MF", "RF", "TH"]
     assert (plan.simulation.object, plan.seed) == ("cube-6", 3)
     assert hand_setup(rig).hand.cycle_s == rig.description.hand.cycle_s < rig.description.cycle_s
+    unstated = rig.description.model_copy(update={"hand": HandSettings(lost_limit=5)})
+    assert hand_setup(replace(rig, description=unstated)).hand.cycle_s == 0.002
     assert set(build_interpreter(rig).perception.fingertips) == {"FF", "MF", "RF", "LF", "TH"}
 
 

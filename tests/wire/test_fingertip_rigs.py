@@ -15,7 +15,7 @@ from drivers.fingertip import load_fingertips
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.check import check_rig
 from tactile_lab.rigs.description import load_rig
-from tactile_lab.rigs.emulate import emulated
+from tactile_lab.rigs.emulate import emulated, emulated_rig
 from tactile_lab.rigs.findings import Finding
 from tactile_lab.rigs.fingertip_rig import load_fingertip_rig
 
@@ -183,6 +183,12 @@ def test_what_cannot_be_emulated_is_told(rig: Path, changes: dict[str, object], 
     content["wires"] = {"FF": changes if "wire" in changes else content["wires"]["FF"] | changes}
     with pytest.raises(ConfigurationError, match=words), emulated(load_fingertip_rig(write(rig, content))):
         pytest.fail("it was emulated")
+
+
+@pytest.mark.parametrize("name", ["sim", str(TIPS.parents[2] / "sim-wire.yaml")])
+def test_rigs_that_start_what_they_need_are_not_emulated(name: str) -> None:
+    with pytest.raises(ConfigurationError, match="simulated rigs and those with stand_ins start what they need"):
+        emulated_rig(name)
 
 
 def test_a_real_port_is_never_replaced(rig: Path) -> None:
