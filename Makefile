@@ -16,7 +16,7 @@ demo: $(READY)  ## A whole autonomous session on the simulated rig, evaluated, w
 	$(BIN)/tactile-lab run --rig sim --object box-10x6x4 --grasps 16 --seed 1 --out runs
 
 test: check  ## Linters, types, layers, then all tests
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
 check: $(READY)  ## Linters, types and the layer contract
 	$(BIN)/ruff check .
