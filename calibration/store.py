@@ -209,7 +209,7 @@ def read_record(path: Path) -> CalibrationRecord:
     """
     content = load(path)
     if not is_stored(content):
-        hint = "Calibrate with tactile-lab calibrate; a file of plain figures says not where they come from"
+        hint = "Calibrate with tactile-lab calibrate; a file of plain figures does not say where they come from"
         raise ConfigurationError("is not a stored calibration", where=str(path), hint=hint)
     check_seal(content, str(path))
     del content[SEAL]

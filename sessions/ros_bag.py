@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -32,7 +33,7 @@ def write_ros_bag(tables: SampleTables, folder: Path) -> int:
         from rosbags.rosbag2 import Writer, WriterError
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
-        hint = "Install it: pip install tactile-lab[ros]"
+        hint = f"Install it: python3 -m pip --python {sys.executable} install rosbags"
         raise ConfigurationError("rosbags is not installed", where="session export --rosbag", hint=hint) from error
     store = get_typestore(Stores.ROS2_JAZZY)
     make = _Messages(store.types)

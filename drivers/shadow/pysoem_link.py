@@ -20,6 +20,7 @@ import importlib
 import os
 import select
 import socket
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -242,7 +243,8 @@ def _pysoem(name: str) -> Any:
     try:
         return importlib.import_module("pysoem")
     except ImportError as error:
-        hint = "Install it with: pip install 'tactile-lab[ethercat]', or use our own master"
+        install = f"python3 -m pip --python {sys.executable} install pysoem"
+        hint = f"Install it: {install}; or use our own master"
         raise ConfigurationError("pysoem is not installed", where=name, hint=hint) from error
 
 

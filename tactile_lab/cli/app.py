@@ -27,6 +27,7 @@ app = typer.Typer(
     "130 interrupted.",
     no_args_is_help=True,
     add_completion=False,
+    rich_markup_mode="markdown",  # lines of a paragraph flow together
     pretty_exceptions_enable=False,
 )
 app.command("run")(run.run)

@@ -55,7 +55,7 @@ def _lines(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, 
 
 def _text(value: Any) -> str:
     if isinstance(value, float):
-        return f"{value:.6g}"
+        return f"{value + 0.0:.6g}"  # no minus before zero
     if isinstance(value, list | tuple):
         if len(value) > _LONGEST or any(isinstance(part, list | tuple | Mapping) for part in value):
             return f"{len(value)} entries"

@@ -10,16 +10,31 @@ import typer
 from tactile_lab.errors import ConfigurationError
 
 PORT = 8090
+_PANEL = "Page in the browser"
 LEAST_TOKEN = 16
 
-View = Annotated[bool, typer.Option("--view", help="Show and lead this in a browser too.")]
-Port = Annotated[int, typer.Option("--view-port", min=0, max=65535, help="Port of the page; 0 takes a free one.")]
+View = Annotated[bool, typer.Option("--view", help="Show and lead this in a browser too.", rich_help_panel=_PANEL)]
+Port = Annotated[
+    int,
+    typer.Option("--view-port", min=0, max=65535, help="Port of the page; 0 takes a free one.", rich_help_panel=_PANEL),
+]
 Listen = Annotated[
-    str, typer.Option("--listen", metavar="ADDRESS", help="Address of the page; others than this computer's: --token.")
+    str,
+    typer.Option(
+        "--listen",
+        metavar="ADDRESS",
+        help="Address of the page; others than this computer's need --token.",
+        rich_help_panel=_PANEL,
+    ),
 ]
 Token = Annotated[
     str,
-    typer.Option("--token", envvar="TACTILE_LAB_TOKEN", help="What a visitor of the page must show; 'new' makes one."),
+    typer.Option(
+        "--token",
+        envvar="TACTILE_LAB_TOKEN",
+        help="What a visitor of the page must show; 'new' makes one.",
+        rich_help_panel=_PANEL,
+    ),
 ]
 
 

@@ -11,7 +11,9 @@ from typing import Annotated, Literal
 import typer
 
 from tactile_lab.cli.options import METHOD_HELP, AllowUncalibrated, Json, Method, NoInput, RigName
-from tactile_lab.cli.page_address import PORT, Listen, PageAddress, Port, Token
+from tactile_lab.cli.page_address import PORT, Listen, PageAddress, Port, Token, View
+
+_GUIDED, _EXPLORATION = "Guided sessions", "Choice of the grasps"
 
 
 class Mode(StrEnum):
@@ -44,19 +46,31 @@ def run(
     mode: Annotated[Mode, typer.Option(help="autonomous: the program decides; guided: a person.")] = Mode.AUTONOMOUS,
     led_by: Annotated[
         LedBy | None,
-        typer.Option(help="Guided: the hand is moved by keys, or by hands.", show_default="the rig's, keys on sim"),
+        typer.Option(
+            help="The hand is moved by keys, or by hands.",
+            show_default="the rig's, keys on sim",
+            rich_help_panel=_GUIDED,
+        ),
     ] = None,
     automatic_capture: Annotated[
-        bool, typer.Option("--automatic-capture", help="Guided: capture as soon as the contacts are steady.")
+        bool,
+        typer.Option(
+            "--automatic-capture", help="Capture as soon as the contacts are steady.", rich_help_panel=_GUIDED
+        ),
     ] = False,
-    pedal: Annotated[str, typer.Option(help="Guided: a further key that captures, as a foot pedal sends it.")] = "",
+    pedal: Annotated[
+        str, typer.Option(help="A further key that captures, as a foot pedal sends it.", rich_help_panel=_GUIDED)
+    ] = "",
     pace: Annotated[
         float | None,
         typer.Option(
-            min=0.0, help="Guided, simulated rig: its seconds for a real one; 0: as fast as it goes.", show_default="1"
+            min=0.0,
+            help="Simulated rig: its seconds for a real one; 0: as fast as it goes.",
+            show_default="1",
+            rich_help_panel=_GUIDED,
         ),
     ] = None,
-    view: Annotated[bool, typer.Option("--view", help="Show the session live in a browser.")] = False,
+    view: View = False,
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
     token: Token = "",
@@ -66,14 +80,23 @@ def run(
             help="Exploration policy that chooses the grasps: information, or one to compare with it "
             "(docs/exploration.md).",
             show_default="the rig's",
+            rich_help_panel=_EXPLORATION,
         ),
     ] = None,
     bounding_box: Annotated[
-        bool, typer.Option("--bounding-box", help="Feel the object's bounding box before the first grasp.")
+        bool,
+        typer.Option(
+            "--bounding-box",
+            help="Feel the object's bounding box before the first grasp.",
+            rich_help_panel=_EXPLORATION,
+        ),
     ] = False,
-    confirm: Annotated[bool, typer.Option("--confirm", help="Ask before every grasp; a veto takes the next best.")] = (
-        False
-    ),
+    confirm: Annotated[
+        bool,
+        typer.Option(
+            "--confirm", help="Ask before every grasp; a veto takes the next best.", rich_help_panel=_EXPLORATION
+        ),
+    ] = False,
     allow_uncalibrated: AllowUncalibrated = False,
     as_json: Json = False,
     no_input: NoInput = False,

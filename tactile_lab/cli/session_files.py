@@ -40,7 +40,7 @@ def export(
     contacts: Annotated[Path | None, typer.Option(help="Contact log to write, JSON (tactile-contacts/1).")] = None,
     csv: Annotated[Path | None, typer.Option(help="New folder for CSV tables and pictures.")] = None,
     hdf5: Annotated[Path | None, typer.Option(help="New HDF5 file with all samples and pictures.")] = None,
-    rosbag: Annotated[Path | None, typer.Option(help="New folder for a ROS 2 bag (needs tactile-lab[ros]).")] = None,
+    rosbag: Annotated[Path | None, typer.Option(help="New folder for a ROS 2 bag (needs the package rosbags).")] = None,
     archive: Annotated[Path | None, typer.Option(help="New ZIP file with the whole session.")] = None,
     root: Root = Path("runs"),
     dimension: Annotated[

@@ -72,7 +72,7 @@ def measure_ethercat(seconds: float) -> list[WireRow]:
     with virtual_cable(near, far):
         for master in masters:
             if master == "pysoem" and find_spec("pysoem") is None:
-                rows.append(WireRow(master, "not measured", None, None, "install tactile-lab[ethercat]"))
+                rows.append(WireRow(master, "not measured", None, None, "the package pysoem is not installed"))
                 continue
             trial = Trial(near, far, master)
             rows += [*trial.steady(seconds), trial.losses(), trial.killed(), trial.watchdog(), trial.bare()]

@@ -118,7 +118,7 @@ def test_a_finger_without_a_calibrated_tip_is_told(inside, rig_file):
     del content["fingertips"]["MF"]
     fingertips.write_text(yaml.safe_dump(content))
     answer = inside("rig", "check", rig_file)
-    assert answer.code == 4  # plain figures say not where they come from
+    assert answer.code == 4  # plain figures do not say where they come from
     assert re.search(r"fingertip MF +ok +none", answer.err)
 
 
