@@ -123,7 +123,7 @@ def _cycle(hand: ShadowHand, link: EthercatLink | PysoemLink, statistics: CycleS
     words = f"{statistics.summary()}; {counters.lost} of {counters.cycles} without a status"
     punctual = statistics.summary()
     figures = {"start_late_p50_us": punctual.median_us, "start_late_p99_us": punctual.p99_us, "lost_share": share}
-    advice = () if share < TOLERATED_LOSS else (LOSSY,)
+    advice: tuple[str, ...] = () if share < TOLERATED_LOSS else (LOSSY,)
     advice += (_PAUSED,) if any(words.endswith(_HALTED) for words in hand.health()) else ()
     return Finding("cycle", not advice, "; ".join((*advice, words, *remarks)), figures)
 
