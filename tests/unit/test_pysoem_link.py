@@ -96,7 +96,7 @@ def opened(monkeypatch: pytest.MonkeyPatch, soem: Soem, **settings: Any) -> Pyso
 
 def test_without_pysoem_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pysoem", None)
-    with pytest.raises(ConfigurationError, match=r"pysoem is not installed. Install it: .* install pysoem; or use our own master"):
+    with pytest.raises(ConfigurationError, match=r"pysoem is not installed. Install it: .* install pysoem"):
         PysoemLink("hand", EthercatSettings(interface="lo"), VirtualClock())
 
 
