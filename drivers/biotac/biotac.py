@@ -165,6 +165,16 @@ class BioTac:
         change = self.channels.captured_means(self._electrodes) - self._tare_electrodes
         if pdc_rise <= self.calibration.touch_pdc_counts or sum(self._touches) < self._settings.touch_samples:
             return None
+        return self._contact(pdc_rise, change)
+
+    def newest_contact(self) -> TipContact | None:
+        """The contact by the newest readings alone; None before a tare and where no electrode is squeezed."""
+        if self._tare_pdc is None or not self.channels.fitted:
+            return None
+        return self._contact(self._pdc_rise(), self.channels.newest(self._electrodes) - self._tare_electrodes)
+
+    def _contact(self, pdc_rise: float, change: Array) -> TipContact | None:
+        """Of readings above the untouched ones; None where no electrode is squeezed."""
         found = contact_from_electrodes(
             change[None],
             self._layout,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from gtsam import Pose3
-
 from sessions.decisions import AutonomousDecisions, Decision, End, Pause, UndoGrasp, Veto, Wait
 from sessions.grasp_cycle import GraspPlan
 from sessions.guided.desk import Desk
@@ -76,15 +74,20 @@ class GuidedDecisions(AutonomousDecisions):
 
     def estimated(self, step: SlamStep) -> None:
         super().estimated(step)
-        self._desk.unknown = self.thinking.ask(_unknown, step.world_T_object)
+        self._desk.unknown = self.thinking.ask(_unknown)
         self._desk.tell(f"grasp {step.index + 1} {step.verdict}: {step.reason}")
+
+    def undone(self) -> None:
+        super().undone()
+        self._desk.unknown = self.thinking.ask(_unknown)
 
     def failed(self, error: TactileLabError) -> bool:
         return isinstance(error, (SafetyError, DeviceError)) and self._desk.fail(str(error))
 
 
-def _unknown(thinker: Thinker, world_T_object: Pose3 | None) -> str:
-    """Which part of an object at this pose is still unknown."""
+def _unknown(thinker: Thinker) -> str:
+    """Which part of the object is still unknown."""
+    world_T_object = thinker.slam.world_T_object
     pose = None if world_T_object is None else planar(world_T_object)
     return unknown_in_words(thinker.known_shape(), pose)
 

@@ -11,6 +11,7 @@ from sessions.decisions import GraspAbandonedError
 from sessions.guided.operator import Ask, Operator, Panel, Request, Stage
 from sessions.guided.settings import GuidedSettings
 from sessions.guided.sight import Sight, Watcher
+from sessions.guided.words import unknown_in_words
 from sessions.recorder import Level
 from sessions.safety import InterruptGuard
 from tactile_lab.clock import NANOSECONDS
@@ -48,7 +49,7 @@ class Desk:
         self.sight = Sight({})
         self.automatic = settings.automatic
         self.grasp = 1
-        self.suggestion = self.unknown = ""
+        self.suggestion, self.unknown = "", unknown_in_words(None, None)
         self.paused = ""
         """Why the session pauses; "" when it does not."""
         self.end_wanted = self.undo_wanted = False

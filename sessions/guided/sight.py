@@ -9,6 +9,7 @@ import numpy as np
 
 from drivers.ati.force_tip import ForceTip
 from drivers.ati.intrinsic_contact import contact_on_ellipsoid, wrench_transform
+from drivers.biotac.biotac import BioTac
 from drivers.fingertip import FingertipSensor
 from sessions.guided.settings import GuidedSettings
 from sessions.perception import Perception
@@ -130,12 +131,15 @@ class Watcher:
             points_m.append(world_T_distal.transformFrom(touch[0]))
             normals.append(world_T_distal.rotation().rotate(touch[1]))
         if not points_m:
-            return 0.0
+            return None
         return planar_observability(np.array(points_m), np.array(normals)).smallest
 
 
 def _touch_distal(tip: FingertipSensor, world_R_distal: Array) -> tuple[Array, Array] | None:
     """Contact point and normal out of the object in the distal frame, by the newest sample; changes nothing."""
+    if isinstance(tip, BioTac):
+        touch = tip.newest_contact()
+        return None if touch is None else (touch.point_distal_m, touch.normal_distal)
     if not isinstance(tip, ForceTip) or tip.newest is None:
         return None
     model, mounting = tip.calibration, tip.calibration.distal_T_sensor.pose()

@@ -206,6 +206,7 @@ def test_a_touch_becomes_a_contact_in_the_distal_frame(tip: BioTac) -> None:
     tip.begin_capture()
     finger.feed(REST)
     assert tip.contact(UPRIGHT) is None
+    assert tip.newest_contact() is None
     layout = electrode_layout(19)
     point = np.array([-0.003, 0.0, -0.007])
     tip.begin_capture()
@@ -214,6 +215,9 @@ def test_a_touch_becomes_a_contact_in_the_distal_frame(tip: BioTac) -> None:
     assert contact is not None
     np.testing.assert_allclose(contact.point_distal_m, [0, -0.007, 0.016], atol=1.5e-3)  # palm side, below the ball
     np.testing.assert_allclose(contact.normal_distal, [0, 1, 0], atol=0.1)  # out of the object, into the finger
+    newest = tip.newest_contact()
+    assert newest is not None
+    np.testing.assert_allclose(newest.point_distal_m, contact.point_distal_m, atol=1e-4)
     assert contact.force_N == pytest.approx(tip.load_N(UPRIGHT), rel=0.01)
     assert 0.3 < contact.force_N < 1.5
     spread = contact.normal_distal @ contact.point_covariance_m2 @ contact.normal_distal

@@ -89,6 +89,8 @@ def test_grasp_is_taken_back_and_the_estimate_with_it(tmp_path: Path) -> None:
     run = Run(tmp_path, world, SimulatedOperator([Cue(at(Stage.PLACE, 2), ask(Ask.UNDO))]))
     assert world.mark_counts[MarkKind.UNDO] == 1
     assert world.mark_counts[MarkKind.CAPTURE_END] == 3
+    at_first = {panel.unknown for panel in run.operator.panels if panel.grasp == 1 and panel.stage is Stage.PLACE}
+    assert at_first == {"the whole object is unknown"}
     assert [grasp.index for grasp in run.outcome.grasps] == [0, 1]
     again = TactileSlam(SlamSettings(particles=200), seed=1)
     for grasp in run.outcome.grasps:
