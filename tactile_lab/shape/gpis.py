@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 from scipy.spatial.distance import cdist
 
@@ -24,6 +25,7 @@ from tactile_lab.shape.kernels import (
     cross_covariance_with_gradients,
     log_parameter_traces,
 )
+from tactile_lab.shape.leave_one_out import inflation, negative_log_densities
 from tactile_lab.shape.observations import Observations, check_contacts
 from tactile_lab.shape.posterior import PosteriorMean, Prediction
 from tactile_lab.shape.priors import PriorMean
@@ -176,22 +178,28 @@ class Gpis:
         by_noise = 2 * self.noise_scale**2 * (np.diag(outer) @ self.observations.noise_variance)
         return 0.5 * np.append(by_kernel, by_noise)
 
+    def leave_one_out_costs(self, asked: NDArray[np.intp]) -> Array:
+        """Negative log density of some contacts, value and normal, each given all others, up to a constant.
+
+        The marginal likelihood of all contacts is that of the others times this density, so these costs tell what
+        would be gained by leaving a contact out.
+
+        Args:
+            asked: indices of the contacts, shape (a,), the costs are in the same order; normals must be observed.
+        """
+        each = np.arange(self.contacts_m.shape[1] + 1)
+        groups = asked[:, None] + len(self.contacts_m) * each
+        return negative_log_densities(self._factor, self._weights, groups)
+
     @cached_property
     def sigma_inflation(self) -> float:
         """How many times larger than stated the standard deviation of the surface is, at least 1.
 
-        A stationary kernel does not foresee edges. It shows in the normals: the squares of their standardised
-        leave-one-out residuals, ``weight^2 / inverse[i, i]``, exceed their mean for a true model, ``(d - 1) / d``
-        (a unit normal has no error along itself), by a ratio r of 2 to 3.5 on sharp shapes and of 0.9 to 1.2 on smooth
-        ones. What comes from the sensors' noise should not grow, what comes from interpolation should grow by r;
-        the variance is given the geometric mean, ``sqrt(r)``. Off-surface points do not tell.
+        By :func:`tactile_lab.shape.leave_one_out.inflation`; off-surface points do not tell.
         """
         if self._gradient_count == 0:
             return 1.0
-        dimension = self.contacts_m.shape[1]
-        squares = (self._weights**2 / self._factor.inverse_diagonal())[len(self.contacts_m) :]
-        ratio = float(squares.mean()) * dimension / (dimension - 1)
-        return float(max(1.0, ratio) ** 0.25)
+        return inflation(self._factor, self._weights, *self.contacts_m.shape)
 
     def mean(self, points_m: Array) -> Array:
         """Posterior mean (2.13, 2.18) at points of shape (q, d); shape (q,), metres."""

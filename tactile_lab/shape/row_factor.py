@@ -88,6 +88,28 @@ class RowFactor:
         diagonal[self.rows] = np.einsum("ij,ij->j", inverted, inverted)
         return diagonal
 
+    def inverse_blocks(self, groups: NDArray[np.intp]) -> Array:
+        """Blocks of :meth:`inverse`, for a third of the work or less.
+
+        Args:
+            groups: rows that belong together, shape (a, e).
+
+        Returns:
+            The inverse between the rows of each group, shape (a, e, e).
+        """
+        places = np.empty_like(self.rows)
+        places[self.rows] = np.arange(len(places))
+        columns = places[groups].ravel()
+        if 3 * len(columns) > len(places):
+            inverted, _ = lapack.dtrtri(self.lower, lower=1)
+            half = inverted[:, columns]
+        else:
+            units = np.zeros((len(places), len(columns)), order="F")
+            units[columns, np.arange(len(columns))] = 1.0
+            half, _ = lapack.dtrtrs(self.lower, units, lower=1, overwrite_b=1)
+        own = half.reshape(len(half), *groups.shape)
+        return np.asarray(np.einsum("rai,raj->aij", own, own))
+
     def extended(self, cross: Array, corner: Array, old_rows: NDArray[np.intp], rows: NDArray[np.intp]) -> Self | None:
         """The factor with m rows more, at a cost of order ``n^2 m``; None if they make it indefinite.
 

@@ -18,6 +18,7 @@ from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.fixed_lag import condensed
 from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.pose_evidence import PoseEvidence
 
 _EXPECTED_RIGHT = 99.0
@@ -65,7 +66,7 @@ class Judge:
 
     def rated(self, contact_map: ContactMap) -> Hypothesis:
         """A map as it is."""
-        return self._hypothesis(contact_map, PoseEvidence(contact_map, self._noise).value(contact_map.rows))
+        return self._hypothesis(contact_map, self._misfit(contact_map))
 
     def smoothed(self, contact_map: ContactMap, iterations: int) -> Hypothesis:
         """The poses of largest evidence nearby; once more if contacts turn out not to fit them."""
@@ -94,10 +95,9 @@ class Judge:
         """
         while True:
             asked = _asked(contact_map, grasp)
-            evidence = PoseEvidence(contact_map, self._noise)
-            value, costs = evidence.value_and_leave_one_out_costs(contact_map.rows, asked)
+            costs = contact_map.fit().leave_one_out_costs(asked)
             if len(asked) == 0 or costs.max() <= self._unexplained_cost or len(contact_map.grasp_indices) == 1:
-                return contact_map, value
+                return contact_map, self._misfit(contact_map)
             contact_map = contact_map.without_contact(*contact_map.origins[asked[costs.argmax()]])
 
     def with_covariances(self, contact_map: ContactMap) -> ContactMap:
@@ -121,6 +121,13 @@ class Judge:
         breaks = int(np.sum(~contact_map.follows_hand))
         return wrong * anywhere - share + _BREAK_COST * breaks
 
+    def _misfit(self, contact_map: ContactMap) -> float:
+        """As :meth:`PoseEvidence.value`, by the field, which is needed anyway."""
+        contacts = contact_map.contacts
+        constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
+        motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
+        return motion - contact_map.fit().log_marginal_likelihood() - float(constant)
+
     def _hypothesis(self, contact_map: ContactMap, misfit: float) -> Hypothesis:
         intrusion = free_space_costs(contact_map.fit(), contact_map.free_points_m[None])[0]
         return Hypothesis(contact_map, misfit, float(intrusion), self.price(contact_map))
@@ -139,9 +146,14 @@ def likeliest(hypotheses: list[Hypothesis], count: int, gap: float) -> list[Hypo
 
 def different(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
     """The likeliest of those that ended at the same trajectory."""
+    return unlike(hypotheses, [])
+
+
+def unlike(hypotheses: list[Hypothesis], known: list[Hypothesis]) -> list[Hypothesis]:
+    """As :func:`different`, of those that ended at none of the known trajectories."""
     kept: list[Hypothesis] = []
     for one in sorted(hypotheses, key=cost):
-        if not any(_same(one.map, other.map) for other in kept):
+        if not any(_same(one.map, other.map) for other in (*known, *kept)):
             kept.append(one)
     return kept
 

@@ -21,7 +21,7 @@ from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.fixed_lag import unfolded
 from tactile_lab.tracking.free_space import free_space_costs
-from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost, different, likeliest, weights
+from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost, different, likeliest, unlike, weights
 from tactile_lab.tracking.late_placing import Relocate, placed_late, relocated
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import estimated_noise
@@ -190,7 +190,7 @@ class JointTracker:
         found = [sharp.better(one.map) for one in self._hypotheses]
         best = min(found, key=cost)
         limit = self._judge.rated(best.map).cost
-        others = [one for one in different(self._regrouped(best)) if one.cost < limit]
+        others = [one for one in unlike(self._regrouped(best), self._hypotheses) if one.cost < limit]
         return sorted(found + [sharp.better(one.map) for one in others], key=cost)
 
     def _readmitted(self, hypothesis: Hypothesis) -> Hypothesis:

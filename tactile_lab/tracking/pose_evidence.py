@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import singledispatch
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 from scipy.optimize import minimize
 
@@ -68,6 +67,7 @@ class PoseEvidence:
         self._noise_variance = seen.noise_variance
         self._kernel: Kernel = initial_kernel(seen, contact_map.settings)
         self._prior: PriorMean = prior_mean(contacts.points_m, contacts.normals, contact_map.settings)
+        self._last: tuple[Array, _Placed] | None = None
 
     def value(self, rows: Array) -> float:
         """The negative log posterior at poses of shape (k, size)."""
@@ -124,29 +124,6 @@ class PoseEvidence:
         whitened, _ = lapack.dtrtrs(placed.factor, seen.reshape(len(seen), -1)[:, size:], lower=1)
         return np.asarray(whitened)
 
-    def value_and_leave_one_out_costs(self, rows: Array, asked: NDArray[np.intp]) -> tuple[float, Array]:
-        """The negative log posterior, and for some contacts that of their density given all others.
-
-        The marginal likelihood of all contacts is that of the others times this, so these costs tell what would be
-        gained by leaving a contact out. They follow from the blocks of the inverse covariance alone.
-
-        Args:
-            rows: poses, shape (k, size).
-            asked: indices of the contacts, shape (a,); the costs are in the same order.
-        """
-        placed = self._placed(rows)
-        count, each = len(placed.points), placed.points.shape[1] + 1
-        lines = (asked[:, None] + count * np.arange(each)).ravel()
-        units = np.zeros((count * each, len(lines)))
-        units[lines, np.arange(len(lines))] = 1.0
-        half, _ = lapack.dtrtrs(placed.factor, units, lower=1, overwrite_b=1)
-        own_half = half.reshape(len(half), len(asked), each)
-        blocks = np.einsum("rai,raj->aij", own_half, own_half)
-        own = placed.weights[lines].reshape(len(asked), each)
-        misfits = np.einsum("ai,ai->a", own, np.linalg.solve(blocks, own[..., None])[..., 0])
-        costs = 0.5 * (misfits - np.linalg.slogdet(blocks)[1])
-        return placed.misfit + self._motion.value(rows), np.asarray(costs)
-
     def maximised(self, rows: Array, max_iterations: int, accuracy: float = 0.1) -> tuple[Array, float]:
         """Poses of largest posterior near the given ones, and the negative log posterior there.
 
@@ -160,6 +137,7 @@ class PoseEvidence:
         """
         if len(rows) == 1:
             return rows, self.value(rows)
+        rows = np.vstack([rows[:1], self._space.moved(rows[1:], np.zeros_like(rows[1:]))])  # as the first step has them
         spread = np.linalg.inv(np.linalg.cholesky(self.information(rows))).T
         scale = max(abs(self.value(rows)), 1.0)
 
@@ -181,6 +159,12 @@ class PoseEvidence:
         return moved(found.x), float(found.fun)
 
     def _placed(self, rows: Array) -> _Placed:
+        """The contacts for some poses; the last ones are remembered, as the same are often asked for in turn."""
+        if self._last is None or not np.array_equal(self._last[0], rows):
+            self._last = rows.copy(), self._computed(rows)
+        return self._last[1]
+
+    def _computed(self, rows: Array) -> _Placed:
         from tactile_lab.tracking.evidence_kernels import assemble  # compiled loops are slow to import
 
         points, normals = self._space.to_object(rows[self._grasp_of], self._world.points_m, self._world.normals)

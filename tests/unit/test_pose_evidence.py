@@ -14,6 +14,7 @@ from tactile_lab.shape.kernels import Kernel, Matern52, SquaredExponential, Thin
 from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.evidence_kernels import assemble, pull
+from tactile_lab.tracking.hypotheses import Judge
 from tactile_lab.tracking.motion import MotionNoise, compose, deviation, row_pose_in_space
 from tactile_lab.tracking.motion_cost import estimated_noise
 from tactile_lab.tracking.pose_evidence import PoseEvidence, third_derivative
@@ -117,11 +118,12 @@ def test_smoothing_finds_the_poses_again() -> None:
 def test_leaving_one_contact_out_changes_the_evidence_by_its_cost() -> None:
     contact_map = true_map("hexagon", count=3)
     contact_map = replace(contact_map, settings=contact_map.settings.model_copy(update={"prior_mean": "zero"}))
-    value, costs = PoseEvidence(contact_map, NOISE).value_and_leave_one_out_costs(
-        contact_map.rows, np.arange(len(contact_map.contacts))
-    )
+    value = PoseEvidence(contact_map, NOISE).value(contact_map.rows)
+    costs = contact_map.fit().leave_one_out_costs(np.arange(len(contact_map.contacts)))
     assert costs.shape == (len(contact_map.contacts),)
-    assert value == pytest.approx(PoseEvidence(contact_map, NOISE).value(contact_map.rows))
+    assert Judge(NOISE, 2.0).rated(contact_map).misfit == pytest.approx(value)
+    few = np.array([4, 1])
+    assert contact_map.fit().leave_one_out_costs(few) == pytest.approx(costs[few])
     for origin, cost in zip(contact_map.origins, costs, strict=True):
         without = PoseEvidence(contact_map.without_contact(*origin), NOISE).value(contact_map.rows)
         assert cost == pytest.approx(value - without, abs=1e-6)
@@ -134,9 +136,7 @@ def test_a_torn_contact_costs_most() -> None:
     normals[2] *= -1.0
     torn = replace(grasp, contacts_world=replace(grasp.contacts_world, normals=normals))
     spoiled = replace(contact_map, placed=(*contact_map.placed[:3], torn, *contact_map.placed[4:]))
-    _, costs = PoseEvidence(spoiled, NOISE).value_and_leave_one_out_costs(
-        spoiled.rows, np.arange(len(spoiled.contacts))
-    )
+    costs = spoiled.fit().leave_one_out_costs(np.arange(len(spoiled.contacts)))
     worst = int(costs.argmax())
     assert spoiled.grasp_indices[worst] == 3
     cleaned = spoiled.without_contact(*spoiled.origins[worst])
