@@ -14,6 +14,9 @@ from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.pose_rows import PLANAR, PoseRows
 
+_WHATEVER_THE_POSES = ("contacts_world", "grasp_indices", "_free_world")
+"""What a map has gathered from its grasps and keeps when only their poses change."""
+
 WHILE_TRACKING_m = 0.080
 """Longest kernel while more is to come: contacts on a smooth side would else rule out the edge behind it."""
 
@@ -110,9 +113,16 @@ class ContactMap:
     @property
     def free_points_m(self) -> Array:
         """Places that were free at grasps whose contacts are part of the shape, object frame, shape (q, d)."""
-        known = [(grasp.row, grasp.free_world_m) for grasp in self.placed if grasp.used]
-        places = [self.space.to_object(row, free, free)[0] for row, free in known if len(free)]
-        return np.vstack([np.empty((0, self.placed[0].contacts_world.dimension)), *places])
+        places, grasps = self._free_world
+        return self.space.to_object(self.rows[grasps], places, places)[0]
+
+    @cached_property
+    def _free_world(self) -> tuple[Array, NDArray[np.intp]]:
+        """These places where they were, world frame, and the grasp of each."""
+        found = [grasp.free_world_m if grasp.used else np.empty((0, 0)) for grasp in self.placed]
+        known = [places for places in found if len(places)]
+        owners = np.repeat(np.arange(len(found)), [len(places) for places in found])
+        return np.vstack([np.empty((0, self.dimension)), *known]), owners
 
     @cached_property
     def contacts_world(self) -> ContactSet:
@@ -165,8 +175,10 @@ class ContactMap:
 
     def with_rows(self, rows: Array) -> ContactMap:
         """The map with other poses, shape (n, 3), covariances kept."""
-        moved = [replace(grasp, row=row) for grasp, row in zip(self.placed, rows, strict=True)]
-        return replace(self, placed=tuple(moved))
+        placed = [replace(grasp, row=row) for grasp, row in zip(self.placed, rows, strict=True)]
+        moved = replace(self, placed=tuple(placed))
+        moved.__dict__.update({name: self.__dict__[name] for name in _WHATEVER_THE_POSES if name in self.__dict__})
+        return moved
 
     def reread(self, backward: ContactMap) -> ContactMap:
         """This map with the poses and doubts of another one, of the same grasps in the opposite order.

@@ -49,7 +49,8 @@ class MotionCost:
 
     def value(self, rows: Array) -> float:
         """The cost of poses of shape (k, size)."""
-        return float(self._cost(self._scaled(rows)))
+        slip = self._lengths(self._scaled(rows))
+        return _cost(slip, np.maximum(slip - STIFF_BEYOND_SIGMA, 0.0))
 
     def value_and_gradient(self, rows: Array) -> tuple[float, Array]:
         """The cost and its derivative by each pose, shape (k, size)."""
@@ -62,7 +63,7 @@ class MotionCost:
         gradient = np.zeros_like(rows)
         gradient[1:] += np.einsum("kij,ki->kj", later, pull)
         gradient[:-1] += np.einsum("kij,ki->kj", earlier, pull)
-        return float(self._cost(scaled)), gradient
+        return _cost(slip, excess), gradient
 
     def information(self, rows: Array) -> Array:
         """Second derivative by all poses but the first, slips taken as Gaussian; shape ((k - 1) size, (k - 1) size)."""
@@ -88,13 +89,11 @@ class MotionCost:
         return np.asarray(slips * self._weights)
 
     def _lengths(self, scaled: Array) -> Array:
-        split = self._space.translations
-        return np.stack([np.linalg.norm(scaled[:, :split], axis=1), np.linalg.norm(scaled[:, split:], axis=1)], axis=1)
+        return np.sqrt(np.add.reduceat(scaled**2, [0, self._space.translations], axis=1))
 
-    def _cost(self, scaled: Array) -> Array:
-        slip = self._lengths(scaled)
-        excess = np.maximum(slip - STIFF_BEYOND_SIGMA, 0.0)
-        return np.asarray(0.5 * np.sum(slip**2) + 0.5 * _STIFFNESS * np.sum(excess**2))
+
+def _cost(slip: Array, excess: Array) -> float:
+    return float(0.5 * np.sum(slip**2) + 0.5 * _STIFFNESS * np.sum(excess**2))
 
 
 def estimated_noise(contact_map: ContactMap, configured: MotionNoise) -> MotionNoise:

@@ -116,15 +116,16 @@ class PlanarRows:
         along_y = -(sine * by_points[..., 0] + cosine * by_points[..., 1])
         turning = by_points[..., 0] * points[..., 1] - by_points[..., 1] * points[..., 0]
         turning = turning + by_normals[..., 0] * normals[..., 1] - by_normals[..., 1] * normals[..., 0]
-        return np.stack(np.broadcast_arrays(along_x, along_y, turning), axis=-1)
+        result = np.empty((*turning.shape, 3))
+        result[..., 0], result[..., 1], result[..., 2] = along_x, along_y, turning
+        return result
 
     def slip_derivatives(self, rows: Array, motions: Array) -> tuple[Array, Array]:
         later = np.broadcast_to(np.eye(3), (len(rows) - 1, 3, 3))
-        earlier = -later
         cosine, sine = np.cos(motions[1:, 2]), np.sin(motions[1:, 2])
-        earlier = earlier.copy()
+        earlier = np.zeros((len(rows) - 1, 3, 3))
         earlier[:, 0, 0] = earlier[:, 1, 1] = -cosine
-        earlier[:, 0, 1], earlier[:, 1, 0] = sine, -sine
+        earlier[:, 0, 1], earlier[:, 1, 0], earlier[:, 2, 2] = sine, -sine, -1.0
         return later, earlier
 
 
