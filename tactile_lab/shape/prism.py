@@ -54,14 +54,25 @@ class Prism:
     Attributes:
         name: "prism".
         outline: model of the horizontal section.
-        top, bottom: the levels it ends at; above the table the bottom is replaced by it.
+        top, bottom: the levels it ends at, by the field where no contact is on them; above the table the bottom is
+            replaced by it.
         log_evidence: that of the outline, and how well walls are upright and the ends level.
     """
 
     name = "prism"
 
-    def __init__(self, outline: FittedShape, top: Level, bottom: Level, log_evidence: float) -> None:
-        self.outline, self.top, self.bottom, self.log_evidence = outline, top, bottom, log_evidence
+    def __init__(self, outline: FittedShape, top: _End, bottom: _End, log_evidence: float) -> None:
+        self.outline, self._top, self._bottom, self.log_evidence = outline, top, bottom, log_evidence
+
+    @property
+    def top(self) -> Level:
+        """Raises ShapeError: it was not touched, and the field has no inside."""
+        return self._top.level
+
+    @property
+    def bottom(self) -> Level:
+        """Raises ShapeError: it was not touched, and the field has no inside."""
+        return self._bottom.level
 
     @classmethod
     def fit(
@@ -82,15 +93,15 @@ class Prism:
         walls = np.flatnonzero(on_walls(contacts.normals))
         if len(walls) < _LEAST_WALL_CONTACTS:
             raise ShapeError(f"{len(walls)} contacts on walls are too few for an outline")
-        ends = [_level(gpis, contacts, side, np.flatnonzero(side * up > _LEVEL_COSINE)) for side in (1.0, -1.0)]
-        free = _beside(free_points_m, ends[0].height_m, ends[1].height_m)
+        top, bottom = [_End(gpis, side, np.flatnonzero(side * up > _LEVEL_COSINE)) for side in (1.0, -1.0)]
+        free = _beside(free_points_m, top, bottom)
         outline = best_outline(_planar_field(gpis, contacts, walls), free)
         if outline.log_evidence is None:
             raise ShapeError("the outline's model has no evidence to compare")
         tilt_weights = contacts.normal_weights[walls]
         upright = -0.5 * np.sum(tilt_weights * up[walls] ** 2) + _scale(tilt_weights)
-        evidence = outline.log_evidence + upright + ends[0].log_likelihood + ends[1].log_likelihood
-        return cls(outline, ends[0], ends[1], float(evidence))
+        evidence = outline.log_evidence + upright + top.log_likelihood + bottom.log_likelihood
+        return cls(outline, top, bottom, float(evidence))
 
     @cached_property
     def section(self) -> Contour:
@@ -132,18 +143,41 @@ def on_walls(normals: Array) -> NDArray[np.bool_]:
     return np.asarray(np.abs(normals[:, 2]) <= _LEVEL_COSINE)
 
 
-def _level(gpis: Gpis, contacts: WeightedContacts, side: float, members: Indices) -> Level:
-    """The end that some contacts lie on, or where the field ends if none do; upward for side 1, downward for -1."""
-    if len(members) == 0:
-        end = field_end(gpis, np.array([0.0, 0.0, side]))
-        return Level(side * end.offset_m, end.sigma_m, 0.0)
-    weights, turns = contacts.point_weights[members], contacts.normal_weights[members]
-    heights = contacts.points_m[members, 2]
-    height_m = float(np.average(heights, weights=weights))
-    away = contacts.normals[members] - [0.0, 0.0, side]
-    misfit = np.sum(weights * (heights - height_m) ** 2) + np.sum(turns[:, None] * away**2)
-    scale = _scale(weights) + 3 * _scale(turns) - 0.5 * np.log(len(contacts))
-    return Level(height_m, float(weights.sum() ** -0.5), float(scale - 0.5 * misfit))
+@dataclass(frozen=True)
+class _End:
+    """An end of a prism: upward for side 1, downward for -1.
+
+    Where the field ends is looked for only when that is asked for: most prisms are made for their evidence alone.
+
+    Attributes:
+        gpis: the field.
+        side: see above.
+        members: indices of the contacts on it.
+    """
+
+    gpis: Gpis
+    side: float
+    members: Indices
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of the contacts on it, zero if there are none."""
+        return self.level.log_likelihood if len(self.members) else 0.0
+
+    @cached_property
+    def level(self) -> Level:
+        """The level that its contacts lie on, or where the field ends if there are none."""
+        if len(self.members) == 0:
+            end = field_end(self.gpis, np.array([0.0, 0.0, self.side]))
+            return Level(self.side * end.offset_m, end.sigma_m, 0.0)
+        contacts, members = contacts_of(self.gpis), self.members
+        weights, turns = contacts.point_weights[members], contacts.normal_weights[members]
+        heights = contacts.points_m[members, 2]
+        height_m = float(np.average(heights, weights=weights))
+        away = contacts.normals[members] - [0.0, 0.0, self.side]
+        misfit = np.sum(weights * (heights - height_m) ** 2) + np.sum(turns[:, None] * away**2)
+        scale = _scale(weights) + 3 * _scale(turns) - 0.5 * np.log(len(contacts))
+        return Level(height_m, float(weights.sum() ** -0.5), float(scale - 0.5 * misfit))
 
 
 def _scale(weights: Array) -> float:
@@ -163,12 +197,12 @@ def _planar_field(gpis: Gpis, contacts: WeightedContacts, walls: Indices) -> Gpi
     ).optimise(max_iterations=15)
 
 
-def _beside(free_points_m: Array | None, top_m: float, bottom_m: float) -> Array | None:
+def _beside(free_points_m: Array | None, top: _End, bottom: _End) -> Array | None:
     """Free places at the heights of the prism, seen from above."""
     if free_points_m is None or len(free_points_m) == 0:
         return None
     heights = free_points_m[:, 2]
-    return free_points_m[(heights > bottom_m) & (heights < top_m), :2]
+    return free_points_m[(heights > bottom.level.height_m) & (heights < top.level.height_m), :2]
 
 
 def _thinned(contour: Contour, step_m: float) -> tuple[Array, Array]:
