@@ -9,7 +9,7 @@ import typer
 
 from tactile_lab.errors import ConfigurationError
 
-PORT = 8090
+HERE, PORT = "127.0.0.1", 8090
 _PANEL = "Page in the browser"
 LEAST_TOKEN = 16
 
@@ -48,7 +48,10 @@ class PageAddress:
 
     @classmethod
     def wanted(cls, view: bool, address: str, port: int, token: str) -> PageAddress | None:
-        """The address when a page was asked for."""
+        """The address when a page was asked for. Raises BadParameter for one without a page."""
+        for option, given in (("--listen", address != HERE), ("--view-port", port != PORT)):
+            if given and not view:
+                raise typer.BadParameter("belongs to --view", param_hint=f"'{option}'")
         return cls(address, port, token) if view else None
 
     def checked(self) -> tuple[str, int, str]:

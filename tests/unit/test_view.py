@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gtsam import Pose3, Rot3
+from typer import BadParameter
 
 from drivers.shadow.kinematics import joint_vector, palm_T_distal
 from sessions import schemas
@@ -209,6 +210,8 @@ def test_other_addresses_need_a_token() -> None:
     with pytest.raises(ConfigurationError, match="at least 16"):
         PageAddress("0.0.0.0", 8090, "short").checked()
     assert PageAddress("0.0.0.0", 8090, "new").checked()[2] != ""
+    with pytest.raises(BadParameter, match="belongs to --view"):
+        PageAddress.wanted(False, "0.0.0.0", 8090, "")
     with pytest.raises(DeviceError, match="a token is needed"):
         Page("0.0.0.0", 0, "", "test")
 
