@@ -15,7 +15,7 @@ app = typer.Typer(help="Rigs: the devices of a laboratory, and their calibration
 
 @app.command("list")
 def list_rigs(
-    ports: Annotated[bool, typer.Option("--ports", help="List serial ports and CAN interfaces instead.")] = False,
+    ports: Annotated[bool, typer.Option("--ports", help="List serial ports, CAN and network interfaces.")] = False,
     watch: Annotated[float, typer.Option(min=0.0, help="List ports; wait so many seconds for a change.")] = 0.0,
     as_json: Json = False,
     no_input: NoInput = False,
@@ -55,10 +55,12 @@ def _list_ports(watch_s: float, as_json: bool) -> None:
         rows = {"ports": found, "gone": gone, "come": come}
         emit_json({name: [asdict(port) for port in ports] for name, ports in rows.items()})
         return
+    changed = {port.name for port in gone} & {port.name for port in come}
     for port in gone:
-        say(f"{port.name} went: {port.description}")
+        if port.name not in changed:
+            say(f"{port.name} went: {port.description}")
     for port in come:
-        say(f"{port.name} came: {port.description}")
+        say(f"{port.name}: now {port.description}" if port.name in changed else f"{port.name} came: {port.description}")
     if watch_s and not (gone or come):
         say("nothing changed")
 

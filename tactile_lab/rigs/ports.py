@@ -1,4 +1,4 @@
-"""What a fingertip or a bridge could be plugged into: serial ports and CAN interfaces of this computer."""
+"""What a fingertip, a bridge or a hand could be plugged into: ports and interfaces of this computer."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from serial.tools import list_ports
 from tactile_lab.clock import NANOSECONDS, Clock
 
 _STABLE_NAMES = Path("/dev/serial/by-id")
+_NETWORK, _ETHERNET = Path("/sys/class/net"), "1"
 _LOOK_ns = NANOSECONDS // 5
 
 
@@ -19,9 +20,9 @@ class PortFound:
     """One port.
 
     Attributes:
-        kind: ``serial`` or ``can``.
+        kind: ``serial``, ``can`` or ``network``.
         name: what to write into a rig file: the name that stays the same where the system has one.
-        description: what the adapter says of itself.
+        description: what the adapter says of itself; of a network interface, whether a cable leads somewhere.
     """
 
     kind: str
@@ -30,14 +31,32 @@ class PortFound:
 
 
 def list_all_ports() -> list[PortFound]:
-    """Serial ports, then CAN interfaces of the kernel."""
+    """Serial ports, then CAN interfaces of the kernel, then its Ethernet interfaces."""
     stable = {str(link.resolve()): str(link) for link in _STABLE_NAMES.glob("*")}
     serial_ports = [
         PortFound("serial", stable.get(port.device, port.device), (port.description or "").replace("n/a", ""))
         for port in sorted(list_ports.comports())
     ]
     buses = can.detect_available_configs(interfaces="socketcan")
-    return serial_ports + [PortFound("can", str(bus["channel"]), str(bus["interface"])) for bus in buses]
+    can_ports = [PortFound("can", str(bus["channel"]), str(bus["interface"])) for bus in buses]
+    return serial_ports + can_ports + [_network(name) for name in sorted(_NETWORK.glob("*")) if _is_ethernet(name)]
+
+
+def _is_ethernet(interface: Path) -> bool:
+    return _told(interface / "type") == _ETHERNET
+
+
+def _network(interface: Path) -> PortFound:
+    connected = _told(interface / "operstate") == "up"
+    return PortFound("network", interface.name, "connected" if connected else "no cable, or not set up")
+
+
+def _told(file: Path) -> str:
+    """What the kernel says; nothing of an interface that has gone meanwhile."""
+    try:
+        return file.read_text().strip()
+    except OSError:
+        return ""
 
 
 def wait_for_change(clock: Clock, before: list[PortFound], seconds: float) -> tuple[list[PortFound], list[PortFound]]:
