@@ -245,12 +245,12 @@ class Conductor:
         return arrived
 
     def _carry(self, grasp: Grasp, wanted: Reorientation) -> None:
-        """Squeeze, and re-orient the object, unless too few fingers hold it or no grasp will follow."""
+        """Squeeze, and re-orient the object, unless it is to stay, too few fingers hold it or no grasp will follow."""
         cycle, touching = self._cycle, grasp.touching
         self._supervisor.count_contacts(len(touching))
         hand_motion = Pose3()
         last = len(self._grasps) >= self._settings.grasps or self._guard.requested
-        if holds(touching) and not last:
+        if wanted.moves and holds(touching) and not last:
             self._phase("squeeze")
             cycle.squeeze(touching)
             self._phase("re-orient")

@@ -174,10 +174,19 @@ def _tips_are_clear(plans: Sequence[GraspPlan], limits: HandLimits, known: Known
         heights_m = starts_m[:, None, :, 2] + above_m[None, :, None] - known.origin_height_m
         level_m = np.broadcast_to(flat_m[:, None], (*heights_m.shape, 2))
         places_m = np.concatenate([level_m, heights_m[..., None]], axis=-1)
-    found = known.field.predict(places_m.reshape(-1, known.dimension), variance=True)
-    sigma_m = np.minimum(np.sqrt(found.variance_m2), limits.exploration.clearance_m)
-    margin_m = found.mean_m - limits.exploration.caution * sigma_m - limits.exploration.clearance_m
-    return np.asarray(margin_m.reshape(len(plans), -1).min(axis=1) > 0.0)
+    clear = _are_clear(places_m.reshape(-1, known.dimension), limits.exploration, known)
+    return np.asarray(clear.reshape(len(plans), -1).all(axis=1))
+
+
+def _are_clear(places_m: Array, settings: ExplorationSettings, known: KnownShape) -> Verdicts:
+    """Which places keep clear of the surface; its uncertainty is asked where it decides, as it is dear."""
+    spare_m = known.field.predict(places_m).mean_m - settings.clearance_m
+    clear = spare_m > settings.caution * settings.clearance_m
+    decisive = (spare_m > 0.0) & ~clear
+    if decisive.any():
+        sigma_m = np.minimum(np.sqrt(known.field.variance(places_m[decisive])), settings.clearance_m)
+        clear[decisive] = spare_m[decisive] > settings.caution * sigma_m
+    return np.asarray(clear)
 
 
 def _open_tips_m(plan: GraspPlan, tip: TipEllipsoid) -> Array:

@@ -34,6 +34,11 @@ class Reorientation:
     turn_rad: float
     shift_world_m: Array
 
+    @property
+    def moves(self) -> bool:
+        """Whether it is carried at all; else the hand opens and leaves it where it is."""
+        return bool(self.turn_rad != 0.0 or np.any(self.shift_world_m != 0.0))
+
 
 class Planner:
     """Where to grasp, and how to carry the object then.
@@ -184,23 +189,28 @@ class Planner:
             self._rule.centre_m = contact_centre(grasp, plan)
         turn_rad = self._turn(grasp, plan)
         self._hand_motion, self._here = Pose3(), plan.frame
-        return Reorientation(turn_rad, self._rule.step_back(self.centre_m))
+        shift_m = np.zeros(2) if turn_rad is None else self._rule.step_back(self.centre_m)
+        return Reorientation(turn_rad or 0.0, shift_m)
 
-    def _turn(self, grasp: Grasp, plan: GraspPlan) -> float:
-        """How far to turn the object: as the policy would have it, where there is one and something to choose by."""
+    def _turn(self, grasp: Grasp, plan: GraspPlan) -> float | None:
+        """How far to turn the object, None to leave it: as the policy would have it, where there is one to ask."""
         turn_rad = self._rule.turn(plan.frame.yaw_rad)
         if self._chooser is None:
             return turn_rad
         self._chooser.grasped(grasp)
         knowledge = self._knowledge(grasp.index) if grasp.index >= self._fixed_grasps else None
-        return turn_rad if knowledge is None else self._chooser.turn(plan.frame, knowledge, turn_rad)
+        covariance = self._slam.pose_covariance
+        if knowledge is None or covariance is None:
+            return None if self._chooser.may_leave else turn_rad
+        return self._chooser.turn(plan.frame, replace(knowledge, covariance=covariance), grasp, turn_rad)
 
     def carried(self, hand_motion_world: Pose3) -> None:
         """Take note that the hand carried the object since the last grasp."""
-        self._hand_motion, self._landings_m = hand_motion_world, []
-        motion = planar(hand_motion_world)
+        self._hand_motion, motion = hand_motion_world, planar(hand_motion_world)
         self._box = None if self._box is None else self._box.moved(motion)
         self._carried = not hand_motion_world.equals(Pose3(), 1e-9)
+        if self._carried:
+            self._landings_m = []
         if self._here is not None:
             pose = motion * Pose2(self._here.x_m, self._here.y_m, self._here.yaw_rad)
             self._here = GraspFrame(float(pose.x()), float(pose.y()), float(pose.theta()))

@@ -17,18 +17,14 @@ from sessions.explorer import KnownShape
 from sessions.grasp_cycle import GraspPlan
 from sessions.hand_candidates import HandCandidate, HandLimits, Offer, offer
 from sessions.motion import GraspFrame
+from sessions.turn_choice import TurnChooser, with_contacts
 from tactile_lab.exploration.candidates import ModelledObject, PredictedContacts, predict_contacts
 from tactile_lab.exploration.policy import Belief, Decision, Policy
 from tactile_lab.exploration.prediction import sampled_displacements
-from tactile_lab.exploration.rewards import variance_reward
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.tracking.motion import MotionNoise
 
 _SAMPLED_SURFACES = 32
-_TURNS = 3
-"""Re-orientations to choose from, each way round."""
-
-_TURN_YAWS = 7
 
 
 @dataclass(frozen=True)
@@ -141,6 +137,7 @@ class PolicyChooser:
 
     def __init__(self, policy: Policy, limits: HandLimits, noise: MotionNoise, rng: np.random.Generator) -> None:
         self.policy, self._limits, self._noise, self._rng = policy, limits, noise, rng
+        self._turns = TurnChooser(policy, limits, noise)
         self._expected: PredictedContacts | None = None
         self._missed_m: list[Array] = []
 
@@ -174,36 +171,22 @@ class PolicyChooser:
                 self._missed_m.append(point_m)
             seen.add(finger)
 
-    def turn(self, frame: GraspFrame, knowledge: Knowledge, otherwise: float) -> float:
-        """How to turn the object in hand: as the best grasp after it promises most (equation 4.20).
+    @property
+    def may_leave(self) -> bool:
+        """Whether the object stays where it is unless there is a reason to turn it."""
+        return self._turns.may_leave
+
+    def turn(self, frame: GraspFrame, knowledge: Knowledge, grasp: Grasp, otherwise: float) -> float | None:
+        """How to turn the object in hand, radians; None to leave it where it is.
 
         Args:
             frame: of the hand.
-            knowledge: from before this grasp.
+            knowledge: from before this grasp, the pose as certain as it will be after it.
+            grasp: this one.
             otherwise: the turn where nothing tells them apart, radians.
         """
-        options = self._turns(frame.yaw_rad)
-        if self.policy.name == "random" or not options:
-            return otherwise
-        rewards = [self._reward_after(turn, frame, knowledge) for turn in options]
-        return options[int(np.argmax(rewards))] if max(rewards) > min(rewards) else otherwise
-
-    def _turns(self, yaw_rad: float) -> list[float]:
-        """Turns that keep the hand in its window."""
-        low, high = self._limits.plan.yaw_window_rad
-        sizes = np.linspace(*self._limits.plan.turn_rad, _TURNS)
-        both = [float(sign * size) for size in sizes for sign in (1.0, -1.0)]
-        return [turn for turn in both if low <= yaw_rad + turn <= high]
-
-    def _reward_after(self, turn_rad: float, frame: GraspFrame, knowledge: Knowledge) -> float:
-        """Best variance reward among a few grasps after the object was turned about the hand's vertical axis."""
-        about = Pose2(frame.x_m, frame.y_m, 0.0)
-        pose = about * Pose2(0.0, 0.0, turn_rad) * about.inverse() * knowledge.world_T_object
-        few = self._limits.exploration.model_copy(update={"yaws": _TURN_YAWS, "shifts_m": (0.0,)})
-        offered = offer(replace(self._limits, exploration=few), knowledge.known, pose)
-        modelled = _modelled(knowledge, pose)
-        rewards = [variance_reward(predict_contacts(one.candidate, modelled)) for one in offered.usable]
-        return max(rewards, default=0.0)
+        belief = with_contacts(self._belief(knowledge), grasp)
+        return self._turns.choose(frame, knowledge.known, belief, otherwise, self._rng)
 
     def _belief(self, knowledge: Knowledge) -> Belief:
         known, field = knowledge.known, knowledge.known.field

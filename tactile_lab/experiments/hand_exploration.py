@@ -7,6 +7,7 @@ for the same without physics. What counts as explored stands in :mod:`tactile_la
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from drivers.simulation.world import SimulatedWorld
@@ -15,6 +16,7 @@ from sessions.conductor import Conductor
 from sessions.conductor_settings import ConductorSettings
 from sessions.progress import GraspReport, NullProgress
 from sessions.recorder import NullRecorder
+from sessions.thinker import Thinker
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.hand_judge import Judge, UntilExplored
@@ -33,25 +35,26 @@ OBJECTS = (
     "cylinder",
 )
 POLICIES = ("random", "variance", "clusters", "information")
-GRASPS = 24
+ACTIONS = 24
 RIG = "sim"
 
 
-def settings(grasps: int) -> list[Setting]:
-    """Every object with every policy, in the plane and in space."""
-    return grid(object=list(OBJECTS), dimension=[2, 3], policy=list(POLICIES), grasps=[grasps])
+def settings(actions: int) -> list[Setting]:
+    """Every object with every policy, in the plane and in space, with a budget of actions."""
+    return grid(object=list(OBJECTS), dimension=[2, 3], policy=list(POLICIES), actions=[actions])
 
 
 def explore_by_hand(cell: Cell) -> dict[str, Any]:
-    """One session. Cell: object, dimension, policy, grasps."""
+    """One session. Cell: object, dimension, policy, actions."""
     rig, dimension = load_rig(RIG), int(cell["dimension"])
     world = simulated_world(rig, cell.seed, cell["object"])
     bench = build_bench(rig, world, NullRecorder())
     slam, conductor = estimation(rig, cell), conductor_settings(rig, cell)
-    judge = Judge(world.object_model.mesh, slam, dimension)
     bench.connect()
     try:
         crew = autonomous_crew(bench, slam, conductor, seed=cell.seed, dimension=dimension)
+        shape = partial(crew.thinking.ask, Thinker.known_shape)
+        judge = Judge(world.object_model.mesh, slam, shape, dimension, int(cell["actions"]))
         crew = replace(crew, decisions=UntilExplored(crew.thinking, judge))
         outcome = Conductor(bench, conductor, crew, Watch(world, judge)).run()
     finally:
@@ -66,10 +69,10 @@ def estimation(rig: Rig, cell: Cell) -> TactileSlam:
 
 
 def conductor_settings(rig: Rig, cell: Cell) -> ConductorSettings:
-    """Those of the rig, with the cell's policy and number of grasps."""
+    """Those of the rig, with the cell's policy; every grasp is an action at least."""
     own = rig.description.conductor
     exploration = own.exploration.model_copy(update={"policy": cell["policy"]})
-    return own.model_copy(update={"exploration": exploration, "grasps": int(cell["grasps"])})
+    return own.model_copy(update={"exploration": exploration, "grasps": int(cell["actions"])})
 
 
 class Watch(NullProgress):

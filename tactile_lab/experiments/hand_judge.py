@@ -1,13 +1,17 @@
-"""Judging a session of the hand that explores: what counts as explored, and what its decisions promised.
+"""Judging a session of the hand that explores: what is explored after every action, and what its decisions promised.
 
-A session ends when the object is explored by both definitions, or with its budget. In the plane they are A and B of
-:mod:`tactile_lab.experiments.explored`, on the outline at the height of the fingertips. In space the surface counts
-without the underside, which nothing can touch: A, 90 % of it lies within 5 mm of the estimated surface; B, a contact
-lies within 12 mm besides (half the distance of neighbouring fingertips).
+A session ends when the object is explored, when its budget of actions is spent, or when the object is lost. In the
+plane it is explored by A and B of :mod:`tactile_lab.experiments.explored`, on the outline at the height of the
+fingertips. In space the surface counts without the underside, which nothing can touch: A, 90 % of it lies within 5 mm
+of the estimated surface, ends the session; B, a contact lies within 12 mm besides (half the distance of neighbouring
+fingertips). *Touched* is what contacts came near (4.5 mm in the plane, 12 mm in space) where they truly lay, whatever
+the estimate makes of them: that is what a decision promises.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,29 +21,45 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from sessions.decisions import Decision, End, Veto
+from sessions.explorer import KnownShape
 from sessions.grasp_cycle import GraspPlan
 from sessions.planner import Reorientation
 from sessions.policy_choice import Choice
 from sessions.policy_decisions import PolicyDecisions
 from sessions.thinking import Thinking
-from tactile_lab.errors import ShapeError
 from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.evaluation.shape import compare_contour, compare_mesh, horizontal_outline
-from tactile_lab.experiments.explored import GOAL, ExploredMap
+from tactile_lab.experiments.explored import GOAL, CONTACT_m, ExploredMap
 from tactile_lab.experiments.explored_objects import moved_alike
+from tactile_lab.exploration.policy import Surface
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.geometry.poses import transform_points
-from tactile_lab.shape.sampling import sample_polygon
-from tactile_lab.shape.surface import extract_mesh
+from tactile_lab.shape.sampling import nearest_on_mesh, sample_polygon
 from tactile_lab.slam import TactileSlam
 from tactile_lab.slam_result import SlamResult
 
+MEASURES = ("A", "B", "touched")
+"""What is followed from action to action."""
+
 _WITHIN_m = 0.005
-_CONTACT_m = 0.012
+_CONTACT_IN_SPACE_m = 0.012
 _UNDERSIDE = -0.9
 _SAMPLES = 2000
-_DENSE_SAMPLES = 20_000
-_MESH_GRID_m = 0.005
+
+
+@dataclass(frozen=True)
+class Look:
+    """What is explored after a grasp.
+
+    Attributes:
+        actions: so far.
+        minutes: of simulated time.
+        shares: of the surface, by each of the measures.
+    """
+
+    actions: int
+    minutes: float
+    shares: dict[str, float]
 
 
 class Judge:
@@ -48,29 +68,42 @@ class Judge:
     Args:
         mesh: the true surface, in the frame whose poses are told.
         slam: the estimation.
+        shape: gives the shape as the session's planner knows it now.
         dimension: 2 or 3.
+        budget: of actions.
     """
 
-    def __init__(self, mesh: trimesh.Trimesh, slam: TactileSlam, dimension: int) -> None:
-        self._mesh, self._slam, self._dimension = mesh, slam, dimension
+    def __init__(
+        self,
+        mesh: trimesh.Trimesh,
+        slam: TactileSlam,
+        shape: Callable[[], KnownShape | None],
+        dimension: int,
+        budget: int,
+    ) -> None:
+        self._mesh, self._slam, self._shape, self._dimension, self._budget = mesh, slam, shape, dimension, budget
         self._true_points_m = reachable_points(mesh, dimension)
         self.truth: list[Pose3] = []
         """True pose of the object at each grasp."""
         self.grasps: list[Grasp] = []
         self.choices: dict[int, Choice] = {}
-        self.shares: list[tuple[float, float]] = []
-        """Of the surface explored after each grasp, by A and by B."""
-        self.minutes: list[float] = []
-        """Simulated time at which each grasp was done."""
+        self.looks: list[Look] = []
+        """One a grasp."""
         self.actions = 0
         """Approaches so far: every grasp is one, done or given up, and a tap on the top before it another."""
-        self._actions_at: list[int] = []
+        self.carried = 0
+        """How often the object was carried."""
 
     @property
     def is_explored(self) -> bool:
         """By both definitions in the plane, by A in space: contacts everywhere would take fifty grasps there."""
-        asked = (0, 1) if self._dimension == 2 else (0,)
-        return all(self._first(which) is not None for which in asked)
+        asked = ("A", "B") if self._dimension == 2 else ("A",)
+        return all(self._first(measure) is not None for measure in asked)
+
+    @property
+    def is_over(self) -> bool:
+        """Explored, or the budget is spent."""
+        return self.is_explored or self.actions >= self._budget
 
     def keep(self, choice: Choice) -> None:
         """Take note of a decision."""
@@ -78,21 +111,32 @@ class Judge:
 
     def look(self, minutes: float) -> None:
         """See what is explored after a grasp that was done at this time."""
-        self.minutes.append(minutes)
-        self._actions_at.append(self.actions)
-        self.shares.append(self._explored())
+        self.looks.append(Look(self.actions, minutes, self._explored()))
 
-    def _explored(self) -> tuple[float, float]:
-        surface = self._slam.surface
-        points = self._in_map_frame()
-        if surface is None or points is None:
-            return 0.0, 0.0
+    def _explored(self) -> dict[str, float]:
+        near, touched = self._near_and_touched()
+        return {"A": near[0], "B": near[1], "touched": touched}
+
+    def _near_and_touched(self) -> tuple[tuple[float, float], float]:
+        """Shares by A and B, and what was truly touched."""
+        true_contacts_m = np.concatenate([_seen(g, t) for g, t in zip(self.grasps, self.truth, strict=False)])
+        touched = _within(self._true_points_m, true_contacts_m[:, : self._dimension], self._reach_m)
+        known, points = self._shape(), self._in_map_frame()
+        if known is None or points is None:
+            return (0.0, 0.0), float(touched.mean())
+        contacts_m = known.field.contacts_m
         if self._dimension == 2:
-            known = ExploredMap.of(surface.contacts_m, surface.normals)
-            return float(known.explored("A5", points).mean()), float(known.explored("B", points).mean())
-        near = surface_within(self._slam, points, _WITHIN_m)
-        touched = cKDTree(surface.contacts_m).query(points)[0] < _CONTACT_m
-        return float(near.mean()), float((near & touched).mean())
+            outline = ExploredMap.of(contacts_m, known.field.normals)
+            shares = (float(outline.explored("A5", points).mean()), float(outline.explored("B", points).mean()))
+        else:
+            near = surface_within(known.surface, points, _WITHIN_m)
+            shares = (float(near.mean()), float((near & _within(points, contacts_m, self._reach_m)).mean()))
+        return shares, float(touched.mean())
+
+    @property
+    def _reach_m(self) -> float:
+        """How far beside a contact the surface counts as touched."""
+        return CONTACT_m if self._dimension == 2 else _CONTACT_IN_SPACE_m
 
     def _in_map_frame(self) -> Array | None:
         """The true points laid over the estimate by the best fit of all contacts; None before there are enough."""
@@ -103,30 +147,48 @@ class Judge:
         estimated, true_m = (np.concatenate([part[side] for part in parts]) for side in (0, 1))
         return laid_over(self._true_points_m, true_m, estimated)
 
-    def _first(self, which: int) -> int | None:
-        """Number of the grasp, from 0, that reached the goal by one of the definitions; None if none did."""
-        return next((number for number, share in enumerate(self.shares) if share[which] >= GOAL), None)
+    def _first(self, measure: str) -> Look | None:
+        """The first time that the goal was reached by one of the measures, within the budget; None if it never was."""
+        within = (look for look in self.looks if look.actions <= self._budget)
+        return next((look for look in within if look.shares[measure] >= GOAL), None)
+
+    # --- figures -----------------------------------------------------------------------------------------------
 
     def figures(self, result: SlamResult) -> dict[str, Any]:
         """The figures of a session that has ended."""
         points = [grasp.points_world_m for grasp in self.grasps]
         poses, count = result.world_T_object, min(len(result.world_T_object), len(self.truth))
         return {
-            **self._reached("A", 0),
-            **self._reached("B", 1),
-            "share_A": self.shares[-1][0] if self.shares else 0.0,
-            "share_B": self.shares[-1][1] if self.shares else 0.0,
+            **self._reached("A"),
+            **self._reached("B"),
+            **self._followed(),
             "contacts": sum(map(len, points)),
+            "carried": self.carried,
             "registration_mm": registration_rms_mm(points[:count], poses[:count], self.truth[:count], self._dimension),
             "hausdorff_mm": self._hausdorff_mm(result),
             "promises": self._kept_promises(),
         }
 
-    def _reached(self, definition: str, which: int) -> dict[str, float | None]:
-        """Actions and simulated minutes until the goal by a definition; None where it was not reached."""
-        number = self._first(which)
-        actions, minutes = (None, None) if number is None else (self._actions_at[number], self.minutes[number])
-        return {f"actions_{definition}": actions, f"minutes_{definition}": minutes}
+    def _reached(self, measure: str) -> dict[str, float | None]:
+        """Actions and simulated minutes until the goal, None where it was not reached; the budget counts at most."""
+        look = self._first(measure)
+        actions, minutes = (None, None) if look is None else (look.actions, look.minutes)
+        most = self._budget if actions is None else actions
+        return {f"actions_{measure}": actions, f"minutes_{measure}": minutes, f"at_most_{measure}": most}
+
+    def _followed(self) -> dict[str, Any]:
+        """Each measure after 0, 1, ... actions, its mean, and at the end; it stays where it was when the hand stops."""
+        figures: dict[str, Any] = {}
+        for measure in MEASURES:
+            curve = [self._share_after(actions, measure) for actions in range(self._budget + 1)]
+            figures[f"curve_{measure}"] = [round(share, 4) for share in curve]
+            figures[f"area_{measure}"] = float(np.mean(curve[1:]))
+            figures[f"share_{measure}"] = curve[-1]
+        return figures
+
+    def _share_after(self, actions: int, measure: str) -> float:
+        done = [look.shares[measure] for look in self.looks if look.actions <= actions]
+        return done[-1] if done else 0.0
 
     def status(self, ending: str) -> str:
         """How a session that ended so counts: "ok" where all was explored."""
@@ -145,17 +207,17 @@ class Judge:
         return None
 
     def _kept_promises(self) -> list[list[float]]:
-        """What each decision promised, and what came of it by definition B."""
-        before = [0.0, *(share[1] for share in self.shares)]
+        """What each decision promised, and the share of the surface that its grasp truly touched for the first time."""
+        touched = [0.0, *(look.shares["touched"] for look in self.looks)]
         return [
-            [choice.decision.promised_gain, before[index + 1] - before[index]]
+            [choice.decision.promised_gain, touched[index + 1] - touched[index]]
             for index, choice in sorted(self.choices.items())
-            if choice.decision.promised_gain is not None and index < len(self.shares)
+            if choice.decision.promised_gain is not None and index < len(self.looks)
         ]
 
 
 class UntilExplored(PolicyDecisions):
-    """Follows the policy until the judge says that all is explored.
+    """Follows the policy until the judge says that all is explored, or the budget spent.
 
     Args:
         thinking: where the planner with the policy is asked.
@@ -166,6 +228,10 @@ class UntilExplored(PolicyDecisions):
         super().__init__(thinking, judge.keep)
         self._judge = judge
 
+    def think(self, index: int) -> None:
+        if not self._judge.is_over:
+            super().think(index)
+
     def arrived(self, landings_world_m: list[Array]) -> None:
         assert self.suggested is not None
         self._judge.actions += 2 if self.suggested.tap else 1
@@ -175,9 +241,12 @@ class UntilExplored(PolicyDecisions):
         self._judge.grasps.append(grasp)
         return super().captured(grasp, plan)
 
+    def carried(self, hand_motion_world: Pose3) -> None:
+        self._judge.carried += not hand_motion_world.equals(Pose3(), 1e-9)
+        super().carried(hand_motion_world)
+
     def decide(self, index: int) -> Decision:
-        decision = super().decide(index)
-        return End("explored") if self._judge.is_explored else decision
+        return End("explored, or the budget is spent") if self._judge.is_over else super().decide(index)
 
 
 def reachable_points(mesh: trimesh.Trimesh, dimension: int) -> Array:
@@ -201,6 +270,13 @@ def _seen(grasp: Grasp, pose: Pose3) -> Array:
     return transform_points(pose.inverse(), grasp.points_world_m)
 
 
+def _within(points_m: Array, places_m: Array, reach_m: float) -> NDArray[np.bool_]:
+    """Which points lie nearer to one of some places than a reach; none where there are no places."""
+    if len(places_m) == 0:
+        return np.zeros(len(points_m), dtype=bool)
+    return np.asarray(cKDTree(places_m).query(points_m)[0] < reach_m)
+
+
 def laid_over(points_m: Array, source_m: Array, target_m: Array) -> Array:
     """Points moved as ``source_m`` is moved best onto ``target_m``, both (n, 3): in the plane, and along z."""
     flat = moved_alike(points_m[:, :2], source_m[:, :2], target_m[:, :2])
@@ -209,15 +285,9 @@ def laid_over(points_m: Array, source_m: Array, target_m: Array) -> Array:
     return np.column_stack([flat, points_m[:, 2] + float(np.mean(target_m[:, 2] - source_m[:, 2]))])
 
 
-def surface_within(slam: TactileSlam, points_m: Array, reach_m: float) -> NDArray[np.bool_]:
+def surface_within(surface: Surface | None, points_m: Array, reach_m: float) -> NDArray[np.bool_]:
     """Which points, shape (n, 3), lie within reach of the surface as estimated now; none where there is none."""
-    surface = slam.surface
-    try:
-        mesh = None if surface is None else extract_mesh(surface, resolution_m=_MESH_GRID_m)
-    except ShapeError:
-        mesh = None
-    if mesh is None:
+    if surface is None:
         return np.zeros(len(points_m), dtype=bool)
-    dense = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    samples, _ = trimesh.sample.sample_surface(dense, _DENSE_SAMPLES, seed=0)
-    return np.asarray(cKDTree(samples).query(points_m)[0] < reach_m)
+    mesh = trimesh.Trimesh(surface.points_m, surface.cells, process=False)
+    return np.asarray(nearest_on_mesh(points_m, mesh)[0] < reach_m)

@@ -30,19 +30,19 @@ from tactile_lab.slam import TactileSlam
 POLICIES = ("random", "clusters", "information")
 
 
-def settings(grasps: int) -> list[Setting]:
-    """Every object with each of these policies, in the plane and in space."""
-    return grid(object=list(OBJECTS), dimension=[2, 3], policy=list(POLICIES), grasps=[grasps])
+def settings(actions: int) -> list[Setting]:
+    """Every object with each of these policies, in the plane and in space, with a budget of actions."""
+    return grid(object=list(OBJECTS), dimension=[2, 3], policy=list(POLICIES), actions=[actions])
 
 
 def explore_by_kinematics(cell: Cell) -> dict[str, Any]:
-    """One session. Cell: object, dimension, policy, grasps."""
+    """One session. Cell: object, dimension, policy, actions."""
     rig, dimension, body = load_rig(RIG), int(cell["dimension"]), solid(cell["object"])
     slam, settings = estimation(rig, cell), conductor_settings(rig, cell)
-    judge = Judge(body.mesh, slam, dimension)
     calibration = next(iter(force_tips(rig).values()))
     tip = TipEllipsoid(calibration.semi_axes_m, calibration.centre_distal_m)
     planner = planner_for(slam, settings, tip, cell.seed, dimension)
+    judge = Judge(body.mesh, slam, planner.known_shape, dimension, int(cell["actions"]))
     decisions = UntilExplored(ThinkingHere(Thinker(slam, planner)), judge)
     rng = np.random.default_rng([cell.seed, 52183])
     hand = KinematicHand(body, settings.cycle, tip, settings.plan.yaw_window_rad, rng)
@@ -58,14 +58,14 @@ def _session(
     judge: Judge,
     settings: ConductorSettings,
 ) -> str:
-    """Grasps until all is explored, or the object is lost by the limits of a session; how it ended."""
+    """Grasps until the decisions end it, or the object is lost by the limits of a session; how it ended."""
     missed = empty = 0
-    while len(judge.grasps) < settings.grasps:
+    while True:
         index = len(judge.grasps)
         decisions.think(index)
         decision = decisions.decide(index)
         if not isinstance(decision, DoGrasp):
-            break
+            return "complete"
         attempt = hand.attempt(decision.plan)
         decisions.arrived(attempt.landings_world_m)
         if attempt.grasp is None:
@@ -83,7 +83,6 @@ def _session(
         missed, empty = 0, 0 if attempt.grasp.touching else empty + 1
         if empty >= settings.safety.empty_grasps or _strayed(decisions, settings):
             return "object lost"
-    return "complete"
 
 
 def _strayed(decisions: UntilExplored, settings: ConductorSettings) -> bool:

@@ -2,9 +2,8 @@
 
 The hand comes down, lays its fingertips on the top and closes along the same lines as on the rig; a fingertip is a ball
 that stops where it first touches. What physics would add is drawn: fingertips pass beside their lines, contacts are
-measured imprecisely (:mod:`tactile_lab.experiments.sensing`), and an object that is carried slips in the hand.
-Middle phalanges do not touch, and an object stays where it is while the hand closes (on the simulated rig it is
-pushed by half a millimetre).
+measured imprecisely (:mod:`tactile_lab.experiments.sensing`), an object is pushed a little while the hand closes, and
+one that is carried slips in the hand. Middle phalanges do not touch.
 """
 
 from __future__ import annotations
@@ -34,6 +33,10 @@ BESIDE_SIGMA_m = 0.0015
 SLIP_SIGMA_m = 0.005
 SLIP_SIGMA_rad = float(np.deg2rad(10.0))
 """The simulated rig shows 1 to 7 mm per axis and 3 to 15 degrees rms while an object is carried, by object."""
+
+PUSH_SIGMA_m = 0.0005
+PUSH_SIGMA_rad = float(np.deg2rad(0.5))
+"""So far the closing hand pushes an object on the simulated rig, per axis and about its middle."""
 
 _STEP_m = 0.001
 _DESCENT_STEP_m = 0.003
@@ -90,6 +93,8 @@ class KinematicHand:
         self._here = plan.frame
         if reached is None:
             return Attempt(plan, landings, None)
+        middle = np.asarray(self.world_T_body.translation())
+        self.world_T_body = self._strayed(middle, PUSH_SIGMA_m, PUSH_SIGMA_rad) * self.world_T_body
         contacts, lines = self._close(reached)
         palm = reached.frame.pose * table_of(reached, self._tip).grasp_T_palm
         stamp_ns = round(1e9 * self.elapsed_s)
@@ -98,22 +103,20 @@ class KinematicHand:
         return Attempt(reached, landings, grasp)
 
     def carry(self, wanted: Reorientation, attempt: Attempt) -> Pose3:
-        """Turn and shift the object as it is held; it slips. Nothing where it is not held.
+        """Turn and shift the object as it is held; it slips. Nothing where it is not held, or to be left.
 
         Returns:
             The hand's motion in the world.
         """
         assert attempt.grasp is not None
-        if not holds(attempt.grasp.touching):
+        if not (wanted.moves and holds(attempt.grasp.touching)):
             return Pose3()
         frame = attempt.plan.frame
         about = np.array([frame.x_m, frame.y_m, 0.0])
         shift = np.append(wanted.shift_world_m, 0.0)
         turned = Rot3.Yaw(wanted.turn_rad)
         motion = Pose3(turned, about + shift - turned.rotate(about))
-        middle = Pose3(Rot3(), attempt.grasp.points_world_m.mean(axis=0))
-        x, y, turn = self._rng.normal(size=3) * [SLIP_SIGMA_m, SLIP_SIGMA_m, SLIP_SIGMA_rad]
-        slip = middle * spatial(Pose2(x, y, turn)) * middle.inverse()
+        slip = self._strayed(attempt.grasp.points_world_m.mean(axis=0), SLIP_SIGMA_m, SLIP_SIGMA_rad)
         self.world_T_body, self._motion = motion * slip * self.world_T_body, motion
         cycle, way_m = self._cycle, float(np.linalg.norm(shift))
         self.elapsed_s += max(abs(wanted.turn_rad) / cycle.carry_turn_rad_s, way_m / cycle.carry_m_s) + cycle.rest_s
@@ -208,6 +211,12 @@ class KinematicHand:
         aside = np.zeros_like(centres_world_m)
         aside[:, :2] = self._rng.normal(0.0, BESIDE_SIGMA_m, (len(aside), 2))
         return np.asarray(centres_world_m + aside)
+
+    def _strayed(self, middle_world_m: Array, sigma_m: float, sigma_rad: float) -> Pose3:
+        """How far the object strays in the world, turning about a place."""
+        x, y, turn = self._rng.normal(size=3) * [sigma_m, sigma_m, sigma_rad]
+        about = Pose3(Rot3(), middle_world_m)
+        return about * spatial(Pose2(x, y, turn)) * about.inverse()
 
     def _measured(self, finger: str, centre_world_m: Array) -> Contact:
         """The contact of a fingertip that stands at a place: where the surface is nearest to its centre."""

@@ -11,6 +11,8 @@ from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.compiled import compiled
 
 _PARALLEL = 1e-14
+_BLOCK = 24
+"""Successive triangles with a common bounding sphere: in an extracted mesh they are neighbours."""
 
 
 @compiled
@@ -61,6 +63,20 @@ def bounding_spheres(vertices: Any, faces: Any) -> Any:
 
 
 @compiled
+def spheres_of_blocks(spheres: Any) -> Any:
+    """Spheres around so many successive ones each, shape (b, 4)."""
+    blocks = np.zeros(((spheres.shape[0] + _BLOCK - 1) // _BLOCK, 4))
+    for b in range(blocks.shape[0]):
+        own = spheres[b * _BLOCK : (b + 1) * _BLOCK]
+        for axis in range(3):
+            blocks[b, axis] = np.mean(own[:, axis])
+        for s in range(own.shape[0]):
+            radius = np.sqrt(np.sum((own[s, :3] - blocks[b, :3]) ** 2)) + np.sqrt(own[s, 3])
+            blocks[b, 3] = max(blocks[b, 3], (1.0 + 1e-9) * radius * radius)
+    return blocks
+
+
+@compiled
 def crossing(p: Any, q: Any, r: Any, start: Any, way: Any) -> Any:
     """Distance along a ray to a triangle that it meets from outside (Moeller and Trumbore 1997), -1 for none."""
     ex, ey, ez = q[0] - p[0], q[1] - p[1], q[2] - p[2]
@@ -81,11 +97,24 @@ def crossing(p: Any, q: Any, r: Any, start: Any, way: Any) -> Any:
 
 
 @compiled
-def passes(sphere: Any, start: Any, way: Any) -> Any:
-    """Whether the line of a ray meets a sphere (middle and squared radius)."""
+def passes(sphere: Any, start: Any, way: Any, longest: Any) -> Any:
+    """Whether a ray meets a sphere (middle and squared radius) before it ends."""
     x, y, z = sphere[0] - start[0], sphere[1] - start[1], sphere[2] - start[2]
     ahead = x * way[0] + y * way[1] + z * way[2]
-    return x * x + y * y + z * z - ahead * ahead <= sphere[3]
+    beyond = max(-ahead, ahead - longest, 0.0)
+    return x * x + y * y + z * z - ahead * ahead + beyond * beyond <= sphere[3]
+
+
+@compiled
+def nearest_hit(vertices: Any, faces: Any, spheres: Any, block: Any, start: Any, way: Any, best: Any) -> Any:
+    """Distance of a ray's first hit with a block's triangles, if it is below ``best``; else that."""
+    for m in range(block * _BLOCK, min((block + 1) * _BLOCK, faces.shape[0])):
+        if passes(spheres[m], start, way, best):
+            a, b, c = faces[m]
+            along = crossing(vertices[a], vertices[b], vertices[c], start, way)
+            if 0.0 < along < best:
+                best = along
+    return best
 
 
 @compiled
@@ -102,15 +131,14 @@ def hits_on_meshes(vertices: Any, faces: Any, starts: Any, ways: Any, longest: A
     found = np.full((starts.shape[0], starts.shape[1]), np.inf)
     for s in range(starts.shape[0]):
         spheres = bounding_spheres(vertices[s], faces)
+        blocks = spheres_of_blocks(spheres)
         for r in range(starts.shape[1]):
-            start, way, best = starts[s, r], ways[s, r], longest[r]
-            for m in range(faces.shape[0]):
-                if passes(spheres[m], start, way):
-                    a, b, c = faces[m]
-                    along = crossing(vertices[s, a], vertices[s, b], vertices[s, c], start, way)
-                    if 0.0 < along < best:
-                        best = along
-                        found[s, r] = along
+            best = longest[r]
+            for block in range(blocks.shape[0] if best > 0.0 else 0):
+                if passes(blocks[block], starts[s, r], ways[s, r], best):
+                    best = nearest_hit(vertices[s], faces, spheres, block, starts[s, r], ways[s, r], best)
+            if best < longest[r]:
+                found[s, r] = best
     return found
 
 

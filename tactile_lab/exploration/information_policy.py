@@ -54,6 +54,8 @@ class InformationSettings(StrictModel):
         reach_m, reach_in_space_m: so far along a contour, or a surface, a contact tells about it.
         detail_m: standard deviation of what the field does not foresee between contacts (edges, corners).
         point_sigma_m, normal_sigma_rad: of a contact's measurement.
+        accuracy_m, accuracy_in_space_m: a contour, or a surface, known to this is good enough, as its finer digits are
+            nobody's gain; 0 where all of them count.
         pose_sigma_m: a pose known to this (a turn with an arm of 30 mm) is good enough.
         pose_weight: of the pose's information against the shape's; 1 is the chain rule, 0 asks for the shape alone.
         least_gain: stop when no grasp promises so many nats; 0 never does.
@@ -68,6 +70,8 @@ class InformationSettings(StrictModel):
     reach_in_space_m: float = Field(default=0.012, gt=0)
     detail_m: float = Field(default=0.003, ge=0)
     point_sigma_m: float = Field(default=0.001, gt=0)
+    accuracy_m: float = Field(default=0.0, ge=0)
+    accuracy_in_space_m: float = Field(default=0.005, ge=0)
     normal_sigma_rad: float = Field(default=float(np.deg2rad(5.0)), gt=0)
     pose_sigma_m: float = Field(default=0.003, gt=0)
     pose_weight: float = Field(default=1.0, ge=0)
@@ -79,6 +83,10 @@ class InformationSettings(StrictModel):
         """How far a contact tells about a contour (2) or a surface (3), metres."""
         return self.reach_m if dimension == 2 else self.reach_in_space_m
 
+    def accuracy(self, dimension: int) -> float:
+        """To which a contour (2) or a surface (3) is to be known, metres."""
+        return self.accuracy_m if dimension == 2 else self.accuracy_in_space_m
+
 
 @dataclass(frozen=True)
 class Promise:
@@ -88,7 +96,8 @@ class Promise:
         pose: nats about the pose, shape (c,).
         shape: nats about the shape, shape (c,).
         touching: expected number of contacts, shape (c,).
-        new_share: expected share of the whole surface that is newly explored, shape (c,).
+        new_share: expected share of the surface that is newly touched, shape (c,): of all that fingers could touch,
+            what comes within a contact's reach for the first time.
     """
 
     pose: Array
@@ -110,6 +119,32 @@ class InformationPolicy:
             return surface
         promise = promised(candidates, belief, surface, self.settings, rng)
         return self._decided(candidates, surface, belief, promise, rng)
+
+    def best_rate(
+        self,
+        candidates: Sequence[Candidate],
+        belief: Belief,
+        rng: np.random.Generator,
+        lost_nats: float = 0.0,
+        seconds: float = 0.0,
+    ) -> float:
+        """The largest expected information per second, 1/s; 0 where nothing can be touched, or foreseen.
+
+        Args:
+            candidates, belief, rng: as for a choice.
+            lost_nats: knowledge of the pose that is lost on the way to these candidates.
+            seconds: that the way takes, beside the candidates' own times.
+        """
+        if not candidates or belief.surface is None:
+            return 0.0
+        promise = promised(candidates, belief, belief.surface, self.settings, rng)
+        times = seconds + np.array([candidate.time_s for candidate in candidates])
+        rates = (self.settings.pose_weight * (promise.pose - lost_nats) + promise.shape) / times
+        return float(np.max(rates[promise.touching > 0], initial=0.0))
+
+    def pose_nats(self, covariance: Array) -> float:
+        """How much there is to be learned of a pose with this covariance (x m, y m, yaw rad), nats."""
+        return float(0.5 * _log_det(covariance * _wanted(self.settings)))
 
     def _decided(
         self,
@@ -141,7 +176,8 @@ class InformationPolicy:
         if limit is None or float(np.quantile(surface.sigma_m, self.settings.enough)) > limit:
             return ""
         fresh = unexplored(surface, belief, self.settings.reach(belief.dimension))
-        share = float(surface.sizes[~fresh].sum() / surface.sizes.sum())
+        sizes = surface.sizes * surface.touchable(belief.origin_height_m)
+        share = float(sizes[~fresh].sum() / sizes.sum())
         if share < self.settings.enough:
             return ""
         return f"{100 * share:.0f} % of the surface has been touched and it is known to {1e3 * limit:.3g} mm"
@@ -168,12 +204,14 @@ def promised(
     touches = expected_touches(candidates, belief, worlds)
     pose, placed = _pose_information(touches, belief, worlds, settings)
     reach_m = settings.reach(belief.dimension)
-    fresh, patches = unexplored(surface, belief, reach_m), _patches(surface, reach_m)
+    touchable = surface.touchable(belief.origin_height_m)
+    fresh, patches = touchable & unexplored(surface, belief, reach_m), _patches(surface, reach_m)
     chance = covered_chance(touches, surface, reach_m)
     hidden = surface.sigma_m**2 + settings.detail_m**2
-    worth = 0.5 * np.log1p(hidden / (settings.point_sigma_m**2 + placed[:, None])) * fresh * patches
+    left = settings.point_sigma_m**2 + settings.accuracy(belief.dimension) ** 2 + placed[:, None]
+    worth = 0.5 * np.log1p(hidden / left) * fresh * patches
     worth = worth * _hope(surface, belief, reach_m)
-    new_share = chance @ (fresh * surface.sizes) / surface.sizes.sum()
+    new_share = chance @ (fresh * surface.sizes) / max(float(surface.sizes[touchable].sum()), _SMALLEST_VARIANCE)
     touching = touches.touching.sum(axis=2).mean(axis=1)
     return Promise(pose, np.sum(chance * worth, axis=1), touching, new_share)
 
@@ -230,11 +268,16 @@ def _pose_information(
     told = np.einsum("csfi,csf,csfj->csij", rows, met / variance, rows)
     told[..., 2, 2] += _told_by_normals(surface, touches, met, settings)
     after = np.linalg.inv(np.linalg.inv(prior + _SMALLEST_VARIANCE * np.eye(3)) + told)
-    wanted = np.array([1.0, 1.0, ARM_m**2]) / settings.pose_sigma_m**2
+    wanted = _wanted(settings)
     nats = 0.5 * (_log_det(prior * wanted) - _log_det(after * wanted))
     moved = np.einsum("csfi,csij,csfj->csf", rows, after, rows)
     placed = np.sum(moved * met, axis=(1, 2)) / np.maximum(met.sum(axis=(1, 2)), 1)
     return nats.mean(axis=1), placed
+
+
+def _wanted(settings: InformationSettings) -> Array:
+    """Precision of a pose that is good enough, the diagonal, shape (3,)."""
+    return np.array([1.0, 1.0, ARM_m**2]) / settings.pose_sigma_m**2
 
 
 def _log_det(scaled: Array) -> Array:

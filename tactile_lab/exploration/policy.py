@@ -21,6 +21,9 @@ from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.field_grid import Field
 from tactile_lab.shape.surface import Contour, SurfaceMesh
 
+_FACES_THE_TABLE = -0.7
+"""Largest z of a normal there."""
+
 Indices = NDArray[np.int64]
 Outcome = Literal["grasp", "stop", "nothing"]
 
@@ -61,6 +64,16 @@ class Surface:
         sizes = np.sqrt(np.maximum(np.linalg.det(edges @ edges.transpose(0, 2, 1)), 0.0)) / (self.cells.shape[1] - 1)
         shares = np.repeat(sizes / self.cells.shape[1], self.cells.shape[1])
         return np.asarray(np.bincount(self.cells.ravel(), shares, minlength=len(self.points_m)), dtype=float)
+
+    def touchable(self, origin_height_m: float) -> NDArray[np.bool_]:
+        """Which vertices fingers could touch, shape (n,): not what faces the table or is, as yet, below it.
+
+        Args:
+            origin_height_m: height of the object frame's origin over the table.
+        """
+        if self.points_m.shape[1] == 2:
+            return np.ones(len(self.points_m), dtype=bool)
+        return (self.normals[:, 2] > _FACES_THE_TABLE) & (self.points_m[:, 2] > -origin_height_m)
 
 
 def _nothing_2d() -> Array:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
+from scipy.spatial import cKDTree
 
 from tactile_lab.exploration.candidates import Candidate, ClosingRays
 from tactile_lab.exploration.first_hits import first_hits
@@ -157,11 +158,8 @@ def _padded(rays: ClosingRays, fingers: int) -> tuple[Array, Array, Array]:
 
 def _nearest(worlds: PossibleWorlds, points: Array, touching: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Index of the vertex, in its own world, nearest to each touch."""
-    found = []
-    for corners, own, met in zip(worlds.corners_m, points, touching, strict=True):
-        apart = np.sum(own[met] ** 2, axis=1)[:, None] - 2 * own[met] @ corners.T + np.sum(corners**2, axis=1)
-        found.append(apart.argmin(axis=1))
-    return np.concatenate(found).astype(np.int64)
+    worldwise = zip(worlds.corners_m, points, touching, strict=True)
+    return np.concatenate([cKDTree(corners).query(own[met])[1] for corners, own, met in worldwise]).astype(np.int64)
 
 
 def _in_worlds(

@@ -101,6 +101,16 @@ def test_verbs_come_in_the_order_of_the_cycle() -> None:
     assert watcher.phases[8:] == ["descend", "close", "capture", "release", "lift", "estimate"]
 
 
+def test_an_object_that_is_to_stay_is_let_go_where_it_is() -> None:
+    world, watcher, wanted = DiscWorld(disc()), Watcher(), settings(2)
+    crew = autonomous_crew(world, TactileSlam(SlamSettings(particles=200), seed=1), wanted, seed=3)  # type: ignore[arg-type]
+    outcome = Conductor(world, wanted, replace(crew, decisions=Leaving(crew.thinking)), watcher).run()  # type: ignore[arg-type]
+    grasp = ["descend", "close", "capture", "release", "lift", "estimate"]
+    assert watcher.phases == [*grasp, *grasp]
+    assert MarkKind.HOLD_BEGIN not in world.marks
+    assert outcome.grasps[1].hand_motion_world.equals(Pose3(), 1e-12)
+
+
 def test_hand_motion_carries_the_object_and_goes_into_the_next_grasp() -> None:
     target = disc()
     start_m = target.centre_m.copy()
@@ -411,6 +421,14 @@ def test_senseless_plans_are_refused(content: dict[str, Any]) -> None:
 
 
 # --- decisions other than the planner's ---------------------------------------------------------------------------
+
+
+class Leaving(AutonomousDecisions):
+    """Never carries the object."""
+
+    def captured(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
+        super().captured(grasp, plan)
+        return Reorientation(0.0, np.zeros(2))
 
 
 class Scripted(AutonomousDecisions):

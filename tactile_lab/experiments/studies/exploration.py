@@ -21,15 +21,17 @@ EXPLORATION_COLUMNS = (
     Column("correlation of promised and realised share", "promises", 2, kind="correlation"),
 )
 HAND_COLUMNS = (
-    Column("actions by A", "actions_A", 1, kind="estimate"),
-    Column("actions by B", "actions_B", 1, kind="estimate"),
+    Column("actions by A, budget where not reached", "at_most_A", 1, kind="estimate"),
     Column("by A: median / p90 / max", "actions_A", 0),
-    Column("by B", "actions_B", 0),
+    Column("actions by B, budget where not reached", "at_most_B", 1, kind="estimate"),
+    Column("mean share over the actions by A", "area_A", 3, kind="estimate"),
+    Column("touched", "area_touched", 3, kind="estimate"),
+    Column("touched at the end", "share_touched", 0, kind="percent"),
     Column("simulated minutes by A", "minutes_A", 1),
-    Column("explored by A at the end", "share_A", 0, kind="percent"),
+    Column("times carried", "carried", 1, kind="mean"),
     HAUSDORFF,
     REGISTRATION,
-    Column("correlation of promised and realised share", "promises", 2, kind="correlation"),
+    Column("correlation of promised and touched share", "promises", 2, kind="correlation"),
 )
 _ACTIONS_LABEL = "actions until 90 % of the contour is explored (definition B)"
 
@@ -64,9 +66,9 @@ EXPLORATION_HAND = Experiment(
     hand_exploration.settings,
     hand_exploration.explore_by_hand,
     HAND_COLUMNS,
-    ranges("policy", "grasps until 90 % is explored (definition B)", "actions_B", _hand_condition, columns=2),
+    ranges("policy", "actions until 90 % is explored (definition A)", "actions_A", _hand_condition, columns=2),
     pooled=("object",),
-    grasps=hand_exploration.GRASPS,
+    grasps=hand_exploration.ACTIONS,
 )
 
 EXPLORATION_KINEMATIC = Experiment(
@@ -75,7 +77,7 @@ EXPLORATION_KINEMATIC = Experiment(
     kinematic_exploration.settings,
     kinematic_exploration.explore_by_kinematics,
     HAND_COLUMNS,
-    ranges("policy", "approaches until 90 % is explored (definition A)", "actions_A", _hand_condition, columns=2),
+    ranges("policy", "actions until 90 % is explored (definition A)", "actions_A", _hand_condition, columns=2),
     pooled=("object",),
-    grasps=hand_exploration.GRASPS,
+    grasps=hand_exploration.ACTIONS,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gtsam import Pose2
+from gtsam import Pose2, Pose3
 
 from drivers.shadow.posture import TipEllipsoid
 from sessions.cycle_settings import CycleSettings
@@ -70,16 +70,28 @@ def test_a_held_object_goes_with_the_hand_but_for_its_slip_and_the_next_grasp_kn
     strayed = (motion * before).between(own.world_T_body)
     assert 0.0 < np.linalg.norm(strayed.translation()) < 0.025
     assert np.asarray(motion.translation())[:2] == pytest.approx([0.03, 0.0], abs=1e-9)
+    held = own.world_T_body
+    assert own.carry(Reorientation(0.0, np.zeros(2)), attempt).equals(Pose3(), 1e-12)  # it is left where it is
+    assert own.world_T_body.equals(held, 1e-12)
     following = own.attempt(GraspPlan(GraspFrame(0.03, 0.0, 0.5), "pinch", 0.028)).grasp
     assert following is not None
     assert following.hand_motion_world.equals(motion, 1e-12)
 
 
 def test_a_short_session_is_judged() -> None:
-    setting = (("object", "cube-6"), ("dimension", 2), ("policy", "information"), ("grasps", 3))
+    setting = (("object", "cube-6"), ("dimension", 2), ("policy", "information"), ("actions", 3))
     figures = explore_by_kinematics(Cell(setting, 1))
     assert figures["status"] == "not explored"
     assert figures["contacts"] >= 9
-    assert 0.0 < figures["share_A"] < 1.0
     assert figures["registration_mm"] < 5.0
-    assert len(figures["promises"]) == 1  # the first two grasps follow the fixed rule
+    assert (figures["actions_A"], figures["at_most_A"]) == (None, 3)  # not reached, so the budget counts
+    for measure in ("A", "B", "touched"):
+        curve = figures[f"curve_{measure}"]
+        assert len(curve) == 4
+        assert curve[0] == 0.0
+        assert 0.0 < curve[3] < 1.0
+        assert figures[f"area_{measure}"] == pytest.approx(np.mean(curve[1:]), abs=1e-3)
+    assert figures["curve_touched"] == sorted(figures["curve_touched"])  # what was touched stays touched
+    (promised, touched) = figures["promises"][0]  # the first two grasps follow the fixed rule
+    assert touched == pytest.approx(figures["curve_touched"][3] - figures["curve_touched"][2], abs=1e-3)
+    assert promised == pytest.approx(touched, abs=0.15)

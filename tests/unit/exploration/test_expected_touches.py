@@ -34,8 +34,9 @@ def test_the_nominal_touches_are_those_on_the_field() -> None:
         assert points[0][met[0]] == pytest.approx(expected, abs=1.5e-3)
 
 
-def test_compiled_hits_on_a_mesh_are_the_plain_ones() -> None:
-    mesh = solid("l-block").mesh
+@pytest.mark.parametrize("name", ["l-block", "sphere"])
+def test_compiled_hits_on_a_mesh_are_the_plain_ones(name: str) -> None:
+    mesh = solid(name).mesh
     rng = np.random.default_rng(0)
     starts = rng.normal(size=(40, 3))
     starts *= 0.15 / np.linalg.norm(starts, axis=1, keepdims=True)
@@ -46,6 +47,8 @@ def test_compiled_hits_on_a_mesh_are_the_plain_ones() -> None:
     found = first_hits(np.asarray(mesh.vertices)[None], faces, starts[None], ways[None], np.full(40, 0.3))
     assert np.isfinite(expected).sum() > 20
     assert found[0] == pytest.approx(np.asarray(expected), abs=1e-9)
+    short = np.where(np.arange(40) % 2, np.asarray(expected) - 1e-6, 0.0)
+    assert not np.isfinite(first_hits(np.asarray(mesh.vertices)[None], faces, starts[None], ways[None], short)).any()
 
 
 def test_candidates_with_fewer_fingers_touch_with_fewer() -> None:

@@ -156,6 +156,18 @@ def test_misses_halve_what_information_hopes_for_there(half_known: Belief) -> No
     assert after.new_share == pytest.approx(before.new_share)
 
 
+def test_digits_finer_than_the_wanted_accuracy_are_nobodys_gain(half_known: Belief) -> None:
+    assert half_known.surface is not None
+    shape = [
+        promised(
+            ten(), half_known, half_known.surface, InformationSettings(accuracy_m=a), np.random.default_rng(0)
+        ).shape
+        for a in (0.0, 0.005, 0.05)
+    ]
+    assert (shape[0] > shape[1]).all()
+    assert (shape[2] < 0.1 * shape[0]).all()
+
+
 def test_a_fully_known_surface_lets_clusters_fall_back_to_variance() -> None:
     belief = belief_of(*contacts_every(0.005))
     decision = choose("clusters", belief)

@@ -27,6 +27,7 @@ from sessions.policy_decisions import PolicyDecisions, Proposal, everything_appr
 from sessions.safety import SafetySettings
 from sessions.thinker import Thinker
 from sessions.thinking import ThinkingHere
+from sessions.turn_choice import with_contacts
 from tactile_lab.exploration.candidates import Candidate, ModelledObject, predict_contacts
 from tactile_lab.exploration.policies import POLICIES, make_policy
 from tactile_lab.exploration.policy import Belief, Decision, best_of, nothing_to_choose
@@ -258,9 +259,54 @@ def test_a_region_that_never_yields_contact_is_given_up() -> None:
 def test_turns_keep_the_hand_in_its_window() -> None:
     one = chooser()
     for yaw in (-1.2, 0.0, 1.2):
-        turn = one.turn(GraspFrame(0.0, 0.0, yaw), knowledge(), 0.3)
+        turn = one.turn(GraspFrame(0.0, 0.0, yaw), knowledge(), touching("FF", "TH"), 0.3)
+        assert turn is not None
         assert -1.31 <= yaw + turn <= 1.31
         assert 0.2 < abs(turn) < 0.8
+
+
+def turn_of_a_box_with_untouched_sides(window_rad: tuple[float, float], closings: tuple[str, ...]) -> float | None:
+    """What becomes of a box in a hand at yaw 0.4; one contact each tells where its sides along x are."""
+    along = np.linspace(-0.03, 0.03, 13)
+    ends = [np.column_stack([np.full(13, x), along]) for x in (0.03, -0.03)]
+    points = np.vstack([*ends, [[0.0, 0.03], [0.0, -0.03]]])
+    normals = np.repeat([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [13, 13, 1, 1], axis=0)
+    field = Gpis.fit(points, normals, 0.001, 0.05)
+    known = known_shape(field, 2, HEIGHT_m, ExplorationSettings())
+    found = Knowledge(known, Pose2(), 1e-6 * np.eye(3), np.zeros(len(field.contacts_m), dtype=int), 5)
+    hand = limits(plan=PlanSettings(yaw_window_rad=window_rad, closings=closings))
+    noise = MotionNoise(translation_m=0.002, rotation_rad=0.05)
+    one = PolicyChooser(make_policy("information"), hand, noise, np.random.default_rng(0))
+    return one.turn(GraspFrame(0.0, 0.0, 0.4), found, Grasp(2, 0, (), Pose3()), 0.3)
+
+
+def test_an_object_is_left_unless_what_is_unknown_of_it_is_out_of_reach() -> None:
+    assert turn_of_a_box_with_untouched_sides((-1.31, 1.31), ("pinch", "radial")) is None
+    turn = turn_of_a_box_with_untouched_sides((-0.4, 0.4), ("pinch",))
+    assert turn is not None
+    assert turn < -0.2
+
+
+def test_contacts_of_the_grasp_in_hand_count_when_a_turn_is_chosen() -> None:
+    known = knowledge()
+    belief = chooser("information")._belief(known)
+    grasp = touching("FF", "TH")
+    seen = with_contacts(belief, grasp)
+    assert len(seen.contacts_m) == len(belief.contacts_m) + 2
+    assert np.count_nonzero(seen.latest_contacts) == 2
+    back = np.array([known.world_T_object.transformFrom(point) for point in seen.contacts_m[-2:]])
+    np.testing.assert_allclose(back, grasp.points_world_m[:, :2], atol=1e-12)
+    assert np.linalg.norm(seen.normals[-1]) == pytest.approx(1.0)
+
+
+def test_nothing_touches_the_underside() -> None:
+    surface = SOLID_BOX.surface
+    assert surface is not None
+    touchable = surface.touchable(0.0)
+    assert surface.points_m[touchable][:, 2].min() > 0.0
+    assert touchable[surface.points_m[:, 2] > 0.03].all()
+    assert not touchable[surface.normals[:, 2] < -0.8].any()
+    assert surface.touchable(0.2)[surface.normals[:, 2] > -0.5].all()  # high over the table all but what faces down
 
 
 def test_record_is_plain_json_with_all_candidates() -> None:
