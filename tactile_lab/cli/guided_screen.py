@@ -12,7 +12,8 @@ from tactile_lab.geometry.contacts import FINGERS
 
 STEPS = (Stage.PLACE, Stage.GUIDE, Stage.CLOSE, Stage.HOLD, Stage.CAPTURE, Stage.ROTATE, Stage.RELEASE)
 KEYS = "SPACE next · g go · u undo · x give up · p pause · e end · a automatic · n note · m marker"
-_BAR_N, _BAR_WIDTH = 1.0, 8
+_BAR_N, _BAR_WIDTH = 1.0, 4  # five fingers fit beside one another in 80 columns
+_FORCE_WIDTH = _BAR_WIDTH + len(" 0.00 N")
 _SAID = {Stage.PLACE: ("object", "suggested"), Stage.HOLD: ("stability", "observability")}
 """Facts that plain lines tell at a step, beside the contacts."""
 
@@ -65,7 +66,7 @@ def _fact(name: str, value: str) -> Text:
 
 
 def _forces(panel: Panel) -> RenderableType:
-    grid = Table.grid(padding=(0, 2))
+    grid = Table.grid(padding=(0, 1))
     cells = []
     for finger in FINGERS:
         grid.add_column(no_wrap=True)
@@ -77,9 +78,9 @@ def _forces(panel: Panel) -> RenderableType:
 def _force(finger: str, panel: Panel) -> Text:
     force_N, touches = panel.sight.forces_N.get(finger), finger in panel.sight.touching
     if finger in panel.sight.silent:
-        return Text(f"{finger} no reading     ", style="yellow")
+        return Text(f"{finger} {'no reading':<{_FORCE_WIDTH}}", style="yellow")
     if force_N is None:
-        return Text(f"{finger} not zeroed     ", style="dim")
+        return Text(f"{finger} {'not zeroed':<{_FORCE_WIDTH}}", style="dim")
     filled = min(_BAR_WIDTH, round(_BAR_WIDTH * force_N / _BAR_N))
     bar = "#" * filled + "." * (_BAR_WIDTH - filled)
-    return Text(f"{finger} {bar} {force_N:4.2f}", style="green" if touches else "dim")
+    return Text(f"{finger} {bar} {force_N:4.2f} N", style="green" if touches else "dim")
