@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gtsam import Pose3
 
-from calibration.block_plan import CLEAR_m, load_block, plan_block
+from calibration.block_plan import CLEAR_m, FINGERS, load_block, plan_block
 from calibration.block_problem import BlockResult, BlockSettings, BlockWizard, is_of_block, solve_block
 from calibration.forearm import ForearmCalibration
 from calibration.geometry import Block
@@ -28,7 +28,7 @@ from tactile_lab.rigs.description import load_rig
 from tactile_lab.workflow.calibrating_joints import JointRequest, JointSettings, from_file, joint_wizard
 
 BLOCK = Block(size_m=(0.12, 0.06, 0.06), world_T_block=RigidTransform(translation_m=(0.0, 0.0, 0.03)))
-PLAN = plan_block(BLOCK, ("FF", "MF"))
+PLAN = plan_block(BLOCK)
 SPREAD = np.diag(np.repeat([np.radians(0.1), 2e-4], 3) ** 2)
 
 
@@ -62,8 +62,8 @@ def test_offsets_are_told_or_named_and_their_sigmas_tell_so() -> None:
             (offset.offset_rad - rig.bias_rad[JOINT_INDEX[joint]]) / offset.sigma_rad
             for joint, offset in found.offsets.items()
         ]
-    assert {joint for joint in told if told.count(joint) == 4} == {"FFJ4", "FFJ3", "MFJ4", "MFJ3"}
-    assert not {"FFJ1", "MFJ1"} & set(told)
+    assert {joint for joint in told if told.count(joint) == 4} == {f"{finger}{joint}" for finger in FINGERS for joint in ("J4", "J3")}
+    assert not {f"{finger}J1" for finger in FINGERS} & set(told)
     assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.4
     assert np.abs(off).max() < 4.0
 
@@ -83,7 +83,7 @@ def test_touches_that_do_not_fit_fail_and_too_few_are_refused() -> None:
     calibration = ForearmCalibration.of(rig.world_T_mount * Pose3.Expmap(np.full(6, 0.006)), SPREAD)
     assert not solve_block(touches, calibration, BlockSettings()).passed
     with pytest.raises(ConfigurationError, match="press with two fingers or more"):
-        solve_block(touches[: len(touches) // 2], calibration, BlockSettings())
+        solve_block(touches[: len(touches) // 3], calibration, BlockSettings())
     faces = [touch for touch in touches if touch.target.name != "block +x"]
     with pytest.raises(ConfigurationError, match="press the top and all four sides"):
         solve_block(faces, calibration, BlockSettings())
