@@ -53,10 +53,10 @@ class Conductor:
         self._progress = progress or NullProgress()
         self._supervisor, self._cycle, self._decisions = crew.supervisor, crew.performer, crew.decisions
         self._survey, self._guard = crew.survey, crew.guard
+        self._guard.heard = self._progress.interrupted
         self._estimation = Estimation(bench, crew.thinking)
         self._thought_of: int | None = None
         self._paused = False
-        self._interruption_told = False
         self._grasps: list[Grasp] = []
         self._misses = 0
         self._number = 0
@@ -284,9 +284,6 @@ class Conductor:
 
     def _phase(self, name: str) -> None:
         self._progress.phase(self._number, name)
-        if self._guard.requested and not self._interruption_told:
-            self._interruption_told = True
-            self._progress.told("Ctrl+C: finishing this grasp, then closing the session; once more to end at once")
 
     def _tell(self, level: Level, message: str) -> None:
         self._bench.event(level, "conductor", message)

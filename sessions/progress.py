@@ -57,6 +57,9 @@ class Progress(Protocol):
     def told(self, message: str) -> None:
         """Something a person should know at once."""
 
+    def interrupted(self) -> None:
+        """Ctrl+C was pressed, in the midst of anything: only to be noted here."""
+
 
 class NullProgress:
     """Nobody watches."""
@@ -68,4 +71,7 @@ class NullProgress:
         """Not told to anyone."""
 
     def told(self, message: str) -> None:
+        """Not told to anyone."""
+
+    def interrupted(self) -> None:
         """Not told to anyone."""

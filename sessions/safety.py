@@ -229,6 +229,8 @@ class InterruptGuard:
 
     def __init__(self) -> None:
         self.requested = False
+        self.heard: Callable[[], None] = lambda: None
+        """Called by the first at once, in the midst of whatever goes on: it may note that, and no more."""
         self._previous: Callable[[int, FrameType | None], Any] | int | None = None
         self._active = False
 
@@ -248,6 +250,7 @@ class InterruptGuard:
     def _interrupted(self, number: int, frame: FrameType | None) -> None:
         if not self.requested:
             self.requested = True
+            self.heard()
         elif callable(self._previous):
             self._previous(number, frame)  # it knows where an interruption would be lost
         else:

@@ -16,6 +16,7 @@ from tactile_lab.geometry.contacts import FINGERS
 HEAD = ("grasp", "closing", *FINGERS, "±mm", "±deg", "known", "verdict")
 WIDTHS = (6, -8, *([5] * len(FINGERS)), 6, 6, 7, -1)
 """Of the columns, in characters; negative where text stands to the left."""
+INTERRUPTED = "Ctrl+C: finishing this grasp, then closing the session; once more to end at once"
 LEGEND = "fingertip forces in N, uncertainty of the pose, share of the surface known"
 
 
@@ -33,8 +34,10 @@ class LiveProgress:
 
     def __init__(self, title: str, *, live: bool = True, reasons: bool = False) -> None:
         self._title, self._begun, self._listed, self._reasons = title, False, False, reasons
+        self._now, self._is_interrupted, self._interruption_told = Text(""), False, False
         live = live and people.is_terminal
-        self._live = Live(console=people, refresh_per_second=8, transient=True) if live else None
+        shown = Live(console=people, refresh_per_second=8, transient=True, get_renderable=self._render)
+        self._live = shown if live else None
 
     def __enter__(self) -> Self:
         return self
@@ -52,8 +55,10 @@ class LiveProgress:
             say(self._title, "bold")
             if self._live is not None:
                 self._live.start()
-        if self._live is not None:
-            self._live.update(Text(f"grasp {number}: {name}" if number else name, style="dim"))
+        self._now = Text(f"grasp {number}: {name}" if number else name, style="dim")
+        if self._is_interrupted and not self._interruption_told:
+            self._interruption_told = True
+            self.told(INTERRUPTED)
 
     def grasp_done(self, report: GraspReport) -> None:
         """A grasp has been captured and estimated."""
@@ -68,6 +73,15 @@ class LiveProgress:
     def told(self, message: str) -> None:
         """Something a person should know at once."""
         say(message, "yellow")
+
+    def interrupted(self) -> None:
+        """Ctrl+C was pressed: the line of the step in hand says so at once, a line that stays at the next step."""
+        self._is_interrupted = True
+
+    def _render(self) -> Text:
+        """What is happening now."""
+        told_here = self._is_interrupted and not self._interruption_told
+        return Text(INTERRUPTED, style="yellow") if told_here else self._now
 
 
 def _line(cells: tuple[str, ...], style: str = "") -> None:

@@ -50,6 +50,9 @@ class Watcher(NullProgress):
     def told(self, message: str) -> None:
         self.messages.append(message)
 
+    def interrupted(self) -> None:
+        self.messages.append(f"interrupted in {self.phases[-1]}")
+
 
 def settings(grasps: int = 2, **overrides: Any) -> ConductorSettings:
     quick = {"landing_force_N": 0.25, "squeeze_s": 0.1, "finger_rad_s": 20.0, "travel_m_s": 1.0, "turn_rad_s": 5.0}
@@ -257,6 +260,7 @@ def test_one_interrupt_finishes_the_step_and_ends_the_session() -> None:
     assert outcome.ending is Ending.INTERRUPTED
     assert len(outcome.grasps) == 1  # the capture is finished, kept and estimated
     assert watcher.phases[-4:] == ["capture", "release", "lift", "estimate"]
+    assert watcher.messages == ["interrupted in capture"]
 
 
 def test_interrupt_before_the_capture_lets_go_without_a_grasp() -> None:

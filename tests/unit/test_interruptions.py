@@ -19,6 +19,7 @@ from sessions.policy_decisions import Proposal
 from tactile_lab.cli import approval, wizard
 from tactile_lab.cli.approval import TerminalApproval
 from tactile_lab.cli.interruptions import interruptions_heeded
+from tactile_lab.cli.progress import INTERRUPTED, LiveProgress
 from tactile_lab.cli.terminal_input import LineInput
 
 PATIENCE_s = 30.0
@@ -145,6 +146,17 @@ def test_a_grasp_is_approved_vetoed_or_neither_when_the_session_is_to_end(typed:
     assert approve(proposal(lambda: len(looks) > 2 or bool(looks.append(1))))
     os.write(typed, b"no\n")
     assert not approve(proposal())  # it asks again
+
+
+def test_ctrl_c_in_a_session_shows_at_once_and_stays_on_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with LiveProgress("a session", live=False) as progress:
+        progress.phase(1, "descend")
+        progress.interrupted()
+        assert progress._render().plain == INTERRUPTED
+        progress.phase(1, "close")
+        assert progress._render().plain == "grasp 1: close"
+        progress.phase(1, "capture")
+    assert capsys.readouterr().err.count(INTERRUPTED) == 1
 
 
 def test_an_unfinished_line_counts_when_the_input_ends() -> None:
