@@ -28,7 +28,8 @@ def streaming_rig(folder: Path) -> Path:
 
 
 def test_the_lateness_of_a_streaming_camera_is_found_from_the_recording(tmp_path: Path) -> None:
-    request = running.SessionRequest(str(streaming_rig(tmp_path)), "box-10x6x4", tmp_path, grasps=2)
+    rig = str(streaming_rig(tmp_path))
+    request = running.SessionRequest(rig, "box-10x6x4", tmp_path, method="odometry", grasps=2)
     finished = running.run_session(request, NullProgress())
     session = Session.open(finished.folder)
     assert finished.evaluation is not None

@@ -21,8 +21,9 @@ from tests.support.warm_terminal import Piped, WarmProgram
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
-def start(program: WarmProgram, root: Path, grasps: int = 8) -> Piped:
-    return program.pipes(root, "run", "--grasps", grasps, "--seed", 1, "--out", root)
+def start(program: WarmProgram, root: Path, grasps: int = 8, method: str = "odometry") -> Piped:
+    words = ("--grasps", grasps, "--seed", 1, "--method", method, "--out", root)
+    return program.pipes(root, "run", *words)
 
 
 def only_session(root: Path) -> Path:
@@ -98,7 +99,7 @@ def test_ctrl_c_at_the_beginning(tmp_path, delay_s):
 
 
 def test_ctrl_c_while_the_result_is_judged_keeps_the_session(program, tmp_path, inside):
-    process = start(program, tmp_path, grasps=1)
+    process = start(program, tmp_path, grasps=1, method="joint")  # judging it takes a while
     process.until(r"^ +1/1 ")
     while status(folder := only_session(tmp_path)) == "open":
         time.sleep(0.005)
@@ -120,7 +121,7 @@ def test_a_full_disk_ends_the_session_and_the_recorded_part_replays(tmp_path, in
 
     with monkeypatch.context() as patched:
         patched.setattr(traffic_disk.os, "write", write_while_there_is_room)
-        answer = inside("run", "--grasps", 4, "--seed", 1, "--out", tmp_path)
+        answer = inside("run", "--grasps", 4, "--seed", 1, "--method", "odometry", "--out", tmp_path)
     assert answer.code == 1
     assert "the disk is full" in answer.err
     folder = only_session(tmp_path)
