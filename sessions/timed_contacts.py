@@ -18,7 +18,7 @@ from gtsam import Pose3, Rot3
 
 from sessions.contact_form import ObjectTruth
 from sessions.contact_log import ContactLog
-from sessions.timed_table import SIGMAS, Row, TimedTable, as_numbers, check_columns, read_csv, read_json, refused
+from sessions.timed_table import Row, TimedTable, as_numbers, check_columns, read_csv, read_json, refused
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.geometry.contacts import Contact, Grasp
 from tactile_lab.strict_yaml import validate
@@ -71,7 +71,11 @@ def _truth(document: Mapping[str, Any], path: Path) -> ObjectTruth | None:
 
 
 def _with_sigmas(settings: ImportSettings, document: Mapping[str, Any]) -> ImportSettings:
-    return replace(settings, **{name: float(document[name]) for name in SIGMAS if name in document})
+    return replace(
+        settings,
+        point_sigma_m=document.get("point_sigma_m", settings.point_sigma_m),
+        normal_sigma_rad=document.get("normal_sigma_rad", settings.normal_sigma_rad),
+    )
 
 
 def _log(table: TimedTable, settings: ImportSettings, truth: ObjectTruth | None) -> ContactLog:
