@@ -16,7 +16,6 @@ from drivers.shadow.palm_images import USUAL_PALM, PalmName
 from drivers.shadow.tactile_requests import TactileKind
 from tactile_lab.strict_yaml import StrictModel
 
-
 WIRE_CYCLE_s = 0.002
 """Period of a hand on its cable that nobody has stated; Shadow's own host has 1 ms."""
 

@@ -8,9 +8,9 @@ Four weaknesses of SOEM are made good. A lost frame blocks it for several millis
 to block. Then it asks the socket over and over until the answer is there, at the cost of a core: so the answer is
 waited for before SOEM looks. It tells answers apart by an index of sixteen values only, so that after a stall it can go
 on with old data for ever: a status is used only when it echoes the last command that the palm had taken before. And a
-frame that gets lost while it looks at the ring leaves it with fewer slaves, or with zeros in place of their names or
-their process data: so it is given the patience of the settings, and nothing is refused that was not seen in several
-looks.
+frame that gets lost while it sets up the ring leaves it with fewer slaves, with other names or process data than
+theirs, or with slaves that refuse what they got: so it is given the patience of the settings, and nothing is refused
+that was not seen in several looks.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from drivers.shadow.palm_images import PalmImage
 from tactile_lab.clock import Clock
 from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
 
-LOOKS = 3
-"""So often the ring is looked at before what was seen counts as what is there."""
+LOOKS = 5
+"""So often the ring is looked at, and set up, before what was seen counts as what is there."""
 
 _STATE_us, _OP_TRIES = 50_000, 40
 _WRITTEN, _READ = 2, 1
@@ -84,8 +84,7 @@ class PysoemLink:
                 flags = fcntl.fcntl(descriptor, fcntl.F_GETFL)
                 fcntl.fcntl(descriptor, fcntl.F_SETFL, flags | os.O_NONBLOCK)
             with self._patience():
-                self._hand = self._seen(master)
-            self._operate(master)
+                self._hand = self._brought_up(master)
         except BaseException:
             master.close()
             raise
@@ -183,15 +182,17 @@ class PysoemLink:
         finally:
             timeouts.ret = usual_us
 
-    def _seen(self, master: Any) -> HandIdentity:
-        """The hand, mapped; looks that did not show it are counted."""
+    def _brought_up(self, master: Any) -> HandIdentity:
+        """The hand, in operation; looks that did not show it, or did not bring it there, are counted."""
         while True:
             try:
-                return self._mapped(master)
+                hand = self._mapped(master)
+                self._operate(master)
+                return hand
             except DeviceError as error:
                 self.counts.misread += 1
                 if self.counts.misread == LOOKS:
-                    raise self._wrong(f"{error.what}, in each of {LOOKS} looks at the ring", error.hint) from error
+                    raise self._wrong(f"{error.what}, at the last of {LOOKS} looks at the ring", error.hint) from error
 
     def _mapped(self, master: Any) -> HandIdentity:
         """One look: who is there, with process data as SOEM maps them."""
@@ -216,9 +217,11 @@ class PysoemLink:
         for _ in range(_OP_TRIES):
             if master.state_check(self._soem.OP_STATE, _STATE_us) == self._soem.OP_STATE:
                 return
+            master.read_state()
+            if any(slave.state & AL_ERROR for slave in master.slaves):
+                break  # it has refused
             master.send_processdata()
             master.receive_processdata(2000)
-        master.read_state()
         raise self._wrong(f"does not reach OP: it is in {self._status(master.slaves[1])}", "Switch the hand off and on")
 
     def _check_states(self) -> None:

@@ -15,11 +15,11 @@ from drivers.shadow.pysoem_link import LOOKS, PysoemLink
 from tactile_lab.clock import VirtualClock
 from tactile_lab.errors import ConfigurationError, DeviceError
 
-OP, USUAL_us = 8, 2000
+OP, REFUSED, USUAL_us = 8, 0x12, 2000
 SIZES = PALMS["0220"].command_bytes, PALMS["0220"].status_bytes
 
 
-def board(product: int, serial: int = 0, vendor: int = 0x530, sizes: tuple[int, int] = (0, 0)) -> Any:
+def board(product: int, serial: int = 0, vendor: int = 0x530, sizes: tuple[int, int] = (0, 0), state: int = OP) -> Any:
     """A slave as SOEM shows it."""
     words = serial.to_bytes(4, "little")
     output, images = bytes(sizes[0]), bytes(sizes[1])
@@ -30,14 +30,15 @@ def board(product: int, serial: int = 0, vendor: int = 0x530, sizes: tuple[int, 
         eeprom_read=lambda word: words,
         output=output,
         input=images,
-        state=OP,
-        al_status=0,
+        state=state,
+        al_status=0x1E,
     )
 
 
 HAND = (board(0), board(6, 634, sizes=SIZES))
 NAMELESS = (board(0, vendor=0), board(0, vendor=0))
 UNMAPPED = (board(0), board(6, 634))
+REFUSING = (board(0), board(6, 634, sizes=SIZES, state=REFUSED))
 WITHOUT_SERIAL = (board(0), board(6, sizes=SIZES))
 
 
@@ -77,8 +78,11 @@ class Soem:
     def write_state(self) -> None:
         """Slaves obey."""
 
+    def read_state(self) -> None:
+        """The states are those of the look."""
+
     def state_check(self, state: int, timeout_us: int) -> int:
-        return state
+        return OP if all(slave.state == OP for slave in self.slaves) else REFUSED
 
     def send_processdata(self) -> None:
         """Nothing moves."""
@@ -100,7 +104,7 @@ def test_without_pysoem_the_message_says_how_to_get_it(monkeypatch: pytest.Monke
         PysoemLink("hand", EthercatSettings(interface="lo"), VirtualClock())
 
 
-@pytest.mark.parametrize("misread", [NAMELESS, UNMAPPED, (), HAND[:1], WITHOUT_SERIAL])
+@pytest.mark.parametrize("misread", [NAMELESS, UNMAPPED, (), HAND[:1], WITHOUT_SERIAL, REFUSING])
 def test_a_hand_that_was_misread_is_looked_at_again_and_that_is_told(
     monkeypatch: pytest.MonkeyPatch, misread: tuple[Any, ...]
 ) -> None:
@@ -121,7 +125,7 @@ def test_a_hand_that_is_read_rightly_is_looked_at_once_with_the_patience_of_the_
 
 def test_what_is_foreign_in_every_look_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     soem = Soem(NAMELESS)
-    with pytest.raises(DeviceError, match=r"vendor 0x0, not of Shadow Robot \(0x530\), in each of 3 looks at the ring"):
+    with pytest.raises(DeviceError, match=r"vendor 0x0, not of Shadow Robot \(0x530\), at the last of 5 looks at the ring"):
         opened(monkeypatch, soem)
     assert soem.looked == LOOKS
     assert not soem.is_open
