@@ -123,9 +123,19 @@ def test_a_hand_that_is_read_rightly_is_looked_at_once_with_the_patience_of_the_
     assert link.health() == ()
 
 
-def test_what_is_foreign_in_every_look_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    soem = Soem(NAMELESS)
-    with pytest.raises(DeviceError, match=r"vendor 0x0, not of Shadow Robot \(0x530\), at the last of 5 looks at the ring"):
-        opened(monkeypatch, soem)
+@pytest.mark.parametrize(
+    ("ring", "words"),
+    [
+        (NAMELESS, r"first slave is of vendor 0x0, not of Shadow Robot \(0x530\), at the last of 5 looks at the ring"),
+        ((board(0), board(77, sizes=SIZES)), r"second slave is .* \(product 0x4d\)"),
+        ((board(0), board(6, 3, sizes=SIZES)), "hand 3, not hand 634"),
+    ],
+)
+def test_what_is_foreign_in_every_look_is_refused(
+    monkeypatch: pytest.MonkeyPatch, ring: tuple[Any, ...], words: str
+) -> None:
+    soem = Soem(ring)
+    with pytest.raises(DeviceError, match=words):
+        opened(monkeypatch, soem, serial=634)
     assert soem.looked == LOOKS
     assert not soem.is_open
