@@ -84,6 +84,9 @@ def reconstruct(
         SessionError, ShapeError: the data, or the true mesh, can not be read.
     """
     path = Path(source)
+    if path.suffix.lower() == ".csv":
+        hint = f"Timed contacts become one by: tactile-lab session import {source}"
+        raise ConfigurationError("is a table, not a contact log", where=source, hint=hint)
     if path.is_file() or path.suffix == ".json":
         return reconstruct_log(path, wishes, out, progress)
     session = find_session(root, source)

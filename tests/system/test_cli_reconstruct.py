@@ -250,6 +250,7 @@ def test_what_is_neither_log_nor_session_is_named(inside, tmp_path):
     (tmp_path / "photo.json").write_bytes(b"\xff\xd8\xff\xe0")
     refused(inside("reconstruct", tmp_path / "photo.json"), 1, "photo.json: is not JSON")
     refused(inside("reconstruct", tmp_path / "none.json"), 1, "none.json: can not be read")
+    refused(inside("reconstruct", tmp_path / "hits.csv"), 2, "is a table", "tactile-lab session import")
     refused(inside("reconstruct", tmp_path), 1, str(tmp_path))
     refused(inside("reconstruct", "nowhere", "--root", tmp_path), 1, "nowhere: no such session")
 
