@@ -137,7 +137,7 @@ def test_a_session_on_an_expired_calibration_is_refused_or_says_that_it_was_allo
     rig = Path(shutil.copy(RIGS / "sim.yaml", tmp_path / "mine.yaml"))
     file = tmp_path / "calibrations" / "simulated-hand" / "forearm.yaml"
     write_record(file, read_record(file).model_copy(update={"valid_until_utc": "2020-01-01T00:00:00+00:00"}))
-    words = ("run", "--rig", rig, "--grasps", 1, "--out", tmp_path / "runs", "--json")
+    words = ("run", "--rig", rig, "--grasps", 1, "--method", "odometry", "--out", tmp_path / "runs", "--json")
     refused = inside(*words)
     assert (refused.code, "is valid until 2020-01-01" in refused.err) == (2, True)
     assert not (tmp_path / "runs").exists()

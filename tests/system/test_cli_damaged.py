@@ -68,7 +68,7 @@ def test_a_recording_damaged_in_the_middle(inside, session_copy):
     middle = int(0.7 * len(content))
     content[middle : middle + 50] = bytes(50)
     traffic.write_bytes(content)
-    answer = inside("session", "replay", session_copy)
+    answer = inside("session", "replay", session_copy, "--method", "odometry")
     assert answer.code == 3
     assert "the recording is damaged" in answer.err
 
@@ -162,4 +162,4 @@ def test_a_session_never_closed_is_shown_and_replayed(inside, session_copy):
     manifest = session_copy / "session.yaml"
     manifest.write_text(manifest.read_text().replace("status: closed", "status: open"))
     assert "killed before it was closed" in inside("session", "show", session_copy).err
-    assert inside("session", "replay", session_copy).code == 0
+    assert inside("session", "replay", session_copy, "--method", "odometry").code == 0

@@ -84,7 +84,7 @@ def test_another_seed_of_the_estimation_gives_another_result_in_the_replay_folde
 def test_a_replay_removes_what_an_earlier_one_left(inside, session_copy):
     (session_copy / "replay").mkdir()
     (session_copy / "replay" / "contour.csv").write_text("of another estimation")
-    assert inside("session", "replay", session_copy, "--dimension", 3).code == 0
+    assert inside("session", "replay", session_copy, "--method", "odometry", "--dimension", 3).code == 0
     assert not (session_copy / "replay" / "contour.csv").exists()
 
 

@@ -63,7 +63,8 @@ def placed(markers: MarkerSettings) -> tuple[tuple[PrintedMarker, Pose3], tuple[
 def test_a_session_with_a_video_for_its_camera_is_judged_by_what_it_shows(tmp_path: Path) -> None:
     if shutil.which("ip") is None:
         pytest.skip("no ip command to make virtual interfaces with")
-    request = running.SessionRequest(with_video(tmp_path).source, OBJECT, tmp_path / "runs", grasps=1)
+    rig = with_video(tmp_path).source
+    request = running.SessionRequest(rig, OBJECT, tmp_path / "runs", method="odometry", grasps=1)
     try:
         finished = running.run_session(request, NullProgress())
     except DeviceError as error:
