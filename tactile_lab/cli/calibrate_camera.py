@@ -100,7 +100,7 @@ def _begin(board: AnyBoard, asker: Asker) -> None:
 
 def _guide(found: Gathering) -> None:
     """One line a view: how many there are, and what is missing next."""
-    from tactile_lab.cli.console import say
+    from tactile_lab.cli.console import counted, say
 
     name = f"picture {found.pictures}"
     if name in found.refused:
@@ -109,9 +109,9 @@ def _guide(found: Gathering) -> None:
     missing = found.coverage.missing
     rest = f"; and {len(missing) - 1} more" if len(missing) > 1 else ""
     say(
-        f"{len(found.views)} views; next: {missing[0]}{rest}"
+        f"{counted(len(found.views), 'view')}; next: {missing[0]}{rest}"
         if missing
-        else f"{len(found.views)} views; all is covered"
+        else f"{counted(len(found.views), 'view')}; all is covered"
     )
 
 

@@ -44,6 +44,11 @@ def say(text: str, style: str = "") -> None:
     _tell(Text(text, style=style), style)
 
 
+def counted(number: int, noun: str) -> str:
+    """A number of things: "1 grasp", "3 grasps"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def complain(text: str) -> None:
     """One error line for people."""
     _tell(Text.assemble(("error: ", "bold red"), text), "bold red")

@@ -8,7 +8,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from tactile_lab.cli.console import people, say
+from tactile_lab.cli.console import counted, people, say
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
 
 UNKNOWN = "–"
@@ -26,7 +26,7 @@ _POSE = (("Position error", "mm", "mm"), ("Rotation error", "deg", "° "))
 def show_evaluation(content: Mapping[str, Any]) -> None:
     """Print the content of ``evaluation.json``; what is unknown shows as a dash."""
     made = f"{content['dimension']}-D, method {content['method']}, seed {content['seed']}"
-    basis = f"{content['grasps']} grasps, {content['contacts']} contacts"
+    basis = f"{counted(content['grasps'], 'grasp')}, {counted(content['contacts'], 'contact')}"
     people.print()
     say(
         f"Evaluation of {content['object']} ({made}; {basis})",
@@ -59,7 +59,7 @@ def _rest(content: Mapping[str, Any]) -> Table:
     share = f"off the true surface, 95 % below {_figure(sensing.get('p95_mm'), 'mm')}"
     spread = f"95 % below {_figure(time.get('step_ms_p95'), 'ms', 0)}; {_figure(time.get('total_s'), 's', 1)} in all"
     wrong = f"accepted of {_count(loops.get('tested'))} tested, {_count(loops.get('wrong'))} of them wrong"
-    seen = f"of {content['grasps']} grasps known"
+    seen = f"of {counted(content['grasps'], 'grasp')} known"
     grid = _grid(("other figures", ""), "")
     grid.add_row("Registration error", _figure(content.get("registration_rms_mm"), "mm"), _verdict(content))
     grid.add_row("Contact error, median", _figure(sensing.get("median_mm"), "mm"), share)

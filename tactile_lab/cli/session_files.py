@@ -51,7 +51,7 @@ def export(
 ) -> None:
     """Write a session in a form that others read: its grasps as a contact log, its samples as tables, or all of it."""
     from sessions.listing import find_session
-    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.cli.console import counted, emit_json, say
     from tactile_lab.workflow import exporting
 
     del no_input
@@ -62,7 +62,7 @@ def export(
         log = exporting.export_contacts(found, contacts, dimension)
         touched = sum(len(grasp.contacts) for grasp in log.grasps)
         told |= {"log": str(contacts), "dimension": log.dimension, "grasps": len(log.grasps), "contacts": touched}
-        say(f"{len(log.grasps)} grasps with {touched} contacts: {contacts}")
+        say(f"{counted(len(log.grasps), 'grasp')} with {counted(touched, 'contact')}: {contacts}")
     for kind, place in (("csv", csv), ("hdf5", hdf5), ("rosbag", rosbag), ("archive", archive)):
         if place is not None:
             written = exporting.EXPORTS[kind](found, place)
@@ -95,7 +95,7 @@ def bring_in(
     from math import radians
 
     from sessions.timed_contacts import ImportSettings
-    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.cli.console import counted, emit_json, say
     from tactile_lab.workflow.importing import import_contacts, import_session
 
     del no_input
@@ -112,5 +112,5 @@ def bring_in(
     touched = sum(len(grasp.contacts) for grasp in log.grasps)
     if as_json:
         emit_json({"log": str(target), "dimension": log.dimension, "grasps": len(log.grasps), "contacts": touched})
-    say(f"{len(log.grasps)} grasps with {touched} contacts: {target}")
+    say(f"{counted(len(log.grasps), 'grasp')} with {counted(touched, 'contact')}: {target}")
     say(f"estimate with: tactile-lab reconstruct {target} --out RESULTS")

@@ -63,7 +63,9 @@ class Wishes:
             "largest_sigma_m": self.largest_sigma_m,
         }
         wanted = {**given, **from_file, **{key: value for key, value in options.items() if value is not None}}
-        return validate(wanted, SlamSettings, where="options" if self.settings is None else str(self.settings))
+        if self.settings is None:
+            return validate(wanted, SlamSettings, where="options", hint="Change the options")
+        return validate(wanted, SlamSettings, where=str(self.settings))
 
 
 def reconstruct(
