@@ -126,9 +126,10 @@ class Terminal(Call):
     def ended(self, code: int) -> str:
         """Everything it said, once it ended with that exit code. A traceback fails the test."""
         self._child.expect(pexpect.EOF)
-        self._child.close()
         told = self.told + str(self._child.before)
-        assert self.exit_code() == code, told
+        ended = self.exit_code()  # before the terminal goes: a program that is still ending would be hung up
+        self._child.close()
+        assert ended == code, told
         assert "Traceback" not in told, told
         return told
 
