@@ -20,6 +20,7 @@ from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.pose_evidence import PoseEvidence
+from tactile_lab.tracking.pose_rows import PoseRows
 
 _EXPECTED_RIGHT = 99.0
 """Contacts that are right for one that is wrong, before any was seen."""
@@ -27,8 +28,14 @@ _EXPECTED_RIGHT = 99.0
 _BREAK_COST = 20.0
 """Negative log probability that the object moves otherwise than with the hand, wherever it then lies."""
 
+_REMEMBERED = 8
+"""Maps whose information is kept: trajectories are compared each with each."""
+
 _SAME_TRANSLATION_m = 0.001
 _SAME_ROTATION_rad = 0.03
+_SAME_VALLEY = 0.5
+"""Trajectories are one whose squared distance, in what the data say about all poses together, is less than this for
+each number: places that the data do not tell apart differ by two on average."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +70,7 @@ class Judge:
             unexplained_cost: negative log likelihood of a contact that nothing explains.
         """
         self._noise, self._unexplained_cost = noise, unexplained_cost
+        self._informed: dict[int, tuple[ContactMap, Array]] = {}
 
     def rated(self, contact_map: ContactMap) -> Hypothesis:
         """A map as it is."""
@@ -103,10 +111,52 @@ class Judge:
     def with_covariances(self, contact_map: ContactMap) -> ContactMap:
         """The map with the covariance that all contacts and motions leave to each pose."""
         size, count = contact_map.space.size, len(contact_map.placed)
-        joint = np.linalg.inv(PoseEvidence(contact_map, self._noise).information(contact_map.rows))
+        joint = np.linalg.inv(self._information(contact_map))
         blocks = joint.reshape(count - 1, size, count - 1, size)[np.arange(count - 1), :, np.arange(count - 1)]
         later = [replace(one, covariance=block) for one, block in zip(contact_map.placed[1:], blocks, strict=True)]
         return replace(contact_map, placed=(contact_map.placed[0], *later))
+
+    def different(self, hypotheses: list[Hypothesis], *, by_contacts: bool = True) -> list[Hypothesis]:
+        """The likeliest of those that ended at the same trajectory.
+
+        Args:
+            hypotheses: to choose from.
+            by_contacts: those that leave out other contacts are different, even if they are close.
+        """
+        return self.unlike(hypotheses, [], by_contacts=by_contacts)
+
+    def unlike(
+        self, hypotheses: list[Hypothesis], known: list[Hypothesis], *, by_contacts: bool = True
+    ) -> list[Hypothesis]:
+        """As :meth:`different`, of those that ended at none of the known trajectories."""
+        kept: list[Hypothesis] = []
+        for one in sorted(hypotheses, key=cost):
+            if not any(self._same(one.map, other.map, by_contacts) for other in (*known, *kept)):
+                kept.append(one)
+        return kept
+
+    def _same(self, one: ContactMap, other: ContactMap, by_contacts: bool) -> bool:
+        """Whether two trajectories are one: near everywhere, or off only where the contacts leave the poses open.
+
+        An optimiser that stops where little is to be gained ends at many places of one valley; kept apart, they would
+        take the places of true alternatives.
+        """
+        gaps = one.space.deviation(one.rows, other.rows)
+        if _near(gaps, one.space):
+            return True
+        if not _near(gaps[0], one.space) or _explained(one, by_contacts) != _explained(other, by_contacts):
+            return False
+        steps = gaps[1:].ravel()
+        return bool(steps @ self._information(other) @ steps < _SAME_VALLEY * len(steps))
+
+    def _information(self, contact_map: ContactMap) -> Array:
+        """Of all poses but the first; the last maps' are remembered."""
+        if id(contact_map) not in self._informed:
+            while len(self._informed) >= _REMEMBERED:
+                del self._informed[next(iter(self._informed))]
+            found = PoseEvidence(contact_map, self._noise).information(contact_map.rows)
+            self._informed[id(contact_map)] = contact_map, found
+        return self._informed[id(contact_map)][1]
 
     def price(self, contact_map: ContactMap) -> float:
         """What the contacts cost that are left out, and the steps in which the object did not follow the hand.
@@ -144,20 +194,6 @@ def likeliest(hypotheses: list[Hypothesis], count: int, gap: float) -> list[Hypo
     return [one for one in ranked if one.cost < ranked[0].cost + gap]
 
 
-def different(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
-    """The likeliest of those that ended at the same trajectory."""
-    return unlike(hypotheses, [])
-
-
-def unlike(hypotheses: list[Hypothesis], known: list[Hypothesis]) -> list[Hypothesis]:
-    """As :func:`different`, of those that ended at none of the known trajectories."""
-    kept: list[Hypothesis] = []
-    for one in sorted(hypotheses, key=cost):
-        if not any(_same(one.map, other.map) for other in (*known, *kept)):
-            kept.append(one)
-    return kept
-
-
 def weights(hypotheses: list[Hypothesis]) -> Array:
     """Their probabilities, if one of them is true, shape (n,)."""
     costs = np.array([hypothesis.cost for hypothesis in hypotheses])
@@ -165,10 +201,15 @@ def weights(hypotheses: list[Hypothesis]) -> Array:
     return np.asarray(relative / relative.sum())
 
 
-def _same(one: ContactMap, other: ContactMap) -> bool:
-    gaps = np.abs(one.space.deviation(one.rows, other.rows))
-    limits = np.where(np.arange(one.space.size) < one.space.translations, _SAME_TRANSLATION_m, _SAME_ROTATION_rad)
-    return bool((gaps <= limits).all())
+def _explained(contact_map: ContactMap, by_contacts: bool) -> list[frozenset[int] | bool]:
+    """What of each grasp is aside; or only whether all of it is."""
+    return [grasp.left_out if by_contacts else grasp.used for grasp in contact_map.placed]
+
+
+def _near(gaps: Array, space: PoseRows) -> bool:
+    """Whether poses differ by less than is worth telling apart."""
+    limits = np.where(np.arange(space.size) < space.translations, _SAME_TRANSLATION_m, _SAME_ROTATION_rad)
+    return bool((np.abs(gaps) <= limits).all())
 
 
 def _asked(contact_map: ContactMap, grasp: int | None) -> NDArray[np.intp]:

@@ -21,7 +21,7 @@ from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.fixed_lag import unfolded
 from tactile_lab.tracking.free_space import free_space_costs
-from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost, different, likeliest, unlike, weights
+from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost, likeliest, weights
 from tactile_lab.tracking.late_placing import Relocate, placed_late, relocated
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import estimated_noise
@@ -36,7 +36,6 @@ _LEAST_KNOWN = 30
 
 _POOR_GAIN = 2.5
 """Evidence (natural logarithm) that a contact brings on unknown ground, at most; on known ground it is 6 to 10."""
-
 
 _MOST_REGROUPINGS = 3
 """A trajectory that took several wrong turns is mended at one after the other."""
@@ -126,7 +125,7 @@ class JointTracker:
         branches = likeliest(unplaced + self._branched(contacts), self._settings.smoothed, self._settings.branch_gap)
         smoothed = [self._judge.smoothed(branch.map, self._settings.iterations) for branch in branches]
         smoothed += self._relocated(min(smoothed, key=cost))
-        self._branches = self._likeliest(different(smoothed), self._settings.hypotheses)
+        self._branches = self._likeliest(self._judge.different(smoothed), self._settings.hypotheses)
         self.effective_count = float(1 / np.sum(weights(self._branches) ** 2))
         return self._branches[0].map.placed[-1].used
 
@@ -169,12 +168,12 @@ class JointTracker:
         is_short = not self._hypotheses[0].map.archive
         readable = len(self.map.placed) > 2 and len(self.map.placed[-1].contacts_world) > 0
         if self._settings.backwards and is_short and readable:
-            self._hypotheses = different(self._hypotheses + self._backwards())
+            self._hypotheses = self._judge.different(self._hypotheses + self._backwards())
         self._regroup()
         for _ in range(2):
             iterations = self._settings.final_iterations
             smoothed = [self._judge.smoothed(one.map, iterations) for one in self._hypotheses]
-            self._hypotheses = self._likeliest(different(smoothed), self._settings.hypotheses)
+            self._hypotheses = self._likeliest(self._judge.different(smoothed), self._settings.hypotheses)
             self._share_best_kernel()
         self._hypotheses = [self._placed_late(self._readmitted(one)) for one in self._hypotheses]
         faceted = self._faceted()
@@ -184,14 +183,16 @@ class JointTracker:
     def _faceted(self) -> list[Hypothesis]:
         """The hypotheses in the light of flat faces, the likeliest first.
 
-        Where the likeliest one can be joined otherwise and then is likelier without faces, that is looked at too.
+        Where the likeliest one can be joined otherwise and then is likelier without faces, that is looked at too. Faces
+        decide anew which contacts are aside, so that trajectories that differ in these alone are looked at once.
         """
         sharp = SharpJudge(self._judge, self._noise)
-        found = [sharp.better(one.map) for one in self._hypotheses]
+        known = self._judge.different(self._hypotheses, by_contacts=False)
+        found = [sharp.better(one.map) for one in known]
         best = min(found, key=cost)
         limit = self._judge.rated(best.map).cost
-        others = [one for one in unlike(self._regrouped(best), self._hypotheses) if one.cost < limit]
-        return sorted(found + [sharp.better(one.map) for one in others], key=cost)
+        others = self._judge.unlike(self._regrouped(best), known, by_contacts=False)
+        return sorted(found + [sharp.better(one.map) for one in others if one.cost < limit], key=cost)
 
     def _readmitted(self, hypothesis: Hypothesis) -> Hypothesis:
         """With a second look at all contacts: some were left out when little was known of the object."""
@@ -221,7 +222,7 @@ class JointTracker:
         """Join the likeliest hypothesis otherwise, and what is likelier then once more."""
         for _ in range(_MOST_REGROUPINGS):
             best = min(self._hypotheses, key=cost)
-            found = different(self._hypotheses + self._regrouped(best))
+            found = self._judge.different(self._hypotheses + self._regrouped(best))
             self._hypotheses = self._likeliest(found, self._settings.hypotheses)
             if self._hypotheses[0].cost >= best.cost:
                 break
@@ -237,9 +238,8 @@ class JointTracker:
         contacts, known = len(best.map.placed[-1].contacts_world), len(best.map.contacts)
         gain = self._hypotheses[0].cost - best.cost
         expected = contacts >= _LEAST_TO_RELOCATE and known >= _LEAST_KNOWN
-        if self._relocate is None or not expected or gain > _POOR_GAIN * contacts:
-            return []
-        return relocated(best, self._relocate, self._judge)
+        asked = expected and gain <= _POOR_GAIN * contacts
+        return relocated(best, self._relocate, self._judge) if self._relocate and asked else []
 
     def _unplaced(self, hypothesis: Hypothesis, contacts: ContactSet) -> Hypothesis:
         """All contacts of the grasp left out: the motion model alone says where the object is."""

@@ -14,7 +14,7 @@ from tactile_lab.shape.kernels import Kernel, Matern52, SquaredExponential, Thin
 from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.evidence_kernels import assemble, pull
-from tactile_lab.tracking.hypotheses import Judge
+from tactile_lab.tracking.hypotheses import Hypothesis, Judge
 from tactile_lab.tracking.motion import MotionNoise, compose, deviation, row_pose_in_space
 from tactile_lab.tracking.motion_cost import estimated_noise
 from tactile_lab.tracking.pose_evidence import PoseEvidence, third_derivative
@@ -220,3 +220,19 @@ def test_the_noise_of_the_motion_is_learnt_from_the_slips(scale: float) -> None:
     learnt = estimated_noise(contact_map, configured)
     assert abs(np.log(learnt.translation_m / 0.010)) < 0.7 * abs(np.log(scale))
     assert abs(np.log(learnt.rotation_rad / np.deg2rad(20.0))) < 0.7 * abs(np.log(scale))
+
+
+def test_trajectories_are_one_where_the_contacts_leave_the_difference_open() -> None:
+    contact_map = true_map("ellipse", count=6)
+    judge = Judge(NOISE, 2.0)
+    variances, ways = np.linalg.eigh(np.linalg.inv(PoseEvidence(contact_map, NOISE).information(contact_map.rows)))
+    length = 2 * np.sqrt(variances[-1])
+
+    def moved(way: Array) -> Hypothesis:
+        return judge.rated(contact_map.with_rows(contact_map.rows + np.vstack([np.zeros(3), way.reshape(-1, 3)])))
+
+    best, open_way, certain_way = judge.rated(contact_map), moved(length * ways[:, -1]), moved(length * ways[:, 0])
+    assert np.abs(open_way.map.rows - contact_map.rows).max() > 0.03
+    assert len(judge.different([best, open_way])) == 1
+    assert len(judge.different([best, certain_way])) == 2
+    assert judge.unlike([certain_way, open_way], [best]) == [certain_way]
