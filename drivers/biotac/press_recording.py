@@ -71,12 +71,17 @@ def _units(directions: Array, where: str) -> Array:
     return np.asarray(directions / length[:, None])
 
 
+def _reason(error: Exception) -> str:
+    """What an error says, without numbers of the operating system."""
+    return str(getattr(error, "strerror", None) or error)
+
+
 def _matrix(path: Path) -> Array:
     try:
         values = np.loadtxt(path, ndmin=2)
     except (OSError, ValueError) as error:
         hint = "Give a text file of numbers, one column a sample"
-        raise ConfigurationError(f"can not be read ({error})", where=str(path), hint=hint) from error
+        raise ConfigurationError(f"can not be read ({_reason(error)})", where=str(path), hint=hint) from error
     if not np.isfinite(values).all():
         raise ConfigurationError("holds values that are no numbers", where=str(path), hint="Leave those samples out")
     return np.asarray(values.T)
@@ -87,7 +92,8 @@ def _table(path: Path) -> tuple[Array, Array]:
         with path.open(newline="", encoding="utf-8") as file:
             rows = list(csv.reader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ConfigurationError(f"can not be read ({error})", where=str(path), hint="Give a CSV table") from error
+        hint = "Give a CSV table"
+        raise ConfigurationError(f"can not be read ({_reason(error)})", where=str(path), hint=hint) from error
     electrodes = len(rows[0]) - len(_NORMAL) if rows else 0
     names = [f"e{number}" for number in range(1, electrodes + 1)]
     if not rows or [name.strip().lower() for name in rows[0]] != [*names, *_NORMAL]:

@@ -32,7 +32,7 @@ from tactile_lab.rigs.fingertip_rig import FingertipRig, is_fingertip_rig, load_
 from tactile_lab.rigs.hand_rig import HandRig, is_hand_rig, load_hand_rig
 
 _EMULATED_SERIAL = 634
-_NO_NEED = "Only those can be emulated by themselves; simulated rigs and those with stand_ins start what they need"
+_NO_NEED = "Name a file of kind fingertips or hand; simulated rigs and those with stand_ins start what they need"
 _VOLTS_RATE_Hz = 1000.0
 
 
