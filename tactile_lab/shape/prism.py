@@ -28,6 +28,8 @@ from tactile_lab.shape.surface import Contour, SurfaceMesh
 _LEVEL_COSINE = np.sqrt(0.5)
 """A contact whose normal points up by more than this is one of the top."""
 _LEAST_WALL_CONTACTS = 6
+_FLAT_EAR = 1e-7
+"""Twice the area of an ear that counts as flat, as a share of the squared extent of the polygon."""
 _CORNER_TURN = 0.15
 _FOOT_SIGMA_m = 1e-4
 _VERTEX_SPACING = 2.0
@@ -239,15 +241,20 @@ def _extruded(ring_m: Array, bottom_m: float, top_m: float) -> FacetMesh:
 def ear_triangles(ring_m: Array) -> Indices:
     """Triangles that fill a simple counter-clockwise polygon of shape (n, 2): ears cut off, the roundest first.
 
+    Flat ears, on straight sides with points between their ends, are left for last: their halves would fall together.
+
     Raises:
         ShapeError: the polygon crosses itself.
     """
     left = list(range(len(ring_m)))
+    flat_m2 = _FLAT_EAR * float(np.ptp(ring_m, axis=0).max()) ** 2
     triangles = []
     while len(left) > 3:
         corners = np.array(left)
         before, after = np.roll(corners, 1), np.roll(corners, -1)
-        ears = _ears(ring_m, before, corners, after)
+        ears = _ears(ring_m, before, corners, after, flat_m2)
+        if not ears.any():
+            ears = _ears(ring_m, before, corners, after, 0.0)
         if not ears.any():
             raise ShapeError("the outline crosses itself", hint="More contacts would help")
         spans = np.where(ears, np.linalg.norm(ring_m[after] - ring_m[before], axis=1), np.inf)
@@ -257,14 +264,17 @@ def ear_triangles(ring_m: Array) -> Indices:
     return np.array([*triangles, tuple(left)], dtype=np.int64)
 
 
-def _ears(ring_m: Array, before: Indices, corners: Indices, after: Indices) -> Array:
-    """Whether each corner can be cut off: it turns left, and no other corner lies in its triangle."""
+def _ears(ring_m: Array, before: Indices, corners: Indices, after: Indices, least_m2: float) -> Array:
+    """Whether each corner can be cut off: it turns left, and no other corner lies in its triangle or on its sides.
+
+    Below ``least_m2``, of twice a triangle's area, three points lie on a line.
+    """
     a, b, c = ring_m[before], ring_m[corners], ring_m[after]
-    ears = _turn(a, b, c) > 0
+    ears = _turn(a, b, c) > least_m2
     for ear in np.flatnonzero(ears):
         points = ring_m[corners]
         sides = [_turn(p[ear], q[ear], points) for p, q in ((a, b), (b, c), (c, a))]
-        within = np.minimum.reduce(sides) >= 0
+        within = np.minimum.reduce(sides) >= -least_m2
         within[[ear, ear - 1, (ear + 1) % len(corners)]] = False
         ears[ear] = not within.any()
     return np.asarray(ears)

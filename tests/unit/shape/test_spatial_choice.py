@@ -146,6 +146,20 @@ def test_ears_fill_a_polygon_that_is_not_convex() -> None:
     assert sum(areas) == pytest.approx(polygon_area(outline))
 
 
+@pytest.mark.parametrize("turn_rad", [0.0, 0.3, 1.2, 2.8])
+def test_ears_leave_no_slivers_on_straight_sides_that_many_points_lie_on(turn_rad: float) -> None:
+    corners = np.array([[0.04, -0.03], [0.0, 0.05], [-0.045, -0.028]])
+    shares = np.linspace(0.0, 1.0, 28)[:-1, None]
+    ring = np.vstack(
+        [(1 - shares) * a + shares * b for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    )
+    cosine, sine = np.cos(turn_rad), np.sin(turn_rad)
+    ring = ring @ np.array([[cosine, sine], [-sine, cosine]])
+    triangles = ear_triangles(ring)
+    assert min(polygon_area(ring[triangle]) for triangle in triangles) > 1e-8
+    assert len(triangles) == len(ring) - 2
+
+
 def test_an_outline_that_crosses_itself_can_not_be_filled() -> None:
     with pytest.raises(ShapeError, match="crosses itself"):
         ear_triangles(np.array([[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.0], [-1.0, 1.0], [3.0, 1.5]]))
