@@ -245,7 +245,7 @@ class JointTracker:
         """All contacts of the grasp left out: the motion model alone says where the object is."""
         last = hypothesis.map.placed[-1]
         row = self._space.compose(self._motion, last.row)
-        covariance = last.covariance + np.diag(self._space.sigmas(self._noise) ** 2)
+        covariance = last.covariance + np.diag(self._space.sigmas(self._noise.after(self._motion)) ** 2)
         grasp = PlacedGrasp(contacts, row, covariance, self._motion).put_aside()
         longer = hypothesis.map.with_grasp(grasp)
         return replace(hypothesis, map=longer, left_out=self._judge.price(longer))
@@ -269,7 +269,9 @@ class JointTracker:
 
     def _proposed(self, hypothesis: Hypothesis, contacts: ContactSet) -> list[Hypothesis]:
         """Continuations of a hypothesis, rated contact by contact only."""
-        noise = self._noise.accumulated(1 + hypothesis.map.trailing_unplaced)
+        unplaced, placed = hypothesis.map.trailing_unplaced, hypothesis.map.placed
+        motions = np.array([self._motion, *(grasp.motion for grasp in placed[len(placed) - unplaced :])])
+        noise = self._noise.after(motions).accumulated(1 + unplaced)
         predicted = self._space.compose(self._motion, hypothesis.map.placed[-1].row)
         fitted = hypothesis.map.fit()
         rows, fit = propose(predicted, contacts, fitted, noise, self._settings.proposals, self._space)

@@ -19,20 +19,35 @@ class MotionNoise(StrictModel):
     """Standard deviations of what the object does beside the hand's motion, per re-orientation.
 
     The defaults are the thesis's 100 % (section 3.4.1): 10 mm per axis and 20 degrees.
+
+    Attributes:
+        translation_m, rotation_rad: per axis, and about the vertical.
+        left_lying: share of these that remains where the hand did not carry the object between two grasps and the
+            closing hand alone may have pushed it. 1 where objects are moved by others than the hand as well.
     """
 
     translation_m: float = Field(default=0.010, gt=0)
     rotation_rad: float = Field(default=float(np.deg2rad(20.0)), gt=0)
+    left_lying: float = Field(default=1.0, gt=0, le=1)
 
     @property
     def sigmas(self) -> Array:
         """Standard deviations of x, y (m) and yaw (rad)."""
         return np.array([self.translation_m, self.translation_m, self.rotation_rad])
 
+    def after(self, motions: Array) -> MotionNoise:
+        """The noise of one step after the hand's motions, rows or one row: less where it did not move the object."""
+        if np.any(motions):
+            return self
+        factor = self.left_lying
+        scaled = {"translation_m": factor * self.translation_m, "rotation_rad": factor * self.rotation_rad}
+        return self.model_copy(update=scaled)
+
     def accumulated(self, steps: int) -> MotionNoise:
         """The noise of several re-orientations without a measurement between them."""
         factor = float(np.sqrt(steps))
-        return MotionNoise(translation_m=factor * self.translation_m, rotation_rad=factor * self.rotation_rad)
+        translation_m, rotation_rad = factor * self.translation_m, factor * self.rotation_rad
+        return self.model_copy(update={"translation_m": translation_m, "rotation_rad": rotation_rad})
 
 
 def pose_row(world_T_object: Pose2) -> Array:

@@ -39,8 +39,9 @@ class MotionCost:
                 nothing. None: always.
         """
         self._motions, self._space = motions, space
-        certainty = np.ones(len(motions)) if follows is None else follows.astype(float)
-        self._weights = np.maximum(certainty, _HARDLY)[1:, None] / space.sigmas(noise)
+        certainty = np.ones(len(motions)) if follows is None else np.where(follows, 1.0, _HARDLY)
+        certainty = np.where(motions.any(axis=1), certainty, certainty / noise.left_lying)
+        self._weights = certainty[1:, None] / space.sigmas(noise)
 
     @classmethod
     def of(cls, contact_map: ContactMap, noise: MotionNoise) -> Self:
@@ -104,6 +105,5 @@ def estimated_noise(contact_map: ContactMap, configured: MotionNoise) -> MotionN
     freedom = np.array([translations, size - translations])
     variance = (_CONFIGURED_SLIPS + np.sum(slips**2, axis=0) / freedom) / (_CONFIGURED_SLIPS + len(slips))
     ratio = np.sqrt(variance)
-    return MotionNoise(
-        translation_m=float(configured.translation_m * ratio[0]), rotation_rad=float(configured.rotation_rad * ratio[1])
-    )
+    translation_m, rotation_rad = float(configured.translation_m * ratio[0]), float(configured.rotation_rad * ratio[1])
+    return configured.model_copy(update={"translation_m": translation_m, "rotation_rad": rotation_rad})

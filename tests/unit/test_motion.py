@@ -20,6 +20,8 @@ from tactile_lab.tracking.motion import (
     row_pose_in_space,
     sample_motion,
 )
+from tactile_lab.tracking.motion_cost import MotionCost
+from tactile_lab.tracking.pose_rows import PLANAR
 
 rows = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-3.0, 3.0)).map(np.array)
 
@@ -80,3 +82,17 @@ def test_a_row_in_space_stands_at_the_given_height() -> None:
     pose = row_pose_in_space(pose_row(Pose2(0.1, 0.2, 0.3)), 0.022)
     assert np.allclose(pose.translation(), [0.1, 0.2, 0.022])
     assert pose.rotation().yaw() == pytest.approx(0.3)
+
+
+def test_an_object_that_was_left_lying_is_expected_where_it_was() -> None:
+    noise = MotionNoise(translation_m=0.01, rotation_rad=0.1, left_lying=0.2)
+    still, carried = np.zeros(3), np.array([0.0, 0.05, 0.5])
+    assert np.allclose(noise.after(still).sigmas, 0.2 * noise.sigmas)
+    assert noise.after(np.array([still, carried])) == noise  # of several motions one moved it
+    assert noise.after(still).accumulated(4).translation_m == pytest.approx(0.004)
+    slip = np.array([0.004, 0.0, 0.0])
+    costs = [
+        MotionCost(np.array([still, motion]), noise, PLANAR).value(np.array([still, compose(motion, still) + slip]))
+        for motion in (still, carried)
+    ]
+    assert costs == pytest.approx([0.5 * 2.0**2, 0.5 * 0.4**2])
