@@ -275,19 +275,16 @@ class JointTracker:
         predicted = self._space.compose(self._motion, hypothesis.map.placed[-1].row)
         fitted = hypothesis.map.fit()
         rows, fit = propose(predicted, contacts, fitted, noise, self._settings.proposals, self._space)
-        free = contacts.free_m
-        places, _ = self._space.to_object(rows[:, None], free, free)
+        places, _ = self._space.to_object(rows[:, None], contacts.free_m, contacts.free_m)
         intrusions = hypothesis.intrusion + free_space_costs(fitted, places)
-        grasps = [
-            PlacedGrasp(contacts, row, covariance, self._motion)
-            for row, covariance in zip(rows, np.linalg.inv(fit.information), strict=True)
-        ]
-        return [
-            Hypothesis(
-                hypothesis.map.with_grasp(grasp), hypothesis.misfit + float(misfit), float(free), hypothesis.left_out
+        found = zip(rows, np.linalg.inv(fit.information), fit.cost, intrusions, strict=True)
+        proposed = []
+        for row, covariance, misfit, intrusion in found:
+            longer = hypothesis.map.with_grasp(PlacedGrasp(contacts, row, covariance, self._motion))
+            proposed.append(
+                Hypothesis(longer, hypothesis.misfit + float(misfit), float(intrusion), hypothesis.left_out)
             )
-            for grasp, misfit, free in zip(grasps, fit.cost, intrusions, strict=True)
-        ]
+        return proposed
 
     def _likeliest(self, hypotheses: list[Hypothesis], count: int) -> list[Hypothesis]:
         return likeliest(hypotheses, count, self._settings.evidence_gap)
