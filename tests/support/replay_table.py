@@ -41,9 +41,9 @@ RIGS = "sim,sim-biotac,sim-wire,sim-wire-biotac"
 HEAD = """## Replay of all rigs and objects
 
 `python -m tests.support.replay_table --into docs/results.md`: a session of two grasps, seed 1, for every rig and
-object (on wires of one, the first box of two, in real time: `--rigs sim-wire,sim-wire-biotac --grasps 1`), and its replay
-as fast as possible. Samples: all that the decoders gave, in order, compared bit by bit. Results: trajectory, contacts,
-contour or surface, and the estimation's own record, compared byte by byte.
+object (on wires of one, the first box of two, in real time: `--rigs sim-wire,sim-wire-biotac --grasps 1`), and its
+replay as fast as possible. Samples: all that the decoders gave, in order, compared bit by bit. Results: trajectory,
+contacts, contour or surface, and the estimation's own record, compared byte by byte.
 
 | Rig | Object | Samples | Are the same | Results | Bytes read, times the original pace |
 |---|---|---:|---|---|---:|

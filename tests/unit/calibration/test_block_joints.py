@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gtsam import Pose3
 
-from calibration.block_plan import CLEAR_m, FINGERS, load_block, plan_block
+from calibration.block_plan import FINGERS, CLEAR_m, load_block, plan_block
 from calibration.block_problem import BlockResult, BlockSettings, BlockWizard, is_of_block, solve_block
 from calibration.forearm import ForearmCalibration
 from calibration.geometry import Block
@@ -62,7 +62,9 @@ def test_offsets_are_told_or_named_and_their_sigmas_tell_so() -> None:
             (offset.offset_rad - rig.bias_rad[JOINT_INDEX[joint]]) / offset.sigma_rad
             for joint, offset in found.offsets.items()
         ]
-    assert {joint for joint in told if told.count(joint) == 4} == {f"{finger}{joint}" for finger in FINGERS for joint in ("J4", "J3")}
+    assert {joint for joint in told if told.count(joint) == 4} == {
+        f"{finger}{joint}" for finger in FINGERS for joint in ("J4", "J3")
+    }
     assert not {f"{finger}J1" for finger in FINGERS} & set(told)
     assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.4
     assert np.abs(off).max() < 4.0
