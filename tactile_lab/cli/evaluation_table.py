@@ -74,9 +74,10 @@ def _verdict(content: Mapping[str, Any]) -> Text:
     error_mm = content.get("registration_rms_mm")
     if error_mm is None:
         return Text("not known without truth")
+    without = "" if content.get("own_turns") is None else ", turns about its axis left out"
     if error_mm <= FAILURE_LIMIT_MM:
-        return Text(f"passed: at most {FAILURE_LIMIT_MM:g} mm", style="green")
-    return Text(f"failed: above {FAILURE_LIMIT_MM:g} mm", style="bold red")
+        return Text(f"passed: at most {FAILURE_LIMIT_MM:g} mm{without}", style="green")
+    return Text(f"failed: above {FAILURE_LIMIT_MM:g} mm{without}", style="bold red")
 
 
 def _grid(titles: tuple[str, ...], *notes: str) -> Table:

@@ -25,6 +25,7 @@ from tactile_lab.evaluation.figures import (
     UncertaintyFigures,
 )
 from tactile_lab.evaluation.loops import wrong_loops
+from tactile_lab.evaluation.own_turns import own_turns, without_own_turns
 from tactile_lab.evaluation.plain import json_text, plain
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM, registration_rms_mm
 from tactile_lab.evaluation.reservations import reservations
@@ -71,6 +72,8 @@ class Evaluation:
         shape: errors with that alignment.
         shape_best_fit: errors after the best rigid alignment.
         registration_rms_mm: see :func:`tactile_lab.evaluation.registration.registration_rms_mm`.
+        own_turns: turns about its axis that leave the object as it is and do not count in the registration, see
+            :func:`tactile_lab.evaluation.own_turns.own_turns`; None for none.
         uncertainty: see :class:`UncertaintyFigures`; None without a shape.
         sensing: see :class:`SensingFigures`; None without sightings or mesh.
         failed: the object was lost or the registration error is above 5 mm; None when neither is known.
@@ -90,6 +93,7 @@ class Evaluation:
     uncertainty: UncertaintyFigures | None
     pose: PoseErrors | None
     registration_rms_mm: float | None
+    own_turns: int | None
     sensing: SensingFigures | None
     failed: bool | None
     loops: LoopFigures
@@ -128,7 +132,9 @@ def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
         raise SessionError(counts, where=str(folder), hint="Replay the session to renew its results")
     shape, incomparable = _shape(folder, results, truth)
     points = [rows.points_world_m for rows in contacts]
-    registration_mm = registration_rms_mm(points, poses, truth.world_T_object, results.dimension)
+    turns = None if truth.mesh is None else own_turns(truth.mesh)
+    told = poses if turns is None else without_own_turns(poses, truth.world_T_object, turns)
+    registration_mm = registration_rms_mm(points, told, truth.world_T_object, results.dimension)
     seen = sum(pose is not None for pose in truth.world_T_object)
     shape_known = truth.mesh is not None or truth.outline_m is not None
     return Evaluation(
@@ -145,6 +151,7 @@ def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
         uncertainty=_uncertainty(results.sigma_quantiles_m),
         pose=pose_errors(poses, truth.world_T_object),
         registration_rms_mm=registration_mm,
+        own_turns=turns,
         sensing=_sensing(results, truth),
         failed=_failed(str(results.slam["status"]), registration_mm),
         loops=_loops(results, truth),

@@ -92,7 +92,8 @@ def _verdict(evaluation: Mapping[str, Any]) -> str:
     if evaluation.get("registration_rms_mm") is None:
         return NEEDS_TWO
     passed = evaluation["registration_rms_mm"] <= FAILURE_LIMIT_MM
-    return f"{'passed: at most' if passed else 'failed: above'} {FAILURE_LIMIT_MM:g} mm"
+    without = "" if evaluation.get("own_turns") is None else "; turns about its own axis left out"
+    return f"{'passed: at most' if passed else 'failed: above'} {FAILURE_LIMIT_MM:g} mm{without}"
 
 
 def _loop_note(loops: Mapping[str, Any]) -> str:

@@ -28,18 +28,6 @@ DATA_VARIABLE = "TACTILE_LAB_DATA"
 YCB_PREFIX = "ycb:"
 YCB_NAMES = ("cracker_box", "mug", "mustard_bottle", "tomato_soup_can")
 
-ANY_TURN = 0
-
-OWN_TURNS: Mapping[str, int] = {
-    "cylinder": ANY_TURN,
-    "sphere": ANY_TURN,
-    "bottle": ANY_TURN,
-    YCB_PREFIX + "tomato_soup_can": ANY_TURN,
-    "hexagonal-prism": 6,
-}
-"""Solids that look the same after turns about their vertical axis smaller than three slips of full noise: any turn, or
-so many in a full one. No contact can tell such turns apart."""
-
 _MUG_GRID_m = 0.0015
 
 

@@ -62,9 +62,9 @@ class SweptBench:
 
 @dataclass
 class Outcome:
-    """What came of one run: the health's words without figures, the error that ended it, and samples taken."""
+    """What came of one run: the health's words, by what they are without figures; why it ended; samples taken."""
 
-    words: set[str]
+    words: dict[str, str]
     stopped: TactileLabError | None
     samples: int
 
@@ -75,7 +75,7 @@ def _without_figures(text: str) -> str:
 
 def run(bench: SweptBench, driver: SweptDriver) -> Outcome:
     """Run a connected driver for the sweep's number of cycles, or until it stops."""
-    words: set[str] = set()
+    words: dict[str, str] = {}
     samples = 0
     for _ in range(STEPS):
         bench.clock.sleep_until_ns(bench.clock.now_ns() + STEP_ns)
@@ -84,7 +84,7 @@ def run(bench: SweptBench, driver: SweptDriver) -> Outcome:
             samples += len(bench.use(driver))
         except (DeviceError, CodecError) as error:
             return Outcome(words, error, samples)
-        words |= {_without_figures(text) for text in driver.health()}
+        words.update({_without_figures(text): text for text in driver.health()})
     return Outcome(words, None, samples)
 
 
@@ -145,9 +145,10 @@ class DriverSweep:
         driver.connect()
         link.armed = True
         outcome = run(bench, driver)
-        new = outcome.words - clean.words
+        new = outcome.words.keys() - clean.words.keys()
         record_property("injected", link.injected)
-        record_property("counted", "; ".join(sorted(new)) or str(outcome.stopped or "nothing"))
+        counted = "; ".join(outcome.words[each] for each in sorted(new))
+        record_property("counted", counted or str(outcome.stopped or "nothing"))
         assert link.injected > 0, "the fault never struck"
         self._judge(fault_name, outcome, new, clean)
         driver.close()
