@@ -56,7 +56,7 @@ class Positioner:
     def _reset(self) -> None:
         """As new: nothing received, nothing sent."""
         self._heard: int | None = None
-        self._sequence = QUESTION
+        self._before = self._sequence = QUESTION
         self._last: PositionerSample | None = None
         self._sent = self._target = np.zeros(6)
         self._sent_ns = self._clock.now_ns()
@@ -168,6 +168,7 @@ class Positioner:
         if behind == 0 or (behind < _BEGINS_ANEW and self._heard != QUESTION):
             self._counters.late += behind > 0
             return None
+        self._count_left_out(status.sequence)
         self._heard = status.sequence
         return PositionerSample(datagram.stamp_ns, status.q)
 
@@ -176,7 +177,7 @@ class Positioner:
         if not self._counters.lost_in_a_row:
             self._sent = self._step_towards_target((now_ns - self._sent_ns) / NANOSECONDS)
         self._sent_ns = now_ns
-        self._sequence = self._sequence % LARGEST_SEQUENCE + 1
+        self._before, self._sequence = self._sequence, self._sequence % LARGEST_SEQUENCE + 1
         self._link.send(encode_command(PositionerCommand(self._sequence, self._sent)))
         self._counters.cycles += 1
 
@@ -196,7 +197,18 @@ class Positioner:
 
     # --- what can go wrong -------------------------------------------------------------------------------------
 
+    def _count_left_out(self, newest: int) -> None:
+        """Statuses between the newest and the one before it that never came, and did not count as overdue."""
+        if self._heard is None or self._heard == QUESTION:
+            return
+        left_out = (newest - self._heard) % LARGEST_SEQUENCE - 1  # numbers begin at 1
+        if left_out < _BEGINS_ANEW:
+            self._counters.lost += max(left_out - self._counters.lost_in_a_row, 0)
+
     def _count_loss(self) -> None:
+        """A cycle without a status; while the command before is answered, the answer to this one is on its way."""
+        if self._heard == self._before:
+            return
         self._counters.lost += 1
         self._counters.lost_in_a_row += 1
         if self._counters.lost_in_a_row >= self._settings.lost_limit and self._fault is None:

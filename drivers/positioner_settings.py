@@ -73,8 +73,8 @@ class PositionerCounters:
 
     Attributes:
         cycles: exchanges.
-        lost: exchanges without a new status.
-        lost_in_a_row: the present run of them.
+        lost: commands whose status never came; until another one tells, cycles in which one is overdue.
+        lost_in_a_row: the present run of such cycles.
         malformed: messages that were no status.
         late: statuses that came behind newer ones, and were left alone.
     """

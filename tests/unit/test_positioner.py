@@ -39,7 +39,7 @@ class FakeBase:
         self.clock = clock
         self.q: Array = np.array([0.1, 0.0, 0.4, 0.0, 0.5, 0.0])
         self.commands: list[PositionerCommand] = []
-        self.mute = self.frozen = False
+        self.mute = self.frozen = self.slow = False
         self.wall_x_m = 9.0
         self.garbage = b""
         self._waiting: list[Datagram] = []
@@ -56,6 +56,8 @@ class FakeBase:
             self._waiting.append(Datagram(answer, self.clock.now_ns()))
 
     def read(self) -> list[Datagram]:
+        if self.slow:
+            return []
         waiting, self._waiting = self._waiting, []
         return waiting
 
@@ -262,9 +264,21 @@ def test_while_no_status_comes_the_ramp_waits(rig: Rig, trouble: str) -> None:
     assert any("cycles lost" in problem for problem in rig.device.health())
 
 
+def test_a_status_that_takes_up_to_a_cycle_is_not_lost_and_one_that_never_comes_is(rig: Rig) -> None:
+    for slow in (False, True, False, True, False, False):
+        rig.base.slow = slow
+        rig.run(1)
+    assert rig.device.counters.lost == 0
+    rig.base.mute = True
+    rig.run(2)
+    rig.base.mute = False
+    rig.run(2)
+    assert rig.device.counters.lost == 2
+
+
 def test_ten_lost_cycles_stop_the_positioner_and_the_next_exchange_says_so(rig: Rig) -> None:
     rig.base.mute = True
-    rig.run(10)
+    rig.run(11)  # the first answer may be on its way
     with pytest.raises(DeviceError, match="base: stopped after 10 cycles in a row without a status"):
         rig.run(1)
     rig.base.mute = False
