@@ -39,6 +39,8 @@ from tactile_lab.rigs.laboratory import open_laboratory
 from tactile_lab.rigs.stream_watch import StreamWatch, in_words
 
 LISTEN_ns = 500_000_000
+SETTLE_ns = 500_000_000
+"""Before that: what is done for the first time takes longer than a cycle."""
 _NOISY = 6.0
 """How many times the calibrated noise a still force sensor may show."""
 
@@ -89,8 +91,11 @@ def _devices(rig: Rig, seed: int, move: bool) -> list[Finding]:
             names = _names_told(bench)
             try:
                 bench.connect()
+                bench.run(SETTLE_ns)
+                before = _cycles_and_losses(bench)
                 bench.run(LISTEN_ns)
-                return _findings(bench, watch, names, rig.description.devices)
+                shares = _shares_lost(before, _cycles_and_losses(bench))
+                return _findings(bench, watch, names, rig.description.devices, shares)
             finally:
                 bench.close()
     except DeviceError as error:
@@ -120,9 +125,29 @@ def _names_told(bench: Bench) -> TactileNames:
     return names
 
 
-def _findings(bench: Bench, watch: StreamWatch, names: TactileNames, serials: Mapping[str, str]) -> list[Finding]:
+def _cycles_and_losses(bench: Bench) -> dict[str, tuple[int, int]]:
+    """Cycles so far, and how many of them were lost, of the hand and the positioner where they count."""
+    found = {}
+    if isinstance(bench.hand, HandProcess):
+        counts = bench.hand.report()["hand"]
+        found[HAND_LINK] = counts["cycles"], counts["lost"]
+    elif isinstance(bench.hand, ShadowHand):
+        found[HAND_LINK] = bench.hand.counters.cycles, bench.hand.counters.lost
+    if isinstance(bench.base, Positioner):
+        found[BASE_LINK] = bench.base.counters.cycles, bench.base.counters.lost
+    return found
+
+
+def _shares_lost(before: Mapping[str, tuple[int, int]], after: Mapping[str, tuple[int, int]]) -> dict[str, float]:
+    """Of the cycles in between, by link."""
+    return {link: (lost - before[link][1]) / max(cycles - before[link][0], 1) for link, (cycles, lost) in after.items()}
+
+
+def _findings(
+    bench: Bench, watch: StreamWatch, names: TactileNames, serials: Mapping[str, str], shares: Mapping[str, float]
+) -> list[Finding]:
     bench.tare()
-    findings = [_hand(bench, watch), _base(bench, watch)]
+    findings = [_hand(bench, watch, shares.get(HAND_LINK, 0.0)), _base(bench, watch, shares.get(BASE_LINK, 0.0))]
     for finger in FINGERS:
         if isinstance(tip := bench.fingertips.get(finger), BioTac):
             findings.append(_biotac(tip, names, serials.get(fingertip_link(finger), "")))
@@ -133,41 +158,34 @@ def _findings(bench: Bench, watch: StreamWatch, names: TactileNames, serials: Ma
     return findings
 
 
-def _hand(bench: Bench, watch: StreamWatch) -> Finding:
+def _hand(bench: Bench, watch: StreamWatch, share: float) -> Finding:
     figures: Figures = watch.figures(HAND_LINK)
     words, losses, health = [in_words(figures)], tuple[str, ...](), bench.hand.health()
     if isinstance(bench.hand, HandProcess):
         report = bench.hand.report()
-        punctual, counts, health = report["punctuality"], report["hand"], tuple(report["health"])
+        punctual, health = report["punctuality"], tuple(report["health"])
         losses = EthercatCounts(**report["wire"]).problems()
         figures |= {"start_late_p50_us": punctual["median_us"], "start_late_p99_us": punctual["p99_us"]}
         words += [str(bench.hand.ready), f"starts late by {punctual['p99_us']:.0f} us (99 %)"]
         figures |= {"serial": str(bench.hand.ready.serial), "palm": bench.hand.ready.palm}
-        figures["lost_share"] = counts["lost"] / max(counts["cycles"], 1)
-    elif isinstance(bench.hand, ShadowHand):
-        counters = bench.hand.counters
-        figures["lost_share"] = counters.lost / max(counters.cycles, 1)
-        if bench.hand.newest is not None:
-            figures["spare_us"] = float(bench.hand.newest.idle_us)
+    elif isinstance(bench.hand, ShadowHand) and bench.hand.newest is not None:
+        figures["spare_us"] = float(bench.hand.newest.idle_us)
+    figures["lost_share"] = share
     if (warmest_C := bench.situation().warmest_C) is not None:
         figures["warmest_C"] = warmest_C
         words.append(f"warmest motor {warmest_C:.0f} C")
     if revisions := firmware(bench.observer.interpreter.newest[HAND_LINK].sample):
         figures["firmware"] = revisions
         words.append(f"firmware revision {revisions}")
-    share = float(figures.get("lost_share", 0.0))
     words.append(f"{100 * share:.1f} % of cycles lost")
     problems, remarks = told_losses(health, share, losses)
     return _finding("hand", problems, words + remarks, figures)
 
 
-def _base(bench: Bench, watch: StreamWatch) -> Finding:
+def _base(bench: Bench, watch: StreamWatch, share: float) -> Finding:
     place = ", ".join(f"{value:.3f}" for value in bench.perception.base_q[:3])
     figures = watch.figures(BASE_LINK)
-    problems, remarks = _problems(bench.base), list[str]()
-    if isinstance(bench.base, Positioner):
-        counters = bench.base.counters
-        problems, remarks = told_losses(problems, counters.lost / max(counters.cycles, 1))
+    problems, remarks = told_losses(_problems(bench.base), share)
     return _finding("base", problems, [f"at {place} m", in_words(figures), *remarks], figures)
 
 
