@@ -11,6 +11,7 @@ import typer
 if TYPE_CHECKING:
     from drivers.biotac.normal_training import MethodErrors
 
+from tactile_lab.cli.calibrate_steps import OUTSIDE
 from tactile_lab.cli.options import Json, NoInput
 
 
@@ -48,10 +49,11 @@ def biotac(
     from all of it. A rig uses the file that its "calibration.normals" names. Rows without a normal are untouched ones,
     and tare the others.
 
-    Exit code 0: PASS; 1: FAIL, the file is written all the same; 2: the recording can not be used.
+    Exit code 0: PASS; 3: FAIL, what was learned is written beside the file; 2: the recording can not be used.
     """
     from dataclasses import asdict
 
+    from calibration.forearm_record import target_file
     from calibration.normals import calibrate_normals, normals_record
     from calibration.store import write_record
     from drivers.biotac.press_recording import read_presses
@@ -60,7 +62,9 @@ def biotac(
     del no_input
     found = calibrate_normals(read_presses(recording, normals), in_sensor_frame=sensor_frame)
     if out is not None:
-        write_record(out, normals_record(found, finger, station, serial=serial, notes=notes, earlier=out))
+        record = normals_record(found, finger, station, serial=serial, notes=notes, earlier=out)
+        out = target_file(out, record)
+        write_record(out, record)
     if as_json:
         rows = [asdict(row) for row in found.methods]
         emit_json({"file": str(out) if out else None, "passed": found.passed, "share": found.share, "methods": rows})
@@ -71,7 +75,7 @@ def biotac(
         say(f"learned: {found.share:.2f} of the median error of equation 2.24 with squeezed electrodes")
         say("PASS" if found.passed else "FAIL", "bold green" if found.passed else "bold red")
     if not found.passed:
-        raise typer.Exit(1)
+        raise typer.Exit(OUTSIDE)
 
 
 def _cells(row: MethodErrors) -> list[str]:

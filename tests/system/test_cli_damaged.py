@@ -62,10 +62,20 @@ def test_a_recording_cut_off_before_the_first_grasp(inside, session_copy, size):
     assert "0 of 3 grasps could be read" in answer.err
 
 
+def inside_a_chunk(content, wanted):
+    """The middle of the chunk of messages after a place of an MCAP file: what lies between chunks is read by nobody."""
+    place, chunk = 8, 0x06
+    while True:
+        kind, length = content[place], int.from_bytes(content[place + 1 : place + 9], "little")
+        if kind == chunk and place > wanted:
+            return place + 9 + length // 2
+        place += 9 + length
+
+
 def test_a_recording_damaged_in_the_middle(inside, session_copy):
     traffic = session_copy / "traffic.mcap"
     content = bytearray(traffic.read_bytes())
-    middle = int(0.7 * len(content))
+    middle = inside_a_chunk(content, int(0.7 * len(content)))
     content[middle : middle + 50] = bytes(50)
     traffic.write_bytes(content)
     answer = inside("session", "replay", session_copy, "--method", "odometry")
