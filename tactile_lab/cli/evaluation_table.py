@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tactile_lab.cli.console import counted, people, say
-from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
+from tactile_lab.evaluation.registration import registration_verdict
 
 UNKNOWN = "–"
 
@@ -74,10 +74,8 @@ def _verdict(content: Mapping[str, Any]) -> Text:
     error_mm = content.get("registration_rms_mm")
     if error_mm is None:
         return Text("not known without truth")
-    without = "" if content.get("own_turns") is None else ", turns about its axis left out"
-    if error_mm <= FAILURE_LIMIT_MM:
-        return Text(f"passed: at most {FAILURE_LIMIT_MM:g} mm{without}", style="green")
-    return Text(f"failed: above {FAILURE_LIMIT_MM:g} mm{without}", style="bold red")
+    passed, words = registration_verdict(error_mm, content.get("own_turns"))
+    return Text(words, style="green" if passed else "bold red")
 
 
 def _grid(titles: tuple[str, ...], *notes: str) -> Table:

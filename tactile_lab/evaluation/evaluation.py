@@ -133,7 +133,7 @@ def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
     shape, incomparable = _shape(folder, results, truth)
     points = [rows.points_world_m for rows in contacts]
     turns = None if truth.mesh is None else own_turns(truth.mesh)
-    told = poses if turns is None else without_own_turns(poses, truth.world_T_object, turns)
+    told = without_own_turns(poses, truth.world_T_object, turns)
     registration_mm = registration_rms_mm(points, told, truth.world_T_object, results.dimension)
     seen = sum(pose is not None for pose in truth.world_T_object)
     shape_known = truth.mesh is not None or truth.outline_m is not None

@@ -45,7 +45,7 @@ def own_turns(mesh: trimesh.Trimesh) -> int | None:
     return next((number for number in range(_MOST, _FEWEST - 1, -1) if stays(2 * np.pi / number)), None)
 
 
-def without_own_turns(estimate: Poses, world_T_object: Poses, turns: int) -> tuple[Pose3 | None, ...]:
+def without_own_turns(estimate: Poses, world_T_object: Poses, turns: int | None) -> tuple[Pose3 | None, ...]:
     """Estimated poses, turned about the object's axis towards the heading it truly has.
 
     The axis in the estimated object frame is where the estimates place the true axis, in the mean over all grasps. An
@@ -54,11 +54,11 @@ def without_own_turns(estimate: Poses, world_T_object: Poses, turns: int) -> tup
     Args:
         estimate: estimated poses, None where there is none.
         world_T_object: true poses, None where unknown.
-        turns: see :func:`own_turns`.
+        turns: see :func:`own_turns`; None leaves the poses as they are.
     """
     known = zip(estimate, world_T_object, strict=True)
     pairs = [(pose, truth) for pose, truth in known if pose is not None and truth is not None]
-    if not pairs or not all(_stands(truth) for _, truth in pairs):
+    if turns is None or not pairs or not all(stands(truth) for _, truth in pairs):
         return tuple(estimate)
     axis_m = np.mean([pose.transformTo(truth.translation()) for pose, truth in pairs], axis=0)
     heading = pairs[0][1].rotation().inverse() * pairs[0][0].rotation()
@@ -79,5 +79,6 @@ def _nearest_turn(estimated: Rot3, true: Rot3, turns: int) -> Rot3:
     return estimated * Rot3.Rz(step_rad * round((estimated.inverse() * true).yaw() / step_rad))
 
 
-def _stands(pose: Pose3) -> bool:
-    return bool(abs(pose.rotation().matrix()[2, 2] - 1.0) < _UPRIGHT)
+def stands(world_T_object: Pose3) -> bool:
+    """Whether an object's own axis is vertical."""
+    return bool(abs(world_T_object.rotation().matrix()[2, 2] - 1.0) < _UPRIGHT)

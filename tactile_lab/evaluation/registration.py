@@ -19,6 +19,18 @@ FAILURE_LIMIT_MM = 5.0
 """A run whose registration error is above this limit counts as failed."""
 
 
+def registration_verdict(error_mm: float, own_turns: int | None) -> tuple[bool, str]:
+    """Whether a run passes, and that in words.
+
+    Args:
+        error_mm: its registration error.
+        own_turns: see :func:`tactile_lab.evaluation.own_turns.own_turns`.
+    """
+    without = "" if own_turns is None else ", turns about its own axis left out"
+    passed = error_mm <= FAILURE_LIMIT_MM
+    return passed, f"{'passed: at most' if passed else 'failed: above'} {FAILURE_LIMIT_MM:g} mm{without}"
+
+
 def registration_rms_mm(
     contacts_world_m: Sequence[Array], estimate: Poses, truth: Poses, dimension: int
 ) -> float | None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
+from tactile_lab.evaluation.registration import registration_verdict
 
 UNKNOWN = "\u2013"
 NEEDS_TWO = "needs the true pose at two grasps"
@@ -91,9 +91,7 @@ def _sensing_note(sensing: Mapping[str, Any]) -> str:
 def _verdict(evaluation: Mapping[str, Any]) -> str:
     if evaluation.get("registration_rms_mm") is None:
         return NEEDS_TWO
-    passed = evaluation["registration_rms_mm"] <= FAILURE_LIMIT_MM
-    without = "" if evaluation.get("own_turns") is None else "; turns about its own axis left out"
-    return f"{'passed: at most' if passed else 'failed: above'} {FAILURE_LIMIT_MM:g} mm{without}"
+    return registration_verdict(evaluation["registration_rms_mm"], evaluation.get("own_turns"))[1]
 
 
 def _loop_note(loops: Mapping[str, Any]) -> str:

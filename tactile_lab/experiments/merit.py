@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from gtsam import Pose3
 
-from tactile_lab.evaluation.own_turns import own_turns, without_own_turns
+from tactile_lab.evaluation.own_turns import own_turns, stands, without_own_turns
 from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.experiments.planar_data import PlanarGrasps
 from tactile_lab.experiments.sensing import SimulatedGrasps
@@ -53,11 +52,10 @@ def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
     if isinstance(data, PlanarGrasps):
         shape = contour_figures(result.contour, data.outline_m)
     elif isinstance(data, SpatialGrasps):
-        shape = mesh_figures(result.mesh, data.mesh, upright=_upright(data.world_T_body))
+        shape = mesh_figures(result.mesh, data.mesh, upright=all(map(stands, data.world_T_body)))
     contacts = [grasp.points_world_m for grasp in data.grasps]
-    poses = result.world_T_object
-    if isinstance(data, SpatialGrasps) and (turns := own_turns(data.mesh)) is not None:
-        poses = without_own_turns(poses, data.world_T_body, turns)
+    turns = own_turns(data.mesh) if isinstance(data, SpatialGrasps) else None
+    poses = without_own_turns(result.world_T_object, data.world_T_body, turns)
     return {
         **shape,
         "registration_mm": registration_rms_mm(contacts, poses, data.world_T_body, result.dimension),
@@ -66,10 +64,6 @@ def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
         "untracked": sum(step.verdict == "untracked" for step in result.steps),
         "step_ms": [round(1e3 * seconds, 3) for seconds in result.step_seconds[1:]],
     }
-
-
-def _upright(world_T_body: tuple[Pose3, ...]) -> bool:
-    return all(abs(pose.rotation().matrix()[2, 2] - 1.0) < 1e-9 for pose in world_T_body)
 
 
 def _within(errors_m: Array, sigma_m: Array) -> float:
