@@ -19,6 +19,7 @@ from drivers.biotac.learned_normal import LearnedNormals
 from drivers.biotac.settings import BioTacCalibration, BioTacSettings, EllipsoidSkinSettings, load_biotacs
 from drivers.biotac.slot_codec import PALM_SLOT_BYTES, SLOT_BYTES, SLOTS, Channel, Slot, decode_slot, electrode_channel
 from drivers.fingertip import TipContact
+from drivers.shadow.tactile_names import TactileAnswers
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
 from tactile_lab.geometry.contacts import FINGERS, Array
@@ -28,17 +29,11 @@ _NOT_FITTED = "no sensor fitted: readings outside the converter's range"
 __all__ = ["BioTac", "BioTacCalibration", "BioTacSettings", "EllipsoidSkinSettings", "TactileReading", "load_biotacs"]
 
 
-class TactileReading(Protocol):
-    """The part of the hand's sample that belongs to the fingertips."""
+class TactileReading(TactileAnswers, Protocol):
+    """The same part of the hand's sample, and when it was taken."""
 
     @property
     def stamp_ns(self) -> int: ...
-    @property
-    def tactile_type(self) -> int: ...
-    @property
-    def tactile_valid(self) -> int: ...
-    @property
-    def tactile(self) -> bytes: ...
 
 
 class BioTac:

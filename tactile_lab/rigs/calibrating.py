@@ -25,11 +25,11 @@ from drivers.shadow.posture import LONG_FINGERS, TipEllipsoid
 from drivers.simulation.settings import HandBoard, ObjectStart
 from sessions.bench import Bench
 from sessions.calibration_station import Board, CalibrationStation, StationSettings
-from sessions.recorder import Recorder, TrafficSink
+from sessions.recorder import TrafficSink
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig
-from tactile_lab.rigs.laboratory import open_laboratory
+from tactile_lab.rigs.laboratory import connected_bench
 from tactile_lab.strict_yaml import StrictModel, load_model
 
 _ASIDE = ObjectStart(x_m=0.44, y_m=0.44, yaw_rad=0.0)
@@ -96,15 +96,10 @@ def forearm_wizard(
     rig = _prepared(request)
     plan, data = _plan(rig, request), _data(rig, request.method)
     wizard = ForearmWizard("touch" if request.method == "touch" else "marker", plan, data, request.settings.wizard)
-    with open_laboratory(rig, request.seed, "box-10x6x4") as laboratory:
-        bench = laboratory.bench(Recorder(onlooker))
-        bench.connect()
-        try:
-            station = _station(rig, request, data, bench)
-            yield wizard, station
-            station.close()
-        finally:
-            bench.close()
+    with connected_bench(rig, request.seed, "box-10x6x4", onlooker) as bench:
+        station = _station(rig, request, data, bench)
+        yield wizard, station
+        station.close()
 
 
 def _station(rig: Rig, request: ForearmRequest, data: ForearmData, bench: Bench) -> CalibrationStation:

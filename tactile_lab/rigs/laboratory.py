@@ -14,7 +14,7 @@ from drivers.simulation.mesh_object import MESH_PREFIX
 from drivers.simulation.objects import CATALOGUE, ObjectModel, object_model
 from drivers.simulation.world import SimulatedWorld, marker_settings
 from sessions.bench import Bench
-from sessions.recorder import Recorder
+from sessions.recorder import Recorder, TrafficSink
 from tactile_lab.clock import Clock, MonotonicClock
 from tactile_lab.rigs.build import build_bench, simulated_world
 from tactile_lab.rigs.description import Rig
@@ -119,6 +119,29 @@ def open_laboratory(rig: Rig, seed: int, object_name: str) -> Iterator[Simulated
         target_or_none, clock = object_model(object_name) if known else None, MonotonicClock()
         with preferred():
             yield WiredLaboratory(with_palm(rig, clock), clock, _markers(rig), target_or_none)
+
+
+@contextmanager
+def connected_bench(
+    rig: Rig, seed: int, object_name: str, onlooker: TrafficSink, *, first_move: bool | None = None
+) -> Iterator[Bench]:
+    """The connected devices of a rig, for a wizard; they are closed in the end.
+
+    Args:
+        rig, seed, object_name: see :func:`open_laboratory`.
+        onlooker: is shown what the devices say.
+        first_move: see :meth:`Laboratory.bench`.
+
+    Raises:
+        TactileLabError: as :func:`open_laboratory`; or a device does not connect.
+    """
+    with open_laboratory(rig, seed, object_name) as laboratory:
+        bench = laboratory.bench(Recorder(onlooker), first_move=first_move)
+        bench.connect()
+        try:
+            yield bench
+        finally:
+            bench.close()
 
 
 def _markers(rig: Rig) -> MarkerSettings:

@@ -15,12 +15,12 @@ from calibration.forearm import load_forearm
 from drivers.fingertip import FingertipCalibration, load_fingertips
 from drivers.shadow.posture import LONG_FINGERS
 from sessions.fingertip_station import FingertipStation, FingertipStationSettings
-from sessions.recorder import Recorder, TrafficSink
+from sessions.recorder import TrafficSink
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.calibrating import cleared, tip_shapes
 from tactile_lab.rigs.description import Rig, load_rig
-from tactile_lab.rigs.laboratory import open_laboratory
+from tactile_lab.rigs.laboratory import connected_bench
 from tactile_lab.strict_yaml import StrictModel
 
 
@@ -80,15 +80,10 @@ def fingertip_wizard(
     world_T_mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
     plan, data = plan_wrenches(request.finger, request.presses), _data(rig, request.finger)
     wizard = FingertipWizard(plan, data, before, request.settings.noise)
-    with open_laboratory(cleared(rig), request.seed, "box-10x6x4") as laboratory:
-        bench = laboratory.bench(Recorder(onlooker))
-        bench.connect()
-        try:
-            station = FingertipStation(bench, world_T_mount, tip_shapes(rig), request.settings.station)
-            yield wizard, station
-            station.close()
-        finally:
-            bench.close()
+    with connected_bench(cleared(rig), request.seed, "box-10x6x4", onlooker) as bench:
+        station = FingertipStation(bench, world_T_mount, tip_shapes(rig), request.settings.station)
+        yield wizard, station
+        station.close()
 
 
 def force_fingertips(rig: Rig, finger: str) -> dict[str, FingertipCalibration]:

@@ -26,12 +26,12 @@ from drivers.simulation.objects import object_model
 from drivers.simulation.settings import ObjectStart
 from sessions.calibration_station import CalibrationStation, StationSettings
 from sessions.held_hand import HeldHand
-from sessions.recorder import Recorder, TrafficSink
+from sessions.recorder import TrafficSink
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.calibrating import cleared, tip_shapes
 from tactile_lab.rigs.description import Rig, load_rig
-from tactile_lab.rigs.laboratory import open_laboratory
+from tactile_lab.rigs.laboratory import connected_bench
 from tactile_lab.strict_yaml import StrictModel, load, load_model
 
 BLOCK = "box-12x6x6"
@@ -148,13 +148,8 @@ def pose_wizard(
     """
     check_calibration(rig)
     plan = [PlannedPose(pose) for pose in poses if pose.unread]
-    with open_laboratory(rig, seed, BLOCK) as laboratory:
-        bench = laboratory.bench(Recorder(onlooker), first_move=False)
-        bench.connect()
-        try:
-            yield PoseSteps(plan, limits), HeldHand(bench)
-        finally:
-            bench.close()
+    with connected_bench(rig, seed, BLOCK, onlooker, first_move=False) as bench:
+        yield PoseSteps(plan, limits), HeldHand(bench)
 
 
 def from_touches(data: ForearmData, rig: Rig, settings: JointSettings) -> FoundJoints:
@@ -192,15 +187,10 @@ def joint_wizard(request: JointRequest, onlooker: TrafficSink) -> Iterator[tuple
         raise ConfigurationError(f"{', '.join(unknown)} can not press alone", where="--fingers", hint=hint)
     world_T_mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
     wizard = BlockWizard(plan_block(block, request.fingers, request.rounds), request.settings.block)
-    with open_laboratory(_with_block(rig, block), request.seed, BLOCK) as laboratory:
-        bench = laboratory.bench(Recorder(onlooker))
-        bench.connect()
-        try:
-            station = CalibrationStation(bench, world_T_mount, tips, request.settings.station)
-            yield wizard, station
-            station.close()
-        finally:
-            bench.close()
+    with connected_bench(_with_block(rig, block), request.seed, BLOCK, onlooker) as bench:
+        station = CalibrationStation(bench, world_T_mount, tips, request.settings.station)
+        yield wizard, station
+        station.close()
 
 
 def _block(rig: Rig, request: JointRequest) -> Block:
