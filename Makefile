@@ -27,10 +27,12 @@ check: $(READY)  ## Linters, types and the layer contract
 bench: $(READY)  ## Speed and memory, printed beside the reference
 	$(BIN)/tactile-lab bench
 
-EXPERIMENTS := methods-2d methods-3d methods-6dof random-contacts figure-2.7 figure-2.12 figure-3.12 figure-3.14 figure-3.15 figure-3.16 graph-stress
+METHODS := methods-2d methods-3d methods-6dof random-contacts graph-stress
+FIGURES := figure-2.7 figure-2.12 figure-3.12 figure-3.14 figure-3.15 figure-3.16
 
-results: $(READY)  ## All experiments over the reported seeds (hours), their tables and plots into docs/results.md
-	for name in $(EXPERIMENTS); do $(BIN)/tactile-lab experiment $$name --into docs/results.md || exit 1; done
+results: $(READY)  ## Methods and the thesis's figures over the reported seeds (hours), with tables and plots, into docs
+	for name in $(METHODS); do $(BIN)/tactile-lab experiment $$name --into docs/results.md || exit 1; done
+	for name in $(FIGURES); do $(BIN)/tactile-lab experiment $$name --into docs/thesis-figures.md || exit 1; done
 
 lock:  ## Resolve the dependencies again, with hashes
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-config \
