@@ -9,11 +9,11 @@ import yaml
 from pydantic import Field
 
 from calibration.admission import Installation
-from calibration.store import write_whole
 from drivers.fingertip import Vector3
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.strict_yaml import StrictModel, load, validate
+from tactile_lab.whole_files import write_whole
 
 Square3 = tuple[Vector3, Vector3, Vector3]
 Six = tuple[float, float, float, float, float, float]
@@ -67,5 +67,5 @@ def load_fingertip_data(path: Path, here: Installation) -> FingertipData:
 
 
 def save_fingertip_data(path: Path, data: FingertipData) -> None:
-    """Write wrenches as :func:`load_fingertip_data` reads them, whole or not at all. Raises ConfigurationError."""
+    """Write wrenches as :func:`load_fingertip_data` reads them, whole or not at all. Raises WriteError."""
     write_whole(path, yaml.safe_dump(data.model_dump(mode="json"), sort_keys=False))

@@ -12,7 +12,7 @@ import yaml
 from calibration.guided_steps import GuidedSteps
 from calibration.joints import JointLimits, JointPose, JointPoses
 from calibration.motion_check import Check, MotionReport
-from calibration.store import write_whole
+from tactile_lab.whole_files import write_whole
 
 
 @dataclass(frozen=True)
@@ -55,5 +55,5 @@ class PoseSteps(GuidedSteps[PlannedPose, JointPose]):
 
 
 def save_poses(path: Path, poses: Sequence[JointPose], rig: str) -> None:
-    """Write poses as :func:`calibration.joints.load_poses` reads them. Raises ConfigurationError."""
+    """Write poses as :func:`calibration.joints.load_poses` reads them. Raises WriteError."""
     write_whole(path, yaml.safe_dump(JointPoses(rig=rig, poses=tuple(poses)).model_dump(mode="json"), sort_keys=False))

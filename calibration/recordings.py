@@ -18,7 +18,6 @@ from pydantic import Field, RootModel
 
 from calibration.hand_eye import nearest_rotation
 from calibration.observations import HandPose, Plane, PosePair, Spot, Target, Touch, View
-from calibration.store import write_whole
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.markers import MarkerSettings
 from drivers.fingertip import RigidTransform, Vector3
@@ -26,6 +25,7 @@ from drivers.shadow.kinematics import JOINTS
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import FINGERS, Array
 from tactile_lab.strict_yaml import StrictModel, validate
+from tactile_lab.whole_files import write_whole
 
 FORMAT = "tactile-forearm-data/1"
 
@@ -158,7 +158,7 @@ def load_data(path: Path) -> ForearmData:
 
 
 def save_data(path: Path, data: ForearmData) -> None:
-    """Write observations, whole or not at all. Raises ConfigurationError."""
+    """Write observations, whole or not at all. Raises WriteError."""
     roll, pitch, yaw = data.guess.rotation().xyz()
     file = DataFile(
         rig=data.rig,

@@ -6,7 +6,6 @@ be used. Written whole or not at all; sealed with a hash of its content (:mod:`t
 
 from __future__ import annotations
 
-import os
 import platform
 from collections.abc import Mapping
 from contextlib import suppress
@@ -19,9 +18,11 @@ import yaml
 from pydantic import Field, field_validator
 
 from tactile_lab.calibration_file import SEAL, check_seal, is_stored, plain, seal_of
+from tactile_lab.clock import utc_text
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.strict_yaml import StrictModel, load, validate
+from tactile_lab.whole_files import write_whole
 
 Kind = Literal["forearm", "joints", "fingertips", "biotacs", "normals", "camera"]
 Verdict = Literal["PASS", "FAIL"]
@@ -141,13 +142,13 @@ def new_record(
 ) -> CalibrationRecord:
     """A record of now, by this version of the program; valid for ever when ``valid_days`` is None."""
     created = (now or datetime.now(UTC)).astimezone(UTC)
-    until = None if valid_days is None else _iso(created + timedelta(days=valid_days))
+    until = None if valid_days is None else utc_text(created + timedelta(days=valid_days))
     return CalibrationRecord(
         kind=kind,
         rig=rig,
         devices=dict(devices or {}),
         method=method,
-        created_utc=_iso(created),
+        created_utc=utc_text(created),
         valid_until_utc=until,
         software=software_versions(),
         parameters=plain(parameters) if isinstance(parameters, StrictModel) else dict(parameters),
@@ -164,34 +165,10 @@ def write_record(path: Path, record: CalibrationRecord, comment: str = "") -> No
     """Write a record, sealed, whole or not at all.
 
     Raises:
-        ConfigurationError: the file can not be written.
+        WriteError: the file can not be written.
     """
     head = "".join(f"# {line}\n" for line in comment.splitlines())
     write_whole(path, head + sealed_text(record), "Choose another file with --out")
-
-
-def write_whole(path: Path, text: str, hint: str = "Choose another file") -> None:
-    """Write a file, and its folder, whole or not at all.
-
-    Args:
-        hint: what to do when it can not be written.
-
-    Raises:
-        ConfigurationError: the file can not be written.
-    """
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with partial.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
-    except OSError as error:
-        raise ConfigurationError(f"can not be written ({error.strerror})", where=str(path), hint=hint) from error
-    finally:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
 
 
 def sealed_text(record: CalibrationRecord) -> str:
@@ -244,7 +221,3 @@ def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 
 _Dumper.add_representer(list, _list)
 _Dumper.add_representer(str, _text)
-
-
-def _iso(time: datetime) -> str:
-    return time.astimezone(UTC).isoformat(timespec="seconds")

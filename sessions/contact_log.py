@@ -25,6 +25,7 @@ from tactile_lab.strict_yaml import validate
 from tactile_lab.tracking.contact_checks import opposing_pairs
 from tactile_lab.tracking.contact_set import LARGEST_SLOPE
 from tactile_lab.tracking.first_pose import palm_heading
+from tactile_lab.whole_files import write_whole
 
 __all__ = ["FORMAT", "ContactLog", "MotionSigma", "ObjectTruth", "read_contact_log", "write_contact_log"]
 
@@ -91,7 +92,7 @@ def write_contact_log(path: Path, log: ContactLog) -> None:
 
     Raises:
         ConfigurationError: the log is empty or does not make sense.
-        SessionError: the file can not be written.
+        WriteError: the file can not be written.
     """
     poses = log.true_poses or (None,) * len(log.grasps)
     document = {
@@ -104,10 +105,7 @@ def write_contact_log(path: Path, log: ContactLog) -> None:
         "grasps": [_grasp_entry(grasp, pose, log) for grasp, pose in zip(log.grasps, poses, strict=True)],
     }
     validate(document, Document, where=str(path))
-    try:
-        path.write_text(json.dumps(document, indent=1, allow_nan=False), encoding="utf-8")
-    except OSError as error:
-        raise SessionError(f"can not be written ({error.strerror})", where=str(path), hint="Check the disk") from error
+    write_whole(path, json.dumps(document, indent=1, allow_nan=False))
 
 
 # --- reading -------------------------------------------------------------------------------------------------------

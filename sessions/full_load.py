@@ -26,7 +26,7 @@ from sessions.recorder import NullTraffic, Recorder, TrafficSink
 from sessions.session import create_session
 from sessions.traffic_disk import CutBackFile
 from sessions.traffic_settings import TrafficSettings
-from tactile_lab.errors import SessionError
+from tactile_lab.errors import TactileLabError
 from tactile_lab.geometry.contacts import FINGERS
 
 TICK_ns = 1_000_000
@@ -124,6 +124,7 @@ def run_load(root: Path, settings: LoadSettings, status_file: Path) -> None:
 
     Raises:
         SessionError: the recording can not be made, or failed.
+        WriteError: its folder can not be written.
     """
     status_file.write_bytes(bytes(_STATUS.size))
     with status_file.open("r+b") as file, mmap.mmap(file.fileno(), _STATUS.size) as shared:
@@ -230,7 +231,7 @@ def main() -> None:
     before_s = _cpu_s()
     try:
         run_load(options.root, LoadSettings(**json.loads(options.settings)), options.status)
-    except SessionError as error:
+    except TactileLabError as error:
         sys.exit(str(error))
     options.status.with_suffix(".cpu").write_text(str(_cpu_s() - before_s))
 

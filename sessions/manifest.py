@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import platform
-from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
@@ -15,6 +13,7 @@ from pydantic import Field
 from sessions.formats import converted_manifest
 from tactile_lab.errors import ConfigurationError, SessionError
 from tactile_lab.strict_yaml import StrictModel, load, loads, validate
+from tactile_lab.whole_files import write_whole
 
 Status = Literal["open", "closed", "interrupted", "failed", "recovered"]
 
@@ -104,13 +103,14 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
     """Write ``session.yaml`` so that at any moment either the old or the new one is there, whole.
 
     Raises:
-        SessionError: it can not be written, or holds something YAML has no word for.
+        SessionError: it holds something YAML has no word for.
+        WriteError: it can not be written.
     """
     try:
         text = yaml.dump(manifest.model_dump(), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=120)
     except yaml.YAMLError as error:
         raise SessionError(f"can not be put into YAML ({error})", where=str(folder / MANIFEST)) from error
-    write_whole(folder / MANIFEST, text.encode())
+    write_whole(folder / MANIFEST, text)
 
 
 def installed_versions() -> dict[str, str]:
@@ -137,18 +137,3 @@ def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 
 
 _Dumper.add_representer(str, _text)
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it is there whole or not at all. Raises SessionError."""
-    partial = path.with_name(path.name + ".part")
-    try:
-        with partial.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
-    except OSError as error:
-        with suppress(OSError):  # where the folder is none, either
-            partial.unlink(missing_ok=True)
-        raise SessionError(f"can not be written ({error.strerror})", where=str(path), hint="Check the disk") from error

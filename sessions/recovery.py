@@ -14,15 +14,16 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from sessions.manifest import MANIFEST, Manifest, manifest_from, read_manifest, write_manifest, write_whole
+from sessions.manifest import MANIFEST, Manifest, manifest_from, read_manifest, write_manifest
 from sessions.session import CALIBRATION, RESULTS, TRAFFIC, new_folder
 from sessions.session_ids import recovered_id
 from sessions.traffic import TrafficWriter
 from sessions.traffic_disk import being_written
 from sessions.traffic_reader import Loss, TrafficMessage, TrafficReader
 from sessions.traffic_settings import Attached, TrafficSettings
-from tactile_lab.clock import NANOSECONDS
+from tactile_lab.clock import NANOSECONDS, utc_text
 from tactile_lab.errors import SessionError
+from tactile_lab.whole_files import write_whole
 
 LAST_MOMENTS_s = 0.1
 """What a killed program can have recorded without its reaching the file."""
@@ -76,7 +77,8 @@ def recover(source: Path, root: Path | None = None) -> Recovery:
 
     Raises:
         SessionError: it is being recorded at this moment, is no session, holds nothing that can be read, or the new
-            folder can not be written.
+            folder can not be made.
+        WriteError: the new folder can not be written.
     """
     if being_written(source / TRAFFIC):
         raise SessionError("is being recorded", where=str(source), hint="Wait until that has ended")
@@ -193,7 +195,7 @@ def _count_again(folder: Path, written: Counter[str]) -> None:
 
 def _recovered_manifest(manifest: Manifest, folder: Path, written: Counter[str], recovery: Recovery) -> Manifest:
     lost = {f"lost {topic}": item.lost for topic, item in recovery.topics.items() if item.lost}
-    note = f"Recovered from {recovery.source.name} at {datetime.now(UTC).isoformat(timespec='seconds')}."
+    note = f"Recovered from {recovery.source.name} at {utc_text(datetime.now(UTC))}."
     described = recovery.loss.describe()
     return manifest.model_copy(
         update={

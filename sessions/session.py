@@ -28,7 +28,6 @@ from sessions.manifest import (
     installed_versions,
     read_manifest,
     write_manifest,
-    write_whole,
 )
 from sessions.raw_frames import Stamper
 from sessions.recorder import Recorder
@@ -37,7 +36,9 @@ from sessions.traffic import TrafficWriter
 from sessions.traffic_disk import being_written
 from sessions.traffic_reader import TrafficReader
 from sessions.traffic_settings import Attached, TrafficSettings
+from tactile_lab.clock import utc_text
 from tactile_lab.errors import SessionError
+from tactile_lab.whole_files import write_whole
 
 TRAFFIC, CALIBRATION, RESULTS, TRUTH_MESH = "traffic.mcap", "calibration", "results", "truth/object.ply"
 
@@ -148,7 +149,7 @@ class RunningSession(Session):
                 lost (gaps, late and dropped messages) is added.
 
         Raises:
-            SessionError: the folder can not be written.
+            WriteError: the folder can not be written.
         """
         if self.manifest.status != "open":
             return
@@ -162,7 +163,7 @@ class RunningSession(Session):
         self.manifest = self.manifest.model_copy(
             update={
                 "status": status,
-                "ended_utc": _iso(now or datetime.now(UTC)),
+                "ended_utc": utc_text(now or datetime.now(UTC)),
                 "counts": {**dict(sorted(streams.messages.items())), **(counts or {})},
                 "streams": streams.plain(),
                 "data_loss": {kind: number for kind, number in lost.items() if number},
@@ -212,6 +213,7 @@ def create_session(
 
     Raises:
         SessionError: the folder can not be made or a calibration file can not be read.
+        WriteError: the folder can not be written.
     """
     started = started or datetime.now(UTC)
     folder = new_folder(root, f"{started:%Y%m%d-%H%M%S}-{slug(rig)}-{slug(object_name)}")
@@ -226,7 +228,7 @@ def create_session(
         seeds=dict(seeds or {}),
         settings=dict(settings or {}),
         notes=notes,
-        started_utc=_iso(started),
+        started_utc=utc_text(started),
     )
     write_manifest(folder, manifest)
     (folder / RESULTS).mkdir()
@@ -281,7 +283,3 @@ def _read(path: Path) -> bytes:
 
 def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-def _iso(time: datetime) -> str:
-    return time.astimezone(UTC).isoformat(timespec="seconds")

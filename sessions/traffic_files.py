@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import errno
 from pathlib import Path
 
 from tactile_lab.errors import SessionError
+from tactile_lab.whole_files import disk_full, write_failure
 
 PROFILE = "tactile-lab"
 FORMAT = "tactile-traffic/2"
@@ -21,7 +21,6 @@ def disk_failure(path: Path, error: OSError | SessionError, kept: int) -> Sessio
     """The error that ends a recording, from what the system said; ``kept`` bytes of the file stay."""
     if isinstance(error, SessionError):
         return error
-    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-    what = "the disk is full" if full else f"can not be written ({error.strerror or error})"
-    advice = "free some space and start a new session" if full else "check the disk"
-    return SessionError(what, where=str(path), hint=f"The {kept} bytes recorded so far are kept; {advice}")
+    advice = "free some space and start a new session" if disk_full(error) else "check the disk"
+    hint = f"The {kept} bytes recorded so far are kept; {advice}"
+    return SessionError(write_failure(error), where=str(path), hint=hint)

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import time
+from datetime import UTC, datetime
 from typing import Protocol
 
 NANOSECONDS = 1_000_000_000
+
+
+def utc_text(time: datetime) -> str:
+    """A moment as all files write it: ISO 8601 in UTC, to the second."""
+    return time.astimezone(UTC).isoformat(timespec="seconds")
 
 
 class Clock(Protocol):

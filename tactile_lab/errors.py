@@ -7,6 +7,7 @@ TactileLabError                exit 1
  |- SafetyError                exit 1   a limit of the hand or the workspace was passed: the rig has stopped
  |- SessionError               exit 1   a session folder or its traffic file
  |   `- EstimationError                 the program itself failed while it estimated or planned
+ |- WriteError                 exit 1   a file that can not be written: a full disk, a folder one may not write to
  |- ShapeError                 exit 1   a mesh, contour or model that cannot be used
  |- TrackingError              exit 1   the object can not be followed any further
  `- InterruptionError          exit 130 a person ended the work before it was done
@@ -65,6 +66,10 @@ class SessionError(TactileLabError):
 
 class EstimationError(SessionError):
     """The estimation or the planning of a running session failed for a reason nobody foresaw; its notes say where."""
+
+
+class WriteError(TactileLabError):
+    """A file that can not be written."""
 
 
 class ShapeError(TactileLabError):

@@ -30,7 +30,6 @@ def sweep(
     from concurrent.futures import ProcessPoolExecutor
     from functools import partial
 
-    from sessions.manifest import write_whole
     from tactile_lab.cli.console import emit_json, say, show_table
     from tactile_lab.evaluation.sweep import (
         markdown_table,
@@ -40,6 +39,7 @@ def sweep(
         summary_titles,
         sweep,
     )
+    from tactile_lab.whole_files import write_whole
     from tactile_lab.workflow.sweeping import check_sweep, run_for_sweep
 
     del no_input
@@ -55,7 +55,7 @@ def sweep(
         emit_json([row.as_json() for row in rows])
     else:
         show_table("Median / 90 % below / maximum", summary_titles(), map(summary_cells, found))
-    write_whole(out / "table.md", markdown_table(found).encode())
+    write_whole(out / "table.md", markdown_table(found))
     say(f"table  {out / 'table.md'}")
     if all(row.evaluation is None for row in rows):
         raise typer.Exit(1)

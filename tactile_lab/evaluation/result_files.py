@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 
-from tactile_lab.errors import SessionError
 from tactile_lab.evaluation.plain import json_text, plain
 from tactile_lab.evaluation.prism import Triangles, open_ring, prism
 from tactile_lab.evaluation.tables import NANOSECOND_s, contacts_text, contour_text, pieces_text
@@ -32,6 +31,7 @@ from tactile_lab.shape.mesh_io import write_glb, write_ply
 from tactile_lab.shape.support import supported_mesh, supported_pieces
 from tactile_lab.shape.surface import Contour, SurfaceMesh
 from tactile_lab.slam_result import SlamResult, SlamStep
+from tactile_lab.whole_files import write_whole
 
 SCHEMA_VERSION = 1
 _LEAST_HEIGHT_m = 0.001
@@ -54,7 +54,7 @@ def write_results(
         largest_sigma_m: write what is known so well once more, apart; None for not.
 
     Raises:
-        SessionError: the folder cannot be written.
+        WriteError: the folder can not be written.
     """
     stamps_s = tuple(grasp.stamp_ns * NANOSECOND_s for grasp in grasps)
     texts = {
@@ -65,14 +65,10 @@ def write_results(
         "slam.json": json_text(_slam_record(result, settings or {})),
         "timing.json": json_text({"schema_version": SCHEMA_VERSION, "step_seconds": result.step_seconds}),
     }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in texts.items():
-            (folder / name).write_text(text, encoding="utf-8", newline="\n")
-        meshes = [*_write_mesh(folder, result, grasps), *_write_known_mesh(folder, result, largest_sigma_m)]
-        return [*(folder / name for name in texts), *meshes]
-    except OSError as error:
-        raise SessionError(f"results cannot be written ({error})", where=str(folder), hint="Check the disk") from error
+    for name, text in texts.items():
+        write_whole(folder / name, text)
+    meshes = [*_write_mesh(folder, result, grasps), *_write_known_mesh(folder, result, largest_sigma_m)]
+    return [*(folder / name for name in texts), *meshes]
 
 
 def _write_mesh(folder: Path, result: SlamResult, grasps: Sequence[Grasp]) -> list[Path]:

@@ -15,6 +15,7 @@ from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.runner import FORMAT, version
 from tactile_lab.experiments.study_plots import UNITS
 from tactile_lab.experiments.summary import Group, group_json, grouped, markdown, table
+from tactile_lab.whole_files import write_whole
 
 JSON_FILE, TABLE_FILE, PLOT_FILE, LINES_FILE = "results.json", "results.md", "plot.svg", "runs.jsonl"
 PICTURES = "pictures"
@@ -67,19 +68,15 @@ def write_report(study: Experiment, rows: Sequence[Row], folder: Path, jobs: int
     """Write the three files.
 
     Raises:
-        SessionError: the folder can not be written.
+        WriteError: the folder can not be written.
     """
     texts = {
         JSON_FILE: json.dumps(document(study, rows, jobs), indent=1, allow_nan=False) + "\n",
         TABLE_FILE: section(study, rows, jobs),
         PLOT_FILE: _plot(study, rows),
     }
-    try:
-        for name, text in texts.items():
-            (folder / name).write_text(text, encoding="utf-8")
-    except OSError as error:
-        hint = "Choose another folder with --out"
-        raise SessionError(f"can not be written ({error.strerror})", where=str(folder), hint=hint) from error
+    for name, text in texts.items():
+        write_whole(folder / name, text, "Choose another folder with --out")
 
 
 def insert_section(page: Path, study: Experiment, rows: Sequence[Row], jobs: int) -> None:
@@ -89,22 +86,22 @@ def insert_section(page: Path, study: Experiment, rows: Sequence[Row], jobs: int
     folder ``pictures`` beside the document.
 
     Raises:
-        SessionError: the document can not be read or written, or does not have the marks.
+        SessionError: the document can not be read, or does not have the marks.
+        WriteError: it, or the plot, can not be written.
     """
     begin, end = f"<!-- experiment {study.name} -->", f"<!-- end {study.name} -->"
     picture = Path(PICTURES) / f"{study.name}.svg"
     try:
         before, found, rest = page.read_text(encoding="utf-8").partition(begin)
-        _, closed, after = rest.partition(end)
-        if not (found and closed):
-            hint = f"Add the lines {begin} and {end} where the section belongs"
-            raise SessionError(f"has no place for {study.name}", where=str(page), hint=hint)
-        text = f"{section(study, rows, jobs)}\n![{study.sentence}]({picture.as_posix()})\n"
-        (page.parent / PICTURES).mkdir(exist_ok=True)
-        (page.parent / picture).write_text(_plot(study, rows), encoding="utf-8")
-        page.write_text(f"{before}{begin}\n\n{text}\n{end}{after}", encoding="utf-8")
     except OSError as error:
-        raise SessionError(f"can not be used ({error.strerror})", where=str(page)) from error
+        raise SessionError(f"can not be read ({error.strerror})", where=str(page), hint="Check the path") from error
+    _, closed, after = rest.partition(end)
+    if not (found and closed):
+        hint = f"Add the lines {begin} and {end} where the section belongs"
+        raise SessionError(f"has no place for {study.name}", where=str(page), hint=hint)
+    text = f"{section(study, rows, jobs)}\n![{study.sentence}]({picture.as_posix()})\n"
+    write_whole(page.parent / picture, _plot(study, rows))
+    write_whole(page, f"{before}{begin}\n\n{text}\n{end}{after}")
 
 
 def _plot(study: Experiment, rows: Sequence[Row]) -> str:

@@ -23,6 +23,7 @@ from typing import IO
 
 from tactile_lab.errors import SessionError, TactileLabError
 from tactile_lab.experiments.cells import Cell, Row, Work
+from tactile_lab.whole_files import write_whole
 
 FORMAT = "tactile-experiment/1"
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
@@ -71,7 +72,8 @@ def run_cells(
         finished: told about progress.
 
     Raises:
-        SessionError: the file belongs to another experiment, can not be read or written, or a process died.
+        SessionError: the file belongs to another experiment, can not be read, or a process died.
+        WriteError: the file can not be written.
     """
     settings = settings or RunnerSettings()
     known = _known_rows(name, file, settings.keep)
@@ -159,15 +161,9 @@ def _whole(lines: list[str]) -> list[str]:
 def _appending(name: str, file: Path, rows: list[Row]) -> IO[str]:
     """The file opened behind its head and the rows that stay."""
     head = {"format": FORMAT, "experiment": name, "version": version()}
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        fresh = file.with_suffix(".tmp")
-        fresh.write_text("".join(map(_line, [head, *(row.as_json() for row in rows)])), encoding="utf-8")
-        fresh.replace(file)
-        return file.open("a", encoding="utf-8")
-    except OSError as error:
-        hint = "Choose another folder with --out"
-        raise SessionError(f"can not be written ({error.strerror})", where=str(file), hint=hint) from error
+    lines = "".join(map(_line, [head, *(row.as_json() for row in rows)]))
+    write_whole(file, lines, "Choose another folder with --out")
+    return file.open("a", encoding="utf-8")
 
 
 def _line(document: object) -> str:

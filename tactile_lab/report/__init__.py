@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sessions.manifest import write_whole
 from sessions.session import RESULTS, Session
 from tactile_lab.report.gather import gather
 from tactile_lab.report.page import page
+from tactile_lab.whole_files import write_whole
 
 REPORT = "report.html"
 
@@ -22,10 +22,11 @@ def write(folder: Path, results: Path | None = None) -> Path:
         results: the folder of the results to show; the session's own when None.
 
     Raises:
-        SessionError: no session folder, no results yet, or the file cannot be written.
+        SessionError: no session folder, or no results yet.
         ShapeError: a mesh that cannot be read.
+        WriteError: the file can not be written.
     """
     results = results or folder / RESULTS
     path = results / REPORT
-    write_whole(path, page(gather(Session.open(folder), results)).encode())
+    write_whole(path, page(gather(Session.open(folder), results)))
     return path

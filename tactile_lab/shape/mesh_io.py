@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.surface import SurfaceMesh
+from tactile_lab.whole_files import write_whole
 
 SMALLEST_EXTENT_m, LARGEST_EXTENT_m = 0.005, 1.0
 """A hand can not explore objects outside this range; a mesh outside it is in other units."""
@@ -59,7 +60,7 @@ def write_ply(path: Path | str, mesh: SurfaceMesh) -> None:
     """Write a binary PLY with normals, colours and the vertex property ``sigma_m``; equal meshes give equal bytes.
 
     Raises:
-        ShapeError: the file can not be written.
+        WriteError: the file can not be written.
     """
     vertex_type = [(name, "<f8") for name in ("x", "y", "z")] + [(name, "<f4") for name in ("nx", "ny", "nz")]
     vertex_type += [(name, "u1") for name in ("red", "green", "blue", "alpha")] + [("sigma_m", "<f4")]
@@ -69,14 +70,14 @@ def write_ply(path: Path | str, mesh: SurfaceMesh) -> None:
         vertices[name] = column
     faces = np.empty(len(mesh.faces), dtype=[("count", "u1"), ("vertices", "<i4", (3,))])
     faces["count"], faces["vertices"] = 3, mesh.faces
-    _write(Path(path), _ply_header(vertex_type, len(vertices), len(faces)) + vertices.tobytes() + faces.tobytes())
+    write_whole(Path(path), _ply_header(vertex_type, len(vertices), len(faces)) + vertices.tobytes() + faces.tobytes())
 
 
 def write_glb(path: Path | str, mesh: SurfaceMesh) -> None:
     """Write a binary glTF with normals and colours by standard deviation; equal meshes give equal bytes.
 
     Raises:
-        ShapeError: the file can not be written.
+        WriteError: the file can not be written.
     """
     surface = trimesh.Trimesh(
         mesh.vertices,
@@ -86,7 +87,7 @@ def write_glb(path: Path | str, mesh: SurfaceMesh) -> None:
         process=False,
     )
     scene = trimesh.Scene(surface)
-    _write(Path(path), scene.export(file_type="glb", include_normals=True))  # type: ignore[no-untyped-call]
+    write_whole(Path(path), scene.export(file_type="glb", include_normals=True))  # type: ignore[no-untyped-call]
 
 
 def _load(path: Path) -> trimesh.Trimesh:
@@ -113,10 +114,3 @@ def _ply_header(vertex_type: list[tuple[str, str]], vertex_count: int, face_coun
     lines += [f"element vertex {vertex_count}", *(f"property {names[kind]} {name}" for name, kind in vertex_type)]
     lines += [f"element face {face_count}", "property list uchar int vertex_indices", "end_header"]
     return ("\n".join(lines) + "\n").encode("ascii")
-
-
-def _write(path: Path, content: bytes) -> None:
-    try:
-        path.write_bytes(content)
-    except OSError as error:
-        raise ShapeError(f"can not be written ({error.strerror})", where=str(path)) from error

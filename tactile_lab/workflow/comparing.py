@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from sessions.manifest import write_whole
 from sessions.marks import Mark, MarkKind
 from sessions.schemas import MARKS_TOPIC, TRANSFORMS_TOPIC
 from sessions.session import Session
@@ -25,6 +24,7 @@ from tactile_lab.evaluation.time_alignment import ClockOffset, Track, clock_offs
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.report.comparison_plot import comparison_svg
 from tactile_lab.rigs.description import rig_of_session
+from tactile_lab.whole_files import write_whole
 from tactile_lab.workflow.judging import TruthChoice, judge_results, marker_detector
 
 
@@ -107,11 +107,7 @@ def _folder(session: Session, name: str) -> Path:
 
 
 def write_comparison(comparison: Comparison, out: Path) -> list[Path]:
-    """Write table, rows, everything, and a plot; the files. Raises SessionError."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SessionError(f"can not be made ({error.strerror})", where=str(out), hint="Choose --out") from error
+    """Write table, rows, everything, and a plot; the files. Raises WriteError."""
     texts = {
         "comparison.md": markdown(comparison.summaries),
         "comparison.csv": rows_csv(comparison.judged),
@@ -119,7 +115,7 @@ def write_comparison(comparison: Comparison, out: Path) -> list[Path]:
         "comparison.svg": comparison_svg(comparison.summaries),
     }
     for name, text in texts.items():
-        write_whole(out / name, text.encode())
+        write_whole(out / name, text, "Choose another folder with --out")
     return [out / name for name in texts]
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from sessions.archives import export_archive
 from sessions.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
-from sessions.manifest import write_whole
 from sessions.replay import Replay, kept_grasps
 from sessions.sample_tables import SampleTables, read_tables
 from sessions.session import Session
@@ -19,6 +18,7 @@ from tactile_lab.geometry.contacts import Contact
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import rig_of_session
 from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.whole_files import write_whole
 from tactile_lab.workflow.replaying import recorded_slam, true_poses
 
 
@@ -33,8 +33,9 @@ def export_contacts(session: Session, path: Path, dimension: int | None = None) 
         dimension: 2 keeps the horizontal part; None for the session's own.
 
     Raises:
-        SessionError: the recording can not be read, holds no grasp, or the log can not be written.
+        SessionError: the recording can not be read, or holds no grasp.
         ConfigurationError: no grasp of the session has a contact.
+        WriteError: the log can not be written.
     """
     settings = recorded_slam(session)
     replay = Replay(session, build_interpreter(rig_of_session(session)))
@@ -73,11 +74,15 @@ def _truth(session: Session, path: Path) -> ObjectTruth:
     name = session.manifest.object_name
     if session.truth_mesh is None:
         return ObjectTruth(name=name)
-    try:
-        write_whole(path.with_suffix(".ply"), session.truth_mesh.read_bytes())
-    except OSError as error:
-        raise SessionError(f"can not be written ({error.strerror})", where=str(path), hint="Check the path") from error
+    write_whole(path.with_suffix(".ply"), _bytes(session.truth_mesh))
     return ObjectTruth(name=name, mesh=path.with_suffix(".ply").name)
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise SessionError(f"can not be read ({error.strerror})", where=str(path), hint="Check the file") from error
 
 
 def export_csv(session: Session, folder: Path) -> int:

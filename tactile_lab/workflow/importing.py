@@ -8,11 +8,11 @@ from pathlib import Path
 
 from sessions.archives import import_archive
 from sessions.contact_log import ContactLog, read_contact_log, write_contact_log
-from sessions.manifest import write_whole
 from sessions.session import Session
 from sessions.timed_contacts import ImportSettings, read_timed_contacts
 from tactile_lab.errors import ConfigurationError, SessionError, TactileLabError
 from tactile_lab.shape.mesh_io import read_mesh
+from tactile_lab.whole_files import write_whole
 
 
 def import_session(archive: Path, root: Path, name: str | None = None) -> Session:
@@ -24,7 +24,8 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
     """Timed contacts as a contact log, with the true mesh, where there is one, copied beside it.
 
     Raises:
-        SessionError: a file can not be read or written, or the log exists already.
+        SessionError: a file can not be read, or the log exists already.
+        WriteError: a file can not be written.
         ConfigurationError: the contacts do not fit the form or do not make sense; nothing is left then.
         ShapeError: the mesh can not be used.
     """
@@ -50,7 +51,7 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
 
 
 def _copied(mesh: Path, copy: Path) -> list[Path]:
-    """The file that was made: none where the mesh is in its place already. Raises SessionError."""
+    """The file that was made: none where the mesh is in its place already. Raises SessionError, WriteError."""
     if copy.exists() and copy.resolve() != mesh.resolve():
         raise SessionError("exists already", where=str(copy), hint="Choose another name with --out")
     if copy.exists():

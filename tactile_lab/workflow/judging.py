@@ -9,7 +9,6 @@ from pathlib import Path
 from calibration.admission import refuse_foreign
 from drivers.camera.calibration import is_opencv, load_camera
 from drivers.camera.markers import MarkerSettings
-from sessions.manifest import write_whole
 from sessions.progress import NullProgress, Progress
 from sessions.session import RESULTS, Session
 from sessions.session_outcome import SessionOutcome
@@ -27,6 +26,7 @@ from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.rigs.description import OTHER_VERSION, Rig, rig_of_session
 from tactile_lab.slam import TactileSlam
 from tactile_lab.strict_yaml import validate
+from tactile_lab.whole_files import write_whole
 
 EVALUATION = "evaluation.json"
 _KNOWN = ("known.csv", "known.ply")
@@ -167,11 +167,12 @@ def write_evaluation(out: Path, truth: Truth, object_name: str) -> Evaluation:
 
     Raises:
         SessionError, ShapeError: as :func:`tactile_lab.evaluation.evaluation.evaluate`.
+        WriteError: the folder can not be written.
     """
     stamps_s = read_results(out).trajectory.stamps_s
-    write_whole(out / TRUTH_TRAJECTORY, trajectory_text(Trajectory(stamps_s, truth.world_T_object)).encode())
+    write_whole(out / TRUTH_TRAJECTORY, trajectory_text(Trajectory(stamps_s, truth.world_T_object)))
     evaluation = evaluate(out, truth, object_name)
-    write_whole(out / EVALUATION, evaluation.as_text().encode())
+    write_whole(out / EVALUATION, evaluation.as_text())
     return evaluation
 
 

@@ -12,10 +12,9 @@ from drivers.camera.boards import AnyBoard, CHECK_BAR_mm, SingleMarker, load_boa
 from drivers.camera.markers import MarkerSettings
 from drivers.camera.print_files import pdf_bytes, svg_text
 from drivers.camera.print_layout import Sheet, sheet_of
-from sessions.manifest import write_whole
 from tactile_lab.calibration_file import load_parameters
-from tactile_lab.errors import ConfigurationError
 from tactile_lab.strict_yaml import StrictModel, validate
+from tactile_lab.whole_files import write_whole
 
 _HEAD = "# Made by tactile-lab markers; measured_bar_mm is the length of the print's check bar, 100 mm if it is true.\n"
 _RIG_HEAD = "# The markers of a rig as they were printed: name this file as calibration.markers in the rig file.\n"
@@ -36,7 +35,8 @@ def print_sheet(boards: Mapping[str, AnyBoard], out: Path, name: str, paper: str
     """Write NAME.pdf and NAME.svg, and a description of each board under its own name.
 
     Raises:
-        ConfigurationError: the boards do not fit on the paper, or the files can not be written.
+        ConfigurationError: the boards do not fit on the paper.
+        WriteError: the files can not be written.
     """
     pdf, svg = _write_vectors(sheet_of(list(boards.values()), paper), out, name)
     descriptions = [_write(out / f"{each}.yaml", _text(board, _HEAD)) for each, board in boards.items()]
@@ -80,20 +80,16 @@ def _single(dictionary: str, number: int, side_m: float, measured_mm: float | No
 
 
 def _write_vectors(sheet: Sheet, out: Path, name: str) -> tuple[Path, Path]:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigurationError(f"can not be made ({error.strerror})", where=str(out), hint="Choose --out") from error
-    return _write(out / f"{name}.pdf", pdf_bytes(sheet)), _write(out / f"{name}.svg", svg_text(sheet).encode())
+    return _write(out / f"{name}.pdf", pdf_bytes(sheet)), _write(out / f"{name}.svg", svg_text(sheet))
 
 
-def _write(path: Path, content: bytes) -> Path:
-    write_whole(path, content)
+def _write(path: Path, content: str | bytes) -> Path:
+    write_whole(path, content, "Choose another place with --out")
     return path
 
 
-def _text(model: StrictModel, head: str) -> bytes:
-    return (head + yaml.safe_dump(model.model_dump(mode="json"), sort_keys=False)).encode()
+def _text(model: StrictModel, head: str) -> str:
+    return head + yaml.safe_dump(model.model_dump(mode="json"), sort_keys=False)
 
 
 def check_bar_words(scale: float, measured: bool) -> str:

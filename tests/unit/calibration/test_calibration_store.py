@@ -14,7 +14,7 @@ from calibration.forearm import ForearmCalibration, load_forearm
 from calibration.store import CalibrationRecord, new_record, read_record, write_record
 from drivers.camera.calibration import load_camera
 from drivers.fingertip import load_fingertips
-from tactile_lab.errors import ConfigurationError
+from tactile_lab.errors import ConfigurationError, WriteError
 from tactile_lab.rigs.description import load_rig, shipped_rigs
 
 NOW = datetime(2026, 11, 21, 9, 0, tzinfo=UTC)
@@ -87,22 +87,9 @@ def test_a_plain_file_is_no_record(tmp_path):
         read_record(path)
 
 
-def test_an_interrupted_write_leaves_the_old_file_and_no_other(stored, monkeypatch):
-    before = stored.read_bytes()
-
-    def pulled(number: int) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("calibration.store.os.fsync", pulled)
-    with pytest.raises(KeyboardInterrupt):
-        write_record(stored, record(verdict="FAIL"))
-    assert stored.read_bytes() == before
-    assert list(stored.parent.iterdir()) == [stored]
-
-
 def test_a_place_that_can_not_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(ConfigurationError, match="--out"):
+    with pytest.raises(WriteError, match="--out"):
         write_record(tmp_path / "file" / "forearm.yaml", record())
 
 

@@ -14,7 +14,7 @@ import trimesh
 from gtsam import Pose2, Pose3
 from synthetic_grasps import Recorded, SIZE_m, box_grasps
 
-from tactile_lab.errors import SessionError, ShapeError
+from tactile_lab.errors import SessionError, ShapeError, WriteError
 from tactile_lab.evaluation.plain import json_text, plain
 from tactile_lab.evaluation.prism import open_ring, prism, signed_area_m2, triangulate
 from tactile_lab.evaluation.result_files import write_results
@@ -115,9 +115,9 @@ def test_steps_are_told_without_durations(tmp_path: Path, recorded: Recorded) ->
     assert not any("seconds" in step for step in steps)
 
 
-def test_folder_that_can_not_be_made_is_a_session_error(tmp_path: Path, result: SlamResult) -> None:
+def test_folder_that_can_not_be_made_is_named(tmp_path: Path, result: SlamResult) -> None:
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(SessionError, match="cannot be written"):
+    with pytest.raises(WriteError, match="can not be written"):
         write_results(tmp_path / "file" / "results", result, box_grasps(5).grasps)
 
 

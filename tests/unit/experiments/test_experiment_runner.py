@@ -9,7 +9,7 @@ from pathlib import Path
 import grimp
 import pytest
 
-from tactile_lab.errors import SessionError, TrackingError
+from tactile_lab.errors import SessionError, TrackingError, WriteError
 from tactile_lab.experiments import runner
 from tactile_lab.experiments.cells import Cell, Row, grid, planned_cells
 from tactile_lab.experiments.graph_runs import solve_stressed_graph
@@ -148,7 +148,7 @@ def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SessionError, match="not a file of results"):
         run_cells("test", CELLS[:1], square, file)
     (tmp_path / "plain").write_text("")
-    with pytest.raises(SessionError, match="can not be written"):
+    with pytest.raises(WriteError, match="can not be written"):
         run_cells("test", CELLS[:1], square, tmp_path / "plain" / "runs.jsonl")
 
 

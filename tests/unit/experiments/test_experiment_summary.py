@@ -120,5 +120,5 @@ def test_a_section_replaces_what_is_between_its_marks(tmp_path: Path) -> None:
     assert text.endswith("\n\nafter\n")
     with pytest.raises(SessionError, match=r"no place for figure-3\.12"):
         insert_section(page, EXPERIMENTS["figure-3.12"], ROWS, 1)
-    with pytest.raises(SessionError, match="can not be used"):
+    with pytest.raises(SessionError, match="can not be read"):
         insert_section(tmp_path / "none.md", study, ROWS, 1)

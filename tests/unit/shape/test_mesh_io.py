@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tactile_lab.errors import ShapeError
+from tactile_lab.errors import ShapeError, WriteError
 from tactile_lab.shape.mesh_io import COLOUR_RANGE_m, read_mesh, sigma_colours, write_glb, write_ply
 from tactile_lab.shape.surface import SurfaceMesh
 
@@ -124,9 +124,10 @@ def test_mesh_with_nan_is_refused(tmp_path: Path) -> None:
 
 
 def test_unwritable_place_is_an_error_that_names_it(surface: SurfaceMesh, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
     for write in (write_ply, write_glb):
-        with pytest.raises(ShapeError, match="can not be written"):
-            write(tmp_path / "no folder" / "mesh", surface)
+        with pytest.raises(WriteError, match="file/mesh: can not be written"):
+            write(tmp_path / "file" / "mesh", surface)
 
 
 def test_scanned_household_objects_are_closed(lab_data: Path) -> None:

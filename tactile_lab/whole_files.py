@@ -1,0 +1,48 @@
+"""Files that are written whole or not at all: after a power cut, too, either the old or the new one is there."""
+
+from __future__ import annotations
+
+import errno
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from tactile_lab.errors import WriteError
+
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+
+
+def write_whole(path: Path, content: str | bytes, hint: str = "Choose another folder, or check its rights") -> None:
+    """Write a file, and its folder where there is none, whole or not at all.
+
+    Args:
+        content: text goes out as UTF-8 with the line ends it has.
+        hint: what to do when this place can not be written; a full disk has an advice of its own.
+
+    Raises:
+        WriteError: the disk is full, or the place can not be written; an older file is as it was.
+    """
+    partial = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with partial.open("wb") as file:
+            file.write(content.encode() if isinstance(content, str) else content)
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(path)
+    except OSError as error:
+        advice = "Free some space on it, then try again" if disk_full(error) else hint
+        raise WriteError(write_failure(error), where=str(path), hint=advice) from error
+    finally:  # after an interruption too; nothing is left of it when all went well
+        with suppress(OSError):  # where the folder is none, either
+            partial.unlink(missing_ok=True)
+
+
+def disk_full(error: OSError) -> bool:
+    """Whether the disk, or one's share of it, is full."""
+    return error.errno in _FULL
+
+
+def write_failure(error: OSError) -> str:
+    """Why something could not be written, in words."""
+    return "the disk is full" if disk_full(error) else f"can not be written ({error.strerror or error})"
