@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -87,11 +86,6 @@ def manual_record(
         valid_days=valid_days,
         now=now,
     )
-
-
-def target_file(out: Path, record: CalibrationRecord) -> Path:
-    """Where a record goes: its file, or beside it when it failed, so that it replaces nothing that passed."""
-    return out if record.verdict == "PASS" else out.with_name(f"{out.stem}.failed{out.suffix}")
 
 
 def _residuals(quality: Quality) -> dict[str, Any]:

@@ -161,6 +161,11 @@ def new_record(
     )
 
 
+def target_file(out: Path, record: CalibrationRecord) -> Path:
+    """Where a record goes: its file, or beside it when it failed, so that it replaces nothing that passed."""
+    return out if record.verdict == "PASS" else out.with_name(f"{out.stem}.failed{out.suffix}")
+
+
 def write_record(path: Path, record: CalibrationRecord, comment: str = "") -> None:
     """Write a record, sealed, whole or not at all.
 

@@ -53,9 +53,8 @@ def biotac(
     """
     from dataclasses import asdict
 
-    from calibration.forearm_record import target_file
     from calibration.normals import calibrate_normals, normals_record
-    from calibration.store import write_record
+    from calibration.store import target_file, write_record
     from drivers.biotac.press_recording import read_presses
     from tactile_lab.cli.console import emit_json, say, show_table
 

@@ -110,8 +110,7 @@ def store_result(
         Exit: code 3, the result failed.
         InterruptionError: the person does not want it stored.
     """
-    from calibration.forearm_record import target_file
-    from calibration.store import write_record
+    from calibration.store import target_file, write_record
     from tactile_lab.calibration_file import plain
     from tactile_lab.cli.calibration_tables import tell_verdict
     from tactile_lab.cli.console import emit_json, say

@@ -11,7 +11,7 @@ from gtsam import Pose3, Rot3
 
 from calibration.admission import Installation, admit, objections
 from calibration.forearm import ForearmCalibration, load_forearm
-from calibration.store import CalibrationRecord, new_record, read_record, write_record
+from calibration.store import CalibrationRecord, new_record, read_record, target_file, write_record
 from drivers.camera.calibration import load_camera
 from drivers.fingertip import load_fingertips
 from tactile_lab.errors import ConfigurationError, WriteError
@@ -85,6 +85,12 @@ def test_a_plain_file_is_no_record(tmp_path):
     path.write_text(yaml.safe_dump({"world_T_mount": {"translation_m": [0, 0, 0]}}))
     with pytest.raises(ConfigurationError, match="is not a stored calibration"):
         read_record(path)
+
+
+def test_a_failed_result_goes_beside_the_file_and_replaces_nothing_that_passed(tmp_path):
+    out = tmp_path / "forearm.yaml"
+    assert target_file(out, record()) == out
+    assert target_file(out, record(verdict="FAIL")) == tmp_path / "forearm.failed.yaml"
 
 
 def test_a_place_that_can_not_be_written_is_named(tmp_path):
