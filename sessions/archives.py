@@ -159,8 +159,8 @@ def _as_session(folder: Path, path: Path) -> Session:
     for role in manifest.calibration:
         session.calibration_file(role)  # its hash
     session.traffic()
-    if manifest.name != folder.name:
-        write_manifest(folder, manifest.model_copy(update={"name": folder.name}))
+    changes = {"name": folder.name, "derived": manifest.derivation("import", path.name)}
+    write_manifest(folder, manifest.model_copy(update=changes))
     return Session.open(folder)
 
 

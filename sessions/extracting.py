@@ -113,6 +113,6 @@ def _write_manifest(session: Session, into: Path, counts: Mapping[str, int]) -> 
         "streams": {},
         "data_loss": {},
         "problem": "",
-        "notes": f"{session.manifest.notes}\nA piece of {session.manifest.name}.".strip(),
+        "derived": session.manifest.derivation("piece", session.manifest.name),
     }
     write_manifest(into, session.manifest.model_copy(update=changes))

@@ -13,7 +13,7 @@ from sessions import raw_frames, schemas
 from tactile_lab.errors import SessionError
 
 TRAFFIC_FORMATS = ("tactile-traffic/1", "tactile-traffic/2")
-MANIFEST_FORMATS = ("tactile-session/1", "tactile-session/2")
+MANIFEST_FORMATS = ("tactile-session/1", "tactile-session/2", "tactile-session/3")
 
 Message: TypeAlias = tuple[str, bytes, int]
 """Topic, content as it stands in the file, stamp in nanoseconds."""
@@ -33,7 +33,15 @@ def _without_streams(content: dict[str, Any]) -> dict[str, Any]:
     return {**content, "streams": {}}
 
 
-_MANIFEST_CONVERTERS: Mapping[str, Callable[[dict[str, Any]], dict[str, Any]]] = {"tactile-session/1": _without_streams}
+def _without_origin(content: dict[str, Any]) -> dict[str, Any]:
+    """Version 2 did not say, but in its notes, whether it was made of another session: it counts as recorded."""
+    return {**content, "derived": []}
+
+
+_MANIFEST_CONVERTERS: Mapping[str, Callable[[dict[str, Any]], dict[str, Any]]] = {
+    "tactile-session/1": _without_streams,
+    "tactile-session/2": _without_origin,
+}
 
 
 def traffic_converter(written_in: str | None, where: str) -> Callable[[Message], Message]:

@@ -26,6 +26,8 @@ class SessionSummary:
         problem: why it can not be read, why it failed, or what to do about the damage; else empty.
         readable: its manifest can be read.
         left_open: a crash ended it.
+        derived: how it was made of a recorded one (``piece``, ``import``, ``recovered``); empty for a recording.
+        recorded_here: it is a recording, or one's recovery, and may be the last one.
     """
 
     name: str
@@ -40,6 +42,8 @@ class SessionSummary:
     problem: str = ""
     readable: bool = True
     left_open: bool = False
+    derived: tuple[str, ...] = ()
+    recorded_here: bool = True
 
 
 def summarize(folder: Path) -> SessionSummary:
@@ -63,6 +67,8 @@ def summarize(folder: Path) -> SessionSummary:
         data_loss=bool(manifest.data_loss),
         problem=damage or manifest.problem,
         left_open=manifest.status == "open" and not session.being_recorded,
+        derived=tuple(step.how for step in manifest.derived),
+        recorded_here=manifest.recorded_here,
     )
 
 
@@ -90,7 +96,9 @@ def left_open(root: Path) -> list[SessionSummary]:
 
 
 def list_sessions(root: Path) -> list[SessionSummary]:
-    """All sessions directly under ``root``, oldest first; none when there is no such folder.
+    """All sessions directly under ``root``, by the time of their recording, oldest first; none without the folder.
+
+    What was made of a recording stands behind it.
 
     Raises:
         SessionError: ``root`` is not a folder that can be read.
@@ -103,11 +111,15 @@ def list_sessions(root: Path) -> list[SessionSummary]:
         )
     except OSError as error:
         raise SessionError(f"can not be read ({error.strerror})", where=str(root)) from error
-    return sorted((summarize(folder) for folder in folders), key=lambda item: (item.started_utc, item.name))
+    return sorted(map(summarize, folders), key=lambda item: (item.started_utc, len(item.derived), item.name))
 
 
 def find_session(root: Path, name: str) -> Session:
-    """A session by its folder's path, by its name under ``root``, or ``last`` for the newest.
+    """A session by its folder's path, by its name under ``root``, or ``last``.
+
+    ``last`` is the session whose recording under ``root`` began last; its recovery stands in for a torn one. Pieces and
+    imports are never meant: they carry the time of a recording made earlier or elsewhere, by another clock, and
+    whoever made one has its name.
 
     Raises:
         SessionError: there is none, or its manifest can not be read.
@@ -118,11 +130,21 @@ def find_session(root: Path, name: str) -> Session:
 def session_folder(root: Path, name: str) -> Path:
     """The folder of a session, which need not be whole; named as for :func:`find_session`. Raises SessionError."""
     if name == "last":
-        readable = [item for item in list_sessions(root) if item.readable]
-        if not readable:
-            raise SessionError("no session yet", where=str(root), hint="Record one first: tactile-lab run")
-        return readable[-1].folder
+        return _last_recorded(root)
     folder = root / name if (root / name).is_dir() else Path(name)
     if not folder.is_dir():
         raise SessionError("no such session", where=name, hint=f"See: tactile-lab session list --root {root}")
     return folder
+
+
+def _last_recorded(root: Path) -> Path:
+    readable = [item for item in list_sessions(root) if item.readable]
+    recorded = [item for item in readable if item.recorded_here]
+    if recorded:
+        return recorded[-1].folder
+    if readable:
+        names = ", ".join(item.folder.name for item in readable[-3:])
+        hint = f"'last' means none of them; name one: {names}"
+        what = "no session was recorded here, there are only pieces and imports"
+        raise SessionError(what, where=str(root), hint=hint)
+    raise SessionError("no session yet", where=str(root), hint="Record one first: tactile-lab run")

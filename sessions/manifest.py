@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
@@ -11,11 +12,13 @@ import yaml
 from pydantic import Field
 
 from sessions.formats import converted_manifest
+from tactile_lab.clock import utc_text
 from tactile_lab.errors import ConfigurationError, SessionError
 from tactile_lab.strict_yaml import StrictModel, load, loads, validate
 from tactile_lab.whole_files import write_whole
 
 Status = Literal["open", "closed", "interrupted", "failed", "recovered"]
+Making = Literal["recovered", "piece", "import"]
 
 MANIFEST = "session.yaml"
 
@@ -35,6 +38,26 @@ class CalibrationCopy(StrictModel):
     sha256: str
 
 
+class Derivation(StrictModel):
+    """A step by which a session was made of another one.
+
+    Attributes:
+        how: recovered after an accident, a piece cut out, or brought in from an archive.
+        source: name of the other session, or of the archive's file.
+        made_utc: when, ISO 8601; what was recorded keeps the time at which it was.
+    """
+
+    how: Making
+    source: str
+    made_utc: str
+
+    @property
+    def words(self) -> str:
+        """For people."""
+        told = {"recovered": "recovered from", "piece": "a piece of", "import": "imported from"}
+        return f"{told[self.how]} {self.source}, {self.made_utc}"
+
+
 class Manifest(StrictModel):
     """What ``session.yaml`` says.
 
@@ -46,14 +69,15 @@ class Manifest(StrictModel):
         calibration: copies of the files used, by their role.
         versions, seeds, settings: what a repetition needs.
         notes: the operator's.
-        started_utc, ended_utc: ISO 8601.
+        started_utc, ended_utc: ISO 8601, of the recording.
+        derived: how it was made of a recorded one, oldest step first; empty for what was recorded.
         counts: messages by topic, grasps and the like.
         streams: for each topic the messages recorded, gaps, late and dropped ones.
         data_loss: what was not recorded or dropped, by kind; empty when nothing was lost.
         problem: why it failed.
     """
 
-    format: Literal["tactile-session/2"] = "tactile-session/2"
+    format: Literal["tactile-session/3"] = "tactile-session/3"
     name: str
     status: Status
     rig: str
@@ -66,10 +90,20 @@ class Manifest(StrictModel):
     notes: str = ""
     started_utc: str
     ended_utc: str | None = None
+    derived: tuple[Derivation, ...] = ()
     counts: dict[str, int] = Field(default_factory=dict)
     streams: dict[str, dict[str, int]] = Field(default_factory=dict)
     data_loss: dict[str, int] = Field(default_factory=dict)
     problem: str = ""
+
+    @property
+    def recorded_here(self) -> bool:
+        """Whether it is a recording, or one's recovery, and neither a piece of one nor brought in from elsewhere."""
+        return all(step.how == "recovered" for step in self.derived)
+
+    def derivation(self, how: Making, source: str) -> tuple[Derivation, ...]:
+        """``derived`` of what is made of this session now."""
+        return (*self.derived, Derivation(how=how, source=source, made_utc=utc_text(datetime.now(UTC))))
 
 
 def read_manifest(folder: Path) -> Manifest:

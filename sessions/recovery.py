@@ -11,7 +11,6 @@ import shutil
 from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 
 from sessions.manifest import MANIFEST, Manifest, manifest_from, read_manifest, write_manifest
@@ -21,7 +20,7 @@ from sessions.traffic import TrafficWriter
 from sessions.traffic_disk import being_written
 from sessions.traffic_reader import Loss, TrafficMessage, TrafficReader
 from sessions.traffic_settings import Attached, TrafficSettings
-from tactile_lab.clock import NANOSECONDS, utc_text
+from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import SessionError
 from tactile_lab.whole_files import write_whole
 
@@ -195,7 +194,6 @@ def _count_again(folder: Path, written: Counter[str]) -> None:
 
 def _recovered_manifest(manifest: Manifest, folder: Path, written: Counter[str], recovery: Recovery) -> Manifest:
     lost = {f"lost {topic}": item.lost for topic, item in recovery.topics.items() if item.lost}
-    note = f"Recovered from {recovery.source.name} at {utc_text(datetime.now(UTC))}."
     described = recovery.loss.describe()
     return manifest.model_copy(
         update={
@@ -204,7 +202,7 @@ def _recovered_manifest(manifest: Manifest, folder: Path, written: Counter[str],
             "ended_utc": manifest.ended_utc,
             "counts": {**manifest.counts, **dict(sorted(written.items()))},
             "data_loss": {**manifest.data_loss, **recovery.loss.counts(), **lost},
-            "notes": f"{manifest.notes}\n{note}".strip(),
+            "derived": manifest.derivation("recovered", recovery.source.name),
             "problem": f"recovered with loss: {described}" if described else "",
         }
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput, Root
+from tactile_lab.cli.options import LAST, Json, NoInput, Root
 
 if TYPE_CHECKING:
     from tactile_lab.workflow.comparing import Comparison
@@ -23,7 +23,7 @@ class Basis(StrEnum):
 
 def evaluate(
     sessions: Annotated[
-        list[str], typer.Argument(metavar="SESSION...", help="Sessions: folders, names under --root, or 'last'.")
+        list[str], typer.Argument(metavar="SESSION...", help=f"Sessions: folders, names under --root, or {LAST}.")
     ],
     results: Annotated[
         list[str] | None,

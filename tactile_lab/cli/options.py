@@ -44,8 +44,9 @@ SHAPE_HELP = "Model of the final shape; auto: field or facets, by evidence; the 
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
 Root = Annotated[Path, typer.Option(help="Folder of sessions.")]
+LAST = "'last': the newest recorded under --root, which no piece or import is"
 SessionName = Annotated[
-    str, typer.Argument(metavar="SESSION", help="A session's folder, its name under --root, or 'last'.")
+    str, typer.Argument(metavar="SESSION", help=f"A session's folder, its name under --root, or {LAST}.")
 ]
 RigName = Annotated[str, typer.Option("--rig", help="Name of a shipped rig, or a rig file.")]
 AllowUncalibrated = Annotated[

@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.options import METHOD_HELP, SHAPE_HELP, Json, Method, NoInput, Root, Shape
+from tactile_lab.cli.options import LAST, METHOD_HELP, SHAPE_HELP, Json, Method, NoInput, Root, Shape
 
 
 def reconstruct(
     source: Annotated[
         str,
         typer.Argument(
-            metavar="LOG.json|SESSION", help="A contact log, a session's folder, its name under --root, or 'last'."
+            metavar="LOG.json|SESSION", help=f"A contact log, a session's folder, its name under --root, or {LAST}."
         ),
     ],
     method: Annotated[Method | None, typer.Option(help=METHOD_HELP, show_default="joint, or the session's own")] = None,

@@ -25,7 +25,7 @@ def show_sessions(root: Path, summaries: Sequence[SessionSummary]) -> None:
     rows = [
         (
             summary.folder.name,
-            summary.status + (" !" if summary.data_loss else ""),
+            _status_cell(summary),
             "" if summary.grasps is None else str(summary.grasps),
             f"{summary.traffic_bytes / 1e6:.1f}",
             summary.object_name,
@@ -38,6 +38,12 @@ def show_sessions(root: Path, summaries: Sequence[SessionSummary]) -> None:
     for summary in summaries:
         if summary.problem:
             say(f"{summary.folder.name}: {summary.problem}", "yellow")
+
+
+def _status_cell(summary: SessionSummary) -> str:
+    """Status, whether something was lost, and how it was made of another session where the status does not say it."""
+    made = [how for how in summary.derived if how != summary.status]
+    return ", ".join([summary.status + (" !" if summary.data_loss else ""), *made])
 
 
 def tell_left_open(root: Path) -> None:
@@ -96,6 +102,7 @@ def show_session(session: Session) -> None:
         ("object", manifest.object_name),
         ("rig", manifest.rig),
         ("notes", manifest.notes),
+        ("origin", "\n".join(step.words for step in manifest.derived)),
         ("started", _moment(manifest.started_utc)),
         ("ended", _moment(manifest.ended_utc)),
         ("seeds", ", ".join(f"{name} {seed}" for name, seed in manifest.seeds.items())),

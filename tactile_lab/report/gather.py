@@ -64,6 +64,7 @@ def facts(manifest: Manifest) -> SessionFacts:
     plain_settings = {name: value for name, value in manifest.settings.items() if not isinstance(value, dict)}
     made_with = [
         ("session", manifest.name),
+        *(("origin", step.words) for step in manifest.derived),
         *((f"seed: {name}", str(seed)) for name, seed in manifest.seeds.items()),
         *((f"setting: {name}", str(value)) for name, value in plain_settings.items()),
         *((f"version: {name}", number) for name, number in manifest.versions.items()),

@@ -62,10 +62,12 @@ def test_a_raw_frame_says_what_was_put_in(payload, stamp_ns, counter, clock_ns):
     assert raw_frames.decode(raw_frames.encode(payload, stamp_ns, device)) == (payload, device)
 
 
-def test_a_description_of_version_1_is_read_and_written_anew(tmp_path):
-    (tmp_path / "session.yaml").write_text(yaml.safe_dump(MANIFEST_1))
+@pytest.mark.parametrize("changes", [{}, {"format": "tactile-session/2", "streams": {}}])
+def test_a_description_of_an_older_version_is_read_and_written_anew(tmp_path, changes):
+    (tmp_path / "session.yaml").write_text(yaml.safe_dump({**MANIFEST_1, **changes}))
     manifest = read_manifest(tmp_path)
-    assert (manifest.format, manifest.counts, manifest.streams) == ("tactile-session/2", {"grasps": 2}, {})
+    assert (manifest.format, manifest.counts, manifest.streams) == ("tactile-session/3", {"grasps": 2}, {})
+    assert (manifest.derived, manifest.recorded_here) == ((), True)
     write_manifest(tmp_path, manifest)
     assert read_manifest(tmp_path) == manifest
 
@@ -73,7 +75,7 @@ def test_a_description_of_version_1_is_read_and_written_anew(tmp_path):
 @pytest.mark.parametrize(
     ("form", "words"),
     [
-        ("tactile-session/3", "a newer version of the program"),
+        ("tactile-session/4", "a newer version of the program"),
         ("tactile-session/99", "or a newer one"),
         ("tactile-session/0", "a form that this program does not know"),
         ("tactile-session/x", "a form that this program does not know"),

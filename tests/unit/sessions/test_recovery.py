@@ -58,7 +58,8 @@ def test_every_complete_chunk_of_a_torn_session_is_brought_back(tmp_path, share)
     assert (manifest.status, manifest.data_loss["truncated"]) == ("recovered", 1)
     assert manifest.counts["/link/hand/rx"] == len(readable) == recovery.topics["/link/hand/rx"].read
     assert 90 <= recovery.topics["/link/hand/rx"].at_most_more <= 110 or len(readable) < 1000
-    assert f"Recovered from {folder.name}" in manifest.notes
+    (step,) = manifest.derived
+    assert step.words == f"recovered from {folder.name}, {step.made_utc}"
 
 
 def test_a_session_that_was_only_not_closed_is_recovered_without_loss(tmp_path):

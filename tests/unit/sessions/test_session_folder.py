@@ -150,7 +150,7 @@ def test_values_that_yaml_can_not_hold_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("format: tactile-session/3\n", "a newer version of the program"),
+        ("format: tactile-session/9\n", "a newer version of the program"),
         ("format: shopping-list/1\n", "does not know"),
         ("name: [\n", "not valid YAML"),
         ("", "must be keys with values"),
