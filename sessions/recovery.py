@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sessions.manifest import MANIFEST, Manifest, manifest_from, read_manifest, write_manifest
-from sessions.session import CALIBRATION, RESULTS, TRAFFIC, new_folder
+from sessions.session import CALIBRATION, RESULTS, TRAFFIC, TRAJECTORY, new_folder
 from sessions.session_ids import recovered_id
 from sessions.traffic import TrafficWriter
 from sessions.traffic_disk import being_written
@@ -54,12 +54,15 @@ class Recovery:
         folder: the new session; None when the old one was whole and nothing was to be done.
         topics: by topic.
         loss: what could not be read.
+        left_out: folders of results in the old session, by their names in it: they were made of another recording than
+            the new one, and would pass for its own.
     """
 
     source: Path
     folder: Path | None
     topics: dict[str, TopicRecovery]
     loss: Loss
+    left_out: tuple[str, ...] = ()
 
     @property
     def lossy(self) -> bool:
@@ -99,7 +102,7 @@ def _recover_into(folder: Path, source: Path, manifest: Manifest, reader: Traffi
     if not written:
         raise SessionError("holds no message that can be read", where=str(reader.path), hint="Nothing can be recovered")
     _count_again(folder, written)
-    recovery = Recovery(source, folder, topics, reader.loss)
+    recovery = Recovery(source, folder, topics, reader.loss, _result_folders(source))
     write_manifest(folder, _recovered_manifest(manifest, folder, written, recovery))
     return recovery
 
@@ -122,12 +125,12 @@ def _read_through(reader: TrafficReader) -> bool:
 
 
 def _copy_files(source: Path, folder: Path, reader: TrafficReader) -> None:
-    """Everything but the recording, the description and the results; calibrations that are gone from the recording."""
+    """Everything but recording, description and results; calibrations that are gone come from the recording."""
     for item in sorted(source.iterdir()):
-        if item.is_symlink() or item.name in (MANIFEST, RESULTS) or item.suffix in (".mcap", ".part"):
+        if item.is_symlink() or item.name == MANIFEST or item.suffix in (".mcap", ".part") or _holds_results(item):
             continue
         if item.is_dir():
-            shutil.copytree(item, folder / item.name, symlinks=True)
+            shutil.copytree(item, folder / item.name, symlinks=True, ignore=_results_among)
         else:
             shutil.copyfile(item, folder / item.name)
     (folder / CALIBRATION).mkdir(exist_ok=True)
@@ -135,6 +138,19 @@ def _copy_files(source: Path, folder: Path, reader: TrafficReader) -> None:
         kept, _, name = attachment.name.rpartition("/")
         if kept == CALIBRATION and not (folder / CALIBRATION / name).exists():
             write_whole(folder / CALIBRATION / name, attachment.data)
+
+
+def _holds_results(item: Path) -> bool:
+    return item.name == RESULTS or (item / TRAJECTORY).is_file()
+
+
+def _results_among(folder: str, names: list[str]) -> list[str]:
+    return [name for name in names if _holds_results(Path(folder) / name)]
+
+
+def _result_folders(source: Path) -> tuple[str, ...]:
+    """Folders with results in them, wherever they are in a session."""
+    return tuple(sorted(path.parent.relative_to(source).as_posix() for path in source.rglob(TRAJECTORY)))
 
 
 def _copy_traffic(reader: TrafficReader, folder: Path) -> tuple[Counter[str], dict[str, TopicRecovery]]:

@@ -42,6 +42,9 @@ from tactile_lab.whole_files import write_whole
 
 TRAFFIC, CALIBRATION, RESULTS, TRUTH_MESH = "traffic.mcap", "calibration", "results", "truth/object.ply"
 
+TRAJECTORY = "trajectory.csv"
+"""The file that every folder of results holds, and no other folder."""
+
 
 class Session:
     """A session folder, new or opened."""

@@ -105,6 +105,8 @@ def recover(
 ) -> None:
     """Make a whole session of one that a crash left open, or whose recording is torn; the torn one is kept.
 
+    Results of the torn recording stay with it, and are named; 'session replay' makes those of the new one.
+
     Ends with exit code 3 when anything is lost, and says of which topic.
     """
     from sessions.listing import session_folder

@@ -70,6 +70,9 @@ def show_recovery(recovery: Recovery) -> None:
     titles = ["topic", "recovered", "lost", "at most lost at the end", "last stamp, s"]
     show_table(f"Recovered from {recovery.source}", titles, rows, right=(1, 2, 3, 4))
     say(f"session  {recovery.folder}")
+    if recovery.left_out:
+        kept = f"results of the torn recording stay with it ({', '.join(recovery.left_out)})"
+        say(f"{kept}; new ones: tactile-lab session replay {recovery.folder}", "yellow")
     if recovery.lossy:
         warn(f"lost: {recovery.loss.describe()}")
     else:
@@ -83,6 +86,7 @@ def recovery_document(recovery: Recovery) -> dict[str, Any]:
         "session": None if recovery.folder is None else str(recovery.folder),
         "lossy": recovery.lossy,
         "loss": recovery.loss.describe(),
+        "left_out": list(recovery.left_out),
         "topics": {topic: asdict(item) for topic, item in recovery.topics.items()},
     }
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from sessions.marks import Mark, MarkKind
 from sessions.schemas import MARKS_TOPIC, TRANSFORMS_TOPIC
-from sessions.session import Session
+from sessions.session import TRAJECTORY, Session
 from tactile_lab.clock import NANOSECONDS
 from tactile_lab.errors import SessionError
 from tactile_lab.evaluation.comparison import Judged, MethodSummary, compare, markdown, rows_csv
@@ -91,7 +91,7 @@ def _check_different(sessions: Sequence[Session]) -> None:
 def result_folders(session: Session, names: Sequence[str]) -> list[Path]:
     """Folders of results inside a session, or anywhere else by their path. Raises SessionError."""
     if not names:
-        found = sorted(path.parent for path in session.folder.glob("*/trajectory.csv"))
+        found = sorted(path.parent for path in session.folder.glob(f"*/{TRAJECTORY}"))
         if not found:
             raise SessionError("holds no results", where=str(session.folder), hint="Replay the session to get some")
         return found
@@ -100,7 +100,7 @@ def result_folders(session: Session, names: Sequence[str]) -> list[Path]:
 
 def _folder(session: Session, name: str) -> Path:
     for path in (session.folder / name, Path(name)):
-        if (path / "trajectory.csv").is_file():
+        if (path / TRAJECTORY).is_file():
             return path
     hint = "Name folders of results inside the session, or by their path"
     raise SessionError(f"has no results called {name!r}", where=str(session.folder), hint=hint)

@@ -277,6 +277,8 @@ def test_a_torn_session_is_recovered_and_the_torn_one_is_kept(inside, session_co
     assert answer.code == 3
     told = json.loads(answer.out)
     assert "/link/hand/rx" in json.dumps(told)
+    assert told["left_out"] == ["results"]
+    assert f"(results); new ones: tactile-lab session replay {told['session']}" in answer.err
     answer = inside("session", "list", "--root", tmp_path, "--json")
     assert answer.code == 0, answer.err
     assert sorted(item["status"] for item in json.loads(answer.out)) == ["damaged", "recovered"]

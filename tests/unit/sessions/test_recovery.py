@@ -158,6 +158,26 @@ def test_a_list_tells_open_closed_recovered_and_damaged(tmp_path):
     assert "is cut off" in problems[torn]
 
 
+def test_results_of_the_torn_recording_stay_with_it_and_are_named(tmp_path):
+    folder = left_behind(record(tmp_path), 0.9)
+    for place in ("results", "replay", "studies/thesis-pf"):
+        (folder / place).mkdir(parents=True, exist_ok=True)
+        (folder / place / "trajectory.csv").write_text("stale")
+    (folder / "studies" / "plan.txt").write_text("the operator's")
+    (folder / "attachments").mkdir()
+    (folder / "attachments" / "note.txt").write_text("the operator's")
+    recovery = recover(folder)
+    assert recovery.left_out == ("replay", "results", "studies/thesis-pf")
+    assert not list(recovery.folder.rglob("trajectory.csv"))
+    kept = {path.relative_to(recovery.folder).as_posix() for path in recovery.folder.rglob("*.txt")}
+    assert kept == {"studies/plan.txt", "attachments/note.txt"}
+    assert not (recovery.folder / "replay").exists()
+
+
+def test_a_session_without_results_leaves_none_out(tmp_path):
+    assert recover(left_behind(record(tmp_path), 0.9)).left_out == ()
+
+
 def test_links_in_a_session_folder_are_not_followed(tmp_path):
     secret = tmp_path / "secret"
     secret.write_text("mine")
