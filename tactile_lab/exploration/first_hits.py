@@ -55,7 +55,8 @@ def bounding_spheres(vertices: Any, faces: Any) -> Any:
     spheres = np.zeros((faces.shape[0], 4))
     for m in range(faces.shape[0]):
         for corner in range(3):
-            spheres[m, :3] += vertices[faces[m, corner]] / 3.0
+            for axis in range(3):
+                spheres[m, axis] += vertices[faces[m, corner], axis] / 3.0
         for corner in range(3):
             squared = np.sum((vertices[faces[m, corner]] - spheres[m, :3]) ** 2)
             spheres[m, 3] = max(spheres[m, 3], squared)

@@ -2,6 +2,8 @@
 
 Importing this takes a large part of a second: modules with compiled loops are imported where they are called. Their
 arguments are arrays and numbers only: machine code kept for a class of ours can not be loaded after it is renamed.
+They change arrays number by number: assigning a row takes some five seconds more to compile, as numba brings along
+what would write both shapes into an error message.
 """
 
 from __future__ import annotations

@@ -87,17 +87,39 @@ def _absorb(
     middles: Array, scatters: Array, pulls: Array, point_weights: Array, normal_weights: Array, a: int, b: int
 ) -> None:
     """Moments of cluster a after it has taken in b."""
-    total = point_weights[a] + point_weights[b]
-    gap = middles[a] - middles[b]
-    scatters[a] += scatters[b] + np.outer(gap, gap) * (point_weights[a] * point_weights[b] / total)
-    middles[a] = (point_weights[a] * middles[a] + point_weights[b] * middles[b]) / total
-    pulls[a] += pulls[b]
+    one, other = point_weights[a], point_weights[b]
+    total = one + other
+    share = one * other / total
+    for i in range(3):
+        for j in range(3):
+            gap = (middles[a, i] - middles[b, i]) * (middles[a, j] - middles[b, j])
+            scatters[a, i, j] += scatters[b, i, j] + share * gap
+    for i in range(3):
+        middles[a, i] = (one * middles[a, i] + other * middles[b, i]) / total
+        pulls[a, i] += pulls[b, i]
     point_weights[a], normal_weights[a] = total, normal_weights[a] + normal_weights[b]
 
 
 @compiled
-def _cosine(a: Array, b: Array) -> float:
-    return float(np.dot(a, b) / np.sqrt(np.sum(a**2) * np.sum(b**2)))
+def _dot(a: Array, b: Array) -> float:
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@compiled
+def _choose_partner(costs: Array, partner: NDArray[np.int64], cheapest: Array, a: int) -> None:
+    """Write down with which other cluster a merges at the least cost."""
+    partner[a] = np.argmin(costs[a])
+    cheapest[a] = costs[a, partner[a]]
+
+
+@compiled
+def _leave_out(costs: Array, cheapest: Array, labels: NDArray[np.int64], a: int, b: int) -> None:
+    """Cluster b is part of a from now on and merges with nothing."""
+    cheapest[b] = np.inf
+    for c in range(len(labels)):
+        costs[b, c], costs[c, b] = np.inf, np.inf
+        if labels[c] == b:
+            labels[c] = a
 
 
 @compiled
@@ -121,29 +143,29 @@ def merge_clusters(
     weights, normal_weights = point_weights.copy(), normal_weights.copy()
     chi_squares, labels = np.zeros(count), np.arange(count)
     costs = np.full((count, count), np.inf)
+    partner, cheapest = np.zeros(count, np.int64), np.zeros(count)
     for a in range(count):
         for b in range(a + 1, count):
-            if np.dot(normals[a], normals[b]) > least_cosine:
+            if _dot(normals[a], normals[b]) > least_cosine:
                 costs[a, b] = merged_chi_square(middles, scatters, pulls, weights, normal_weights, a, b)
                 costs[b, a] = costs[a, b]
-    partner = np.array([np.argmin(costs[a]) for a in range(count)])
-    cheapest = np.array([costs[a, partner[a]] for a in range(count)])
-    while np.min(cheapest) <= limit:
-        first = int(np.argmin(cheapest))
+    for a in range(count):
+        _choose_partner(costs, partner, cheapest, a)
+    first = np.argmin(cheapest)
+    while cheapest[first] <= limit:
         a, b = min(first, partner[first]), max(first, partner[first])
         chi_squares[a] = merged_chi_square(middles, scatters, pulls, weights, normal_weights, a, b)
         _absorb(middles, scatters, pulls, weights, normal_weights, a, b)
-        labels[labels == b] = a
-        costs[b, :], costs[:, b], cheapest[b] = np.inf, np.inf, np.inf
+        _leave_out(costs, cheapest, labels, a, b)
         for c in range(count):
             if c != a and labels[c] == c:
                 cost = np.inf
-                if _cosine(pulls[a], pulls[c]) > least_cosine:
+                cosine = _dot(pulls[a], pulls[c]) / np.sqrt(_dot(pulls[a], pulls[a]) * _dot(pulls[c], pulls[c]))
+                if cosine > least_cosine:
                     both = merged_chi_square(middles, scatters, pulls, weights, normal_weights, a, c)
                     cost = both - chi_squares[a] - chi_squares[c]
                 costs[a, c], costs[c, a] = cost, cost
-                partner[c] = np.argmin(costs[c])
-                cheapest[c] = costs[c, partner[c]]
-        partner[a] = np.argmin(costs[a])
-        cheapest[a] = costs[a, partner[a]]
+                _choose_partner(costs, partner, cheapest, c)
+        _choose_partner(costs, partner, cheapest, a)
+        first = np.argmin(cheapest)
     return labels
