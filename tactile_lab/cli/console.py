@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
+
+from tactile_lab.cli.table_forms import facts_grid, table_form
 
 people = Console(stderr=True, highlight=False)
 """For people: standard error, colours only on a terminal and without NO_COLOR."""
@@ -75,29 +75,19 @@ def emit_json(document: Any) -> None:
 def show_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[int] = ()) -> None:
     """A table with a rule below its head; ``right`` lists the columns that hold numbers.
 
-    Cells are shown as they are. The last column takes what room is left and wraps.
+    Cells are shown as they are. The last column takes what room is left and wraps; on a terminal that is too narrow
+    for the others each row is a block of lines.
     """
-    grid = Table(box=box.SIMPLE_HEAD, title=Text(title), title_justify="left", title_style="bold", pad_edge=False)
-    for index, column in enumerate(columns):
-        last = index == len(columns) - 1
-        grid.add_column(column, justify="right" if index in right else "left", no_wrap=not last)
     shown = list(rows)
-    for row in shown:
-        grid.add_row(*map(Text, row))
-    people.print(grid)
+    people.print(table_form(people, title, columns, shown, right), crop=False)
     for onlooker in _onlookers:
         onlooker.table(title, columns, shown, right)
 
 
 def show_facts(title: str, facts: Iterable[tuple[str, str]]) -> None:
     """Names with values; facts without a value are left out."""
-    grid = Table.grid(padding=(0, 2))
-    grid.add_column(style="dim", no_wrap=True)
-    grid.add_column()
     shown = [(name, value) for name, value in facts if value]
-    for name, value in shown:
-        grid.add_row(Text(name), Text(value))
     people.print(Text(title, style="bold"), soft_wrap=True)
-    people.print(grid)
+    people.print(facts_grid(shown))
     for onlooker in _onlookers:
         onlooker.table(title, ("", ""), shown, ())

@@ -1,0 +1,74 @@
+"""Tables that lose nothing: as rows and columns where there is room for them, else as one block a row."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich import box
+from rich.cells import cell_len
+from rich.console import Console, Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+_LAST_COLUMN = 24
+"""The last column may be broken into lines, but not into narrower ones than this."""
+_GAP, _EDGES = 3, 2
+"""Blanks between two columns of a table, and at its both sides together."""
+_INDENT = 2
+
+Rows = Sequence[Sequence[str]]
+
+
+def table_form(
+    console: Console, title: str, columns: Sequence[str], rows: Rows, right: Sequence[int]
+) -> RenderableType:
+    """What a console shows of a table.
+
+    A terminal that is too narrow gets blocks. Elsewhere, in a file or a pipe, a table may be as wide as it needs.
+
+    Args:
+        right: indices of the columns that hold numbers.
+    """
+    *widths, last = [max(map(_width, column)) for column in zip(columns, *rows, strict=True)]
+    others = sum(widths) + _GAP * len(widths) + _EDGES
+    fits = others + min(last, _LAST_COLUMN) <= console.width
+    if not fits and console.is_terminal:
+        return _blocks(title, columns, rows)
+    return _table(title, columns, rows, right, None if fits else others + last)
+
+
+def facts_grid(facts: Rows) -> Table:
+    """Names with values, without lines; a long value is broken, also within a word such as a path."""
+    grid = Table.grid(padding=(0, _INDENT))
+    grid.add_column(style="dim", no_wrap=True)
+    grid.add_column(overflow="fold")
+    for name, value in facts:
+        grid.add_row(Text(name), Text(value))
+    return grid
+
+
+def _width(cell: str) -> int:
+    return max(map(cell_len, cell.splitlines()), default=0)
+
+
+def _table(title: str, columns: Sequence[str], rows: Rows, right: Sequence[int], width: int | None) -> Table:
+    """Rows and columns; of the width that they take when None."""
+    grid = Table(
+        box=box.SIMPLE_HEAD, title=Text(title), title_justify="left", title_style="bold", pad_edge=False, width=width
+    )
+    for index, column in enumerate(columns):
+        last = index == len(columns) - 1
+        grid.add_column(Text(column), justify="right" if index in right else "left", no_wrap=not last, overflow="fold")
+    for row in rows:
+        grid.add_row(*map(Text, row))
+    return grid
+
+
+def _blocks(title: str, columns: Sequence[str], rows: Rows) -> Group:
+    """A heading for each row, its first cell, and the other cells that hold something below it, each with its name."""
+    blocks: list[RenderableType] = [Text(title, style="bold")]
+    for row in rows:
+        facts = [(name and f"{name}:", cell) for name, cell in zip(columns[1:], row[1:], strict=True) if cell]
+        blocks += [Text(""), Text(row[0], overflow="fold"), Padding(facts_grid(facts), (0, 0, 0, _INDENT))]
+    return Group(*blocks, Text(""))
