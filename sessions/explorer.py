@@ -20,6 +20,8 @@ from sessions.grasp_cycle import GraspPlan
 from sessions.motion import GraspFrame
 from tactile_lab.errors import ShapeError
 from tactile_lab.exploration.candidates import Candidate, ClosingRays, ModelledObject, ring_of_candidates
+from tactile_lab.exploration.information_policy import InformationSettings
+from tactile_lab.exploration.policies import POLICIES
 from tactile_lab.exploration.policy import Surface
 from tactile_lab.exploration.rewards import RatedCandidate, explored_share, rate
 from tactile_lab.geometry.contacts import FINGERS, Array
@@ -40,6 +42,7 @@ class ExplorationSettings(StrictModel):
             reaches it (a round object can not tell its turn) it does not count.
         policy: name of the policy that chooses among everything the hand can do (:mod:`tactile_lab.exploration`);
             None for the reward of equation 4.20 alone, as above.
+        information: of the policy ``information``, whether it is named here or on the command line.
         side_closings: closings with the hand leaning to one side that policies may choose besides, where a surface is
             wanted.
         caution: standard deviations of the estimated surface that the open fingertips keep clear of besides, of at
@@ -53,11 +56,19 @@ class ExplorationSettings(StrictModel):
     least_contacts: int = Field(default=4, ge=0)
     least_observability: float = Field(default=0.15, ge=0.0)
     policy: str | None = None
+    information: InformationSettings = InformationSettings()
     side_closings: tuple[str, ...] = tuple(LEANING)
     caution: float = Field(default=0.5, ge=0.0)
     clearance_m: float = Field(default=0.012, ge=0.0)
     contour_resolution_m: float = Field(default=0.002, gt=0.0)
     mesh_resolution_m: float = Field(default=0.006, gt=0.0)
+
+    @field_validator("policy")
+    @classmethod
+    def _is_known(cls, name: str | None) -> str | None:
+        if name is not None and name not in POLICIES:
+            raise ValueError(f"no policy is called {name!r}; policies are {', '.join(POLICIES)}")
+        return name
 
     @field_validator("side_closings")
     @classmethod

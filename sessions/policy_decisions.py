@@ -126,4 +126,4 @@ def chooser_for(
     """The policy called ``policy`` over what the hand can do. Raises ConfigurationError if there is none."""
     plan, exploration, cycle, safety = settings
     limits = HandLimits(plan, exploration, cycle, safety, tip, dimension)
-    return PolicyChooser(make_policy(policy), limits, noise, np.random.default_rng([seed, 1]))
+    return PolicyChooser(make_policy(policy, exploration.information), limits, noise, np.random.default_rng([seed, 1]))

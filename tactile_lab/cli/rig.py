@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tactile_lab.cli.options import Json, NoInput
+
+if TYPE_CHECKING:
+    from tactile_lab.rigs.description import Rig
 
 _FOR_EVER_s = 1e8
 
@@ -63,6 +66,54 @@ def _list_ports(watch_s: float, as_json: bool) -> None:
         say(f"{port.name}: now {port.description}" if port.name in changed else f"{port.name} came: {port.description}")
     if watch_s and not (gone or come):
         say("nothing changed")
+
+
+@app.command("show")
+def show(
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="Name of a shipped rig, or a rig file.")],
+    every: Annotated[bool, typer.Option("--all", help="The usual settings too.")] = False,
+    as_json: Json = False,
+    no_input: NoInput = False,
+) -> None:
+    """Show what a rig works with: its devices, its calibration files beside the rig file, and its unusual settings."""
+    from tactile_lab.cli.console import emit_json, say, show_facts, show_table
+    from tactile_lab.rigs.description import load_rig
+    from tactile_lab.rigs.in_force import settings_in_force
+
+    del no_input
+    loaded = load_rig(rig)
+    if as_json:
+        emit_json({"file": loaded.source, **loaded.plain()})
+        return
+    settings = settings_in_force(loaded.description)
+    shown = [item for item in settings if every or item.value != item.usual]
+    show_facts(f"Rig {loaded.description.name}", _facts(loaded))
+    say("")
+    if shown:
+        title = "All settings" if every else f"Settings that are not the usual ones ({len(shown)} of {len(settings)})"
+        show_table(title, ["setting", "here", "usual"], [(item.name, item.value, item.usual) for item in shown])
+    else:
+        say("all settings are the usual ones; --all shows them")
+
+
+def _facts(rig: Rig) -> list[tuple[str, str]]:
+    from tactile_lab.rigs.description import gauge_files
+    from tactile_lab.rigs.in_force import flat
+
+    told = rig.description
+    wires = {} if told.wires is None else flat(told.wires.model_dump(mode="json", exclude_unset=True))
+    files = told.calibration.model_dump(exclude_none=True) | gauge_files(told)
+    return [
+        ("summary", told.summary),
+        ("file", rig.source),
+        ("kind", told.kind + (", with stand-ins" if told.stand_ins else "")),
+        ("cycle", f"{1e3 * told.cycle_s:g} ms"),
+        ("fingertips", told.fingertips),
+        ("station", rig.installation.rig),
+        ("devices", ", ".join(f"{device} {serial}" for device, serial in told.devices.items())),
+        ("wires", "\n".join(f"{name}: {value}" for name, value in wires.items())),
+        ("calibration", "\n".join(f"{role}: {file}" for role, file in files.items())),
+    ]
 
 
 @app.command("check")

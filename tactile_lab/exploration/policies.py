@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.exploration.information.igef import IgefSettings
-from tactile_lab.exploration.information_policy import InformationPolicy
+from tactile_lab.exploration.information_policy import InformationPolicy, InformationSettings
 from tactile_lab.exploration.policy import Policy
 from tactile_lab.exploration.pose_policies import (
     PoseSwitchPolicy,
@@ -70,9 +71,18 @@ POLICIES: Mapping[str, Callable[[], Policy]] = MappingProxyType(
 """How each policy is made, by its name."""
 
 
-def make_policy(name: str) -> Policy:
-    """The policy called ``name``. Raises ConfigurationError if there is none."""
+def make_policy(name: str, information: InformationSettings | None = None) -> Policy:
+    """The policy called ``name``.
+
+    Args:
+        information: settings of the policy ``information``; the usual ones when None. The others are the thesis's, and
+            stay as it has them, so that a comparison with them is one with it.
+
+    Raises:
+        ConfigurationError: there is no policy of that name.
+    """
     if name not in POLICIES:
         hint = f"Policies are {', '.join(POLICIES)}"
         raise ConfigurationError(f"no policy is called {name!r}", where="policy", hint=hint)
-    return POLICIES[name]()
+    policy = POLICIES[name]()
+    return replace(policy, settings=information) if information and isinstance(policy, InformationPolicy) else policy

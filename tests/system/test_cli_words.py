@@ -42,6 +42,7 @@ COMMANDS = (
     "session import",
     "rig",
     "rig list",
+    "rig show",
     "rig check",
     "rig emulate",
 )

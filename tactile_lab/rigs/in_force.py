@@ -1,0 +1,52 @@
+"""Which settings a rig works with: those of its file, and the usual ones where it says nothing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from tactile_lab.rigs.description import RigDescription
+from tactile_lab.strict_yaml import StrictModel
+
+
+@dataclass(frozen=True)
+class SettingInForce:
+    """One setting.
+
+    Attributes:
+        name: its keys in the rig file, joined by dots.
+        value: as a rig file would say it.
+        usual: the same for a rig file that does not say it; empty where there is no such value.
+    """
+
+    name: str
+    value: str
+    usual: str
+
+
+def settings_in_force(description: RigDescription) -> tuple[SettingInForce, ...]:
+    """All settings of a rig's parts, in the order of the rig file."""
+    fields = RigDescription.model_fields
+    usual = {name: field.default.model_dump(mode="json") for name, field in fields.items() if _is_part(field.default)}
+    given = flat(description.model_dump(mode="json", include=set(usual)))
+    known = flat(usual)
+    return tuple(SettingInForce(name, value, known.get(name, "")) for name, value in given.items())
+
+
+def flat(content: dict[str, Any]) -> dict[str, str]:
+    """Nested keys with values as one level of dotted names with texts; a list is one value."""
+    return dict(_flattened("", content))
+
+
+def _is_part(default: object) -> bool:
+    return isinstance(default, StrictModel)
+
+
+def _flattened(name: str, value: Any) -> Iterator[tuple[str, str]]:
+    if not isinstance(value, dict) or not value:
+        yield name, json.dumps(value, ensure_ascii=False)
+        return
+    for key, inner in value.items():
+        yield from _flattened(f"{name}.{key}" if name else str(key), inner)
