@@ -29,6 +29,9 @@ _LARGEST_DAMPING = 1e6
 _LARGEST_FOLD = float(np.cos(np.deg2rad(35.0)))
 """Faces that meet at a larger angle are never one."""
 
+_LEAST_FREEDOM = 1e-6
+"""Keeps the leverage of a contact below one, where it alone holds something."""
+
 
 @dataclass(frozen=True)
 class FacetedTrajectory:
@@ -115,6 +118,24 @@ class FacetSmoother:
     def information(self, rows: Array, faces: FlatFaces) -> Array:
         """Gauss-Newton information by all poses but the first, then by each face's tilt and offset."""
         return self._normal_equations(self._rated(rows, faces))[0]
+
+    def pulls(self, rows: Array, faces: FlatFaces) -> Array:
+        """Chi-square that leaving out each contact would save, poses and faces yielding to the others, shape (n,).
+
+        A contact that a pose or a face hangs on draws it towards itself: its own residual is small, and what it costs
+        is in the others' (the leave-one-out statistics of linear regression, here for all residuals of a contact).
+
+        Args:
+            rows, faces: as fitted.
+        """
+        at = self._rated(rows, faces)
+        information, _ = self._normal_equations(at)
+        count = len(self._grasp_of)
+        residuals = self._residuals(rows, faces).reshape(-1, count).T
+        by_contact = self._jacobian(at).reshape(residuals.shape[1], count, -1).swapaxes(0, 1)
+        leverage = by_contact @ np.linalg.solve(information, by_contact.swapaxes(1, 2))
+        freely = np.eye(residuals.shape[1]) * (1 + _LEAST_FREEDOM) - leverage
+        return np.asarray(np.einsum("na,na->n", residuals, np.linalg.solve(freely, residuals[:, :, None])[:, :, 0]))
 
     def _rated(self, rows: Array, faces: FlatFaces) -> FacetedTrajectory:
         chi_square = float(np.sum(self._residuals(rows, faces) ** 2))

@@ -192,7 +192,8 @@ class JointTracker:
         best = min(found, key=cost)
         limit = self._judge.rated(best.map).cost
         others = self._judge.unlike(self._regrouped(best), known, by_contacts=False)
-        return sorted(found + [sharp.better(one.map) for one in others if one.cost < limit], key=cost)
+        ranked = sorted(found + [sharp.better(one.map) for one in others if one.cost < limit], key=cost)
+        return [sharp.released(ranked[0]), *ranked[1:]]
 
     def _readmitted(self, hypothesis: Hypothesis) -> Hypothesis:
         """With a second look at all contacts: some were left out when little was known of the object."""

@@ -15,10 +15,10 @@ from tactile_lab.shape.polyhedron import Polyhedron
 from tactile_lab.shape.prism import Prism
 from tactile_lab.shape.surface import extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
-from tactile_lab.tracking.facet_smoothing import smoothed_with_faces
+from tactile_lab.tracking.facet_smoothing import FacetSmoother, smoothed_with_faces
 from tactile_lab.tracking.flat_faces import flat_faces
 from tactile_lab.tracking.free_space import free_space_costs
-from tactile_lab.tracking.hypotheses import Hypothesis, Judge
+from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.pose_rows import PLANAR
@@ -33,6 +33,13 @@ _MOST_DOUBTS = 12
 
 _HOPELESS_nats = 100.0
 """Flat faces that are less likely than the field by more than this stay so, whichever contacts are left out."""
+
+
+_LEAST_PULL_nats = 4.0
+_MOST_PULLS = 4
+"""Contacts that are left out on trial: so many at a time, and none that can hardly pay for it."""
+
+_SAME_nats = 1e-6
 
 
 class SharpJudge:
@@ -57,6 +64,19 @@ class SharpJudge:
             settled = _likelier(settled, self._faceted(settled.map))
         return _likelier(smooth, settled)
 
+    def released(self, best: Hypothesis) -> Hypothesis:
+        """A faceted hypothesis without the contacts that it is better off without once poses and faces yield.
+
+        A wrong contact that a pose hangs on is explained by turning the whole grasp, or by a face bent for it, and then
+        fits: looked at where it is, nothing tells it from the others.
+        """
+        while found := [each for each in map(self._faceted, self._without_pulls(best)) if each is not None]:
+            freed = min(found, key=cost)
+            if freed.cost >= best.cost:
+                break
+            best = _likelier(freed, self._faceted(self._restored(freed).map))
+        return best
+
     def without_errors(self, contact_map: ContactMap) -> ContactMap:
         """The map at its poses, without the contacts that neither a field nor flat faces explain."""
         cleaned, _ = self._judge.cleaned(contact_map)
@@ -64,6 +84,16 @@ class SharpJudge:
         if sharp is None:
             return cleaned
         return _likelier(self._judge.rated(cleaned), self._reconsidered(sharp)).map
+
+    def _without_pulls(self, best: Hypothesis) -> list[ContactMap]:
+        """The map without each of the contacts that pull the most; nothing for an object without flat faces."""
+        sharp = self._sharp(best.map)
+        if sharp is None or sharp.cost > best.cost + _SAME_nats:
+            return []
+        faces, _ = flat_faces(best.map)
+        pulls = 0.5 * FacetSmoother(best.map, self._noise).pulls(best.map.rows, faces)
+        strongest = [int(each) for each in np.argsort(-pulls)[:_MOST_PULLS] if pulls[each] > _LEAST_PULL_nats]
+        return [best.map.without_contact(*best.map.origins[each]) for each in strongest]
 
     def _faceted(self, contact_map: ContactMap) -> Hypothesis | None:
         """Poses and faces smoothed together; None if there are no faces that enclose anything."""

@@ -113,3 +113,49 @@ def test_covariances_of_all_poses_hold_their_errors() -> None:
         for grasp, true in zip(rated.placed[1:], contact_map.placed[1:], strict=True)
     ]
     assert np.median(errors) < 7.8
+
+
+def with_wrong_contact(contact_map: ContactMap, grasp: int, contact: int, off_m: float) -> ContactMap:
+    """The map with one contact moved outward along its normal."""
+    world = contact_map.placed[grasp].contacts_world
+    points = world.points_m.copy()
+    points[contact] += off_m * world.normals[contact]
+    placed = list(contact_map.placed)
+    placed[grasp] = replace(placed[grasp], contacts_world=replace(world, points_m=points))
+    return replace(contact_map, placed=tuple(placed))
+
+
+def test_pulls_are_what_leaving_out_each_contact_saves() -> None:
+    contact_map = with_wrong_contact(true_map("rectangle", count=10), 7, 1, 0.010)
+    smoother, faces = FacetSmoother(contact_map, NOISE), flat_faces(contact_map)[0]
+    settled = smoother.fitted(contact_map.rows, faces, 30)
+    pulls = smoother.pulls(settled.rows, settled.faces)
+    wrong = contact_map.origins.index((7, 1))
+    for left_out in (wrong, 0, len(pulls) - 1):
+        others = np.delete(np.arange(len(pulls)), left_out)
+        fewer = contact_map.without_contact(*contact_map.origins[left_out])
+        kept = replace(
+            settled.faces,
+            labels=settled.faces.labels[others],
+            leaning=settled.faces.leaning[others],
+            bounded=settled.faces.bounded[others],
+        )
+        refitted = FacetSmoother(fewer, NOISE).fitted(settled.rows, kept, 30)
+        assert pulls[left_out] == pytest.approx(2 * (settled.cost - refitted.cost), rel=0.15, abs=0.3)
+    assert pulls[wrong] > 4 * np.median(pulls)
+
+
+def test_a_wrong_contact_that_a_pose_hangs_on_is_released() -> None:
+    wrong = with_wrong_contact(true_map("rectangle", count=10), 7, 1, 0.010)
+    settled = sharp_judge(wrong).better(Judge(NOISE, 5.0).smoothed(wrong, 15).map)
+    released = sharp_judge(wrong).released(settled)
+    assert settled.map.left_out_count == 0
+    assert released.cost < settled.cost - 10
+    assert [grasp.left_out for grasp in released.map.placed if grasp.left_out] == [{1}]
+    assert released.map.placed[7].left_out == {1}
+
+
+def test_where_no_contact_is_wrong_none_is_released() -> None:
+    right = true_map("rectangle", count=10)
+    settled = sharp_judge(right).better(Judge(NOISE, 5.0).smoothed(right, 15).map)
+    assert sharp_judge(right).released(settled) is settled
