@@ -32,7 +32,9 @@ def write_whole(path: Path, content: str | bytes, hint: str = "Choose another fo
         partial.replace(path)
     except OSError as error:
         advice = "Free some space on it, then try again" if disk_full(error) else hint
-        raise WriteError(write_failure(error), where=str(path), hint=advice) from error
+        in_the_way = isinstance(error, (FileExistsError, NotADirectoryError))
+        what = f"can not be written ({path.parent} is no folder)" if in_the_way else write_failure(error)
+        raise WriteError(what, where=str(path), hint=advice) from error
     finally:  # after an interruption too; nothing is left of it when all went well
         with suppress(OSError):  # where the folder is none, either
             partial.unlink(missing_ok=True)
