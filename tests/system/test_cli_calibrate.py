@@ -26,7 +26,14 @@ SETTINGS = {
         "needs": {"lever_m": 0.01},
         "limits": {"held_out_mm": 20, "repeat_mm": 20, "repeat_deg": 10, "region_mm": 20, "region_deg": 10},
     },
-    "station": {"travel_m_s": 0.5, "turn_rad_s": 2.5, "press_m_s": 0.04, "again_m_s": 0.006, "settle_s": 0.15},
+    "station": {
+        "travel_m_s": 0.5,
+        "turn_rad_s": 2.5,
+        "fingers_rad_s": 2.5,
+        "press_m_s": 0.04,
+        "again_m_s": 0.006,
+        "settle_s": 0.15,
+    },
 }
 
 
