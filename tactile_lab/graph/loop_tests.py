@@ -8,9 +8,8 @@ Three more follow, in this order, and the first that fails is the reason reporte
 3. it belongs to the combination of loops that agree with each other and with the hand's own motion
    (:func:`~tactile_lab.graph.robust.solve_robustly`).
 
-The nodes of that graph are the inverse poses ``object_T_world``. Between them both the hand's motion and the
-displacement that contacts tell are measurements by themselves, whatever the estimated poses are; between the poses
-``world_T_object`` an error of heading would enter, times the way the hand has gone.
+The nodes of that graph are inverse poses as well (:mod:`~tactile_lab.graph.pose_graph` says why); the hand's motion
+takes the place of the filter's steps.
 """
 
 from __future__ import annotations
@@ -23,12 +22,12 @@ from pydantic import Field
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.graph.placement import Placement, PlacementSettings, judge_placements
-from tactile_lab.graph.pose_graph import Loop
+from tactile_lab.graph.pose_graph import Loop, loop_edge
 from tactile_lab.graph.relative_poses import RelativePose
 from tactile_lab.graph.robust import LoopVerdict, RobustSettings, solve_robustly
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap
-from tactile_lab.tracking.motion import MotionNoise, inverse, pose_row, row_pose
+from tactile_lab.tracking.motion import MotionNoise, inverse
 
 
 class LoopTestSettings(StrictModel):
@@ -94,7 +93,7 @@ def _joint_verdicts(
         RelativePose(k, k + 1, inverse(grasp.motion), _motion_covariance(grasp.row, noise))
         for k, grasp in enumerate(contact_map.placed[1:])
     ]
-    edges = [_edge(loop, rows) for loop in loops]
+    edges = [loop_edge(loop, rows) for loop in loops]
     return solve_robustly(odometry, edges, settings, inverse(rows[0])).verdicts
 
 
@@ -102,15 +101,6 @@ def _motion_covariance(row: Array, noise: MotionNoise) -> Array:
     """The noise acts at the object; seen as a small motion about the world's origin."""
     about_origin = np.array([[1.0, 0.0, row[1]], [0.0, 1.0, -row[0]], [0.0, 0.0, 1.0]])
     return np.asarray(about_origin @ np.diag(noise.sigmas**2) @ about_origin.T)
-
-
-def _edge(loop: Loop, rows: Array) -> RelativePose:
-    """A loop between inverse poses; its covariance, told in the earlier object frame, follows it to the world."""
-    report = loop.report
-    displacement = report.displacement
-    assert displacement is not None, "loops found in a map have one"
-    carried = displacement.inverse().compose(row_pose(rows[report.earlier])).AdjointMap()
-    return RelativePose(report.earlier, report.later, pose_row(displacement), carried @ loop.covariance @ carried.T)
 
 
 def _with_verdict(loop: Loop, verdict: LoopVerdict) -> Loop:

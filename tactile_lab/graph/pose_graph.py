@@ -1,9 +1,13 @@
 """The pose graph behind the filter (thesis section 3.3.3): all poses corrected at once (eq. 3.19 to 3.25).
 
-Nodes are the object's planar poses at each grasp. Edges are the filter's relative poses from grasp to grasp with
-the filter's covariance (3.23), and one relative pose for each pair of similar grasps (3.26) with its own
-covariance. Every such loop is tested before it enters, and weighs less the worse it fits (a redescending cost),
-so that one wrong association can not bend the whole trajectory.
+Nodes are the object's planar poses at each grasp. Edges are the filter's steps from grasp to grasp with the
+filter's covariance (3.23), and one for each pair of similar grasps (3.26) with its own covariance. Every such loop is
+tested before it enters, and weighs less the worse it fits (a redescending cost), so that one wrong association can not
+bend the whole trajectory.
+
+The nodes are kept as inverse poses ``object_T_world``. An edge between two of them is a motion of the object in the
+world, as it was measured, whatever the estimated poses are. Between the poses ``world_T_object`` themselves an error
+of heading would enter, times the way between the grasps: 3 degrees over 10 cm are 5 mm.
 """
 
 from __future__ import annotations
@@ -18,11 +22,12 @@ from scipy.stats import chi2
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.geometry.poses import planar
 from tactile_lab.graph.faces import Labels
+from tactile_lab.graph.relative_poses import RelativePose
 from tactile_lab.graph.similarity import SharedContacts, SimilaritySettings, shared_contacts
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.motion import pose_row, row_pose
+from tactile_lab.tracking.motion import inverse, pose_row, row_pose
 from tactile_lab.tracking.registration import Alignment, align
 
 _ANCHOR_SIGMAS = np.array([1e-6, 1e-6, 1e-6])
@@ -71,7 +76,7 @@ class LoopReport:
     accepted: bool
     reason: str
     earlier_T_later: gtsam.Pose2
-    displacement: gtsam.Pose2 | None = None
+    displacement: gtsam.Pose2
 
 
 @dataclass(frozen=True)
@@ -180,21 +185,41 @@ def optimise_poses(contact_map: ContactMap, loops: list[Loop], settings: PoseGra
         settings: of the graph.
     """
     rows = contact_map.rows
+    nodes = [row_pose(row) for row in inverse(rows)]
     graph, start = gtsam.NonlinearFactorGraph(), gtsam.Values()
-    graph.add(gtsam.PriorFactorPose2(0, row_pose(rows[0]), gtsam.noiseModel.Diagonal.Sigmas(_ANCHOR_SIGMAS)))
-    for index, row in enumerate(rows):
-        start.insert(index, row_pose(row))
-    for index in range(1, len(rows)):
-        relative = row_pose(rows[index - 1]).between(row_pose(rows[index]))
-        noise = gtsam.noiseModel.Gaussian.Covariance(_step_covariance(contact_map, index, settings))
-        graph.add(gtsam.BetweenFactorPose2(index - 1, index, relative, noise))
+    graph.add(gtsam.PriorFactorPose2(0, nodes[0], gtsam.noiseModel.Diagonal.Sigmas(_ANCHOR_SIGMAS)))
+    for index, node in enumerate(nodes):
+        start.insert(index, node)
+    for index in range(1, len(nodes)):
+        graph.add(_factor(_step(contact_map, index, settings)))
     cost = gtsam.noiseModel.mEstimator.GemanMcClure.Create(settings.robust_scale)
     for loop in (loop for loop in loops if loop.report.accepted):
-        robust = gtsam.noiseModel.Robust.Create(cost, gtsam.noiseModel.Gaussian.Covariance(loop.covariance))
-        graph.add(gtsam.BetweenFactorPose2(loop.report.earlier, loop.report.later, loop.report.earlier_T_later, robust))
+        graph.add(_factor(loop_edge(loop, rows), cost))
     found = gtsam.LevenbergMarquardtOptimizer(graph, start).optimize()
-    corrected = np.array([pose_row(found.atPose2(index)) for index in range(len(rows))])
-    return contact_map.with_rows(corrected)
+    corrected = np.array([pose_row(found.atPose2(index)) for index in range(len(nodes))])
+    return contact_map.with_rows(inverse(corrected))
+
+
+def loop_edge(loop: Loop, rows: Array) -> RelativePose:
+    """A loop between inverse poses; its covariance, told in the earlier object frame, follows it to the world."""
+    report = loop.report
+    carried = report.displacement.inverse().compose(row_pose(rows[report.earlier])).AdjointMap()
+    covariance = carried @ loop.covariance @ carried.T
+    return RelativePose(report.earlier, report.later, pose_row(report.displacement), covariance)
+
+
+def _step(contact_map: ContactMap, index: int, settings: PoseGraphSettings) -> RelativePose:
+    """The filter's motion of the object since the grasp before, between inverse poses (3.23)."""
+    before, pose = (row_pose(row) for row in contact_map.rows[[index - 1, index]])
+    carried = pose.AdjointMap()
+    covariance = carried @ _step_covariance(contact_map, index, settings) @ carried.T
+    return RelativePose(index - 1, index, pose_row(before.compose(pose.inverse())), covariance)
+
+
+def _factor(edge: RelativePose, cost: gtsam.noiseModel.mEstimator.Base | None = None) -> gtsam.BetweenFactorPose2:
+    noise = gtsam.noiseModel.Gaussian.Covariance(edge.covariance)
+    robust = noise if cost is None else gtsam.noiseModel.Robust.Create(cost, noise)
+    return gtsam.BetweenFactorPose2(edge.start, edge.end, row_pose(edge.row), robust)
 
 
 def explains_better(corrected: ContactMap, present: ContactMap) -> bool:

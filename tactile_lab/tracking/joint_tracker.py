@@ -13,20 +13,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from pydantic import Field as Limit
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.fixed_lag import unfolded
 from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost, likeliest, weights
+from tactile_lab.tracking.joint_settings import JointSettings
 from tactile_lab.tracking.late_placing import Relocate, placed_late, relocated
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import estimated_noise
 from tactile_lab.tracking.particle_filter import PoseEstimate
-from tactile_lab.tracking.proposals import ProposalSettings, propose
+from tactile_lab.tracking.proposals import propose
 from tactile_lab.tracking.regrouping import regrouped
 from tactile_lab.tracking.sharp_judge import SharpJudge
 
@@ -43,36 +42,6 @@ _MOST_REGROUPINGS = 3
 _BACKWARD_SPREAD = {2: (4, 8), 3: (3, 4)}
 """Hypotheses kept, and branches smoothed, when a session is read backwards, by the dimension of the contacts: a second
 opinion need not be as thorough as the first, and in space it costs as much."""
-
-
-class JointSettings(StrictModel):
-    """Parameters of the hypotheses.
-
-    Attributes:
-        proposals: how poses are proposed.
-        hypotheses: so many are kept from grasp to grasp.
-        smoothed: so many of the branches, by evidence before smoothing, are smoothed.
-        evidence_gap: hypotheses that much less likely than the best (natural logarithm) are given up.
-        branch_gap: the same for branches before they are smoothed.
-        iterations: of the optimiser at each grasp.
-        final_iterations: of the optimiser at the end.
-        backwards: read the session backwards as well at the end, unless it is too long for that.
-        window: beyond twice so many grasps, all but so many are settled.
-        estimate_motion: learn the motion's noise from the session; the configured one counts as much as six grasps.
-        remembered: so many contacts of settled grasps still count.
-    """
-
-    proposals: ProposalSettings = ProposalSettings()
-    hypotheses: int = Limit(default=4, ge=1)
-    smoothed: int = Limit(default=6, ge=1)
-    evidence_gap: float = Limit(default=25.0, gt=0)
-    branch_gap: float = Limit(default=15.0, gt=0)
-    iterations: int = Limit(default=15, ge=1)
-    final_iterations: int = Limit(default=80, ge=1)
-    backwards: bool = True
-    window: int = Limit(default=12, ge=2)
-    estimate_motion: bool = False
-    remembered: int = Limit(default=50, ge=10)
 
 
 class JointTracker:
@@ -102,6 +71,7 @@ class JointTracker:
         self._branches: list[Hypothesis] = []
         self._motion = np.zeros(self._space.size)
         self._whole: tuple[ContactMap, ContactMap] | None = None
+        self._settled = False
         self.effective_count = 1.0
 
     @property
@@ -154,10 +124,16 @@ class JointTracker:
             self._hypotheses = sorted((self._judge.rated(one.map) for one in self._hypotheses), key=cost)
         lag = self._settings
         if count > 2 * lag.window:
+            self._settled = True
             self._hypotheses = [self._judge.condensed(one, lag.window, lag.remembered) for one in self._hypotheses]
 
     def adopt(self, corrected: ContactMap) -> None:
-        if corrected is not self.map:
+        """Take over a corrected map; other poses only if grasps were settled on the way.
+
+        Loops between grasps that were smoothed together are made of contacts that count already: twice is too often,
+        and costs some 5 % of the accuracy.
+        """
+        if self._settled or np.array_equal(corrected.rows, self.map.rows):
             self._hypotheses[0] = replace(self._hypotheses[0], map=corrected)
 
     def finish(self) -> None:

@@ -56,7 +56,7 @@ class SharpJudge:
     def better(self, contact_map: ContactMap) -> Hypothesis:
         """The map, or the one with poses smoothed together with flat faces if those explain its contacts better."""
         smooth = self._judge.rated(contact_map)
-        sharp = self._faceted(contact_map) or self._sharp(contact_map)
+        sharp = self._faceted(contact_map) or self._sharp(contact_map) or self._sharp_without_one(contact_map)
         if sharp is None or sharp.cost > smooth.cost + _HOPELESS_nats:
             return smooth
         settled = self._reconsidered(sharp)
@@ -80,7 +80,7 @@ class SharpJudge:
     def without_errors(self, contact_map: ContactMap) -> ContactMap:
         """The map at its poses, without the contacts that neither a field nor flat faces explain."""
         cleaned, _ = self._judge.cleaned(contact_map)
-        sharp = self._sharp(cleaned)
+        sharp = self._sharp(cleaned) or self._sharp_without_one(cleaned)
         if sharp is None:
             return cleaned
         return _likelier(self._judge.rated(cleaned), self._reconsidered(sharp)).map
@@ -111,6 +111,18 @@ class SharpJudge:
         motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
         misfit = motion - explained - float(constant)
         return Hypothesis(contact_map, misfit, intrusion, self._judge.price(contact_map))
+
+    def _sharp_without_one(self, contact_map: ContactMap) -> Hypothesis | None:
+        """The likeliest sharp outline of all contacts but one, of those that the field explains worst.
+
+        One wrong contact can be enough for faces that enclose nothing. In space that is how round bodies are told.
+        """
+        if contact_map.dimension == 3:
+            return None
+        costs = contact_map.fit().leave_one_out_costs(np.arange(len(contact_map.contacts)))
+        worst = [contact_map.origins[each] for each in np.argsort(-costs)[:_MOST_DOUBTS]]
+        found = [self._sharp(contact_map.without_contact(*each)) for each in worst]
+        return min((each for each in found if each is not None), key=cost, default=None)
 
     def _reconsidered(self, sharp: Hypothesis) -> Hypothesis:
         """Contacts left out that a sharp shape explains by themselves only, and those back that it explains better."""

@@ -18,7 +18,8 @@ from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.icp_tracker import IcpSettings, IcpTracker
-from tactile_lab.tracking.joint_tracker import JointSettings, JointTracker
+from tactile_lab.tracking.joint_settings import JointSettings
+from tactile_lab.tracking.joint_tracker import JointTracker
 from tactile_lab.tracking.late_placing import Relocate
 from tactile_lab.tracking.measurement import (
     CalibratedMeasurement,

@@ -19,6 +19,7 @@ from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.motion import compose, deviation, inverse, planar_motion, pose_row, row_pose
 
 DRIFT_SIGMAS = np.array([0.0015, 0.0015, 0.03])
+NOTHING = np.zeros(3)
 
 
 def true_map(seed: int = 0, count: int = 8) -> ContactMap:
@@ -60,8 +61,11 @@ def position_error_m(estimate: ContactMap, truth: ContactMap) -> float:
     return float(np.sqrt(np.mean(gaps[:, :2] ** 2)))
 
 
-def loop(earlier: int, later: int, relative: Array, accepted: bool = True) -> Loop:
-    report = LoopReport(earlier, later, 3, 1.0, 11.3, accepted, "for the test", row_pose(relative))
+def loop(rows: Array, earlier: int, later: int, accepted: bool = True, off: Array = NOTHING) -> Loop:
+    """A loop as contacts tell it that touch the same places at poses ``rows``, or places that are ``off``."""
+    relative = compose(compose(inverse(rows[earlier]), rows[later]), off)
+    displacement = row_pose(compose(compose(rows[earlier], off), inverse(rows[later])))
+    report = LoopReport(earlier, later, 3, 1.0, 11.3, accepted, "for the test", row_pose(relative), displacement)
     return Loop(report, np.diag([1e-6, 1e-6, 1e-4]))
 
 
@@ -106,24 +110,37 @@ def test_true_loops_pull_a_drifting_trajectory_back() -> None:
     truth = true_map()
     estimate = drifting(truth)
     rows = truth.rows
-    loops = [loop(0, later, compose(inverse(rows[0]), rows[later])) for later in (2, 4, 6, 7)]
+    loops = [loop(rows, 0, later) for later in (2, 4, 6, 7)]
     corrected = optimise_poses(estimate, loops, PoseGraphSettings())
     assert position_error_m(corrected, truth) < 0.35 * position_error_m(estimate, truth)
     assert np.allclose(corrected.rows[0], truth.rows[0], atol=1e-6)
 
 
+def test_loops_hold_whatever_the_heading_was_when_they_were_found() -> None:
+    truth = true_map()
+    drift = np.array([0.004, -0.003, np.deg2rad(8.0)])
+    estimate = truth.with_rows(np.array([truth.rows[0], *(compose(row, drift) for row in truth.rows[1:])]))
+    loops = find_loops(estimate, rectangle_faces(truth), PoseGraphSettings(), list(range(2, 8)))
+    assert any(found.report.accepted for found in loops)
+    for found in (found for found in loops if found.report.accepted):
+        back = compose(pose_row(found.report.displacement), truth.rows[found.report.later])
+        gap = deviation(back, truth.rows[found.report.earlier])
+        assert np.hypot(*gap[:2]) < 0.006
+        assert abs(gap[2]) < np.deg2rad(8.0)
+
+
 def test_a_wrong_loop_that_passed_the_test_hardly_bends_the_trajectory() -> None:
     truth = true_map()
     rows = truth.rows
-    loops = [loop(0, later, compose(inverse(rows[0]), rows[later])) for later in (3, 5, 7)]
-    wrong = loop(1, 6, compose(compose(inverse(rows[1]), rows[6]), np.array([0.06, 0.0, np.pi / 2])))
+    loops = [loop(rows, 0, later) for later in (3, 5, 7)]
+    wrong = loop(rows, 1, 6, off=np.array([0.06, 0.0, np.pi / 2]))
     corrected = optimise_poses(drifting(truth), [*loops, wrong], PoseGraphSettings())
     assert position_error_m(corrected, truth) < 0.003
 
 
 def test_refused_loops_stay_out_of_the_graph() -> None:
     contact_map = drifting(true_map())
-    refused = loop(0, 5, np.array([0.1, 0.1, 1.0]), accepted=False)
+    refused = loop(contact_map.rows, 0, 5, accepted=False, off=np.array([0.1, 0.1, 1.0]))
     assert np.allclose(optimise_poses(contact_map, [refused], PoseGraphSettings()).rows, contact_map.rows, atol=1e-9)
 
 
