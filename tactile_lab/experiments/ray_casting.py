@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.compiled import compiled
 
 _PARALLEL = 1e-14
 
@@ -25,7 +25,7 @@ def first_hits(corners_m: Array, starts_m: Array, ways: Array, longest_m: float)
     return np.asarray(distances), faces
 
 
-@njit(cache=True)
+@compiled
 def _cast(corners: Any, starts: Any, ways: Any, longest: float) -> Any:
     distances = np.full(len(starts), np.inf)
     faces = np.full(len(starts), -1)
@@ -39,7 +39,7 @@ def _cast(corners: Any, starts: Any, ways: Any, longest: float) -> Any:
     return distances, faces
 
 
-@njit(cache=True)
+@compiled
 def _crossing(corners: Any, start: Any, way: Any) -> Any:
     """Distance to one triangle (Moeller and Trumbore 1997), -1 where the ray passes it by."""
     ax, ay, az = corners[1, 0] - corners[0, 0], corners[1, 1] - corners[0, 1], corners[1, 2] - corners[0, 2]
