@@ -169,7 +169,12 @@ class JointTracker:
         limit = self._judge.rated(best.map).cost
         others = self._judge.unlike(self._regrouped(best), known, by_contacts=False)
         ranked = sorted(found + [sharp.better(one.map) for one in others if one.cost < limit], key=cost)
-        return [sharp.released(ranked[0]), *ranked[1:]]
+        return [self._placed_again(sharp.released(ranked[0]), sharp), *ranked[1:]]
+
+    def _placed_again(self, best: Hypothesis, sharp: SharpJudge) -> Hypothesis:
+        """With grasps placed that found no place while a wrong contact spoilt the shape, if that is likelier."""
+        again = self._placed_late(self._judge.rated(best.map))
+        return best if again.map is best.map else min(best, sharp.better(again.map), key=cost)
 
     def _readmitted(self, hypothesis: Hypothesis) -> Hypothesis:
         """With a second look at all contacts: some were left out when little was known of the object."""
