@@ -16,6 +16,7 @@ class SensorStream:
 
     def __init__(self, device: Instrument, link: Link) -> None:
         self._device, self._link = device, link
+        self._asked = device if isinstance(device, AskedInstrument) else None  # looked up once, not in every cycle
 
     def connect(self) -> None:
         """Start the stream. Raises DeviceError."""
@@ -28,8 +29,8 @@ class SensorStream:
     def poll(self) -> None:
         """Take everything that waits on the link, and ask for more where the device needs it. Raises DeviceError."""
         self._link.receive()
-        if isinstance(self._device, AskedInstrument):
-            self._device.ask()
+        if self._asked is not None:
+            self._asked.ask()
 
     @property
     def identity(self) -> str:
