@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from rich.console import Console
 from rich.text import Text
 
-from tactile_lab.cli.table_forms import facts_grid, table_form
+from tactile_lab.cli.table_forms import facts_form, table_form
 
 people = Console(stderr=True, highlight=False)
 """For people: standard error, colours only on a terminal and without NO_COLOR."""
@@ -88,6 +88,6 @@ def show_facts(title: str, facts: Iterable[tuple[str, str]]) -> None:
     """Names with values; facts without a value are left out."""
     shown = [(name, value) for name, value in facts if value]
     people.print(Text(title, style="bold"), soft_wrap=True)
-    people.print(facts_grid(shown))
+    people.print(facts_form(people, shown), crop=False)
     for onlooker in _onlookers:
         onlooker.table(title, ("", ""), shown, ())

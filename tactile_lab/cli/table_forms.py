@@ -38,6 +38,14 @@ def table_form(
     return _table(title, columns, rows, right, None if fits else others + last)
 
 
+def facts_form(console: Console, facts: Rows) -> Table:
+    """Names with values as a console shows them: long ones are broken on a terminal, but not in a file or a pipe."""
+    grid = facts_grid(facts)
+    if not console.is_terminal:
+        grid.width = sum(max(map(_width, column), default=0) for column in zip(*facts, strict=True)) + _INDENT
+    return grid
+
+
 def facts_grid(facts: Rows) -> Table:
     """Names with values, without lines; a long value is broken, also within a word such as a path."""
     grid = Table.grid(padding=(0, _INDENT))

@@ -133,6 +133,8 @@ class JointTracker:
         Loops between grasps that were smoothed together are made of contacts that count already; counted
         twice, they made registration worse (decision 26).
         """
+        if corrected is self.map:
+            return
         if self._settled or np.array_equal(corrected.rows, self.map.rows):
             self._hypotheses[0] = replace(self._hypotheses[0], map=corrected)
 

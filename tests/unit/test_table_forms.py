@@ -110,3 +110,15 @@ def test_no_character_is_lost(width, terminal, title, table):
     told = Counter("".join(lines))
     expected = Counter("".join("".join(row) for row in rows) + title)
     assert not {character: count for character, count in (expected - told).items() if not character.isspace()}
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_long_facts_are_broken_on_a_terminal_alone(monkeypatch, terminal):
+    people = Console(file=io.StringIO(), width=40, force_terminal=terminal, color_system=None, highlight=False)
+    monkeypatch.setattr(console, "people", people)
+    console.show_facts("Session", [("ending", "failed: ../sessions/x: the disk is full"), ("note", "two\nlines")])
+    text = people.file.getvalue()
+    assert ("failed: ../sessions/x: the disk is full" in text) is not terminal
+    assert "full" in text
+    assert "lines" in text
+    console.show_facts("Nothing", [])
