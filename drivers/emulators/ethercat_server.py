@@ -110,7 +110,7 @@ class HandServer:
     def _counts(self) -> dict[str, Any]:
         hand = self._hand
         counts = dataclasses.asdict(hand.ring.counts) | dataclasses.asdict(hand.palm_slave.counts)
-        counts |= {"can_frames": len(self._can.heard)}
+        counts |= {"can_frames": len(set(self._can.heard))}  # one whose cycle was late comes twice
         return counts | {"served": hand.palm.served, "state": str(hand.palm_slave.al_status)}
 
 
