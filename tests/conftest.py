@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import gc
 import os
 import signal
@@ -43,3 +44,15 @@ def no_leaked_threads() -> Iterator[None]:
     yield
     left = [thread.name for thread in threading.enumerate() if thread not in before and thread.is_alive()]
     assert not left, f"threads left running: {left}"
+
+
+@pytest.fixture(scope="module")
+def real_time_alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """For a module whose rigs run in real time: no other such module runs meanwhile, in no worker.
+
+    Two emulated hands and their masters ask for real-time scheduling and for a core each: on two cores nothing else,
+    their own sessions included, would get on.
+    """
+    with (tmp_path_factory.getbasetemp().parent / "real-time.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield

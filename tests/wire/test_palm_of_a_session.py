@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+import pytest
 import yaml
 from ethercat_wire import JOINTS, cable
 
@@ -19,6 +20,8 @@ from tactile_lab.rigs.description import Rig, load_rig, rig_of_session
 from tactile_lab.rigs.laboratory import open_laboratory
 from tactile_lab.rigs.wired import hand_setup
 from tests.support.wire_rig import wire_rig
+
+pytestmark = pytest.mark.usefixtures("real_time_alone")
 
 _CYCLES = 20
 

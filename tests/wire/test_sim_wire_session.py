@@ -35,6 +35,8 @@ from tactile_lab.workflow import running
 from tactile_lab.workflow.attending import crew_for
 from tests.support.wire_rig import wire_rig
 
+pytestmark = pytest.mark.usefixtures("real_time_alone")
+
 
 @dataclass
 class At(NullProgress):

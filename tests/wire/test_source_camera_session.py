@@ -29,6 +29,8 @@ from tactile_lab.workflow.comparing import compare_sessions
 from tactile_lab.workflow.judging import TruthChoice
 from tests.support.wire_rig import wire_rig
 
+pytestmark = pytest.mark.usefixtures("real_time_alone")
+
 OBJECT = "box-10x6x4"
 TRUTH = Pose3(Rot3.Yaw(0.4), np.array([0.02, -0.015, 0.02]))  # the box stands on the table
 
