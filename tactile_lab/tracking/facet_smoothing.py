@@ -117,7 +117,8 @@ class FacetSmoother:
 
     def information(self, rows: Array, faces: FlatFaces) -> Array:
         """Gauss-Newton information by all poses but the first, then by each face's tilt and offset."""
-        return self._normal_equations(self._rated(rows, faces))[0]
+        at = self._rated(rows, faces)
+        return self._information(at, self._jacobian(at))
 
     def pulls(self, rows: Array, faces: FlatFaces) -> Array:
         """Chi-square that leaving out each contact would save, poses and faces yielding to the others, shape (n,).
@@ -129,11 +130,10 @@ class FacetSmoother:
             rows, faces: as fitted.
         """
         at = self._rated(rows, faces)
-        information, _ = self._normal_equations(at)
-        count = len(self._grasp_of)
+        count, jacobian = len(self._grasp_of), self._jacobian(at)
         residuals = self._residuals(rows, faces).reshape(-1, count).T
-        by_contact = self._jacobian(at).reshape(residuals.shape[1], count, -1).swapaxes(0, 1)
-        leverage = by_contact @ np.linalg.solve(information, by_contact.swapaxes(1, 2))
+        by_contact = jacobian.reshape(residuals.shape[1], count, -1).swapaxes(0, 1)
+        leverage = by_contact @ np.linalg.solve(self._information(at, jacobian), by_contact.swapaxes(1, 2))
         freely = np.eye(residuals.shape[1]) * (1 + _LEAST_FREEDOM) - leverage
         return np.asarray(np.einsum("na,na->n", residuals, np.linalg.solve(freely, residuals[:, :, None])[:, :, 0]))
 
@@ -156,13 +156,17 @@ class FacetSmoother:
     def _normal_equations(self, at: FacetedTrajectory) -> tuple[Array, Array]:
         """Gauss-Newton information and gradient by all poses but the first, then by each face's tilt and offset."""
         jacobian = self._jacobian(at)
-        information = jacobian.T @ jacobian
         gradient = jacobian.T @ self._residuals(at.rows, at.faces)
+        slips = self._motion.value_and_gradient(at.rows)[1][1:].ravel()
+        gradient[: len(slips)] += slips
+        return self._information(at, jacobian), gradient
+
+    def _information(self, at: FacetedTrajectory, jacobian: Array) -> Array:
+        information = jacobian.T @ jacobian
         free = (len(at.rows) - 1) * self._space.size
         information[:free, :free] += self._motion.information(at.rows)
-        gradient[:free] += self._motion.value_and_gradient(at.rows)[1][1:].ravel()
         information[np.diag_indices_from(information)] += 1e-9 * np.trace(information) / len(information)
-        return information, gradient
+        return np.asarray(information)
 
     def _jacobian(self, at: FacetedTrajectory) -> Array:
         """Derivatives of the residuals."""
@@ -204,7 +208,7 @@ class FacetSmoother:
 
     def _merger_costs(self, at: FacetedTrajectory, pairs: list[tuple[int, int]]) -> dict[tuple[int, int], float]:
         """Chi-square by which making two faces one is expected to raise the total, for pairs that are nearly flat."""
-        information, _ = self._normal_equations(at)
+        information = self._information(at, self._jacobian(at))
         free, dimension = (len(at.rows) - 1) * self._space.size, at.faces.normals.shape[1]
         covariance = np.linalg.inv(information)[free:, free:]
         costs = {}

@@ -71,7 +71,6 @@ class JointTracker:
         self._branches: list[Hypothesis] = []
         self._motion = np.zeros(self._space.size)
         self._whole: tuple[ContactMap, ContactMap] | None = None
-        self._settled = False
         self.effective_count = 1.0
 
     @property
@@ -85,6 +84,11 @@ class JointTracker:
     def hypotheses(self) -> tuple[Hypothesis, ...]:
         """The trajectories that are still followed, the likeliest first."""
         return tuple(self._hypotheses)
+
+    @property
+    def _has_settled(self) -> bool:
+        """The session is so long that its early grasps are summed up."""
+        return len(self.map.placed) > 2 * self._settings.window
 
     def predict(self, motion: Array) -> None:
         self._motion = motion
@@ -124,7 +128,6 @@ class JointTracker:
             self._hypotheses = sorted((self._judge.rated(one.map) for one in self._hypotheses), key=cost)
         lag = self._settings
         if count > 2 * lag.window:
-            self._settled = True
             self._hypotheses = [self._judge.condensed(one, lag.window, lag.remembered) for one in self._hypotheses]
 
     def adopt(self, corrected: ContactMap) -> None:
@@ -135,7 +138,7 @@ class JointTracker:
         """
         if corrected is self.map:
             return
-        if self._settled or np.array_equal(corrected.rows, self.map.rows):
+        if self._has_settled or np.array_equal(corrected.rows, self.map.rows):
             self._hypotheses[0] = replace(self._hypotheses[0], map=corrected)
 
     def finish(self) -> None:
@@ -143,9 +146,8 @@ class JointTracker:
 
         Where the first grasps left a wrong impression the last ones may not, and the evidence tells which was right.
         """
-        is_short = not self._hypotheses[0].map.archive
         readable = len(self.map.placed) > 2 and len(self.map.placed[-1].contacts_world) > 0
-        if self._settings.backwards and is_short and readable:
+        if self._settings.backwards and not self._has_settled and readable:
             self._hypotheses = self._judge.different(self._hypotheses + self._backwards())
         self._regroup()
         for _ in range(2):
