@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -116,6 +116,15 @@ def validate(content: Any, model: type[Model], *, where: str, hint: str = _RETRY
         return model.model_validate(content)
     except ValidationError as error:
         raise ConfigurationError(_explain(error, model), where=where, hint=hint) from error
+
+
+def dotted(content: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Nested keys with values as one level of names joined by dots; a list is one value, and so is an empty mapping."""
+    for key, value in content.items():
+        if isinstance(value, Mapping) and value:
+            yield from dotted(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
 
 
 # --- errors in plain words -----------------------------------------------------------------------------------------

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from calibration.quality import Judgement
 from calibration.store import CalibrationRecord
 from tactile_lab.cli.console import say, show_facts, show_table
+from tactile_lab.strict_yaml import dotted
 
 _LONGEST = 12
 _LONGEST_TEXT = 200
@@ -43,14 +44,9 @@ def show_quality(judgements: Iterable[Judgement]) -> None:
     show_table("Quality", ["", "is", "limit", ""], rows, right=(1, 2))
 
 
-def _lines(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+def _lines(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Nested names with their values; long lists by their length."""
-    for name, value in content.items():
-        place = f"{prefix}{name}"
-        if isinstance(value, Mapping):
-            yield from _lines(value, f"{place}.")
-        else:
-            yield place, _text(value)
+    return [(name, _text(value)) for name, value in dotted(content) if not isinstance(value, Mapping)]
 
 
 def _text(value: Any) -> str:

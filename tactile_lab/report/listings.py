@@ -12,6 +12,7 @@ from tactile_lab.evaluation.table import UNKNOWN, EvaluationRow, evaluation_rows
 from tactile_lab.report import figures
 from tactile_lab.report.content import ReportContent
 from tactile_lab.report.markup import Markup, badge, element, figure, join, table
+from tactile_lab.strict_yaml import dotted
 
 
 def number(value: float | None, digits: int = 1) -> str:
@@ -118,20 +119,10 @@ def origin_section(content: ReportContent) -> Markup:
     """How the session was made: seeds, versions, calibrations, and all settings of the estimation."""
     rows = [[name, element("code", value)] for name, value in content.facts.made_with]
     rows += [[f"calibration: {role}", element("code", digest)] for role, digest in content.facts.calibrations]
-    settings = [[name, element("code", value)] for name, value in flat(content.results.slam.get("settings") or {})]
+    named = dotted(content.results.slam.get("settings") or {})
+    settings = [[name, element("code", str(value))] for name, value in named if not isinstance(value, Mapping)]
     folded = element(
         "details", element("summary", "Settings of the estimation"), table(["setting", "value"], settings, (0, 1))
     )
     card = element("div", table(["item", "value"], rows, (0, 1)), folded if settings else "", class_="card wrap")
     return join([element("h2", "How it was made"), card])
-
-
-def flat(settings: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
-    """Nested settings as dotted names with their values as text."""
-    rows = []
-    for name, value in settings.items():
-        if isinstance(value, Mapping):
-            rows += flat(value, f"{above}{name}.")
-        else:
-            rows.append((f"{above}{name}", str(value)))
-    return rows

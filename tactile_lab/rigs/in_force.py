@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from tactile_lab.rigs.description import RigDescription
-from tactile_lab.strict_yaml import StrictModel
+from tactile_lab.strict_yaml import StrictModel, dotted
 
 
 @dataclass(frozen=True)
@@ -36,17 +35,9 @@ def settings_in_force(description: RigDescription) -> tuple[SettingInForce, ...]
 
 
 def flat(content: dict[str, Any]) -> dict[str, str]:
-    """Nested keys with values as one level of dotted names with texts; a list is one value."""
-    return dict(_flattened("", content))
+    """Nested keys with values as one level of dotted names, with values as a file would say them."""
+    return {name: json.dumps(value, ensure_ascii=False) for name, value in dotted(content)}
 
 
 def _is_part(default: object) -> bool:
     return isinstance(default, StrictModel)
-
-
-def _flattened(name: str, value: Any) -> Iterator[tuple[str, str]]:
-    if not isinstance(value, dict) or not value:
-        yield name, json.dumps(value, ensure_ascii=False)
-        return
-    for key, inner in value.items():
-        yield from _flattened(f"{name}.{key}" if name else str(key), inner)

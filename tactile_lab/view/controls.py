@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import math
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -28,6 +29,8 @@ BUTTONS: tuple[tuple[Ask, str, IconName, str], ...] = (
     (Ask.END, "End", Icon.PLAYER_STOP, "End the session; press twice"),
 )
 _ROWS = 8
+_LAST_LETTERS_s = 0.3
+"""The browser gathers what is written and may send it after the press that follows it."""
 PANEL_STYLE = "padding:0 0.9em 0.6em 0.9em;font-size:0.85em;line-height:1.45"
 
 
@@ -66,9 +69,10 @@ class Controls:
         button = server.gui.add_button("Keep the note", icon=Icon.PENCIL, color="gray")
 
         def keep(event: Any) -> None:
-            if text.value.strip():
-                press(Ask.NOTE, text.value)
-                text.value = ""
+            time.sleep(_LAST_LETTERS_s)
+            note, text.value = text.value, ""
+            if note.strip():
+                press(Ask.NOTE, note)
 
         button.on_click(keep)
 

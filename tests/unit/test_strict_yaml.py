@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydantic import Field, field_validator, model_validator
 
 from tactile_lab.errors import ConfigurationError
-from tactile_lab.strict_yaml import StrictModel, load, load_model, validate
+from tactile_lab.strict_yaml import StrictModel, dotted, load, load_model, validate
 
 
 class Inner(StrictModel):
@@ -192,3 +192,8 @@ def test_a_model_is_read_from_a_file_and_can_not_be_changed(tmp_path):
     assert settings_read == Settings(cycle_s=0.01, inner=Inner(limit_N=2.0))
     with pytest.raises(ValueError, match="frozen"):
         settings_read.grasps = 3
+
+
+def test_nested_keys_become_dotted_names_and_an_empty_mapping_is_a_value() -> None:
+    content = {"a": 1, "b": {"c": [1, 2], "d": {}, "e": {"f": None}}}
+    assert list(dotted(content)) == [("a", 1), ("b.c", [1, 2]), ("b.d", {}), ("b.e.f", None)]
