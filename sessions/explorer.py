@@ -101,13 +101,23 @@ class KnownShape:
     top_height_m: float | None = None
 
 
-def known_shape(field: Gpis, dimension: int, origin_height_m: float, settings: ExplorationSettings) -> KnownShape:
+def known_shape(
+    field: Gpis, dimension: int, origin_height_m: float, settings: ExplorationSettings, mesh: SurfaceMesh | None = None
+) -> KnownShape:
     """Measure the estimated surface.
 
     Where the contacts enclose nothing yet, the object frame's origin stands in for the middle and nothing is explored.
+
+    Args:
+        field: of the contacts.
+        dimension: 2 or 3.
+        origin_height_m: height of the object frame's origin over the table.
+        settings: resolutions.
+        mesh: the surface of the most probable model, in space; without it the field's own is measured. What is
+            explored is judged by the field in any case, see :func:`_as_far_as_felt`.
     """
     try:
-        extracted = _surface(field, dimension, settings)
+        extracted = _surface(field, dimension, settings) if mesh is None else _as_far_as_felt(mesh, field)
     except ShapeError:
         return KnownShape(field, dimension, origin_height_m, np.zeros(2), 0.0)
     surface = Surface.of(extracted)
@@ -120,6 +130,16 @@ def _surface(field: Gpis, dimension: int, settings: ExplorationSettings) -> Cont
     if dimension == 2:
         return extract_contour(field, resolution_m=settings.contour_resolution_m)
     return extract_mesh(field, resolution_m=settings.mesh_resolution_m)
+
+
+def _as_far_as_felt(mesh: SurfaceMesh, field: Gpis) -> SurfaceMesh:
+    """A model's surface with the field's standard deviations.
+
+    The model concludes from a few contacts where a whole face is, and its sigma there is small if the model is right.
+    Exploring is to find out whether it is: so what counts as known is what contacts have told, which wears off with
+    the distance from them. The field's values are distances, so their standard deviation is the surface's.
+    """
+    return replace(mesh, sigma_m=field.sigma_inflation * np.sqrt(field.variance(mesh.vertices)))
 
 
 def closing_rays(table: Closing) -> ClosingRays:

@@ -18,6 +18,7 @@ from sessions.policy_choice import Choice, Knowledge, PolicyChooser
 from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
 from tactile_lab.geometry.poses import planar
 from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.surface import SurfaceMesh
 from tactile_lab.slam import TactileSlam
 
 _LANDING_m = 0.020
@@ -229,11 +230,18 @@ class Planner:
             self._rule.centre_m = np.asarray(expected.transformFrom(known.centre_m))
 
     def known_shape(self) -> KnownShape | None:
-        """The shape as estimated now; None before there is one."""
+        """The shape as estimated now; None before there is one.
+
+        In space its surface is that of the most probable model, as the result of the session would be by now.
+        """
         field = self._slam.surface
         if field is None:
             return None
         if self._known is None or self._known[0] is not field:
-            shape = known_shape(field, self._dimension, self._slam.origin_height_m, self._exploration)
-            self._known = (field, shape)
+            self._known = (field, self._measured(field))
         return self._known[1]
+
+    def _measured(self, field: Gpis) -> KnownShape:
+        shape = self._slam.shape(self._exploration.mesh_resolution_m) if self._dimension == 3 else None
+        mesh = shape if isinstance(shape, SurfaceMesh) else None
+        return known_shape(field, self._dimension, self._slam.origin_height_m, self._exploration, mesh)

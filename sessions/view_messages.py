@@ -8,11 +8,7 @@ import numpy as np
 
 from sessions.explorer import KnownShape
 from sessions.grasp_cycle import GraspPlan
-from tactile_lab.errors import ShapeError
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.surface import extract_contour, extract_mesh
-
-CONTOUR_RESOLUTION_m, MESH_RESOLUTION_m = 0.002, 0.006
 
 
 def plan_message(index: int, plan: GraspPlan) -> dict[str, Any]:
@@ -32,24 +28,18 @@ def plan_message(index: int, plan: GraspPlan) -> dict[str, Any]:
 def surface_message(known: KnownShape | None) -> dict[str, Any]:
     """The surface in the object frame, with the standard deviation at each vertex.
 
-    An outline (dimension 2) is closed and has no faces. Without a closed shape there are no vertices.
+    It is the one that the planner goes by. An outline (dimension 2) is closed and has no faces. Without a closed shape
+    there are no vertices.
     """
     if known is None:
         return _message(2, np.zeros((0, 3)), np.zeros((0, 3), dtype=int), np.zeros(0), 0.0, 0.0)
-    try:
-        vertices_m, faces, sigma_m = _surface(known)
-    except ShapeError:
-        vertices_m, faces, sigma_m = np.zeros((0, 3)), np.zeros((0, 3), dtype=int), np.zeros(0)
-    return _message(known.dimension, vertices_m, faces, sigma_m, known.explored, known.origin_height_m)
-
-
-def _surface(known: KnownShape) -> tuple[Array, Any, Array]:
+    if known.surface is None:
+        nothing = np.zeros((0, 3)), np.zeros((0, 3), dtype=int), np.zeros(0)
+        return _message(known.dimension, *nothing, known.explored, known.origin_height_m)
+    vertices_m, faces = known.surface.points_m, known.surface.cells
     if known.dimension == 2:
-        contour = extract_contour(known.field, resolution_m=CONTOUR_RESOLUTION_m)
-        flat = np.column_stack([contour.points_m, np.zeros(len(contour.points_m))])
-        return flat, np.zeros((0, 3), dtype=int), contour.sigma_m
-    mesh = extract_mesh(known.field, resolution_m=MESH_RESOLUTION_m)
-    return mesh.vertices, mesh.faces, mesh.sigma_m
+        vertices_m, faces = np.pad(vertices_m, ((0, 0), (0, 1))), np.zeros((0, 3), dtype=int)
+    return _message(known.dimension, vertices_m, faces, known.surface.sigma_m, known.explored, known.origin_height_m)
 
 
 def _message(

@@ -28,21 +28,21 @@ from gtsam import Pose3
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tactile_lab.errors import ShapeError, TrackingError
+from tactile_lab.errors import TrackingError
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.graph.relocation import relocated_rows
 from tactile_lab.one_thread import on_one_thread
 from tactile_lab.shape.gpis import Gpis
-from tactile_lab.shape.models import ShapeName, fit_shape
+from tactile_lab.shape.models import ShapeName
 from tactile_lab.shape.surface import Contour, SurfaceMesh
 from tactile_lab.slam_result import SlamResult, SlamStep, Verdict
+from tactile_lab.slam_shape import present_shape
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.first_pose import first_row
 from tactile_lab.tracking.observability import observability, placement_sigma_m, planar_observability
 from tactile_lab.tracking.particle_filter import CERTAIN_VARIANCE, PoseEstimate
-from tactile_lab.tracking.pose_doubt import with_pose_doubt
 from tactile_lab.tracking.trackers import (
     GRAPH_METHODS,
     THESIS_METHODS,
@@ -112,6 +112,7 @@ class TactileSlam:
         self._origin_height_m = 0.0
         self._steps: list[SlamStep] = []
         self._surface: tuple[ContactMap, Gpis] | None = None
+        self._shape: tuple[ContactMap, float, Contour | SurfaceMesh | None] | None = None
 
     @property
     def settings(self) -> SlamSettings:
@@ -159,7 +160,8 @@ class TactileSlam:
             self._tracker.finish()
             self._tracker.adopt(self._back_end.close_all_loops(self._tracker.map))
             self._tracker.adopt(self._tracker.map.with_best_kernel(max_iterations=30, longest_m=0.300))
-        contour, mesh = self._extract()
+        wanted = self._settings
+        shape = self.shape(wanted.contour_resolution_m if wanted.dimension == 2 else wanted.mesh_resolution_m)
         return SlamResult(
             method=self._settings.method,
             seed=self._seed,
@@ -169,8 +171,8 @@ class TactileSlam:
             steps=tuple(self._steps),
             loops=self._back_end.reports,
             surface=self.surface,
-            contour=contour,
-            mesh=mesh,
+            contour=shape if isinstance(shape, Contour) else None,
+            mesh=shape if isinstance(shape, SurfaceMesh) else None,
             status="lost" if self.is_lost else "ok",
         )
 
@@ -204,6 +206,21 @@ class TactileSlam:
         if self._surface is None or self._surface[0] is not contact_map:
             self._surface = (contact_map, contact_map.fit())
         return self._surface[1]
+
+    @on_one_thread
+    def shape(self, resolution_m: float) -> Contour | SurfaceMesh | None:
+        """The present outline or surface by the model of the settings; None where the contacts enclose nothing yet.
+
+        See :func:`tactile_lab.slam_shape.present_shape`.
+        """
+        if self._tracker is None or self.surface is None:
+            return None
+        contact_map, height_m = self._tracker.map, self._origin_height_m
+        if self._shape is None or self._shape[0] is not contact_map or self._shape[1] != resolution_m:
+            model = self._settings.shape_model
+            made = present_shape(self.surface, contact_map, self._settings, model, height_m, resolution_m)
+            self._shape = (contact_map, resolution_m, made)
+        return self._shape[2]
 
     @property
     def surface_grasps(self) -> NDArray[np.intp]:
@@ -274,20 +291,3 @@ class TactileSlam:
 
     def _covariances(self) -> tuple[Array | None, ...]:
         return tuple(grasp.covariance if grasp else None for grasp in self._placed())
-
-    def _extract(self) -> tuple[Contour | None, SurfaceMesh | None]:
-        if self.surface is None:
-            return None, None
-        free = self._tracker.map.free_points_m if self._tracker else None
-        stands = self._settings.dimension == 3 and self._settings.freedom == "table"
-        floor_m = -self._origin_height_m if stands else None
-        try:
-            shape = fit_shape(self._settings.shape_model, self.surface, free, floor_m)
-            if self._settings.dimension == 2:
-                return shape.contour(self._settings.contour_resolution_m), None
-            mesh = shape.mesh(self._settings.mesh_resolution_m, floor_m)
-            if self._tracker is not None and self._settings.method == "joint":
-                mesh = with_pose_doubt(mesh, shape, self._tracker.map, self._settings.motion)
-            return None, mesh
-        except ShapeError:  # contacts that enclose nothing: the trajectory is still a result
-            return None, None

@@ -12,9 +12,8 @@ from gtsam import Pose2
 
 from sessions.explorer import KnownShape
 from sessions.grasp_cycle import GraspPlan
-from tactile_lab.errors import ShapeError
+from tactile_lab.exploration.policy import Surface
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.surface import extract_contour, extract_mesh
 
 SECTORS = ("far", "far left", "left", "near left", "near", "near right", "right", "far right")
 KNOWN_WELL = 0.9
@@ -42,25 +41,17 @@ def unknown_in_words(known: KnownShape | None, world_T_object: Pose2 | None) -> 
         return "the whole object is unknown"
     if known.explored >= KNOWN_WELL:
         return f"{known.explored:.0%} of the surface is known"
-    try:
-        points_m, sigma_m = _surface_points(known)
-    except ShapeError:
+    if known.surface is None:
         return "the contacts enclose nothing yet"
-    worst = _worst_sector(points_m - known.centre_m, sigma_m, world_T_object)
+    worst = _worst_sector(known.surface, known.centre_m, world_T_object)
     return f"{known.explored:.0%} of the surface is known; least the {SECTORS[worst]} side"
 
 
-def _surface_points(known: KnownShape) -> tuple[Array, Array]:
-    if known.dimension == 2:
-        contour = extract_contour(known.field, resolution_m=0.004)
-        return contour.points_m, contour.sigma_m
-    mesh = extract_mesh(known.field, resolution_m=0.008)
-    return mesh.vertices[:, :2], mesh.sigma_m
-
-
-def _worst_sector(offsets_m: Array, sigma_m: Array, world_T_object: Pose2) -> int:
-    """The sector, seen from the middle, whose points are known worst on average; object frame in."""
+def _worst_sector(surface: Surface, centre_m: Array, world_T_object: Pose2) -> int:
+    """The sector, seen from the middle, that is known worst on average over its part of the surface."""
+    offsets_m = surface.points_m[:, :2] - centre_m
     turns = (np.arctan2(offsets_m[:, 1], offsets_m[:, 0]) + world_T_object.theta()) / (2.0 * np.pi)
     sectors = np.round(turns * len(SECTORS)).astype(int) % len(SECTORS)
-    means = [float(sigma_m[sectors == i].mean()) if np.any(sectors == i) else 0.0 for i in range(len(SECTORS))]
-    return int(np.argmax(means))
+    sizes = np.bincount(sectors, surface.sizes, minlength=len(SECTORS))
+    sums = np.bincount(sectors, surface.sizes * surface.sigma_m, minlength=len(SECTORS))
+    return int(np.argmax(sums / np.maximum(sizes, 1e-12)))

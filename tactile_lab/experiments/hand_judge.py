@@ -4,8 +4,11 @@ A session ends when the object is explored, when its budget of actions is spent,
 plane it is explored by A and B of :mod:`tactile_lab.experiments.explored`, on the outline at the height of the
 fingertips. In space the surface counts without the underside, which nothing can touch: A, 90 % of it lies within 5 mm
 of the estimated surface, ends the session; B, a contact lies within 12 mm besides (half the distance of neighbouring
-fingertips). *Touched* is what contacts came near (4.5 mm in the plane, 12 mm in space) where they truly lay, whatever
-the estimate makes of them: that is what a decision promises.
+fingertips). The estimated surface is that of the most probable model, which the planner goes by and a session would
+end with. It may fit by luck, and not after the next grasp: so in space a goal is reached at the first of two
+successive looks that both find it reached, or at the last look that the budget allows. *Touched* is what contacts
+came near (4.5 mm in the plane, 12 mm in space) where they truly lay, whatever the estimate makes of them: that is
+what a decision promises.
 """
 
 from __future__ import annotations
@@ -148,9 +151,16 @@ class Judge:
         return laid_over(self._true_points_m, true_m, estimated)
 
     def _first(self, measure: str) -> Look | None:
-        """The first time that the goal was reached by one of the measures, within the budget; None if it never was."""
-        within = (look for look in self.looks if look.actions <= self._budget)
-        return next((look for look in within if look.shares[measure] >= GOAL), None)
+        """When the goal was reached by one of the measures, within the budget; None if it never was."""
+        within = (number for number, look in enumerate(self.looks) if look.actions <= self._budget)
+        return next((self.looks[number] for number in within if self._is_reached(measure, number)), None)
+
+    def _is_reached(self, measure: str, number: int) -> bool:
+        """In space only if the next look confirms it, or the budget leaves none; see the module's text."""
+        shares = [look.shares[measure] for look in self.looks[number:]]
+        if shares[0] < GOAL or self._dimension == 2:
+            return shares[0] >= GOAL
+        return shares[1] >= GOAL if len(shares) > 1 else self.actions >= self._budget
 
     # --- figures -----------------------------------------------------------------------------------------------
 

@@ -26,16 +26,21 @@ def flat_box(half_x_m: float = 0.05, half_y_m: float = 0.03) -> KnownShape:
     return known_shape(Gpis.fit(*sides(half_x_m, half_y_m), 0.001, 0.05), 2, HEIGHT_m, ExplorationSettings())
 
 
-def solid_box(height_m: float = 0.04, half_x_m: float = 0.05, half_y_m: float = 0.03) -> KnownShape:
-    """Its sides at two heights and its top, frame on the table."""
+def solid_contacts(
+    height_m: float = 0.04, half_x_m: float = 0.05, half_y_m: float = 0.03
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points and normals on its sides at two heights and on its top, frame on the table."""
     points, normals = sides(half_x_m, half_y_m)
     layers = [np.column_stack([points, np.full(len(points), part * height_m)]) for part in (0.25, 0.75)]
     flat = np.column_stack([normals, np.zeros(len(normals))])
     grid = np.stack(np.meshgrid([-0.03, 0.0, 0.03], [-0.015, 0.015]), axis=-1).reshape(-1, 2)
     top = np.column_stack([grid, np.full(len(grid), height_m)])
-    field = Gpis.fit(
-        np.vstack([*layers, top]), np.vstack([flat, flat, np.tile([0.0, 0.0, 1.0], (len(top), 1))]), 0.001, 0.05
-    )
+    return np.vstack([*layers, top]), np.vstack([flat, flat, np.tile([0.0, 0.0, 1.0], (len(top), 1))])
+
+
+def solid_box(height_m: float = 0.04, half_x_m: float = 0.05, half_y_m: float = 0.03) -> KnownShape:
+    """Touched there, as its field has it."""
+    field = Gpis.fit(*solid_contacts(height_m, half_x_m, half_y_m), 0.001, 0.05)
     return known_shape(field, 3, 0.0, ExplorationSettings())
 
 

@@ -17,6 +17,7 @@ from tactile_lab.experiments.sensing import SimulatedGrasps
 from tactile_lab.geometry.contacts import Grasp
 from tactile_lab.geometry.poses import spatial
 from tactile_lab.shape.metrics import contour_errors
+from tactile_lab.shape.surface import Contour
 from tactile_lab.slam import SlamSettings, TactileSlam
 from tactile_lab.slam_result import SlamResult
 from tactile_lab.tracking.first_pose import palm_heading
@@ -78,6 +79,21 @@ def test_a_solid_is_followed_and_meshed() -> None:
     assert result.contour is None
     heights = [pose.z() for pose in result.world_T_object if pose is not None]
     assert np.allclose(heights, data.grasps[0].points_world_m[:, 2].mean())
+
+
+def test_the_present_shape_is_made_once_and_again_after_the_next_grasp() -> None:
+    slam = TactileSlam(settings())
+    assert slam.shape(0.002) is None
+    for grasp in FOUR.grasps[:3]:
+        slam.step(grasp)
+    outline = slam.shape(0.002)
+    assert isinstance(outline, Contour)
+    assert slam.shape(0.002) is outline
+    assert slam.shape(0.004) is not outline
+    slam.step(FOUR.grasps[3])
+    later = slam.shape(0.002)
+    assert isinstance(later, Contour)
+    assert not np.array_equal(later.points_m, outline.points_m)
 
 
 def test_the_object_frame_is_born_at_the_contacts_centre_along_the_palm() -> None:

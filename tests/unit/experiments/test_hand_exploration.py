@@ -8,7 +8,8 @@ import pytest
 from drivers.simulation.objects import object_model
 from tactile_lab.experiments.catalogue import experiment
 from tactile_lab.experiments.hand_exploration import OBJECTS
-from tactile_lab.experiments.hand_judge import laid_over, reachable_points
+from tactile_lab.experiments.hand_judge import Judge, Look, laid_over, reachable_points
+from tactile_lab.slam import SlamSettings, TactileSlam
 
 
 def test_outline_is_what_fingers_reach_in_the_plane() -> None:
@@ -31,6 +32,42 @@ def test_truth_is_laid_over_the_estimate_by_the_contacts() -> None:
     moved = source @ turn.T + [0.3, -0.2, 0.1]
     np.testing.assert_allclose(laid_over(source[:5], source, moved), moved[:5], atol=1e-9)
     np.testing.assert_allclose(laid_over(source[:5, :2], source, moved), moved[:5, :2], atol=1e-9)
+
+
+def judged(shares: list[float], dimension: int, budget: int = 20) -> Judge:
+    """After grasps that cost three actions each and left so much explored, by each of the measures."""
+    slam = TactileSlam(SlamSettings.model_validate({"dimension": dimension}))
+    judge = Judge(object_model("cube-6").mesh, slam, lambda: None, dimension, budget)
+    for share in shares:
+        judge.actions += 3
+        judge.looks.append(Look(judge.actions, judge.actions / 10, {"A": share, "B": share, "touched": share}))
+    return judge
+
+
+@pytest.mark.parametrize(
+    ("shares", "in_space", "in_the_plane"),
+    [
+        ([0.5, 0.92], None, 6),  # the next look has to confirm it
+        ([0.5, 0.92, 0.95], 6, 6),
+        ([0.92, 0.5, 0.92, 0.93], 9, 3),  # one lucky fit is no exploration
+        ([0.5, 0.5, 0.92, 0.6], None, 9),
+    ],
+)
+def test_in_space_two_successive_looks_have_to_agree(
+    shares: list[float], in_space: int | None, in_the_plane: int
+) -> None:
+    for dimension, actions in ((3, in_space), (2, in_the_plane)):
+        judge = judged(shares, dimension)
+        assert judge.is_explored == judge.is_over == (actions is not None)
+        figures = judge.figures(TactileSlam().finish())
+        assert figures["actions_A"] == actions
+        assert figures["at_most_A"] == (actions or 20)
+
+
+@pytest.mark.parametrize(("budget", "actions"), [(6, 6), (5, None), (7, None)])
+def test_the_last_look_of_the_budget_needs_no_other(budget: int, actions: int | None) -> None:
+    judge = judged([0.5, 0.92], 3, budget)
+    assert judge.figures(TactileSlam().finish())["actions_A"] == actions
 
 
 def test_runs_of_the_experiment() -> None:
