@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tactile_lab.errors import ShapeError
@@ -15,7 +16,7 @@ from tactile_lab.shape.gpis import Gpis
 from tactile_lab.shape.polyhedron_cells import arrange
 from tactile_lab.shape.polyhedron_extent import Cap, open_sides
 from tactile_lab.shape.polyhedron_labels import label_cells
-from tactile_lab.shape.polyhedron_mesh import FacetMesh, area_weighted_normals, boundary, refined
+from tactile_lab.shape.polyhedron_mesh import FacetMesh, area_weighted_normals, borders, boundary, refined
 from tactile_lab.shape.polyhedron_planes import (
     Planes,
     WeightedContacts,
@@ -80,6 +81,19 @@ class Polyhedron:
     @property
     def planes(self) -> Planes:
         return self._regular.planes
+
+    def ends(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Where the planes end: the plane of each contact, shape (n,), and :func:`borders` between planes.
+
+        A plane that bounds nothing, as a wrong contact's, is -1.
+
+        Raises:
+            ShapeError: the planes enclose nothing.
+        """
+        body, kept, _ = self._body(None)
+        found = borders(body)
+        touched = (found[:, :2] >= 0) & (found[:, :2] < kept.planes.count)
+        return kept.planes.labels, found[touched.all(axis=1)]
 
     def contour(self, resolution_m: float = 0.001) -> Contour:
         """Raises ShapeError: a solid has no outline."""

@@ -85,6 +85,23 @@ def _edges(loop: Loop) -> list[tuple[int, int]]:
     return [(min(a, b), max(a, b)) for a, b in zip(loop, (*loop[1:], loop[0]), strict=True)]
 
 
+def borders(mesh: FacetMesh) -> Indices:
+    """Planes that end at each other, shape (k, 3): plane, the one that it ends at, and 1 at a ridge or -1 in a notch.
+
+    Every border is listed from both sides. Planes that meet in ridges as well as in notches bound each other nowhere.
+    """
+    _, edge_of = _numbered_edges(mesh.triangles)
+    one, other = (np.argsort(edge_of.ravel(), kind="stable").reshape(-1, 2) // 3).T
+    one, other = np.append(one, other), np.append(other, one)
+    corners = mesh.vertices_m[mesh.triangles]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    height = np.einsum("ed,ed->e", outward[one], corners[other].mean(axis=1) - corners[one, 0])
+    pairs = np.column_stack([mesh.planes[one], mesh.planes[other], np.where(height < 0, 1, -1)])
+    found = np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
+    _, first, ways = np.unique(found[:, :2], axis=0, return_index=True, return_counts=True)
+    return np.asarray(found[first[ways == 1]])
+
+
 def refined(mesh: FacetMesh, longest_m: float) -> FacetMesh:
     """The same surface with edges of at most ``longest_m``: long edges are halved for both their triangles."""
     while True:

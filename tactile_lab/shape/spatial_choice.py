@@ -20,6 +20,7 @@ from tactile_lab.shape.surface import SurfaceMesh
 _COARSE_m = 0.006
 _FREE_SIGMA_m = 0.003
 _ON_SURFACE_m = 0.006
+_NOISE_SIGMAS = 2.0
 _LARGEST_SHARE_OFF, _LARGEST_SHARE_FILLED = 0.15, 0.05
 _KERNEL_STEPS = 10
 _LEFT_OUT_nats = 12.0
@@ -111,11 +112,22 @@ def _checked_evidence(
         mesh = shape.mesh(_COARSE_m, floor_m)
     except ShapeError:  # its faces enclose nothing
         return -np.inf
-    off = distances_to_mesh(gpis.contacts_m, mesh) > _ON_SURFACE_m
+    away_m = distances_to_mesh(gpis.contacts_m, mesh)
     free = np.empty((0, 3)) if free_points_m is None else free_points_m
-    if off.mean() > _LARGEST_SHARE_OFF or _filled_share(mesh, free) > _LARGEST_SHARE_FILLED:
+    if np.mean(away_m > _ON_SURFACE_m) > _LARGEST_SHARE_OFF or _filled_share(mesh, free) > _LARGEST_SHARE_FILLED:
         return -np.inf
-    return shape.log_evidence - _LEFT_OUT_nats * float(off.sum())
+    return shape.log_evidence - stray_cost(away_m, contacts_of(gpis).point_weights)
+
+
+def stray_cost(away_m: Array, weights: Array) -> float:
+    """What contacts cost that a solid's planes explain but its surface leaves out, nats; at most a wrong contact each.
+
+    Args:
+        away_m: distances of the contacts from the surface, shape (n,).
+        weights: inverse variances of their noise, which the planes account for, shape (n,), 1/m^2.
+    """
+    beyond = np.maximum(away_m * np.sqrt(weights) - _NOISE_SIGMAS, 0.0)
+    return float(np.minimum(0.5 * beyond**2, _LEFT_OUT_nats).sum())
 
 
 def _filled_share(mesh: SurfaceMesh, free_points_m: Array) -> float:

@@ -20,6 +20,7 @@ from tactile_lab.tracking.face_ends import overhang
 from tactile_lab.tracking.flat_faces import FlatFaces, Neighbours, flat_faces, tangents
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
+from tactile_lab.tracking.solid_ends import SolidEnds
 
 _MOST_PLANES_SHARE = 0.25
 """Solids whose planes have less than four contacts each on average are not faceted."""
@@ -62,8 +63,14 @@ class FacetedTrajectory:
 class FacetSmoother:
     """Least squares over the poses of a map and the faces of its contacts."""
 
-    def __init__(self, contact_map: ContactMap, noise: MotionNoise) -> None:
-        self._space = contact_map.space
+    def __init__(self, contact_map: ContactMap, noise: MotionNoise, ends: SolidEnds | None = None) -> None:
+        """
+        Args:
+            contact_map: the poses and contacts.
+            noise: of the motion model.
+            ends: where the faces of a solid end; None in the plane, and where no face is known to end.
+        """
+        self._space, self._ends = contact_map.space, ends
         self._motion = MotionCost.of(contact_map, noise)
         self._world = contact_map.contacts_world
         self._grasp_of = contact_map.grasp_indices
@@ -151,6 +158,8 @@ class FacetSmoother:
         if points.shape[1] == 2:
             over = overhang(points, faces.labels, faces.normals, faces.offsets_m)
             parts.append(over.beyond_m * faces.bounded / self._world.point_sigma_m)
+        if self._ends is not None:
+            parts.append(np.maximum(self._ends.beyond(points, faces.normals, faces.offsets_m), 0.0))
         return np.concatenate(parts)
 
     def _normal_equations(self, at: FacetedTrajectory) -> tuple[Array, Array]:
@@ -194,8 +203,26 @@ class FacetSmoother:
             strength = (faces.bounded / world.point_sigma_m)[:, None]
             by_poses[lines, self._grasp_of] = self._space.by_row(each, points, normals, over.ways, still) * strength
             by_faces[lines, :, 1] = over.by_offsets * strength
+        if self._ends is not None:
+            ended = self._by_ends(self._ends, at)
+            by_poses, by_faces = np.concatenate([by_poses, ended[0]]), np.concatenate([by_faces, ended[1]])
         free = by_poses[:, 1:].reshape(len(by_poses), -1)
         return np.hstack([free, by_faces.reshape(len(by_faces), -1)])
+
+    def _by_ends(self, ends: SolidEnds, at: FacetedTrajectory) -> tuple[Array, Array]:
+        """Derivatives of how far contacts lie beyond the ends of a solid's faces, by poses and by faces."""
+        faces, grasp = at.faces, self._grasp_of[ends.contacts]
+        points, normals = self._space.to_object(at.rows[self._grasp_of], self._world.points_m, self._world.normals)
+        over = ends.strengths * (ends.beyond(points, faces.normals, faces.offsets_m) > 0)
+        ended, line = faces.normals[ends.faces], np.arange(len(over))
+        points, normals = points[ends.contacts], normals[ends.contacts]
+        by_poses = np.zeros((len(line), len(at.rows), self._space.size))
+        by_faces = np.zeros((len(line), faces.count, points.shape[1]))
+        by_point = over[:, None] * ended
+        by_poses[line, grasp] = self._space.by_row(at.rows[grasp], points, normals, by_point, np.zeros_like(normals))
+        tilt = np.einsum("ndt,nd->nt", tangents(ended), points)
+        by_faces[line, ends.faces] = over[:, None] * np.column_stack([tilt, -np.ones(len(line))])
+        return by_poses, by_faces
 
     def _stepped(self, at: FacetedTrajectory, step: Array) -> FacetedTrajectory:
         size, dimension = self._space.size, at.faces.normals.shape[1]

@@ -17,6 +17,7 @@ import numpy as np
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.facet_placing import placed_on_solid
 from tactile_lab.tracking.fixed_lag import unfolded
 from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost, likeliest, weights
@@ -173,7 +174,13 @@ class JointTracker:
         limit = self._judge.rated(best.map).cost
         others = self._judge.unlike(self._regrouped(best), known, by_contacts=False)
         ranked = sorted(found + [sharp.better(one.map) for one in others if one.cost < limit], key=cost)
-        return [self._placed_again(sharp.released(ranked[0]), sharp), *ranked[1:]]
+        return [self._on_solid(self._placed_again(sharp.released(ranked[0]), sharp), sharp), *ranked[1:]]
+
+    def _on_solid(self, best: Hypothesis, sharp: SharpJudge) -> Hypothesis:
+        """In space, with grasps where they belong on the object's faces; an outline tells them apart as it grows."""
+        if self.map.dimension == 2:
+            return best
+        return placed_on_solid(best, sharp, self._noise, self._settings.proposals)
 
     def _placed_again(self, best: Hypothesis, sharp: SharpJudge) -> Hypothesis:
         """With grasps placed that found no place while a wrong contact spoilt the shape, if that is likelier."""

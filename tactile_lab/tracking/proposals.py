@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Protocol
 
 import numpy as np
 from pydantic import Field as Limit
 from scipy.stats import norm, qmc
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.gpis import Gpis
+from tactile_lab.shape.posterior import Prediction
 from tactile_lab.strict_yaml import StrictModel
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.motion import MotionNoise
@@ -57,6 +58,16 @@ class ProposalSettings(StrictModel):
     normal_length_m: float = Limit(default=0.018, gt=0)
 
 
+class Matched(Protocol):
+    """A surface that contacts can be driven onto: a field, or a solid."""
+
+    def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
+        """The field at points of shape (q, d)."""
+
+    def variance(self, points_m: Array, *, rough: bool = False) -> Array:
+        """Its variance there, shape (q,), m^2."""
+
+
 @dataclass(frozen=True)
 class Fit:
     """How poses fit, linearised.
@@ -75,7 +86,7 @@ class Fit:
 def propose(
     predicted: Array,
     contacts: ContactSet,
-    field: Gpis,
+    field: Matched,
     noise: MotionNoise,
     settings: ProposalSettings,
     space: PoseRows = PLANAR,
@@ -119,7 +130,7 @@ class GraspMatch:
         self,
         predicted: Array,
         contacts: ContactSet,
-        field: Gpis,
+        field: Matched,
         noise: MotionNoise,
         settings: ProposalSettings,
         space: PoseRows = PLANAR,

@@ -6,14 +6,18 @@ apart: a contact that only a face of its own explains has to be worth that face,
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from tactile_lab.errors import ShapeError
 from tactile_lab.shape.choice import best_shape, free_evidence, polygon_of
 from tactile_lab.shape.gpis import Gpis
-from tactile_lab.shape.polyhedron import Polyhedron
+from tactile_lab.shape.polyhedron import Polyhedron, contacts_of
 from tactile_lab.shape.prism import Prism
-from tactile_lab.shape.surface import extract_contour
+from tactile_lab.shape.sampling import distances_to_mesh
+from tactile_lab.shape.spatial_choice import stray_cost
+from tactile_lab.shape.surface import SurfaceMesh, extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.facet_smoothing import FacetSmoother, smoothed_with_faces
 from tactile_lab.tracking.flat_faces import flat_faces
@@ -22,9 +26,13 @@ from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.pose_rows import PLANAR
+from tactile_lab.tracking.solid_ends import solid_ends
 
 _ORDERING_RESOLUTION_m = 0.002
 """Of outlines that only order contacts and are compared with free places."""
+
+_COARSE_m = 0.006
+"""Of solids that contacts are measured against."""
 
 _SMALL_FACE = 2
 _DOUBTFUL_CHI_SQUARE = 16.0
@@ -40,6 +48,7 @@ _MOST_PULLS = 4
 """Contacts that are left out on trial: so many at a time, and none that can hardly pay for it."""
 
 _SAME_nats = 1e-6
+_SETTLING_STEPS = 15
 
 
 class SharpJudge:
@@ -56,12 +65,12 @@ class SharpJudge:
     def better(self, contact_map: ContactMap) -> Hypothesis:
         """The map, or the one with poses smoothed together with flat faces if those explain its contacts better."""
         smooth = self._judge.rated(contact_map)
-        sharp = self._faceted(contact_map) or self._sharp(contact_map) or self._sharp_without_one(contact_map)
+        sharp = self.faceted(contact_map) or self._sharp(contact_map) or self._sharp_without_one(contact_map)
         if sharp is None or sharp.cost > smooth.cost + _HOPELESS_nats:
             return smooth
         settled = self._reconsidered(sharp)
         if settled.map is not sharp.map:
-            settled = _likelier(settled, self._faceted(settled.map))
+            settled = _likelier(settled, self.faceted(settled.map))
         return _likelier(smooth, settled)
 
     def released(self, best: Hypothesis) -> Hypothesis:
@@ -70,11 +79,11 @@ class SharpJudge:
         A wrong contact that a pose hangs on is explained by turning the whole grasp, or by a face bent for it, and then
         fits: looked at where it is, nothing tells it from the others.
         """
-        while found := [each for each in map(self._faceted, self._without_pulls(best)) if each is not None]:
+        while found := [each for each in map(self.faceted, self._without_pulls(best)) if each is not None]:
             freed = min(found, key=cost)
             if freed.cost >= best.cost:
                 break
-            best = _likelier(freed, self._faceted(self._restored(freed).map))
+            best = _likelier(freed, self.faceted(self._restored(freed).map))
         return best
 
     def without_errors(self, contact_map: ContactMap) -> ContactMap:
@@ -95,7 +104,24 @@ class SharpJudge:
         strongest = [int(each) for each in np.argsort(-pulls)[:_MOST_PULLS] if pulls[each] > _LEAST_PULL_nats]
         return [best.map.without_contact(*best.map.origins[each]) for each in strongest]
 
-    def _faceted(self, contact_map: ContactMap) -> Hypothesis | None:
+    def solid(self, best: Hypothesis) -> SurfaceMesh | None:
+        """The surface of a hypothesis in space that is sharp; None for others."""
+        sharp = self._sharp(best.map)
+        if sharp is None or sharp.cost > best.cost + _SAME_nats:
+            return None
+        return _best_solid(best.map, best.map.fit())[1]
+
+    def settled(self, contact_map: ContactMap) -> Hypothesis | None:
+        """Poses and faces in space smoothed together, contacts staying between the ends of their faces; else None."""
+        try:
+            faces, _ = flat_faces(contact_map)
+            ends = solid_ends(contact_map, faces)
+        except ShapeError:
+            return None
+        found = FacetSmoother(contact_map, self._noise, ends).fitted(contact_map.rows, faces, _SETTLING_STEPS)
+        return self._sharp(contact_map.with_rows(found.rows))
+
+    def faceted(self, contact_map: ContactMap) -> Hypothesis | None:
         """Poses and faces smoothed together; None if there are no faces that enclose anything."""
         faceted = smoothed_with_faces(contact_map, self._noise)
         return self._sharp(contact_map.with_rows(faceted.rows)) if faceted else None
@@ -153,18 +179,39 @@ def _explained(contact_map: ContactMap, fitted: Gpis) -> tuple[float, float]:
     if contact_map.dimension == 2:
         polygon = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
         return polygon.log_evidence, -free_evidence(polygon.contour(_ORDERING_RESOLUTION_m), free, fitted)
-    on_table = contact_map.space is PLANAR
-    explained = Polyhedron.fit(fitted, free, upright=on_table).log_evidence
+    return _best_solid(contact_map, fitted)[0], float(free_space_costs(fitted, free[None])[0])
+
+
+def _best_solid(contact_map: ContactMap, fitted: Gpis) -> tuple[float, SurfaceMesh]:
+    """Log evidence and surface of the likeliest solid with flat faces or upright walls. Raises ShapeError."""
+    on_table, free = contact_map.space is PLANAR, contact_map.free_points_m
+    makers: list[Callable[[], Polyhedron | Prism]] = [lambda: Polyhedron.fit(fitted, free, upright=on_table)]
     if on_table:
-        explained = max(explained, _prism_evidence(fitted))
-    return explained, float(free_space_costs(fitted, free[None])[0])
+        makers.append(lambda: Prism.fit(fitted, best_shape))
+    best: tuple[float, SurfaceMesh] | None = None
+    for maker in makers:
+        best = _on_surface(maker, fitted, best) or best
+    if best is None:
+        raise ShapeError("the contacts enclose no solid with flat faces or upright walls")
+    return best
 
 
-def _prism_evidence(fitted: Gpis) -> float:
+def _on_surface(
+    maker: Callable[[], Polyhedron | Prism], fitted: Gpis, known: tuple[float, SurfaceMesh] | None
+) -> tuple[float, SurfaceMesh] | None:
+    """A solid's log evidence, less for contacts that its surface leaves out, and its surface; None if not likelier."""
+    least = -np.inf if known is None else known[0]
     try:
-        return Prism.fit(fitted, best_shape).log_evidence
-    except ShapeError:  # too few contacts on walls
-        return -np.inf
+        solid = maker()
+        if solid.log_evidence <= least:
+            return None
+        mesh = solid.mesh(_COARSE_m)
+    except ShapeError:  # too few contacts on walls, or faces that enclose nothing
+        return None
+    evidence = solid.log_evidence - stray_cost(
+        distances_to_mesh(fitted.contacts_m, mesh), contacts_of(fitted).point_weights
+    )
+    return (evidence, mesh) if evidence > least else None
 
 
 def _doubtful(contact_map: ContactMap) -> list[tuple[int, int]]:

@@ -1,0 +1,84 @@
+"""Where the faces of a solid end: at those beside them, which contacts lie before (a ridge) or behind (a notch).
+
+In the plane the corners follow from the order of the faces (:mod:`face_ends`); in space they are read off the body
+that the planes enclose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.polyhedron import Polyhedron
+from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.flat_faces import FlatFaces
+from tactile_lab.tracking.pose_rows import PLANAR
+
+_LEAST_TURN = 0.3
+"""Sine of the least angle between two faces that end at each other, 17 degrees; flatter ones may yet be one."""
+
+_FARTHEST_SIGMAS = 3.0
+"""A contact that lies farther beyond an end than that lies on a part of its face that does not end there."""
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class SolidEnds:
+    """Contacts that must not go beyond another face than their own, one line each.
+
+    Attributes:
+        contacts: shape (k,).
+        faces: that the contact's own face ends at, shape (k,).
+        strengths: by which distances from those faces count, 1/m, shape (k,): over the noise and the sine between the
+            two faces, positive at a ridge and negative in a notch.
+    """
+
+    contacts: Indices
+    faces: Indices
+    strengths: Array
+
+    def beyond(self, points_m: Array, normals: Array, offsets_m: Array) -> Array:
+        """How far the contacts lie beyond the ends, in standard deviations, shape (k,); negative before them.
+
+        Args:
+            points_m: all contacts, object frame, shape (n, 3).
+            normals, offsets_m: of all faces, shape (s, 3) and (s,).
+        """
+        over_m = np.einsum("kd,kd->k", points_m[self.contacts], normals[self.faces]) - offsets_m[self.faces]
+        return np.asarray(self.strengths * over_m)
+
+
+def solid_ends(contact_map: ContactMap, faces: FlatFaces) -> SolidEnds:
+    """The ends of the faces that a map's contacts lie on, for contacts that do not lie beyond them already.
+
+    Args:
+        contact_map: in space.
+        faces: of its contacts.
+
+    Raises:
+        ShapeError: the planes of the contacts enclose nothing.
+    """
+    seen, upright = contact_map.contacts, contact_map.space is PLANAR
+    planes, borders = Polyhedron.fit(contact_map.fit(), contact_map.free_points_m, upright=upright).ends()
+    lines = [_bounded(faces, *_faces_of(faces, planes, border), border[2], seen.point_sigma_m) for border in borders]
+    joined = [np.concatenate(column) for column in zip(*lines, strict=True)] if lines else [np.empty(0, int)] * 3
+    ends = SolidEnds(joined[0], joined[1], np.asarray(joined[2], dtype=float))
+    inside = ends.beyond(seen.points_m, faces.normals, faces.offsets_m) < _FARTHEST_SIGMAS
+    return SolidEnds(ends.contacts[inside], ends.faces[inside], ends.strengths[inside])
+
+
+def _faces_of(faces: FlatFaces, planes: Indices, border: Indices) -> tuple[int, int]:
+    """The faces that most contacts of a border's two planes lie on."""
+    one, other = (int(np.bincount(faces.labels[planes == plane]).argmax()) for plane in border[:2])
+    return one, other
+
+
+def _bounded(faces: FlatFaces, face: int, end: int, way: int, sigma_m: Array) -> tuple[Indices, Indices, Array]:
+    """The contacts of a face that ends at another, that face, and how strongly it counts."""
+    turn = float(np.sqrt(max(1 - (faces.normals[face] @ faces.normals[end]) ** 2, 0.0)))
+    contacts = np.flatnonzero(faces.labels == face) if turn > _LEAST_TURN else np.empty(0, dtype=np.int64)
+    return contacts, np.full(len(contacts), end), way / (max(turn, _LEAST_TURN) * sigma_m[contacts])

@@ -1,0 +1,104 @@
+"""Where the faces of a solid end, and grasps that belong elsewhere on them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactile_lab.shape.polyhedron import Polyhedron
+from tactile_lab.shape.solid_field import SolidField
+from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.facet_placing import placed_on_solid
+from tactile_lab.tracking.facet_smoothing import FacetSmoother
+from tactile_lab.tracking.flat_faces import flat_faces
+from tactile_lab.tracking.hypotheses import Hypothesis, Judge
+from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.proposals import ProposalSettings
+from tactile_lab.tracking.sharp_judge import SharpJudge
+from tactile_lab.tracking.solid_ends import solid_ends
+from tests.support.simulated_contacts import true_map
+
+NOISE = MotionNoise()
+COUNT = 12
+
+
+@pytest.fixture(scope="module")
+def l_block() -> ContactMap:
+    return true_map("l-block", count=COUNT, dimension=3)
+
+
+def moved(contact_map: ContactMap, index: int, step: list[float]) -> ContactMap:
+    rows = contact_map.rows
+    rows[index] = contact_map.space.moved(rows[index], np.array(step))
+    return contact_map.with_rows(rows)
+
+
+def judge_of(contact_map: ContactMap) -> SharpJudge:
+    return SharpJudge(Judge(NOISE, 2.0), NOISE)
+
+
+def rated(contact_map: ContactMap) -> Hypothesis:
+    found = judge_of(contact_map).settled(contact_map)
+    assert found is not None
+    return found
+
+
+def test_contacts_lie_before_the_ends_of_their_faces(l_block: ContactMap) -> None:
+    faces, _ = flat_faces(l_block)
+    ends = solid_ends(l_block, faces)
+    beyond = ends.beyond(l_block.contacts.points_m, faces.normals, faces.offsets_m)
+    assert len(beyond) > 2 * len(l_block.contacts)  # ridges on both sides and above
+    assert beyond.max() < 3
+    assert np.any(ends.strengths < 0)  # the notch
+    assert np.median(beyond) < -5
+
+
+def test_ends_hold_what_would_slide_off(l_block: ContactMap) -> None:
+    faces, _ = flat_faces(l_block)
+    ends = solid_ends(l_block, faces)
+    beyond, off_m = [], []
+    for given in (None, ends):
+        found = FacetSmoother(l_block, NOISE, given).fitted(moved(l_block, 7, [0.03, 0.0, 0.0]).rows, faces, 30)
+        points = l_block.with_rows(found.rows).contacts.points_m
+        beyond.append(ends.beyond(points, found.faces.normals, found.faces.offsets_m).max())
+        off_m.append(np.linalg.norm(found.rows[:, :2] - l_block.rows[:, :2], axis=1).max())
+    assert beyond[0] > 3 > 1 > beyond[1]
+    assert off_m[1] < off_m[0] + 0.001
+
+
+def test_smoothing_between_ends_takes_the_steepest_way(l_block: ContactMap) -> None:
+    """Derivatives that were wrong would make the optimiser stop early or not at all."""
+    faces, _ = flat_faces(l_block)
+    ends = solid_ends(l_block, faces)
+    smoother = FacetSmoother(l_block, NOISE, ends)
+    loose = FacetSmoother(l_block, NOISE).fitted(l_block.rows, faces, 30)
+    settled = smoother.fitted(loose.rows, loose.faces, 6)
+    assert settled.cost == pytest.approx(smoother.fitted(loose.rows, loose.faces, 60).cost, abs=0.05)
+
+
+def test_the_distance_from_a_solid_is_signed(l_block: ContactMap) -> None:
+    mesh = Polyhedron.fit(l_block.fit(), l_block.free_points_m).mesh(0.006)
+    field = SolidField(mesh, 0.001)
+    centre, outside = mesh.vertices.mean(axis=0), mesh.vertices.max(axis=0) + np.array([0.0, 0.0, 0.01])
+    found = field.predict(np.vstack([l_block.contacts.points_m, centre, outside]), gradient=True, variance=True)
+    assert np.median(np.abs(found.mean_m[:-2])) < 0.002
+    assert found.mean_m[-1] > 0.009
+    assert np.median(np.einsum("nd,nd->n", found.gradient[:-2], l_block.contacts.normals)) > 0.95
+    assert found.variance_m2 == pytest.approx(1e-6)
+
+
+def test_a_grasp_that_closed_on_the_wrong_faces_is_found_its_place(l_block: ContactMap) -> None:
+    wrong = rated(moved(l_block, 9, [0.012, -0.02, np.deg2rad(90.0)]))
+    right = rated(l_block)
+    found = placed_on_solid(wrong, judge_of(l_block), NOISE, ProposalSettings())
+    assert wrong.cost > right.cost + 5
+    assert found.cost < wrong.cost - 5
+    gap = l_block.space.deviation(found.map.rows[9:10], l_block.rows[9])[0]
+    assert np.linalg.norm(gap[:2]) < 0.006
+    assert abs(gap[2]) < 0.15
+
+
+def test_what_is_round_has_no_other_places() -> None:
+    contact_map = true_map("ellipsoid", count=12, dimension=3)
+    smooth = Judge(NOISE, 2.0).rated(contact_map)
+    assert placed_on_solid(smooth, judge_of(contact_map), NOISE, ProposalSettings()) is smooth
