@@ -166,7 +166,7 @@ class Recorder:
         self._put_json(schemas.SLAM_STATE_TOPIC, content, stamp_ns)
 
     def surface(self, stamp_ns: int, content: Mapping[str, Any]) -> None:
-        """The estimated surface, see :mod:`sessions.surface_message`."""
+        """The estimated surface, see :func:`sessions.view_messages.surface_message`."""
         self._put_json(schemas.SLAM_SURFACE_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)
 
     def plan(self, stamp_ns: int, content: Mapping[str, Any]) -> None:
