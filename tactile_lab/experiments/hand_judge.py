@@ -3,12 +3,12 @@
 A session ends when the object is explored, when its budget of actions is spent, or when the object is lost. In the
 plane it is explored by A and B of :mod:`tactile_lab.experiments.explored`, on the outline at the height of the
 fingertips. In space the surface counts without the underside, which nothing can touch: A, 90 % of it lies within 5 mm
-of the estimated surface, ends the session; B, a contact lies within 12 mm besides (half the distance of neighbouring
-fingertips). The estimated surface is that of the most probable model, which the planner goes by and a session would
-end with. It may fit by luck, and not after the next grasp: so in space a goal is reached at the first of two
-successive looks that both find it reached, or at the last look that the budget allows. *Touched* is what contacts
-came near (4.5 mm in the plane, 12 mm in space) where they truly lay, whatever the estimate makes of them: that is
-what a decision promises.
+of the estimated surface and 90 % of that within 5 mm of the true one, ends the session; B, a contact lies within 12 mm
+of 90 % besides (half the distance of neighbouring fingertips). The estimated surface is that of the most probable
+model, which the planner goes by and a session would end with. It may fit by luck, and not after the next grasp: so in
+space a goal is reached at the first of two successive looks that both find it reached, or at the last look that the
+budget allows. *Touched* is what contacts came near (4.5 mm in the plane, 12 mm in space) where they truly lay,
+whatever the estimate makes of them: that is what a decision promises.
 """
 
 from __future__ import annotations
@@ -20,8 +20,6 @@ from typing import Any
 import numpy as np
 import trimesh
 from gtsam import Pose3
-from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from sessions.decisions import Decision, End, Veto
 from sessions.explorer import KnownShape
@@ -31,13 +29,18 @@ from sessions.policy_choice import Choice
 from sessions.policy_decisions import PolicyDecisions
 from sessions.thinking import Thinking
 from tactile_lab.evaluation.registration import registration_rms_mm
-from tactile_lab.evaluation.shape import compare_contour, compare_mesh, horizontal_outline
+from tactile_lab.evaluation.shape import compare_contour, compare_mesh
 from tactile_lab.experiments.explored import GOAL, CONTACT_m, ExploredMap
-from tactile_lab.experiments.explored_objects import moved_alike
-from tactile_lab.exploration.policy import Surface
+from tactile_lab.experiments.true_surface import (
+    laid_over,
+    reachable_points,
+    surface_within,
+    true_outline,
+    true_share,
+    within,
+)
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.geometry.poses import transform_points
-from tactile_lab.shape.sampling import nearest_on_mesh, sample_polygon
 from tactile_lab.slam import TactileSlam
 from tactile_lab.slam_result import SlamResult
 
@@ -46,8 +49,6 @@ MEASURES = ("A", "B", "touched")
 
 _WITHIN_m = 0.005
 _CONTACT_IN_SPACE_m = 0.012
-_UNDERSIDE = -0.9
-_SAMPLES = 2000
 
 
 @dataclass(frozen=True)
@@ -123,8 +124,8 @@ class Judge:
     def _near_and_touched(self) -> tuple[tuple[float, float], float]:
         """Shares by A and B, and what was truly touched."""
         true_contacts_m = np.concatenate([_seen(g, t) for g, t in zip(self.grasps, self.truth, strict=False)])
-        touched = _within(self._true_points_m, true_contacts_m[:, : self._dimension], self._reach_m)
-        known, points = self._shape(), self._in_map_frame()
+        touched = within(self._true_points_m, true_contacts_m[:, : self._dimension], self._reach_m)
+        known, points = self._shape(), self._in_map_frame(self._true_points_m)
         if known is None or points is None:
             return (0.0, 0.0), float(touched.mean())
         contacts_m = known.field.contacts_m
@@ -133,22 +134,33 @@ class Judge:
             shares = (float(outline.explored("A5", points).mean()), float(outline.explored("B", points).mean()))
         else:
             near = surface_within(known.surface, points, _WITHIN_m)
-            shares = (float(near.mean()), float((near & _within(points, contacts_m, self._reach_m)).mean()))
+            shares = (
+                min(float(near.mean()), self._true_share(known)),
+                float((near & within(points, contacts_m, self._reach_m)).mean()),
+            )
         return shares, float(touched.mean())
+
+    def _true_share(self, known: KnownShape) -> float:
+        """Share of the surface as estimated now that lies near the true one."""
+        vertices = self._in_map_frame(np.asarray(self._mesh.vertices))
+        if known.surface is None or vertices is None:
+            return 0.0
+        true_mesh = trimesh.Trimesh(vertices, self._mesh.faces, process=False)
+        return true_share(known.surface, known.origin_height_m, true_mesh, _WITHIN_m)
 
     @property
     def _reach_m(self) -> float:
         """How far beside a contact the surface counts as touched."""
         return CONTACT_m if self._dimension == 2 else _CONTACT_IN_SPACE_m
 
-    def _in_map_frame(self) -> Array | None:
-        """The true points laid over the estimate by the best fit of all contacts; None before there are enough."""
+    def _in_map_frame(self, points_m: Array) -> Array | None:
+        """True points laid over the estimate by the best fit of all contacts; None before there are enough."""
         placed = zip(self.grasps, self._slam.trajectory, self.truth, strict=False)
         parts = [(_seen(grasp, pose), _seen(grasp, true)) for grasp, pose, true in placed if pose and grasp.contacts]
         if sum(len(part[0]) for part in parts) < 3:
             return None
         estimated, true_m = (np.concatenate([part[side] for part in parts]) for side in (0, 1))
-        return laid_over(self._true_points_m, true_m, estimated)
+        return laid_over(points_m, true_m, estimated)
 
     def _first(self, measure: str) -> Look | None:
         """When the goal was reached by one of the measures, within the budget; None if it never was."""
@@ -209,7 +221,7 @@ class Judge:
     def _hausdorff_mm(self, result: SlamResult) -> float | None:
         """At the best rigid fit; None where there is no shape."""
         if result.contour is not None:
-            outline = horizontal_outline(self._mesh, _middle_m(self._mesh))
+            outline = true_outline(self._mesh)
             return 1e3 * compare_contour(result.contour.points_m[:-1], outline, None).best_fit.hausdorff_m
         if result.mesh is not None:
             mesh = trimesh.Trimesh(result.mesh.vertices, result.mesh.faces, process=False)
@@ -259,45 +271,6 @@ class UntilExplored(PolicyDecisions):
         return End("explored, or the budget is spent") if self._judge.is_over else super().decide(index)
 
 
-def reachable_points(mesh: trimesh.Trimesh, dimension: int) -> Array:
-    """Points of the true surface that fingers can touch: the outline half-way up, or all but the underside.
-
-    Returns:
-        Shape (n, dimension), object frame.
-    """
-    if dimension == 2:
-        return sample_polygon(horizontal_outline(mesh, _middle_m(mesh)), 0.001)
-    points, faces = trimesh.sample.sample_surface(mesh, _SAMPLES, seed=0)
-    return np.asarray(points[mesh.face_normals[faces][:, 2] > _UNDERSIDE])
-
-
-def _middle_m(mesh: trimesh.Trimesh) -> float:
-    return float(mesh.bounds[:, 2].mean())
-
-
 def _seen(grasp: Grasp, pose: Pose3) -> Array:
     """A grasp's contacts in the frame of an object at ``pose``, shape (n, 3)."""
     return transform_points(pose.inverse(), grasp.points_world_m)
-
-
-def _within(points_m: Array, places_m: Array, reach_m: float) -> NDArray[np.bool_]:
-    """Which points lie nearer to one of some places than a reach; none where there are no places."""
-    if len(places_m) == 0:
-        return np.zeros(len(points_m), dtype=bool)
-    return np.asarray(cKDTree(places_m).query(points_m)[0] < reach_m)
-
-
-def laid_over(points_m: Array, source_m: Array, target_m: Array) -> Array:
-    """Points moved as ``source_m`` is moved best onto ``target_m``, both (n, 3): in the plane, and along z."""
-    flat = moved_alike(points_m[:, :2], source_m[:, :2], target_m[:, :2])
-    if points_m.shape[1] == 2:
-        return flat
-    return np.column_stack([flat, points_m[:, 2] + float(np.mean(target_m[:, 2] - source_m[:, 2]))])
-
-
-def surface_within(surface: Surface | None, points_m: Array, reach_m: float) -> NDArray[np.bool_]:
-    """Which points, shape (n, 3), lie within reach of the surface as estimated now; none where there is none."""
-    if surface is None:
-        return np.zeros(len(points_m), dtype=bool)
-    mesh = trimesh.Trimesh(surface.points_m, surface.cells, process=False)
-    return np.asarray(nearest_on_mesh(points_m, mesh)[0] < reach_m)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
 from drivers.simulation.objects import object_model
 from tactile_lab.experiments.catalogue import experiment
 from tactile_lab.experiments.hand_exploration import OBJECTS
-from tactile_lab.experiments.hand_judge import Judge, Look, laid_over, reachable_points
+from tactile_lab.experiments.hand_judge import Judge, Look
+from tactile_lab.experiments.true_surface import laid_over, reachable_points, surface_within, true_share
+from tactile_lab.exploration.policy import Surface
 from tactile_lab.slam import SlamSettings, TactileSlam
 
 
@@ -76,3 +79,16 @@ def test_runs_of_the_experiment() -> None:
     assert [cell["policy"] for cell in cells] == ["random", "variance", "clusters", "information"]
     assert len(OBJECTS) == 8
     assert len(study.cells([1000])) == 8 * 2 * 4
+
+
+def test_what_an_estimate_adds_to_an_object_is_not_true() -> None:
+    true_mesh = object_model("cube-6").mesh
+    estimate = trimesh.creation.box((0.06, 0.06, 0.06)).subdivide_to_size(0.006)
+    surface = Surface(
+        np.array(estimate.vertices), estimate.vertex_normals, np.full(len(estimate.vertices), 1e-3), estimate.faces
+    )
+    assert true_share(surface, 0.03, true_mesh, 0.005) == pytest.approx(1.0)
+    surface.points_m[surface.points_m[:, 0] > 0.0299, 0] += 0.02  # one side of five 20 mm too far out
+    share = true_share(surface, 0.03, true_mesh, 0.005)
+    assert 0.6 < share < 0.8
+    assert surface_within(surface, reachable_points(true_mesh, 3), 0.005).mean() > share
