@@ -221,8 +221,15 @@ class Planner:
         """Take note that the last grasp was taken back; the hand carried the object so far since the one before."""
         self._hand_motion, self._doubted = hand_motion_world, False
 
-    def estimated(self, index: int) -> None:
-        """Take note that grasp number ``index`` has been estimated: from here on its middle may count."""
+    def estimated(self, index: int, is_placed: bool) -> None:
+        """Take note that grasp number ``index`` has been estimated: from here on its middle may count.
+
+        Args:
+            index: of the grasp, from 0.
+            is_placed: its contacts fit somewhere; else a policy has to look elsewhere, or it would try the same again.
+        """
+        if self._chooser is not None and not is_placed:
+            self._chooser.not_placed()
         known, expected = self.known_shape(), self._expected_pose()
         trusted = index + 1 >= self._fixed_grasps and not self._doubted
         if trusted and known is not None and expected is not None:

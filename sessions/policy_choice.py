@@ -140,6 +140,7 @@ class PolicyChooser:
         self._turns = TurnChooser(policy, limits, noise)
         self._expected: PredictedContacts | None = None
         self._missed_m: list[Array] = []
+        self._met_m: list[Array] = []
 
     def choose(
         self, number: int, knowledge: Knowledge, has_room: Callable[[GraspPlan], bool] = lambda plan: True
@@ -162,14 +163,18 @@ class PolicyChooser:
     def grasped(self, grasp: Grasp) -> None:
         """Take note of the fingers that met nothing where they were expected to touch."""
         expected, self._expected = self._expected, None
+        self._met_m = []
         if expected is None:
             return
         met = {(contact.finger, contact.probed) for contact in grasp.contacts}
         seen: set[str] = set()
         for finger, point_m in zip(expected.fingers, expected.points_object_m, strict=True):
-            if (finger, finger in seen) not in met:
-                self._missed_m.append(point_m)
+            (self._met_m if (finger, finger in seen) in met else self._missed_m).append(point_m)
             seen.add(finger)
+
+    def not_placed(self) -> None:
+        """Take note that the last grasp's contacts fit nowhere: where they were expected is as unknown as before."""
+        self._missed_m += self._met_m
 
     @property
     def may_leave(self) -> bool:

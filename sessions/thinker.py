@@ -113,7 +113,7 @@ class Thinker:
         """
         self._memory.remember()
         step = self.slam.take(grasp)
-        self.planner.estimated(step.index)
+        self.planner.estimated(step.index, step.verdict != "untracked")
         shape = self.planner.known_shape()
         self._estimates.append(Estimate(step, surface_message(shape), None if shape is None else shape.explored))
         return tuple(self._estimates[known:])

@@ -77,7 +77,7 @@ def _session(
         assert not isinstance(wanted, Veto)
         decisions.carried(hand.carry(wanted, attempt))
         step = slam.take(attempt.grasp)
-        planner.estimated(step.index)
+        planner.estimated(step.index, step.verdict != "untracked")
         decisions.estimated(step)
         judge.look(hand.elapsed_s / 60)
         missed, empty = 0, 0 if attempt.grasp.touching else empty + 1

@@ -151,7 +151,7 @@ def test_rule_stands_in_where_nothing_is_known_or_all_is_lost(slam: KnownSlam) -
 def test_estimate_is_carried_with_the_hand() -> None:
     chooser = planner(known_slam())
     chooser.carried(Pose3(Rot3(), np.array([0.1, 0.0, 0.0])))
-    chooser.estimated(3)
+    chooser.estimated(3, True)
     np.testing.assert_allclose(chooser.centre_m, [0.1, 0.0], atol=3e-3)
     assert abs(chooser.plan(4).frame.x_m - 0.1) < 0.03
 

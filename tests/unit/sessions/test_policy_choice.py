@@ -211,6 +211,21 @@ def test_fingers_that_met_nothing_are_remembered_where_they_were_expected() -> N
     np.testing.assert_allclose(missed, expected.points_object_m[:1], atol=1e-6)
 
 
+def test_where_a_grasp_fits_nowhere_is_not_tried_for_ever() -> None:
+    one, known = chooser("information"), knowledge()
+    choice = one.choose(3, known)
+    one.decided(choice, known)
+    candidate = choice.offered.usable[choice.decision.chosen or 0].candidate
+    expected = predict_contacts(candidate, one._belief(known).modelled)
+    one.grasped(touching(*expected.fingers))
+    assert len(one._belief(known).missed_m) == 0
+    one.not_placed()
+    np.testing.assert_allclose(one._belief(known).missed_m, expected.points_object_m, atol=1e-6)
+    one.grasped(touching())  # a grasp that no policy chose: nothing was expected of it
+    one.not_placed()
+    assert len(one._belief(known).missed_m) == len(expected.fingers)
+
+
 def test_a_region_that_never_yields_contact_is_given_up() -> None:
     """A candidate whose fingers have met nothing again and again is not chosen for ever."""
     one, known = chooser("information"), knowledge()
