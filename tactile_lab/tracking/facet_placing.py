@@ -18,7 +18,7 @@ from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.hypotheses import Hypothesis, cost
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
-from tactile_lab.tracking.proposals import GraspMatch, ProposalSettings, propose
+from tactile_lab.tracking.proposals import GraspMatch, ProposalSettings, elsewhere, propose
 from tactile_lab.tracking.sharp_judge import SharpJudge
 
 _MOST_ROUNDS = 3
@@ -34,8 +34,6 @@ _SAMPLES = 48
 
 _LEAST_GAIN_nats = 0.5
 _SURFACE_SIGMA_m = 0.0005
-_OTHER_PLACE = 2.0
-"""In units of what tells proposals apart."""
 
 
 @dataclass(frozen=True)
@@ -79,11 +77,11 @@ def _places(best: Hypothesis, sharp: SharpJudge, noise: MotionNoise, settings: P
     settings = settings.model_copy(update={"samples": _SAMPLES})
     solid, motion = SolidField(mesh, _SURFACE_SIGMA_m), MotionCost.of(best.map, noise)
     grasps = [index for index, grasp in enumerate(best.map.placed) if index and len(grasp.contacts_world)]
-    found = [place for index in grasps for place in _elsewhere(best.map, index, solid, motion, noise, settings)]
+    found = [place for index in grasps for place in _places_of(best.map, index, solid, motion, noise, settings)]
     return sorted(found, key=lambda place: place.change)[:_MOST_TRIED]
 
 
-def _elsewhere(
+def _places_of(
     contact_map: ContactMap,
     index: int,
     solid: SolidField,
@@ -102,10 +100,7 @@ def _elsewhere(
     told = match.fit(asked, match.variance(asked)).cost - 0.5 * np.sum(away**2, axis=1)
     steps = np.array([motion.value(_moved(rows, index, row)) for row in asked])
     changes = (told - told[0] + steps - steps[0])[1:]
-    gaps, split = space.deviation(proposed, rows[index]), space.translations
-    far = np.linalg.norm(gaps[:, :split], axis=1) > _OTHER_PLACE * settings.distinct_m
-    far |= np.linalg.norm(gaps[:, split:], axis=1) > _OTHER_PLACE * settings.distinct_rad
-    hopeful = np.flatnonzero(far & (changes < _HOPELESS_nats))
+    hopeful = np.flatnonzero(elsewhere(proposed, rows[index], settings, space) & (changes < _HOPELESS_nats))
     return [_Place(index, proposed[i], float(changes[i])) for i in hopeful[np.argsort(changes[hopeful])][:_OF_A_GRASP]]
 
 

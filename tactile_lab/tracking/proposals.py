@@ -12,6 +12,7 @@ from functools import cache
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field as Limit
 from scipy.stats import norm, qmc
 
@@ -32,6 +33,7 @@ _ROBUST_SQUARED = 9.0
 _LONGEST_STEP_m = 0.012
 _LONGEST_TURN_rad = 0.35
 
+_OTHER_PLACE = 2.0
 _VARIANCE_EVERY = 3
 """Steps after which the field's variance is asked for again."""
 
@@ -178,6 +180,14 @@ class GraspMatch:
 
     def _placed(self, rows: Array) -> tuple[Array, Array]:
         return self._space.to_object(rows[:, None], self._contacts.points_m, self._contacts.normals)
+
+
+def elsewhere(rows: Array, row: Array, settings: ProposalSettings, space: PoseRows) -> NDArray[np.bool_]:
+    """Which poses, shape (n, size), are other places than one: farther than twice what tells proposals apart."""
+    gaps, split = space.deviation(rows, row), space.translations
+    far = np.linalg.norm(gaps[:, :split], axis=1) > _OTHER_PLACE * settings.distinct_m
+    far |= np.linalg.norm(gaps[:, split:], axis=1) > _OTHER_PLACE * settings.distinct_rad
+    return np.asarray(far)
 
 
 def _limits(space: PoseRows) -> tuple[Array, Array]:

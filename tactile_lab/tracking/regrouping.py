@@ -16,7 +16,7 @@ from tactile_lab.geometry.contacts import Array
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
-from tactile_lab.tracking.proposals import ProposalSettings, propose
+from tactile_lab.tracking.proposals import ProposalSettings, elsewhere, propose
 
 _UNLIKELY_SIGMA = 2.0
 _MOST_STEPS = 4
@@ -53,7 +53,7 @@ def _joined_anew(
     submap = contact_map.contacts.selected(moved).in_object_frame(space.inverse(rows[anchor]), space)
     field = _half(contact_map, keep_later=not moves_later, step=step).fit()
     found, _ = propose(space.compose(motion, rows[other]), submap, field, noise, settings, space)
-    different = _far_from(found, rows[anchor], contact_map, settings)[:_KEPT]
+    different = found[elsewhere(found, rows[anchor], settings, space)][:_KEPT]
     members = np.arange(len(rows)) >= step if moves_later else np.arange(len(rows)) < step
     return [_turned(contact_map, members, space.compose(space.inverse(rows[anchor]), row)) for row in different]
 
@@ -61,13 +61,6 @@ def _joined_anew(
 def _half(contact_map: ContactMap, *, keep_later: bool, step: int) -> ContactMap:
     placed = contact_map.placed[step:] if keep_later else contact_map.placed[:step]
     return replace(contact_map, placed=placed)
-
-
-def _far_from(found: Array, row: Array, contact_map: ContactMap, settings: ProposalSettings) -> Array:
-    gaps, split = contact_map.space.deviation(found, row), contact_map.space.translations
-    far = np.linalg.norm(gaps[:, :split], axis=1) > 2 * settings.distinct_m
-    far |= np.linalg.norm(gaps[:, split:], axis=1) > 2 * settings.distinct_rad
-    return np.asarray(found[far])
 
 
 def _turned(contact_map: ContactMap, members: NDArray[np.bool_], old_T_new: Array) -> ContactMap:
