@@ -164,8 +164,8 @@ class Judge:
 
     def _first(self, measure: str) -> Look | None:
         """When the goal was reached by one of the measures, within the budget; None if it never was."""
-        within = (number for number, look in enumerate(self.looks) if look.actions <= self._budget)
-        return next((self.looks[number] for number in within if self._is_reached(measure, number)), None)
+        numbers = (number for number, look in enumerate(self.looks) if look.actions <= self._budget)
+        return next((self.looks[number] for number in numbers if self._is_reached(measure, number)), None)
 
     def _is_reached(self, measure: str, number: int) -> bool:
         """In space only if the next look confirms it, or the budget leaves none; see the module's text."""

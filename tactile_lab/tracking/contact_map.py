@@ -150,15 +150,19 @@ class ContactMap:
         used = [grasp.used for grasp in reversed(self.placed)]
         return used.index(True)
 
+    def with_placed(self, index: int, grasp: PlacedGrasp) -> ContactMap:
+        """The map with one grasp placed otherwise."""
+        return replace(self, placed=(*self.placed[:index], grasp, *self.placed[index + 1 :]))
+
     def without_contact(self, grasp: int, contact: int) -> ContactMap:
         """The map with one contact left out."""
         emptier = replace(self.placed[grasp], left_out=self.placed[grasp].left_out | {contact})
-        return replace(self, placed=(*self.placed[:grasp], emptier, *self.placed[grasp + 1 :]))
+        return self.with_placed(grasp, emptier)
 
     def with_contact(self, grasp: int, contact: int) -> ContactMap:
         """The map with one contact that was left out made part of the shape again."""
         fuller = replace(self.placed[grasp], left_out=self.placed[grasp].left_out - {contact})
-        return replace(self, placed=(*self.placed[:grasp], fuller, *self.placed[grasp + 1 :]))
+        return self.with_placed(grasp, fuller)
 
     def with_all_contacts(self) -> ContactMap:
         """The map with every contact of the grasps that are used made part of the shape again."""

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from tactile_lab.geometry.contacts import Array
 
-_LEAST_TURN = 0.3
+LEAST_TURN = 0.3
 """Sine of the least angle between two faces that end at each other, 17 degrees; flatter ones may yet be one."""
 
-_FARTHEST_SIGMAS = 3.0
+FARTHEST_SIGMAS = 3.0
 """Where contacts lie farther beyond a corner than that, rather the corner is wrong."""
 
 
@@ -48,7 +48,7 @@ def overhang(points_m: Array, labels: NDArray[np.int64], normals: Array, offsets
     for way in (1, -1):
         neighbour = (np.arange(count) + way) % count
         turn = np.einsum("sd,sd->s", along, normals[neighbour])
-        steep = np.abs(turn) > _LEAST_TURN
+        steep = np.abs(turn) > LEAST_TURN
         turn = np.where(steep, turn, 1.0)
         across = np.einsum("sd,sd->s", normals, normals[neighbour])
         ends_m = (offsets_m[neighbour] - offsets_m * across) / turn
@@ -65,4 +65,4 @@ def between_ends(
     points_m: Array, labels: NDArray[np.int64], normals: Array, offsets_m: Array, sigma_m: Array
 ) -> NDArray[np.bool_]:
     """Contacts between the ends of their faces, but for noise of standard deviation ``sigma_m``, shape (n,)."""
-    return np.asarray(overhang(points_m, labels, normals, offsets_m).beyond_m < _FARTHEST_SIGMAS * sigma_m)
+    return np.asarray(overhang(points_m, labels, normals, offsets_m).beyond_m < FARTHEST_SIGMAS * sigma_m)

@@ -111,6 +111,5 @@ def _moved(rows: Array, index: int, row: Array) -> Array:
 
 
 def _with(contact_map: ContactMap, place: _Place) -> ContactMap:
-    placed = list(contact_map.placed)
-    placed[place.index] = replace(placed[place.index], row=place.row, left_out=frozenset(), moved_freely=False)
-    return replace(contact_map, placed=tuple(placed))
+    whole = replace(contact_map.placed[place.index], row=place.row, left_out=frozenset(), moved_freely=False)
+    return contact_map.with_placed(place.index, whole)

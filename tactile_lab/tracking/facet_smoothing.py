@@ -204,15 +204,14 @@ class FacetSmoother:
             by_poses[lines, self._grasp_of] = self._space.by_row(each, points, normals, over.ways, still) * strength
             by_faces[lines, :, 1] = over.by_offsets * strength
         if self._ends is not None:
-            ended = self._by_ends(self._ends, at)
+            ended = self._by_ends(self._ends, at, points, normals)
             by_poses, by_faces = np.concatenate([by_poses, ended[0]]), np.concatenate([by_faces, ended[1]])
         free = by_poses[:, 1:].reshape(len(by_poses), -1)
         return np.hstack([free, by_faces.reshape(len(by_faces), -1)])
 
-    def _by_ends(self, ends: SolidEnds, at: FacetedTrajectory) -> tuple[Array, Array]:
+    def _by_ends(self, ends: SolidEnds, at: FacetedTrajectory, points: Array, normals: Array) -> tuple[Array, Array]:
         """Derivatives of how far contacts lie beyond the ends of a solid's faces, by poses and by faces."""
         faces, grasp = at.faces, self._grasp_of[ends.contacts]
-        points, normals = self._space.to_object(at.rows[self._grasp_of], self._world.points_m, self._world.normals)
         over = ends.strengths * (ends.beyond(points, faces.normals, faces.offsets_m) > 0)
         ended, line = faces.normals[ends.faces], np.arange(len(over))
         points, normals = points[ends.contacts], normals[ends.contacts]

@@ -104,9 +104,8 @@ def _placed_at(
 
 def _following(hypothesis: Hypothesis, index: int, judge: Judge) -> Hypothesis:
     """The hypothesis with one grasp as the motion model has it after all, if that is no less likely."""
-    placed = list(hypothesis.map.placed)
-    placed[index] = replace(placed[index], moved_freely=False)
-    return min(judge.rated(replace(hypothesis.map, placed=tuple(placed))), hypothesis, key=cost)
+    bound = replace(hypothesis.map.placed[index], moved_freely=False)
+    return min(judge.rated(hypothesis.map.with_placed(index, bound)), hypothesis, key=cost)
 
 
 def _with(contact_map: ContactMap, index: int, grasp: PlacedGrasp) -> ContactMap:

@@ -106,10 +106,12 @@ class SharpJudge:
 
     def solid(self, best: Hypothesis) -> SurfaceMesh | None:
         """The surface of a hypothesis in space that is sharp; None for others."""
-        sharp = self._sharp(best.map)
-        if sharp is None or sharp.cost > best.cost + _SAME_nats:
+        try:
+            evidence, mesh = _best_solid(best.map, best.map.fit())
+        except ShapeError:
             return None
-        return _best_solid(best.map, best.map.fit())[1]
+        sharp = self._explained_by(best.map, evidence, _intrusion(best.map))
+        return None if sharp.cost > best.cost + _SAME_nats else mesh
 
     def settled(self, contact_map: ContactMap) -> Hypothesis | None:
         """Poses and faces in space smoothed together, contacts staying between the ends of their faces; else None."""
@@ -128,11 +130,14 @@ class SharpJudge:
 
     def _sharp(self, contact_map: ContactMap) -> Hypothesis | None:
         """The map as it is, its contacts explained by a sharp shape; None if there is none."""
-        contacts, fitted = contact_map.contacts, contact_map.fit()
         try:
-            explained, intrusion = _explained(contact_map, fitted)
+            return self._explained_by(contact_map, *_explained(contact_map, contact_map.fit()))
         except ShapeError:  # nothing enclosed, or no faces in it
             return None
+
+    def _explained_by(self, contact_map: ContactMap, explained: float, intrusion: float) -> Hypothesis:
+        """The map as it is, given the log evidence of its sharp shape and the cost of the free places that fills."""
+        contacts = contact_map.contacts
         constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
         motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
         misfit = motion - explained - float(constant)
@@ -179,7 +184,12 @@ def _explained(contact_map: ContactMap, fitted: Gpis) -> tuple[float, float]:
     if contact_map.dimension == 2:
         polygon = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
         return polygon.log_evidence, -free_evidence(polygon.contour(_ORDERING_RESOLUTION_m), free, fitted)
-    return _best_solid(contact_map, fitted)[0], float(free_space_costs(fitted, free[None])[0])
+    return _best_solid(contact_map, fitted)[0], _intrusion(contact_map)
+
+
+def _intrusion(contact_map: ContactMap) -> float:
+    """The cost of the free places in space that the field fills."""
+    return float(free_space_costs(contact_map.fit(), contact_map.free_points_m[None])[0])
 
 
 def _best_solid(contact_map: ContactMap, fitted: Gpis) -> tuple[float, SurfaceMesh]:

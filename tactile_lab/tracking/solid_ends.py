@@ -14,14 +14,9 @@ from numpy.typing import NDArray
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.polyhedron import Polyhedron
 from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.face_ends import FARTHEST_SIGMAS, LEAST_TURN
 from tactile_lab.tracking.flat_faces import FlatFaces
 from tactile_lab.tracking.pose_rows import PLANAR
-
-_LEAST_TURN = 0.3
-"""Sine of the least angle between two faces that end at each other, 17 degrees; flatter ones may yet be one."""
-
-_FARTHEST_SIGMAS = 3.0
-"""A contact that lies farther beyond an end than that lies on a part of its face that does not end there."""
 
 Indices = NDArray[np.int64]
 
@@ -67,7 +62,7 @@ def solid_ends(contact_map: ContactMap, faces: FlatFaces) -> SolidEnds:
     lines = [_bounded(faces, *_faces_of(faces, planes, border), border[2], seen.point_sigma_m) for border in borders]
     joined = [np.concatenate(column) for column in zip(*lines, strict=True)] if lines else [np.empty(0, int)] * 3
     ends = SolidEnds(joined[0], joined[1], np.asarray(joined[2], dtype=float))
-    inside = ends.beyond(seen.points_m, faces.normals, faces.offsets_m) < _FARTHEST_SIGMAS
+    inside = ends.beyond(seen.points_m, faces.normals, faces.offsets_m) < FARTHEST_SIGMAS
     return SolidEnds(ends.contacts[inside], ends.faces[inside], ends.strengths[inside])
 
 
@@ -80,5 +75,5 @@ def _faces_of(faces: FlatFaces, planes: Indices, border: Indices) -> tuple[int, 
 def _bounded(faces: FlatFaces, face: int, end: int, way: int, sigma_m: Array) -> tuple[Indices, Indices, Array]:
     """The contacts of a face that ends at another, that face, and how strongly it counts."""
     turn = float(np.sqrt(max(1 - (faces.normals[face] @ faces.normals[end]) ** 2, 0.0)))
-    contacts = np.flatnonzero(faces.labels == face) if turn > _LEAST_TURN else np.empty(0, dtype=np.int64)
-    return contacts, np.full(len(contacts), end), way / (max(turn, _LEAST_TURN) * sigma_m[contacts])
+    contacts = np.flatnonzero(faces.labels == face) if turn > LEAST_TURN else np.empty(0, dtype=np.int64)
+    return contacts, np.full(len(contacts), end), way / (max(turn, LEAST_TURN) * sigma_m[contacts])
