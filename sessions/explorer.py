@@ -20,7 +20,7 @@ from sessions.grasp_cycle import GraspPlan
 from sessions.motion import GraspFrame
 from tactile_lab.errors import ShapeError
 from tactile_lab.exploration.candidates import Candidate, ClosingRays, ModelledObject, ring_of_candidates
-from tactile_lab.exploration.information_policy import InformationSettings
+from tactile_lab.exploration.expected_information import InformationSettings
 from tactile_lab.exploration.policies import POLICIES
 from tactile_lab.exploration.policy import Surface
 from tactile_lab.exploration.rewards import RatedCandidate, explored_share, rate

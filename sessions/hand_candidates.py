@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 from gtsam import Pose2
@@ -31,6 +32,8 @@ from tactile_lab.geometry.contacts import FINGERS, Array
 from tactile_lab.tracking.contact_set import planar_rotation
 
 Verdicts = NDArray[np.bool_]
+HasRoom: TypeAlias = Callable[[GraspPlan], bool]
+"""Whether nothing that only the session knows of stands against a plan."""
 
 _TAP_FROM_m = 0.025
 """Height over the object's top that the rays of a tap begin at."""
@@ -90,12 +93,17 @@ class HandLimits:
         return () if self.dimension == 2 else self.exploration.side_closings
 
 
+def anywhere(plan: GraspPlan) -> bool:
+    """There is room for every plan."""
+    return True
+
+
 def offer(
     limits: HandLimits,
     known: KnownShape,
     world_T_object: Pose2,
     here: GraspFrame | None = None,
-    has_room: Callable[[GraspPlan], bool] = lambda plan: True,
+    has_room: HasRoom = anywhere,
 ) -> Offer:
     """The candidates around an object that is expected at ``world_T_object``.
 

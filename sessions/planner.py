@@ -203,7 +203,8 @@ class Planner:
         covariance = self._slam.pose_covariance
         if knowledge is None or covariance is None:
             return None if self._chooser.may_leave else turn_rad
-        return self._chooser.turn(plan.frame, replace(knowledge, covariance=covariance), grasp, turn_rad)
+        knowledge = replace(knowledge, covariance=covariance)
+        return self._chooser.turn(plan.frame, knowledge, grasp, turn_rad, self._has_room)
 
     def carried(self, hand_motion_world: Pose3) -> None:
         """Take note that the hand carried the object since the last grasp."""

@@ -5,7 +5,6 @@ Nothing here knows the truth: the belief is the estimation's, the candidates are
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from sessions.explorer import KnownShape
 from sessions.grasp_cycle import GraspPlan
-from sessions.hand_candidates import HandCandidate, HandLimits, Offer, offer
+from sessions.hand_candidates import HandCandidate, HandLimits, HasRoom, Offer, anywhere, offer
 from sessions.motion import GraspFrame
 from sessions.turn_choice import TurnChooser, with_contacts
 from tactile_lab.exploration.candidates import ModelledObject, PredictedContacts, predict_contacts
@@ -142,9 +141,7 @@ class PolicyChooser:
         self._missed_m: list[Array] = []
         self._met_m: list[Array] = []
 
-    def choose(
-        self, number: int, knowledge: Knowledge, has_room: Callable[[GraspPlan], bool] = lambda plan: True
-    ) -> Choice:
+    def choose(self, number: int, knowledge: Knowledge, has_room: HasRoom = anywhere) -> Choice:
         """The next grasp among all the hand can do."""
         offered = offer(self._limits, knowledge.known, knowledge.world_T_object, knowledge.here, has_room)
         belief = self._belief(knowledge)
@@ -181,7 +178,9 @@ class PolicyChooser:
         """Whether the object stays where it is unless there is a reason to turn it."""
         return self._turns.may_leave
 
-    def turn(self, frame: GraspFrame, knowledge: Knowledge, grasp: Grasp, otherwise: float) -> float | None:
+    def turn(
+        self, frame: GraspFrame, knowledge: Knowledge, grasp: Grasp, otherwise: float, has_room: HasRoom = anywhere
+    ) -> float | None:
         """How to turn the object in hand, radians; None to leave it where it is.
 
         Args:
@@ -189,9 +188,10 @@ class PolicyChooser:
             knowledge: from before this grasp, the pose as certain as it will be after it.
             grasp: this one.
             otherwise: the turn where nothing tells them apart, radians.
+            has_room: what else stands against a plan as long as the object is left where it is.
         """
         belief = with_contacts(self._belief(knowledge), grasp)
-        return self._turns.choose(frame, knowledge.known, belief, otherwise, self._rng)
+        return self._turns.choose(frame, knowledge.known, belief, otherwise, self._rng, has_room)
 
     def _belief(self, knowledge: Knowledge) -> Belief:
         known, field = knowledge.known, knowledge.known.field

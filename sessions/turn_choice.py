@@ -14,7 +14,7 @@ import numpy as np
 from gtsam import Pose2
 
 from sessions.explorer import KnownShape
-from sessions.hand_candidates import HandLimits, offer
+from sessions.hand_candidates import HandLimits, HasRoom, anywhere, offer
 from sessions.motion import GraspFrame
 from tactile_lab.exploration.candidates import Candidate
 from tactile_lab.exploration.information_policy import InformationPolicy
@@ -51,7 +51,13 @@ class TurnChooser:
         return isinstance(self.policy, InformationPolicy)
 
     def choose(
-        self, frame: GraspFrame, known: KnownShape, belief: Belief, otherwise: float, rng: np.random.Generator
+        self,
+        frame: GraspFrame,
+        known: KnownShape,
+        belief: Belief,
+        otherwise: float,
+        rng: np.random.Generator,
+        has_room: HasRoom,
     ) -> float | None:
         """The turn, radians; None to leave the object.
 
@@ -61,12 +67,14 @@ class TurnChooser:
             belief: about it as it is held.
             otherwise: the turn where nothing tells them apart.
             rng: source of sampled worlds.
+            has_room: what else stands against a plan as long as the object is left where it is.
         """
         turns = self._turns(frame.yaw_rad)
         if self.policy.name == "random" or not turns or belief.surface is None:
             return otherwise
         if isinstance(self.policy, InformationPolicy):
-            return self._most_informative(self.policy, turns, frame, known, belief, rng)
+            left = self._after(0.0, frame, known, belief, has_room)
+            return self._most_informative(self.policy, turns, left, frame, known, belief, rng)
         rewards = [_best_variance(*self._after(turn, frame, known, belief)) for turn in turns]
         return turns[int(np.argmax(rewards))] if max(rewards) > min(rewards) else otherwise
 
@@ -74,6 +82,7 @@ class TurnChooser:
         self,
         policy: InformationPolicy,
         turns: Sequence[float],
+        left: tuple[list[Candidate], Belief],
         frame: GraspFrame,
         known: KnownShape,
         belief: Belief,
@@ -87,8 +96,8 @@ class TurnChooser:
         for turn in turns:
             candidates, turned = self._after(turn, frame, known, replace(belief, pose_covariance=strayed))
             rates.append(policy.best_rate(candidates, turned, np.random.default_rng(chance), lost, self._seconds(turn)))
-        left = policy.best_rate(*self._after(0.0, frame, known, belief), np.random.default_rng(chance))
-        return turns[int(np.argmax(rates))] if max(rates) > left else None
+        without = policy.best_rate(*left, np.random.default_rng(chance))
+        return turns[int(np.argmax(rates))] if max(rates) > without else None
 
     def _seconds(self, turn_rad: float) -> float:
         """That carrying takes."""
@@ -102,14 +111,14 @@ class TurnChooser:
         return [turn for turn in both if low <= yaw_rad + turn <= high]
 
     def _after(
-        self, turn_rad: float, frame: GraspFrame, known: KnownShape, belief: Belief
+        self, turn_rad: float, frame: GraspFrame, known: KnownShape, belief: Belief, has_room: HasRoom = anywhere
     ) -> tuple[list[Candidate], Belief]:
         """A few of the grasps that follow when the object was turned about the hand's vertical axis, and the belief."""
         about = Pose2(frame.x_m, frame.y_m, 0.0)
         pose = about * Pose2(0.0, 0.0, turn_rad) * about.inverse() * belief.world_T_object
         few = self.limits.exploration.model_copy(update={"yaws": _YAWS, "shifts_m": (0.0,)})
         here = GraspFrame(frame.x_m, frame.y_m, frame.yaw_rad + turn_rad)
-        offered = offer(replace(self.limits, exploration=few), known, pose, here)
+        offered = offer(replace(self.limits, exploration=few), known, pose, here, has_room)
         return [one.candidate for one in offered.usable], replace(belief, world_T_object=pose)
 
 

@@ -202,7 +202,7 @@ class TactileSlam:
         """The present field in the object frame; None before there are contacts."""
         if self._tracker is None:
             return None
-        contact_map = self._tracker.map
+        contact_map = self._tracker.refined
         if self._surface is None or self._surface[0] is not contact_map:
             self._surface = (contact_map, contact_map.fit())
         return self._surface[1]
@@ -215,7 +215,7 @@ class TactileSlam:
         """
         if self._tracker is None or self.surface is None:
             return None
-        contact_map, height_m = self._tracker.map, self._origin_height_m
+        contact_map, height_m = self._tracker.refined, self._origin_height_m
         if self._shape is None or self._shape[0] is not contact_map or self._shape[1] != resolution_m:
             model = self._settings.shape_model
             made = present_shape(self.surface, contact_map, self._settings, model, height_m, resolution_m)
@@ -225,7 +225,7 @@ class TactileSlam:
     @property
     def surface_grasps(self) -> NDArray[np.intp]:
         """Which grasp each contact of :attr:`surface` comes from, counted from the object frame's birth, shape (n,)."""
-        return np.empty(0, dtype=np.intp) if self._tracker is None else self._tracker.map.grasp_indices
+        return np.empty(0, dtype=np.intp) if self._tracker is None else self._tracker.refined.grasp_indices
 
     @property
     def is_lost(self) -> bool:
@@ -283,7 +283,7 @@ class TactileSlam:
 
     def _placed(self) -> list[PlacedGrasp | None]:
         """One entry a grasp; grasps before the object frame was born have none."""
-        placed = list(self._tracker.map.placed) if self._tracker else []
+        placed = list(self._tracker.refined.placed) if self._tracker else []
         return [None] * (len(self._steps) - len(placed)) + placed
 
     def _trajectory(self) -> tuple[Pose3 | None, ...]:

@@ -7,8 +7,9 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from tactile_lab.errors import ConfigurationError
+from tactile_lab.exploration.expected_information import InformationSettings
 from tactile_lab.exploration.information.igef import IgefSettings
-from tactile_lab.exploration.information_policy import InformationPolicy, InformationSettings
+from tactile_lab.exploration.information_policy import InformationPolicy
 from tactile_lab.exploration.policy import Policy
 from tactile_lab.exploration.pose_policies import (
     PoseSwitchPolicy,

@@ -15,18 +15,17 @@ from dataclasses import replace
 import numpy as np
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.facet_placing import placed_on_solid
 from tactile_lab.tracking.fixed_lag import unfolded
-from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost, likeliest, weights
 from tactile_lab.tracking.joint_settings import JointSettings
 from tactile_lab.tracking.late_placing import Relocate, placed_late, relocated
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import estimated_noise
+from tactile_lab.tracking.next_grasp import NextGrasp
 from tactile_lab.tracking.particle_filter import PoseEstimate
-from tactile_lab.tracking.proposals import propose
 from tactile_lab.tracking.regrouping import regrouped
 from tactile_lab.tracking.sharp_judge import SharpJudge
 
@@ -36,6 +35,9 @@ _LEAST_KNOWN = 30
 
 _POOR_GAIN = 2.5
 """Evidence (natural logarithm) that a contact brings on unknown ground, at most; on known ground it is 6 to 10."""
+
+_LEAST_FOR_FACES = 3
+"""Grasps; fewer have next to no faces in common."""
 
 _MOST_REGROUPINGS = 3
 """A trajectory that took several wrong turns is mended at one after the other."""
@@ -72,6 +74,8 @@ class JointTracker:
         self._branches: list[Hypothesis] = []
         self._motion = np.zeros(self._space.size)
         self._whole: tuple[ContactMap, ContactMap] | None = None
+        self._refined: tuple[ContactMap, ContactMap] | None = None
+        self._has_ended = False
         self.effective_count = 1.0
 
     @property
@@ -80,6 +84,23 @@ class JointTracker:
         if self._whole is None or self._whole[0] is not best:
             self._whole = (best, unfolded(best))
         return self._whole[1]
+
+    @property
+    def refined(self) -> ContactMap:
+        """The likeliest trajectory in the light of flat faces, as the end would have it; hypotheses stay as they are.
+
+        A field binds neighbouring contacts only, so that poses that are right to a millimetre at the end are off by a
+        centimetre on the way.
+        """
+        best = self._hypotheses[0].map
+        if self._refined is None or self._refined[0] is not best:
+            self._refined = (best, self._with_faces(best))
+        return self._refined[1]
+
+    def _with_faces(self, best: ContactMap) -> ContactMap:
+        if self._has_ended or len(best.placed) < _LEAST_FOR_FACES:
+            return self.map
+        return unfolded(SharpJudge(self._judge, self._noise).better(best).map)
 
     @property
     def hypotheses(self) -> tuple[Hypothesis, ...]:
@@ -96,8 +117,8 @@ class JointTracker:
 
     def weigh(self, contacts: ContactSet) -> bool:
         """Branch every hypothesis into the poses proposed for this grasp, smooth the likeliest and rank them."""
-        unplaced = [self._unplaced(hypothesis, contacts) for hypothesis in self._hypotheses]
-        branches = likeliest(unplaced + self._branched(contacts), self._settings.smoothed, self._settings.branch_gap)
+        step = NextGrasp(contacts, self._motion, self._noise, self._judge, self._settings, self._space)
+        branches = likeliest(step.branches(self._hypotheses), self._settings.smoothed, self._settings.branch_gap)
         smoothed = [self._judge.smoothed(branch.map, self._settings.iterations) for branch in branches]
         smoothed += self._relocated(min(smoothed, key=cost))
         self._branches = self._likeliest(self._judge.different(smoothed), self._settings.hypotheses)
@@ -160,6 +181,7 @@ class JointTracker:
         faceted = self._faceted()
         faceted[0] = replace(faceted[0], map=self._judge.with_covariances(faceted[0].map))
         self._hypotheses = [replace(one, map=unfolded(one.map)) for one in faceted]
+        self._has_ended = True
 
     def _faceted(self) -> list[Hypothesis]:
         """The hypotheses in the light of flat faces, the likeliest first.
@@ -233,51 +255,6 @@ class JointTracker:
         expected = contacts >= _LEAST_TO_RELOCATE and known >= _LEAST_KNOWN
         asked = expected and gain <= _POOR_GAIN * contacts
         return relocated(best, self._relocate, self._judge) if self._relocate and asked else []
-
-    def _unplaced(self, hypothesis: Hypothesis, contacts: ContactSet) -> Hypothesis:
-        """All contacts of the grasp left out: the motion model alone says where the object is."""
-        last = hypothesis.map.placed[-1]
-        row = self._space.compose(self._motion, last.row)
-        covariance = last.covariance + np.diag(self._space.sigmas(self._noise.after(self._motion)) ** 2)
-        grasp = PlacedGrasp(contacts, row, covariance, self._motion).put_aside()
-        longer = hypothesis.map.with_grasp(grasp)
-        return replace(hypothesis, map=longer, left_out=self._judge.price(longer))
-
-    def _branched(self, contacts: ContactSet) -> list[Hypothesis]:
-        """The likeliest continuations of all hypotheses, contacts that do not fit them left out.
-
-        A grasp is only placed if most of its contacts fit: the rest could be anywhere by chance.
-        """
-        if len(contacts) == 0:
-            return []
-        proposed = [each for hypothesis in self._hypotheses for each in self._proposed(hypothesis, contacts)]
-        promising = self._likeliest(proposed, 2 * self._settings.smoothed)
-        cleaned = [self._cleaned(branch) for branch in promising]
-        return [each for each in cleaned if 2 * len(each.map.placed[-1].kept) > len(contacts)]
-
-    def _cleaned(self, branch: Hypothesis) -> Hypothesis:
-        """The branch without contacts of the last grasp that do not fit."""
-        cleaned, misfit = self._judge.cleaned(branch.map, len(branch.map.placed) - 1)
-        return Hypothesis(cleaned, misfit, branch.intrusion, self._judge.price(cleaned))
-
-    def _proposed(self, hypothesis: Hypothesis, contacts: ContactSet) -> list[Hypothesis]:
-        """Continuations of a hypothesis, rated contact by contact only."""
-        unplaced, placed = hypothesis.map.trailing_unplaced, hypothesis.map.placed
-        motions = np.array([self._motion, *(grasp.motion for grasp in placed[len(placed) - unplaced :])])
-        noise = self._noise.after(motions).accumulated(1 + unplaced)
-        predicted = self._space.compose(self._motion, hypothesis.map.placed[-1].row)
-        fitted = hypothesis.map.fit()
-        rows, fit = propose(predicted, contacts, fitted, noise, self._settings.proposals, self._space)
-        places, _ = self._space.to_object(rows[:, None], contacts.free_m, contacts.free_m)
-        intrusions = hypothesis.intrusion + free_space_costs(fitted, places)
-        found = zip(rows, np.linalg.inv(fit.information), fit.cost, intrusions, strict=True)
-        proposed = []
-        for row, covariance, misfit, intrusion in found:
-            longer = hypothesis.map.with_grasp(PlacedGrasp(contacts, row, covariance, self._motion))
-            proposed.append(
-                Hypothesis(longer, hypothesis.misfit + float(misfit), float(intrusion), hypothesis.left_out)
-            )
-        return proposed
 
     def _likeliest(self, hypotheses: list[Hypothesis], count: int) -> list[Hypothesis]:
         return likeliest(hypotheses, count, self._settings.evidence_gap)

@@ -41,6 +41,10 @@ class OdometryTracker:
     def map(self) -> ContactMap:
         return self._map
 
+    @property
+    def refined(self) -> ContactMap:
+        return self._map
+
     def predict(self, motion: Array) -> None:
         """Carry the pose along; its covariance goes with it, and the noise is added."""
         space, row = self._map.space, self._now.row

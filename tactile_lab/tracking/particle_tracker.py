@@ -48,6 +48,10 @@ class ParticleTracker:
     def map(self) -> ContactMap:
         return self._map
 
+    @property
+    def refined(self) -> ContactMap:
+        return self._map
+
     def predict(self, motion: Array) -> None:
         self._motion = motion
         self._belief = self._belief.predicted(motion, self._noise, self._rng)

@@ -59,6 +59,10 @@ class Tracker(Protocol):
     def map(self) -> ContactMap:
         """All grasps so far with their present poses."""
 
+    @property
+    def refined(self) -> ContactMap:
+        """The same with what takes too long to be done in every step: what is told of the object between grasps."""
+
     def predict(self, motion: Array) -> None:
         """Move the belief by the hand's motion (eq. 3.7)."""
 

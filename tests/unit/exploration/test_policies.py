@@ -10,12 +10,8 @@ from gtsam import Pose2
 
 from tactile_lab.errors import ConfigurationError
 from tactile_lab.exploration.candidates import Candidate
-from tactile_lab.exploration.information_policy import (
-    InformationPolicy,
-    InformationSettings,
-    promised,
-    unexplored,
-)
+from tactile_lab.exploration.expected_information import InformationSettings, promised, unexplored
+from tactile_lab.exploration.information_policy import InformationPolicy
 from tactile_lab.exploration.policies import DEFAULT_POLICY, POLICIES, make_policy
 from tactile_lab.exploration.policy import Belief, Decision
 from tactile_lab.exploration.pose_policies import PoseSwitchSettings

@@ -19,7 +19,7 @@ from sessions.policy_choice import Knowledge
 from sessions.policy_decisions import chooser_for
 from tactile_lab.cli.app import app
 from tactile_lab.errors import ConfigurationError
-from tactile_lab.exploration.information_policy import InformationSettings
+from tactile_lab.exploration.expected_information import InformationSettings
 from tactile_lab.exploration.policies import POLICIES, make_policy
 from tactile_lab.exploration.policy import Decision
 from tactile_lab.rigs.description import Rig, RigDescription, load_rig, shipped_rigs

@@ -1,0 +1,88 @@
+"""How a trajectory goes on: the places that a new grasp's contacts could have on what is known of the object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.tracking.contact_map import PlacedGrasp
+from tactile_lab.tracking.contact_set import ContactSet
+from tactile_lab.tracking.free_space import free_space_costs
+from tactile_lab.tracking.hypotheses import Hypothesis, Judge, likeliest
+from tactile_lab.tracking.joint_settings import JointSettings
+from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.pose_rows import PoseRows
+from tactile_lab.tracking.proposals import propose
+
+
+@dataclass(frozen=True)
+class NextGrasp:
+    """A grasp that hypotheses are continued by.
+
+    Attributes:
+        contacts: of the grasp, world frame.
+        motion: of the hand before it, a row.
+        noise: of the motion model.
+        judge: rates what comes of it.
+        settings: of the search.
+        space: what rows mean.
+    """
+
+    contacts: ContactSet
+    motion: Array
+    noise: MotionNoise
+    judge: Judge
+    settings: JointSettings
+    space: PoseRows
+
+    def branches(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """All hypotheses with the grasp aside, and the likeliest with the grasp placed."""
+        return [self._unplaced(hypothesis) for hypothesis in hypotheses] + self._placed(hypotheses)
+
+    def _unplaced(self, hypothesis: Hypothesis) -> Hypothesis:
+        """All contacts of the grasp left out: the motion model alone says where the object is."""
+        last = hypothesis.map.placed[-1]
+        row = self.space.compose(self.motion, last.row)
+        covariance = last.covariance + np.diag(self.space.sigmas(self.noise.after(self.motion)) ** 2)
+        grasp = PlacedGrasp(self.contacts, row, covariance, self.motion).put_aside()
+        longer = hypothesis.map.with_grasp(grasp)
+        return replace(hypothesis, map=longer, left_out=self.judge.price(longer))
+
+    def _placed(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The likeliest continuations of all hypotheses, contacts that do not fit them left out.
+
+        A grasp is only placed if most of its contacts fit: the rest could be anywhere by chance.
+        """
+        if len(self.contacts) == 0:
+            return []
+        proposed = [each for hypothesis in hypotheses for each in self._proposed(hypothesis)]
+        promising = likeliest(proposed, 2 * self.settings.smoothed, self.settings.evidence_gap)
+        cleaned = [self._cleaned(branch) for branch in promising]
+        return [each for each in cleaned if 2 * len(each.map.placed[-1].kept) > len(self.contacts)]
+
+    def _cleaned(self, branch: Hypothesis) -> Hypothesis:
+        """The branch without contacts of the last grasp that do not fit."""
+        cleaned, misfit = self.judge.cleaned(branch.map, len(branch.map.placed) - 1)
+        return Hypothesis(cleaned, misfit, branch.intrusion, self.judge.price(cleaned))
+
+    def _proposed(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Continuations of a hypothesis, rated contact by contact only."""
+        unplaced, placed = hypothesis.map.trailing_unplaced, hypothesis.map.placed
+        motions = np.array([self.motion, *(grasp.motion for grasp in placed[len(placed) - unplaced :])])
+        noise = self.noise.after(motions).accumulated(1 + unplaced)
+        predicted = self.space.compose(self.motion, hypothesis.map.placed[-1].row)
+        fitted = hypothesis.map.fit()
+        rows, fit = propose(predicted, self.contacts, fitted, noise, self.settings.proposals, self.space)
+        places, _ = self.space.to_object(rows[:, None], self.contacts.free_m, self.contacts.free_m)
+        intrusions = hypothesis.intrusion + free_space_costs(fitted, places)
+        found = zip(rows, np.linalg.inv(fit.information), fit.cost, intrusions, strict=True)
+        proposed = []
+        for row, covariance, misfit, intrusion in found:
+            longer = hypothesis.map.with_grasp(PlacedGrasp(self.contacts, row, covariance, self.motion))
+            proposed.append(
+                Hypothesis(longer, hypothesis.misfit + float(misfit), float(intrusion), hypothesis.left_out)
+            )
+        return proposed
