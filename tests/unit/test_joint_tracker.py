@@ -1,4 +1,4 @@
-"""What the joint tracker takes over from outside."""
+"""What the joint tracker takes over from outside, and what it tells between grasps."""
 
 from __future__ import annotations
 
@@ -6,9 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from tactile_lab.experiments.planar_data import simulate
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.settings import GpisSettings
+from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.joint_settings import JointSettings
 from tactile_lab.tracking.joint_tracker import JointTracker
-from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.tracking.motion import MotionNoise, planar_motion
 from tests.support.simulated_contacts import true_map
 
 SHIFT = np.array([0.001, 0.0, 0.0])
@@ -44,3 +49,45 @@ def test_a_session_with_settled_grasps_is_corrected_by_loops() -> None:
     moved = tracker.map.rows + SHIFT
     tracker.adopt(tracker.map.with_rows(moved))
     assert np.allclose(tracker.map.rows, moved)
+
+
+def drifting_box(seed: int, count: int = 8) -> tuple[JointTracker, Array]:
+    """A tracker in the middle of a session with a rectangle, and the true poses in its frame."""
+    data = simulate("rectangle", seed, count=count)
+    rows = np.array([planar_motion(pose) for pose in data.world_T_body])
+    contacts = [ContactSet.of_grasp(grasp, 2, 0.0) for grasp in data.grasps]
+    motions = [planar_motion(grasp.hand_motion_world) for grasp in data.grasps]
+    first = ContactMap((PlacedGrasp(contacts[0], rows[0], 1e-10 * np.eye(3), motions[0]),), GpisSettings())
+    tracker = JointTracker(first, MotionNoise(), JointSettings(), kernel_every=4)
+    for seen, motion in zip(contacts[1:], motions[1:], strict=True):
+        tracker.predict(motion)
+        tracker.weigh(seen)
+        tracker.update_shape(seen, certain=True)
+        tracker.resample()
+    return tracker, rows
+
+
+def rms_away_m(contact_map: ContactMap, true_rows: Array) -> float:
+    truth = contact_map.with_rows(true_rows).contacts.points_m
+    return float(np.sqrt(np.mean(np.sum((contact_map.contacts.points_m - truth) ** 2, axis=1))))
+
+
+def test_what_is_told_between_grasps_is_smoothed_with_the_faces_of_the_object() -> None:
+    """Over several sessions, because a single one may be lucky without."""
+    found = [drifting_box(seed) for seed in (50, 51, 52)]
+    told = [rms_away_m(tracker.refined, rows) for tracker, rows in found]
+    on_the_way = [rms_away_m(tracker.map, rows) for tracker, rows in found]
+    assert np.mean(told) < 0.8 * np.mean(on_the_way)
+
+
+def test_telling_changes_nothing_that_is_followed() -> None:
+    tracker, _ = drifting_box(50, count=4)
+    before = [one.map for one in tracker.hypotheses]
+    assert tracker.refined is tracker.refined
+    assert all(one.map is known for one, known in zip(tracker.hypotheses, before, strict=True))
+
+
+def test_the_end_is_told_as_it_is() -> None:
+    tracker, _ = drifting_box(50, count=4)
+    tracker.finish()
+    assert tracker.refined is tracker.map

@@ -18,7 +18,17 @@ from sessions.explorer import ExplorationSettings, KnownShape, known_shape
 from sessions.grasp_cycle import GraspPlan
 from sessions.guided.attended import AttendedDecisions
 from sessions.guided.operator import Ask, Panel, Request
-from sessions.hand_candidates import LANDED, NO_ROOM, OUT_OF_REACH, TOO_TALL, HandLimits, grasp_time_s, offer
+from sessions.hand_candidates import (
+    LANDED,
+    NO_ROOM,
+    OUT_OF_REACH,
+    TOO_TALL,
+    HandLimits,
+    HasRoom,
+    anywhere,
+    grasp_time_s,
+    offer,
+)
 from sessions.motion import GraspFrame
 from sessions.next_grasp import FixedRule, PlanSettings
 from sessions.planner import Planner
@@ -247,7 +257,12 @@ def test_turns_keep_the_hand_in_its_window() -> None:
         assert 0.2 < abs(turn) < 0.8
 
 
-def turn_of_a_box_with_untouched_sides(window_rad: tuple[float, float], closings: tuple[str, ...]) -> float | None:
+def turn_of_a_box_with_untouched_sides(
+    window_rad: tuple[float, float],
+    closings: tuple[str, ...],
+    noise: MotionNoise = MotionNoise(translation_m=0.002, rotation_rad=0.05),  # noqa: B008
+    has_room: HasRoom = anywhere,
+) -> float | None:
     """What becomes of a box in a hand at yaw 0.4; one contact each tells where its sides along x are."""
     along = np.linspace(-0.03, 0.03, 13)
     ends = [np.column_stack([np.full(13, x), along]) for x in (0.03, -0.03)]
@@ -257,9 +272,8 @@ def turn_of_a_box_with_untouched_sides(window_rad: tuple[float, float], closings
     known = known_shape(field, 2, HEIGHT_m, ExplorationSettings())
     found = Knowledge(known, Pose2(), 1e-6 * np.eye(3), np.zeros(len(field.contacts_m), dtype=int), 5)
     hand = limits(plan=PlanSettings(yaw_window_rad=window_rad, closings=closings))
-    noise = MotionNoise(translation_m=0.002, rotation_rad=0.05)
     one = PolicyChooser(make_policy("information"), hand, noise, np.random.default_rng(0))
-    return one.turn(GraspFrame(0.0, 0.0, 0.4), found, Grasp(2, 0, (), Pose3()), 0.3)
+    return one.turn(GraspFrame(0.0, 0.0, 0.4), found, Grasp(2, 0, (), Pose3()), 0.3, has_room)
 
 
 def test_an_object_is_left_unless_what_is_unknown_of_it_is_out_of_reach() -> None:
@@ -267,6 +281,18 @@ def test_an_object_is_left_unless_what_is_unknown_of_it_is_out_of_reach() -> Non
     turn = turn_of_a_box_with_untouched_sides((-0.4, 0.4), ("pinch",))
     assert turn is not None
     assert turn < -0.2
+
+
+def test_an_object_that_is_in_the_way_where_it_lies_is_turned() -> None:
+    window, closings = (-1.31, 1.31), ("pinch", "radial")
+    assert turn_of_a_box_with_untouched_sides(window, closings, has_room=lambda plan: False) is not None
+
+
+def test_knowledge_of_the_pose_is_worth_less_than_sides_that_nothing_else_reaches() -> None:
+    """One grasp does not win back what a carry costs here; several on sides that were out of reach do."""
+    rough = MotionNoise(translation_m=0.007, rotation_rad=0.2)
+    assert turn_of_a_box_with_untouched_sides((-0.4, 0.4), ("pinch",), rough) is not None
+    assert turn_of_a_box_with_untouched_sides((-1.31, 1.31), ("pinch", "radial"), rough) is None
 
 
 def test_contacts_of_the_grasp_in_hand_count_when_a_turn_is_chosen() -> None:
