@@ -13,6 +13,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
     for study in (
         planar.METHODS_2D,
         solids.METHODS_3D,
+        solids.KNOWN_SHAPE,
         solids.METHODS_6DOF,
         planar.RANDOM_CONTACTS,
         thesis_figures.FIGURE_2_7,

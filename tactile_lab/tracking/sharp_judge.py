@@ -198,25 +198,32 @@ def _best_solid(contact_map: ContactMap, fitted: Gpis) -> tuple[float, SurfaceMe
     makers: list[Callable[[], Polyhedron | Prism]] = [lambda: Polyhedron.fit(fitted, free, upright=on_table)]
     if on_table:
         makers.append(lambda: Prism.fit(fitted, best_shape))
+    solids = [solid for solid in map(_made, makers) if solid is not None]
     best: tuple[float, SurfaceMesh] | None = None
-    for maker in makers:
-        best = _on_surface(maker, fitted, best) or best
+    for solid in sorted(solids, key=lambda one: -one.log_evidence):  # surfaces are dear: the likelier one's comes first
+        best = _on_surface(solid, fitted, best) or best
     if best is None:
         raise ShapeError("the contacts enclose no solid with flat faces or upright walls")
     return best
 
 
+def _made(maker: Callable[[], Polyhedron | Prism]) -> Polyhedron | Prism | None:
+    try:
+        return maker()
+    except ShapeError:  # too few contacts on walls, or on too many planes
+        return None
+
+
 def _on_surface(
-    maker: Callable[[], Polyhedron | Prism], fitted: Gpis, known: tuple[float, SurfaceMesh] | None
+    solid: Polyhedron | Prism, fitted: Gpis, known: tuple[float, SurfaceMesh] | None
 ) -> tuple[float, SurfaceMesh] | None:
     """A solid's log evidence, less for contacts that its surface leaves out, and its surface; None if not likelier."""
     least = -np.inf if known is None else known[0]
+    if solid.log_evidence <= least:
+        return None
     try:
-        solid = maker()
-        if solid.log_evidence <= least:
-            return None
         mesh = solid.mesh(_COARSE_m)
-    except ShapeError:  # too few contacts on walls, or faces that enclose nothing
+    except ShapeError:  # its faces enclose nothing
         return None
     evidence = solid.log_evidence - stray_cost(
         distances_to_mesh(fitted.contacts_m, mesh), contacts_of(fitted).point_weights

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from tactile_lab.errors import ConfigurationError
-from tactile_lab.experiments import tracking_runs
+from tactile_lab.experiments import known_shape, tracking_runs
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.solids import YCB_NAMES, YCB_PREFIX, ycb_path
 from tactile_lab.experiments.studies.planar import METHODS
-from tactile_lab.experiments.study_columns import (
-    TRACKING_COLUMNS,
-)
+from tactile_lab.experiments.study_columns import REGISTRATION, TRACKING_COLUMNS
 from tactile_lab.experiments.study_plots import HAUSDORFF_LABEL, ranges
 
 FACETED_SOLIDS = ("box-12x6x6", "triangular-prism", "hexagonal-prism", "l-block")
@@ -28,10 +26,16 @@ def _scans_left_out() -> str:
     return ""
 
 
+def _solids() -> tuple[str, ...]:
+    return (*FACETED_SOLIDS, *CURVED_SOLIDS, *(() if _scans_left_out() else SCANNED_SOLIDS))
+
+
 def _methods_on_table(grasps: int) -> list[Setting]:
-    scanned = () if _scans_left_out() else SCANNED_SOLIDS
-    solids = (*FACETED_SOLIDS, *CURVED_SOLIDS, *scanned)
-    return grid(noise=[100], shape=solids, method=METHODS, grasps=[grasps])
+    return grid(noise=[100], shape=_solids(), method=METHODS, grasps=[grasps])
+
+
+def _known_on_table(grasps: int) -> list[Setting]:
+    return grid(noise=[100], shape=_solids(), grasps=[grasps], particles=[known_shape.PARTICLES])
 
 
 def _methods_in_space(grasps: int) -> list[Setting]:
@@ -51,6 +55,18 @@ METHODS_3D = Experiment(
     tracking_runs.track_on_table,
     TRACKING_COLUMNS,
     ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", _kind_of_solid),
+    pooled=("shape",),
+    grasps=SPATIAL_GRASPS,
+    left_out=_scans_left_out,
+)
+
+KNOWN_SHAPE = Experiment(
+    "known-shape",
+    "How well solids on a table can be followed if their shape is known.",
+    _known_on_table,
+    known_shape.follow_known_shape,
+    (REGISTRATION,),
+    ranges("shape", "Registration error, mm", "registration_mm", _kind_of_solid),
     pooled=("shape",),
     grasps=SPATIAL_GRASPS,
     left_out=_scans_left_out,

@@ -19,6 +19,7 @@ from tactile_lab.experiments.studies.planar import METHODS
 TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "methods-2d": ({"shape": ["rectangle"], "noise": ["50"], "method": ["known-pose", "odometry", "joint"]}, 4),
     "methods-3d": ({"shape": ["l-block"], "method": ["known-pose", "odometry"]}, 4),
+    "known-shape": ({"shape": ["cylinder"]}, 3),
     "methods-6dof": ({"shape": ["ellipsoid"], "method": ["known-pose", "icp"]}, 4),
     "random-contacts": ({"shape": ["L"], "contacts": ["20"], "model": ["TP, normals", "chosen by evidence"]}, None),
     "figure-2.7": ({"shape": ["ellipse"], "contacts": ["5", "10"], "model": ["SE, normals"]}, None),
