@@ -1,12 +1,19 @@
-"""How long a step of the default method takes, grasp by grasp, and how that grows with the session."""
+"""How long a step of the default method takes, grasp by grasp, and how that grows with the session.
+
+Beside it what follows a step where somebody asks: the trajectory in the light of flat faces, by which planner and page
+go.
+"""
 
 from __future__ import annotations
+
+import time
 
 import numpy as np
 
 from tactile_lab.evaluation.benchmark import Timing, TimingTable
 from tactile_lab.experiments import planar_data, spatial_data
 from tactile_lab.experiments.sensing import SimulatedGrasps
+from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.slam import SlamSettings, TactileSlam
 
 PLANAR_SHAPES = ("rectangle", "ellipse", "L")
@@ -23,30 +30,38 @@ def step_table(*, long_session: int = LONG_SESSION, planar_grasps: int = PLANAR_
         long_session: grasps of the long session.
         planar_grasps: grasps of each session in the plane.
     """
-    _steps_ms(planar_data.simulate("rectangle", _SEED, count=4), 2)
-    planar = np.concatenate(
-        [_steps_ms(planar_data.simulate(shape, _SEED, count=planar_grasps), 2) for shape in PLANAR_SHAPES]
-    )
+    _session(planar_data.simulate("rectangle", _SEED, count=4), 2)
+    planar_runs = [_session(planar_data.simulate(name, _SEED, count=planar_grasps), 2) for name in PLANAR_SHAPES]
+    planar, planar_told = np.concatenate(planar_runs).T
     spatial_grasps = min(SPATIAL_GRASPS, long_session)
-    spatial = _steps_ms(spatial_data.simulate("box-12x6x6", _SEED, count=spatial_grasps), 3)
-    long = _steps_ms(planar_data.simulate("rectangle", _SEED, count=long_session), 2)
+    spatial, spatial_told = _session(spatial_data.simulate("box-12x6x6", _SEED, count=spatial_grasps), 3).T
+    long, _ = _session(planar_data.simulate("rectangle", _SEED, count=long_session), 2).T
     tail = long[-max(1, len(long) // 10) :]
+    shapes = ", ".join(PLANAR_SHAPES)
     return TimingTable(
         "A step of the default method",
         (
-            _line(f"plane, {planar_grasps} grasps, median", np.median(planar), len(planar), ", ".join(PLANAR_SHAPES)),
+            _line(f"plane, {planar_grasps} grasps, median", np.median(planar), len(planar), shapes),
             _line(f"plane, {planar_grasps} grasps, 95 %", np.quantile(planar, 0.95), len(planar), "the same steps"),
+            _line("plane, poses with faces between grasps, median", np.median(planar_told), len(planar), shapes),
             _line(f"space, {spatial_grasps} grasps, median", np.median(spatial), len(spatial), "box 12x6x6"),
             _line(f"space, {spatial_grasps} grasps, 95 %", np.quantile(spatial, 0.95), len(spatial), "the same steps"),
+            _line("space, poses with faces between grasps, median", np.median(spatial_told), len(spatial), "the same"),
             _line(f"plane, last of {long_session} grasps, median", np.median(tail), len(tail), "rectangle"),
         ),
     )
 
 
-def _steps_ms(data: SimulatedGrasps, dimension: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Computing time of each step but the first, milliseconds."""
+def _session(data: SimulatedGrasps, dimension: int) -> Array:
+    """Of each step but the first: its computing time, and how long the trajectory takes after it; ms, shape (n, 2)."""
     slam = TactileSlam(SlamSettings.model_validate({"dimension": dimension}), _SEED)
-    return np.array([1e3 * slam.take(grasp).seconds for grasp in data.grasps][1:])
+    return np.array([_timed(slam, grasp) for grasp in data.grasps][1:])
+
+
+def _timed(slam: TactileSlam, grasp: Grasp) -> tuple[float, float]:
+    step_ms, begun = 1e3 * slam.take(grasp).seconds, time.perf_counter()
+    assert slam.trajectory
+    return step_ms, 1e3 * (time.perf_counter() - begun)
 
 
 def _line(name: str, ms: np.floating, repeats: int, note: str) -> Timing:
