@@ -28,9 +28,6 @@ MOST_GRASPS = 80
 CLAIRVOYANT, INFORMED = "clairvoyant", "outline known"
 """Bounds: one knows even the errors of execution beforehand, the other the true outline and how large errors are."""
 
-_WORTH_A_LOOK = 0.65
-"""Whether a session could end is not asked before so much is explored: looking back takes as long as ten grasps."""
-
 _SHIFT_m, _TURN_rad = 0.006, float(np.deg2rad(8.0))
 
 
@@ -89,9 +86,6 @@ def explore_moving(cell: Cell) -> dict[str, Any]:
 class Exploration:
     """One run: grasp, place, look, decide. The policy does not know by which definition it is judged.
 
-    What is explored is judged twice: as the estimation has it after each grasp, and as a session would leave it that
-    ended there, with all poses smoothed to the end. Decisions are made with the former.
-
     Attributes:
         thing: what is explored.
         palms: candidates relative to it.
@@ -106,7 +100,6 @@ class Exploration:
     policy_name: str
     rng: np.random.Generator
     _actions: dict[Definition, int] = field(default_factory=dict)
-    _at_the_end: dict[Definition, int] = field(default_factory=dict)
     _shares: list[dict[Definition, float]] = field(default_factory=list)
     _decision_ms: list[float] = field(default_factory=list)
     _promises: list[float | None] = field(default_factory=list)
@@ -127,23 +120,17 @@ class Exploration:
 
     def _judged(self, known: ExploredMap | None, count: int) -> bool:
         """Take note of what is explored; whether that is enough by all definitions."""
-        self._shares.append(self._explored(self.thing, known))
-        if self._could_end():
-            ended = self.thing.ended()
-            _note(self._explored(ended, ended.map()), count, self._at_the_end)
-        _note(self._shares[-1], count, self._actions)
-        return len(self._actions) == len(self._at_the_end) == len(self.definitions)
+        self._shares.append(self._explored(known))
+        for definition, share in self._shares[-1].items():
+            if share >= GOAL:
+                self._actions.setdefault(definition, count)
+        return len(self._actions) == len(self.definitions)
 
-    def _explored(self, thing: ExploredObject, known: ExploredMap | None) -> dict[Definition, float]:
+    def _explored(self, known: ExploredMap | None) -> dict[Definition, float]:
         if known is None:
             return dict.fromkeys(self.definitions, 0.0)
-        true_points = thing.in_map_frame(TRUE_POINTS_m)
+        true_points = self.thing.in_map_frame(TRUE_POINTS_m)
         return {each: float(known.explored(each, true_points).mean()) for each in self.definitions}
-
-    def _could_end(self) -> bool:
-        """Whether something might be explored for which it is not known yet."""
-        open_ones = (each for each in self.definitions if each not in self._at_the_end)
-        return any(self._shares[-1][each] >= _WORTH_A_LOOK for each in open_ones)
 
     def _decide(self, policy: Policy | None, known: ExploredMap | None) -> Decision:
         """The policy's choice, and how long it took; before any contact, chance."""
@@ -170,19 +157,10 @@ class Exploration:
 
     def _figures(self) -> dict[str, Any]:
         actions = {f"actions_{each[0]}": self._actions.get(each) for each in self.definitions}
-        at_the_end = {f"ended_{each[0]}": self._at_the_end.get(each) for each in self.definitions}
         return {
             **actions,
-            **at_the_end,
             "status": "ok" if len(self._actions) == len(self.definitions) else "not explored",
             "registration_mm": self.thing.registration_mm(),
             "decision_ms": self._decision_ms,
             "promises": self._kept_promises(),
         }
-
-
-def _note(shares: dict[Definition, float], count: int, reached: dict[Definition, int]) -> None:
-    """The first count at which each goal is reached."""
-    for definition, share in shares.items():
-        if share >= GOAL:
-            reached.setdefault(definition, count)

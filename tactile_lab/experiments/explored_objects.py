@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -40,9 +39,6 @@ class ExploredObject(Protocol):
     def in_map_frame(self, points_body_m: Array) -> Array:
         """The truth, laid over the map by the best fit of all contacts; shape (n, 2). For judging only."""
 
-    def ended(self) -> ExploredObject:
-        """The same as a session would leave it that ended now."""
-
     def belief(self, known: ExploredMap, rng: np.random.Generator) -> Belief:
         """What a policy may know."""
 
@@ -75,9 +71,6 @@ class FixedObject:
 
     def in_map_frame(self, points_body_m: Array) -> Array:
         return points_body_m
-
-    def ended(self) -> FixedObject:
-        return self
 
     def belief(self, known: ExploredMap, rng: np.random.Generator) -> Belief:
         points, normals, indices = _all_contacts(self.grasps)
@@ -143,11 +136,6 @@ class MovingObject:
         estimated = np.concatenate([_placed(grasp, planar(pose)) for grasp, pose, _ in placed])
         true = np.concatenate([_placed(grasp, planar(pose)) for grasp, _, pose in placed])
         return moved_alike(points_body_m, true, estimated)
-
-    def ended(self) -> MovingObject:
-        slam = copy.deepcopy(self.slam)
-        slam.finish()
-        return replace(self, slam=slam)
 
     def belief(self, known: ExploredMap, rng: np.random.Generator) -> Belief:
         """Contacts are dealt to grasps in their order; those that the tracker left out are no longer there."""

@@ -20,10 +20,6 @@ EXPLORATION_COLUMNS = (
     Column("decision, ms: median / p95", "decision_ms", 0, kind="pooled"),
     Column("correlation of promised and realised share", "promises", 2, kind="correlation"),
 )
-AT_THE_END = (
-    Column("by B had the session ended", "ended_B", 1, kind="estimate"),
-    Column("by A had it ended", "ended_A", 1, kind="estimate"),
-)
 HAND_COLUMNS = (
     Column("actions by A, budget where not reached", "at_most_A", 1, kind="estimate"),
     Column("by A: median / p90 / max", "actions_A", 0),
@@ -59,7 +55,7 @@ TABLE_4_3 = Experiment(
     "Thesis, table 4.3: the same of a rectangle that every grasp pushes aside, at full motion noise.",
     exploration_runs.moving_settings,
     exploration_runs.explore_moving,
-    (*EXPLORATION_COLUMNS[:2], *AT_THE_END, *EXPLORATION_COLUMNS[2:], REGISTRATION),
+    (*EXPLORATION_COLUMNS, REGISTRATION),
     ranges("policy", _ACTIONS_LABEL, "actions_B", lambda cell: f"followed by {cell['tracking']}", columns=1),
     grasps=exploration_runs.MOST_GRASPS,
 )

@@ -146,24 +146,6 @@ def test_the_same_cell_is_the_same_run() -> None:
     assert first["promises"] == second["promises"]
 
 
-def test_a_session_that_ends_knows_no_less_of_a_moving_object() -> None:
-    thing = MovingObject.tracked_by("joint", PlanarHand(OUTLINE_m, np.random.default_rng(5)), 5)
-    for palm in TEN_PALMS[:5]:
-        thing.grasp(palm)
-    before = [pose and pose.matrix().tolist() for pose in thing.slam.trajectory]
-    ended = thing.ended()
-    assert [pose and pose.matrix().tolist() for pose in thing.slam.trajectory] == before
-    assert (ended.registration_mm() or np.inf) < 1.2 * (thing.registration_mm() or 0.0)
-    known = ended.map()
-    assert known is not None
-    assert known.explored("A5", ended.in_map_frame(TRUE_POINTS_m)).mean() > 0.5
-
-
-def test_where_the_pose_is_known_an_end_changes_nothing() -> None:
-    figures = explore_fixed(cell(seed=2, policy="information", grasps=60))
-    assert (figures["ended_A"], figures["ended_B"]) == (figures["actions_A"], figures["actions_B"])
-
-
 def test_a_moving_run_states_its_registration() -> None:
     figures = explore_moving(cell(policy="kl", grasps=3))
     assert figures["registration_mm"] < 5.0
