@@ -25,6 +25,7 @@ from tactile_lab.experiments.explored_objects import MovingObject, moved_alike
 from tactile_lab.experiments.planar_hand import PlanarHand, slipped
 from tactile_lab.experiments.summary import Column, Group, correlation, table
 from tactile_lab.exploration.ten_candidates import TEN_PALMS
+from tactile_lab.geometry.poses import planar
 from tests.support.rectangle_world import contacts_every
 
 
@@ -90,13 +91,23 @@ def test_points_move_as_the_contacts_do() -> None:
     assert moved_alike(np.array([[1.0, 0.0]]), source, target) == pytest.approx(np.array([[1.0, 3.0]]))
 
 
-def test_a_moving_object_is_followed_from_where_it_was_known_to_be() -> None:
-    thing = MovingObject.tracked_by("joint", PlanarHand(OUTLINE_m, np.random.default_rng(5)), 5)
-    for palm in TEN_PALMS[:3]:
+def moving_object(seed: int) -> MovingObject:
+    """After five grasps that pushed it aside."""
+    thing = MovingObject.tracked_by("joint", PlanarHand(OUTLINE_m, np.random.default_rng(seed)), seed)
+    for palm in TEN_PALMS[:5]:
         thing.grasp(palm)
-    truth = thing.truth[-1]
-    assert np.hypot(truth.x(), truth.y()) > 0.005
-    assert np.hypot(thing.world_T_body.x() - truth.x(), thing.world_T_body.y() - truth.y()) < 0.008
+    return thing
+
+
+def test_a_moving_object_is_followed_from_where_it_was_known_to_be() -> None:
+    found = [moving_object(seed) for seed in (5, 6, 7)]
+    assert min(float(np.hypot(one.truth[-1].x(), one.truth[-1].y())) for one in found) > 0.005
+    errors = [planar(one.truth[-1]).range(one.world_T_body.translation()) for one in found]
+    assert max(errors) < 0.004
+
+
+def test_what_is_known_of_a_moving_object_is_told_with_its_noise() -> None:
+    thing = moving_object(5)
     laid_over = thing.in_map_frame(TRUE_POINTS_m)
     known = thing.map()
     assert known is not None
