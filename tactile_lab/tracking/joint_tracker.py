@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from tactile_lab.geometry.contacts import Array
+from tactile_lab.tracking.branching import Branching
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.facet_placing import placed_on_solid
@@ -24,7 +25,6 @@ from tactile_lab.tracking.joint_settings import JointSettings
 from tactile_lab.tracking.late_placing import Relocate, placed_late, relocated
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import estimated_noise
-from tactile_lab.tracking.next_grasp import NextGrasp
 from tactile_lab.tracking.particle_filter import PoseEstimate
 from tactile_lab.tracking.regrouping import regrouped
 from tactile_lab.tracking.sharp_judge import SharpJudge
@@ -117,7 +117,7 @@ class JointTracker:
 
     def weigh(self, contacts: ContactSet) -> bool:
         """Branch every hypothesis into the poses proposed for this grasp, smooth the likeliest and rank them."""
-        step = NextGrasp(contacts, self._motion, self._noise, self._judge, self._settings, self._space)
+        step = Branching(contacts, self._motion, self._noise, self._judge, self._settings, self._space)
         branches = likeliest(step.branches(self._hypotheses), self._settings.smoothed, self._settings.branch_gap)
         smoothed = [self._judge.smoothed(branch.map, self._settings.iterations) for branch in branches]
         smoothed += self._relocated(min(smoothed, key=cost))

@@ -19,7 +19,7 @@ from tactile_lab.tracking.proposals import propose
 
 
 @dataclass(frozen=True)
-class NextGrasp:
+class Branching:
     """A grasp that hypotheses are continued by.
 
     Attributes:
