@@ -113,6 +113,8 @@ class Polyhedron:
     def _build(self, floor_m: float | None) -> tuple[FacetMesh, RegularPlanes, tuple[Cap, ...]]:
         """The coarse body, the planes it is made of, and the caps that follow them."""
         kept = _kept(self._regular)
+        if kept.planes.count == 0:
+            raise ShapeError("no plane is touched twice: these enclose nothing")
         caps = open_sides(self._gpis, kept.planes, floor_m)
         normals = np.vstack([kept.planes.normals, *(cap.normal[None] for cap in caps)])
         offsets = np.append(kept.planes.offsets_m, [cap.offset_m for cap in caps])

@@ -157,3 +157,13 @@ def _polyhedron(mesh: trimesh.Trimesh, seed: int) -> SurfaceMesh:
     assert closed(surface)
     assert len(sample_mesh(surface, 100)) == 100
     return surface
+
+
+def test_contacts_that_share_no_plane_enclose_nothing() -> None:
+    """As after two grasps of which one fits nowhere: every contact is alone on its plane, and none is believed."""
+    tilts = np.deg2rad([0.0, 8.0, -8.0, 5.0])
+    normals = np.column_stack([np.cos(tilts), np.sin(tilts), np.zeros(4)])
+    points = np.array([[0.030, 0.0, 0.0], [0.034, 0.01, 0.0], [0.026, -0.01, 0.0], [0.038, 0.0, 0.01]])
+    solid = Polyhedron.fit(Gpis.fit(points, normals, 0.0005, 0.01))
+    with pytest.raises(ShapeError, match="no plane is touched twice"):
+        solid.mesh()
