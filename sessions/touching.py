@@ -207,13 +207,15 @@ class Toucher:
         """Every fingertip moves along a direction until it touches as it should, or has gone as far as it may.
 
         The hand sinks a little meanwhile, and the fingers that touch give way: the thumb hardly moves that way itself.
+        Where a fingertip is pressed hard the hand waits, and goes on from there when the finger has given way.
         """
         s, motion = self.settings, self._motion
         rates = motor_rates(table, pattern.progress, direction_grasp, self._tip)
         gone_m = dict.fromkeys(rates, 0.0)
-        for q in self._sinking(direction_grasp, frame, sink_m):
+        sinking = self._sinking(direction_grasp, frame, sink_m)
+        for _ in motion.shares(s.press_s):
             if max(self._motion.loads_N().values(), default=0.0) < s.most_N:
-                motion.set_base(q)
+                motion.set_base(next(sinking))
             for finger, load_N in self._motion.loads_N().items():
                 step_m = s.gain * float(np.clip(force_N - load_N, -1.0, 1.0)) * motion.cycle_s
                 gone_m[finger] = float(np.clip(gone_m[finger] + step_m, -s.reach_m, s.reach_m))
@@ -224,7 +226,7 @@ class Toucher:
             motion.tick()
 
     def _sinking(self, direction_grasp: Array, frame: GraspFrame, sink_m: float) -> Iterator[Array]:
-        """Positioner targets while the fingertips are laid on, one a cycle."""
+        """Positioner targets while the fingertips are laid on, one for each cycle in which the hand may move."""
         motion, start = self._motion, self._motion.bench.perception.base_q.copy()
         way = np.zeros(6)
         way[:3] = self._motion.bench.world_T_mount.rotation().unrotate(frame.pose.rotation().rotate(direction_grasp))

@@ -89,6 +89,32 @@ def test_taps_are_gentle() -> None:
     assert 0.2 < most < 1.5
 
 
+def test_a_hand_that_waited_for_a_pressed_finger_goes_on_from_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A target that had gone on meanwhile would be a jump onto the stiff thumb, by millimetres in one cycle."""
+    heights: list[float] = []
+    pressed = [5.0] * 8 + [0.0] * 1000
+    world = DiscWorld(disc())
+    motion = motion_on(world)
+    toucher = Toucher(motion, QUICK, TIP)
+
+    def loads_N() -> dict[str, float]:
+        return dict.fromkeys(FINGERS, pressed[min(len(heights) // 2, len(pressed) - 1)])
+
+    def set_base(q: Array) -> None:
+        heights.append(float(q[2]))
+
+    table, frame = closing(TAP.closing, TAP_HEIGHT_m, TIP), GraspFrame(0.0, 0.0, 0.0)
+    start = float(motion.bench.perception.base_q[2])
+    monkeypatch.setattr(motion, "set_base", set_base)
+    monkeypatch.setattr(motion, "loads_N", loads_N)
+    monkeypatch.setattr(motion, "tick", lambda: heights.append(heights[-1] if heights else start))
+    toucher._lay_on(table, TAP, np.array([0.0, 0.0, -1.0]), frame, 0.35, 0.004)
+    steps_m = np.abs(np.diff([start, *heights]))
+    usual_m = 2 * 0.004 / motion.cycles(QUICK.touch.press_s)
+    assert steps_m.max() < 1.01 * usual_m
+    assert abs(heights[-1] - start) > 0.003
+
+
 def test_contacts_probed_before_the_object_was_carried_are_forgotten() -> None:
     world = DiscWorld(disc(radius_m=0.035))
     Toucher(motion_on(world), QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0))
