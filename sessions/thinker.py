@@ -6,7 +6,7 @@ it can live in the session's process or in one of its own, and answers alike in 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from gtsam import Pose3
@@ -41,7 +41,7 @@ class Estimate:
     """What has come of one grasp.
 
     Attributes:
-        step: of the estimation.
+        step: of the estimation, with the object where the surface is told to be.
         surface: the shape as plain data, see :func:`sessions.view_messages.surface_message`.
         explored: share of the surface that is known, 0..1; None before there is one.
     """
@@ -115,6 +115,7 @@ class Thinker:
         step = self.slam.take(grasp)
         self.planner.estimated(step.index, step.verdict != "untracked")
         shape = self.planner.known_shape()
+        step = replace(step, world_T_object=self.slam.world_T_object)
         self._estimates.append(Estimate(step, surface_message(shape), None if shape is None else shape.explored))
         return tuple(self._estimates[known:])
 
