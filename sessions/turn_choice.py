@@ -17,6 +17,7 @@ from sessions.explorer import KnownShape
 from sessions.hand_candidates import HandLimits, HasRoom, anywhere, offer
 from sessions.motion import GraspFrame
 from tactile_lab.exploration.candidates import Candidate
+from tactile_lab.exploration.expected_information import pose_nats
 from tactile_lab.exploration.information_policy import InformationPolicy
 from tactile_lab.exploration.policy import Belief, Policy
 from tactile_lab.exploration.surface_policies import expected_contacts, variances_at
@@ -73,8 +74,7 @@ class TurnChooser:
         if self.policy.name == "random" or not turns or belief.surface is None:
             return otherwise
         if isinstance(self.policy, InformationPolicy):
-            left = self._after(0.0, frame, known, belief, has_room)
-            return self._most_informative(self.policy, turns, left, frame, known, belief, rng)
+            return self._most_informative(self.policy, turns, frame, known, belief, rng, has_room)
         rewards = [_best_variance(*self._after(turn, frame, known, belief)) for turn in turns]
         return turns[int(np.argmax(rewards))] if max(rewards) > min(rewards) else otherwise
 
@@ -82,22 +82,22 @@ class TurnChooser:
         self,
         policy: InformationPolicy,
         turns: Sequence[float],
-        left: tuple[list[Candidate], Belief],
         frame: GraspFrame,
         known: KnownShape,
         belief: Belief,
         rng: np.random.Generator,
+        has_room: HasRoom,
     ) -> float | None:
         """The turn after which a grasp tells most per second, if that is more than without any; all in equal worlds."""
         chance = int(rng.integers(2**62))
         strayed = belief.pose_covariance + np.diag(self.noise.sigmas**2)
-        lost = policy.pose_nats(strayed) - policy.pose_nats(belief.pose_covariance)
+        lost = pose_nats(strayed, policy.settings) - pose_nats(belief.pose_covariance, policy.settings)
         rates = []
         for turn in turns:
             candidates, turned = self._after(turn, frame, known, replace(belief, pose_covariance=strayed))
             rates.append(policy.best_rate(candidates, turned, np.random.default_rng(chance), lost, self._seconds(turn)))
-        without = policy.best_rate(*left, np.random.default_rng(chance))
-        return turns[int(np.argmax(rates))] if max(rates) > without else None
+        left = policy.best_rate(*self._after(0.0, frame, known, belief, has_room), np.random.default_rng(chance))
+        return turns[int(np.argmax(rates))] if max(rates) > left else None
 
     def _seconds(self, turn_rad: float) -> float:
         """That carrying takes."""

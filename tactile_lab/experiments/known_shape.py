@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 from gtsam import Pose3, Rot3
 
-from tactile_lab.evaluation.own_turns import own_turns, without_own_turns
-from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.experiments import spatial_data
 from tactile_lab.experiments.cells import Cell
+from tactile_lab.experiments.merit import registration_mm
 from tactile_lab.experiments.sensing import SLIP_SIGMA_m, SLIP_SIGMA_rad
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.geometry.poses import planar
@@ -65,9 +64,7 @@ def follow_known_shape(cell: Cell) -> dict[str, Any]:
     follower = _Follower(mesh, height_m, noise, cell["particles"], rng)
     rows = follower.trajectory(data.grasps, first)
     poses = [row_pose_in_space(row, height_m) * body_T_frame.inverse() for row in rows]
-    told = without_own_turns(poses, data.world_T_body, own_turns(data.mesh))
-    contacts = [grasp.points_world_m for grasp in data.grasps]
-    return {"registration_mm": registration_rms_mm(contacts, told, data.world_T_body, 3), "status": "ok"}
+    return {"registration_mm": registration_mm(data, poses, 3), "status": "ok"}
 
 
 def _frame(data: spatial_data.SpatialGrasps) -> Pose3:

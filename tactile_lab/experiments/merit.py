@@ -14,6 +14,7 @@ import trimesh
 
 from tactile_lab.evaluation.own_turns import own_turns, stands, without_own_turns
 from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.evaluation.trajectory import Poses
 from tactile_lab.experiments.planar_data import PlanarGrasps
 from tactile_lab.experiments.sensing import SimulatedGrasps
 from tactile_lab.experiments.spatial_data import SpatialGrasps
@@ -53,17 +54,22 @@ def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
         shape = contour_figures(result.contour, data.outline_m)
     elif isinstance(data, SpatialGrasps):
         shape = mesh_figures(result.mesh, data.mesh, upright=all(map(stands, data.world_T_body)))
-    contacts = [grasp.points_world_m for grasp in data.grasps]
-    turns = own_turns(data.mesh) if isinstance(data, SpatialGrasps) else None
-    poses = without_own_turns(result.world_T_object, data.world_T_body, turns)
     return {
         **shape,
-        "registration_mm": registration_rms_mm(contacts, poses, data.world_T_body, result.dimension),
+        "registration_mm": registration_mm(data, result.world_T_object, result.dimension),
         "status": result.status,
-        "contacts": sum(map(len, contacts)),
+        "contacts": sum(len(grasp.contacts) for grasp in data.grasps),
         "untracked": sum(step.verdict == "untracked" for step in result.steps),
         "step_ms": [round(1e3 * seconds, 3) for seconds in result.step_seconds[1:]],
     }
+
+
+def registration_mm(data: SimulatedGrasps, estimate: Poses, dimension: int) -> float | None:
+    """Of a trajectory; turns of a solid about its own axis that no contact can tell do not count."""
+    turns = own_turns(data.mesh) if isinstance(data, SpatialGrasps) else None
+    poses = without_own_turns(estimate, data.world_T_body, turns)
+    contacts = [grasp.points_world_m for grasp in data.grasps]
+    return registration_rms_mm(contacts, poses, data.world_T_body, dimension)
 
 
 def _within(errors_m: Array, sigma_m: Array) -> float:

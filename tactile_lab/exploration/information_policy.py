@@ -14,7 +14,6 @@ from tactile_lab.exploration.candidates import Candidate
 from tactile_lab.exploration.expected_information import (
     InformationSettings,
     Promise,
-    pose_nats,
     promised,
     unexplored,
 )
@@ -64,10 +63,6 @@ class InformationPolicy:
         shape = np.minimum(_AHEAD * promise.shape, promise.together)
         rates = (self.settings.pose_weight * (promise.pose - lost_nats) + shape) / times
         return float(np.max(rates[promise.touching > 0], initial=0.0))
-
-    def pose_nats(self, covariance: Array) -> float:
-        """How much there is to be learned of a pose with this covariance (x m, y m, yaw rad), nats."""
-        return pose_nats(covariance, self.settings)
 
     def _decided(
         self,
