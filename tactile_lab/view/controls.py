@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import math
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -29,8 +28,7 @@ BUTTONS: tuple[tuple[Ask, str, IconName, str], ...] = (
     (Ask.END, "End", Icon.PLAYER_STOP, "End the session; press twice"),
 )
 _ROWS = 8
-_LAST_LETTERS_s = 0.3
-"""The browser gathers what is written and may send it after the press that follows it."""
+_SHOWN_s = 8.0
 PANEL_STYLE = "padding:0 0.9em 0.6em 0.9em;font-size:0.85em;line-height:1.45"
 
 
@@ -68,11 +66,13 @@ class Controls:
         text: Any = server.gui.add_text("Note", "")
         button = server.gui.add_button("Keep the note", icon=Icon.PENCIL, color="gray")
 
-        def keep(event: Any) -> None:
-            time.sleep(_LAST_LETTERS_s)
+        def keep(event: viser.GuiEvent[Any]) -> None:
             note, text.value = text.value, ""
             if note.strip():
                 press(Ask.NOTE, note)
+            elif event.client is not None:  # a browser that is behind sends the press and drops what was written
+                said = "Nothing was written, or it did not arrive. Write it, and press again."
+                event.client.add_notification("No note kept", said, auto_close_seconds=_SHOWN_s, color="red")
 
         button.on_click(keep)
 

@@ -57,6 +57,8 @@ def test_every_button_that_a_person_presses_reaches_the_session_and_the_recordin
         ):
             browser.press(label)
             assert asked(feed).ask is ask, label
+        browser.press("Keep the note")
+        until(lambda: browser.shows("Nothing was written"), "that there is no note")
         browser.write("slipped at the edge")
         browser.press("Keep the note")
         noted = asked(feed)

@@ -16,6 +16,7 @@ from websockets.sync.client import ClientConnection, connect
 
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 PATIENCE_s = 60.0
+_PAUSE_ms = 250
 _SWITCHES = (
     "--headless=new",
     "--no-sandbox",
@@ -99,10 +100,15 @@ class Browser:
         self.evaluate(f"{find}.click()")
 
     def write(self, text: str) -> None:
-        """Write into the page's empty field for text, as from a keyboard."""
+        """Write into the page's empty field for text, as from a keyboard, and stop for as long as a hand takes.
+
+        The page sends what is written or pressed at most every 50 ms, and of several only the last. Its own clock
+        tells when that is past, however busy the computer is.
+        """
         find = "[...document.querySelectorAll('input:not([type])')].find(one => !one.value && !one.readOnly)"
         self.evaluate(f"{find}.focus()")
         self.do("Input.insertText", text=text)
+        self.do("Runtime.evaluate", expression=f"new Promise(go => setTimeout(go, {_PAUSE_ms}))", awaitPromise=True)
 
     def shows(self, words: str) -> bool:
         """Whether a person can read these words in the page."""
