@@ -21,7 +21,7 @@ from sessions.decisions import (
     Wait,
 )
 from sessions.estimation import Estimation
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.planner import Reorientation
 from sessions.progress import GraspReport, NullProgress, Progress
 from sessions.recorder import Level
@@ -255,6 +255,8 @@ class Conductor:
             cycle.squeeze(touching)
             self._phase("re-orient")
             hand_motion = cycle.reorient(wanted.turn_rad, wanted.shift_world_m, touching)
+            if cycle.jammed:
+                self._tell(Level.WARNING, f"{', '.join(cycle.jammed)} pressed hard: the object was carried no farther")
         self._decisions.carried(hand_motion)
 
     def _let_go(self) -> None:

@@ -25,7 +25,7 @@ class ConductorSettings(StrictModel):
 
     grasps: int = Field(default=16, ge=1)
     fixed_grasps: int = Field(default=2, ge=1)
-    missed_approaches: int = Field(default=3, ge=1)
+    missed_approaches: int = Field(default=6, ge=1)
     plan: PlanSettings = PlanSettings()
     cycle: CycleSettings = CycleSettings()
     probing: ProbingSettings = ProbingSettings()

@@ -58,6 +58,8 @@ class CycleSettings(StrictModel):
         closing_m_s: speed of the fingertips; it sets how far the object is pushed.
         touch_force_N: contact force at which a finger stops.
         touch_cycles: cycles in a row with that force: a lone jerk of the finger's own mass is no touch.
+        held_up_rad: angle by which a joint falls behind where something holds the finger.
+        closing_most_N: force on a fingertip at which all fingers stop: links that feel nothing push the object.
         contact_force_N: force that each touching finger settles to for the capture; the thumb takes the others' sum.
         settle_s: time for that.
         rest_s: rest after every motion that something is measured after.
@@ -65,6 +67,8 @@ class CycleSettings(StrictModel):
         squeeze_force_N: force of each finger while the object is carried; the thumb holds against their sum.
         squeeze_s: time to build the squeeze up.
         squeeze_gain: fingertip speed per force error, m/s per N.
+        pressed_N: force on a fingertip that no other finger adds to.
+        pressed_cycles: cycles in a row with that force after which the object is carried no farther.
         carry_turn_rad_s, carry_m_s: speeds while the object is held.
         finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind leave the path.
         touch: taps on the top and probes from the side.
@@ -81,6 +85,8 @@ class CycleSettings(StrictModel):
     closing_m_s: float = Field(default=0.030, gt=0.0)
     touch_force_N: float = Field(default=0.15, gt=0.0)
     touch_cycles: int = Field(default=2, ge=1)
+    held_up_rad: float = Field(default=0.12, gt=0.0)
+    closing_most_N: float = Field(default=2.0, gt=0.0)
     contact_force_N: float = Field(default=0.4, gt=0.0)
     settle_s: float = Field(default=0.3, ge=0.0)
     rest_s: float = Field(default=0.2, gt=0.0)
@@ -88,6 +94,8 @@ class CycleSettings(StrictModel):
     squeeze_force_N: float = Field(default=0.8, gt=0.0)
     squeeze_s: float = Field(default=0.5, gt=0.0)
     squeeze_gain: float = Field(default=0.02, gt=0.0)
+    pressed_N: float = Field(default=3.5, gt=0.0)
+    pressed_cycles: int = Field(default=5, ge=1)
     carry_turn_rad_s: float = Field(default=0.6, gt=0.0)
     carry_m_s: float = Field(default=0.06, gt=0.0)
     finger_rad_s: float = Field(default=1.8, gt=0.0)

@@ -13,7 +13,7 @@ from typing import Protocol, TypeAlias
 from gtsam import Pose3
 
 from sessions.bounding_box import BoundingBox
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.planner import Reorientation
 from sessions.safety import InterruptGuard, SafetySupervisor
 from sessions.thinker import Thinker, Thought
@@ -113,6 +113,7 @@ class Performer(Protocol):
     """Does grasps: the verbs of one, in the order in which they are called. See :class:`GraspCycle`."""
 
     landings_world_m: list[Array]
+    jammed: tuple[str, ...]
 
     @property
     def plan(self) -> GraspPlan: ...

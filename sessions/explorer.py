@@ -16,7 +16,7 @@ from gtsam import Pose2
 from pydantic import Field, field_validator
 
 from drivers.shadow.closing import LEANING, Closing
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.motion import GraspFrame
 from tactile_lab.errors import ShapeError
 from tactile_lab.exploration.candidates import Candidate, ClosingRays, ModelledObject, ring_of_candidates

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from gtsam import Pose3
@@ -11,28 +10,13 @@ from gtsam import Pose3
 from drivers.shadow.closing import Closing, closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.cycle_settings import CycleSettings
-from sessions.motion import GraspFrame, Motion
+from sessions.grasp_plan import GraspPlan, evaded
+from sessions.motion import Motion
 from sessions.touching import Toucher
 from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
 
-
-@dataclass(frozen=True)
-class GraspPlan:
-    """One grasp to do.
-
-    Attributes:
-        frame: the grasp frame in the world.
-        closing: one of :data:`drivers.shadow.closing.CLOSINGS`.
-        height_m: height of the fingertip centres above the table.
-        tap: lay the fingertips on the top first.
-        reason: why this one, for people.
-    """
-
-    frame: GraspFrame
-    closing: str
-    height_m: float
-    reason: str = ""
-    tap: bool = False
+_HASTE_N, _FLIGHT_N = 1.0, 3.0
+"""Largest force errors that count in force control: toward the object, and away from it."""
 
 
 class GraspCycle:
@@ -60,6 +44,9 @@ class GraspCycle:
         self._touching: frozenset[str] = frozenset()
         self.landings_world_m: list[Array] = []
         """Where the tips' centres stood, (3,) each, at each landing on the object in the last approach."""
+
+        self.jammed: tuple[str, ...] = ()
+        """The fingertips that were pressed so hard in the last re-orientation that it was broken off."""
 
     @property
     def plan(self) -> GraspPlan:
@@ -103,13 +90,14 @@ class GraspCycle:
         self._motion.tare(s.rest_s)
 
     def _come_down(self) -> list[str]:
-        """Guarded descent; the fingers that landed on something."""
+        """Guarded descent; the fingers that landed on something, by their tips or, which bends them, by other links."""
         s = self.settings
         down = self._motion.base_joints(self.plan.frame, self._table())
         hit: list[str] = []
 
         def met() -> bool:
-            hit.extend(f for f, load_N in self._motion.loads_N().items() if load_N > s.landing_force_N)
+            felt = {*self._pressed(s.landing_force_N), *self._motion.bent(s.held_up_rad)}
+            hit.extend(finger for finger in FINGERS if finger in felt - set(hit))
             if hit:
                 self.landings_world_m.append(self._motion.tip_centre_world_m(hit[0], self._tip))
             return bool(hit)
@@ -122,16 +110,21 @@ class GraspCycle:
     # --- close and measure -------------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Close every finger along its line until it touches, meets the thumb, or comes to the line's end."""
+        """Close every finger along its line until it touches, meets the thumb, or comes to the line's end.
+
+        Links above the fingertips feel nothing. A finger that is held up by one stops, and all do where the object is
+        pushed hard against a fingertip.
+        """
         s, table = self.settings, self._table()
         step_m = s.closing_m_s * self._motion.supervisor.speed_scale * self._motion.cycle_s
         moving, touched = set(FINGERS), dict.fromkeys(FINGERS, 0)
         self._motion.bench.begin_closing()
-        while moving:
+        while moving and not self._pressed(s.closing_most_N):
             loads_N = self._motion.loads_N()
             for finger in moving:
                 touched[finger] = touched[finger] + 1 if loads_N.get(finger, 0.0) > s.touch_force_N else 0
-            moving = {f for f in moving if touched[f] < s.touch_cycles and self._may_close(f)}
+            held_up = self._motion.bent(s.held_up_rad)
+            moving = {f for f in moving if touched[f] < s.touch_cycles and f not in held_up and self._may_close(f)}
             for finger in sorted(moving):
                 self._progress[finger] += step_m / table.path(finger).length_m
             self._motion.set_fingers(table, self._progress)
@@ -164,7 +157,7 @@ class GraspCycle:
         self._build_up(self._balanced_forces_N(touching, self.settings.squeeze_force_N), self.settings.squeeze_s)
 
     def reorient(self, turn_rad: float, shift_world_m: Array, touching: frozenset[str]) -> Pose3:
-        """Turn about the grasp's vertical axis and shift, holding the object.
+        """Turn about the grasp's vertical axis and shift, holding the object, unless it is jammed (:attr:`jammed`).
 
         Args:
             turn_rad: about world z.
@@ -185,13 +178,26 @@ class GraspCycle:
             dx, dy = share * shift_world_m
             return motion.base_joints(start.moved(float(dx), float(dy), share * turn_rad), table)
 
+        self.jammed, pressed_cycles = (), 0
+
+        def hold() -> bool:
+            nonlocal pressed_cycles
+            self._servo_forces(targets_N)
+            pressed = self._pressed(self.settings.pressed_N)
+            pressed_cycles = pressed_cycles + 1 if pressed else 0
+            if pressed_cycles > self.settings.pressed_cycles:
+                self.jammed = pressed
+            return not self.jammed
+
         world_T_before = motion.bench.perception.world_T_palm
         motion.bench.begin_hold()
-        motion.follow(base_at, duration_s, lambda: self._servo_forces(targets_N))
+        share = motion.follow(base_at, duration_s, hold)
+        if self.jammed:
+            self._build_up(targets_N, self.settings.squeeze_s)
         motion.wait(self.settings.rest_s)
         motion.bench.end_hold()
-        dx, dy = shift_world_m
-        self._plan = replace(self.plan, frame=start.moved(float(dx), float(dy), turn_rad))
+        dx, dy = share * shift_world_m
+        self._plan = replace(self.plan, frame=start.moved(float(dx), float(dy), share * turn_rad))
         return motion.bench.perception.world_T_palm * world_T_before.inverse()
 
     def _balanced_forces_N(self, touching: frozenset[str], force_N: float) -> dict[str, float]:
@@ -209,22 +215,45 @@ class GraspCycle:
             self._motion.tick()
 
     def _servo_forces(self, targets_N: dict[str, float]) -> None:
-        """One cycle of force control: a fingertip moves along its line in proportion to its force error."""
-        table, loads_N = self._table(), self._motion.loads_N()
+        """One cycle of force control: a fingertip moves along its line in proportion to its force error.
+
+        It gives way faster than it presses. One that is held up presses no farther, and none does while another is
+        pressed hard. Strained fingers without a force to keep give way.
+        """
+        s, table, loads_N = self.settings, self._table(), self._motion.loads_N()
+        held_up = FINGERS if self._pressed(s.pressed_N) else self._motion.bent(s.held_up_rad)
+        errors_N = dict.fromkeys(self._strained(), -_HASTE_N)
         for finger, target_N in targets_N.items():
+            most_N = 0.0 if finger in held_up else _HASTE_N
+            errors_N[finger] = float(np.clip(target_N - loads_N.get(finger, 0.0), -_FLIGHT_N, most_N))
+        for finger, error_N in errors_N.items():
             path = table.path(finger)
-            error_N = float(np.clip(target_N - loads_N.get(finger, 0.0), -1.0, 1.0))
-            step = self.settings.squeeze_gain * error_N * self._motion.cycle_s / path.length_m
+            step = s.squeeze_gain * error_N * self._motion.cycle_s / path.length_m
             self._progress[finger] = float(np.clip(self._progress[finger] + step, *path.valid))
         self._motion.set_fingers(table, self._progress)
+
+    def _pressed(self, force_N: float) -> tuple[str, ...]:
+        """The fingertips that feel more than a force."""
+        return tuple(finger for finger, load_N in self._motion.loads_N().items() if load_N > force_N)
+
+    def _strained(self) -> set[str]:
+        """The fingers whose tips are pressed hard, or that are held up."""
+        return {*self._pressed(self.settings.pressed_N), *self._motion.bent(self.settings.held_up_rad)}
 
     # --- and away ----------------------------------------------------------------------------------------------
 
     def release(self) -> None:
-        """Open the hand, every tip back along its line: a short cut through the joints would dip into the table."""
+        """Open the hand, every tip back along its line: a short cut through the joints would dip into the table.
+
+        Strained fingers are freed first, the others wait for them.
+        """
         table, closed, opened = self._table(), self._progress, self._opened()
-        for share in self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s)):
-            self._progress = {finger: u + share * (opened[finger] - u) for finger, u in closed.items()}
+        step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))
+        shares = dict.fromkeys(FINGERS, 0.0)
+        while closed_still := {finger for finger in FINGERS if shares[finger] < 1.0}:
+            for finger in closed_still & self._strained() or closed_still:
+                shares[finger] = min(1.0, shares[finger] + step)
+            self._progress = {finger: u + shares[finger] * (opened[finger] - u) for finger, u in closed.items()}
             self._motion.set_fingers(table, self._progress)
             self._motion.tick()
 
@@ -244,37 +273,3 @@ class GraspCycle:
 
     def _table(self) -> Closing:
         return closing(self.plan.closing, self.plan.height_m, self._tip)
-
-
-def evaded(
-    wanted: GraspPlan,
-    now: GraspPlan,
-    hit: Sequence[str],
-    landed: set[str],
-    table: Closing,
-    shift_m: float,
-    yaw_window_rad: tuple[float, float],
-) -> GraspPlan:
-    """The plan after a landing: shifted toward the fingers that landed, or turned when both sides did.
-
-    Args:
-        wanted, now: the plan as it was chosen, and what has become of it so far.
-        hit: fingers that landed just now.
-        landed: those that landed since the hand was turned, ``hit`` among them; emptied when it turns.
-        table: the plan's closing.
-        shift_m: how far to shift.
-        yaw_window_rad: yaws the arm can take up.
-    """
-    if "TH" in landed and landed - {"TH"}:
-        landed.clear()
-        return replace(wanted, frame=_turned_away(wanted.frame, yaw_window_rad))
-    directions = np.array([table.path(finger).start_m[:2] for finger in hit])
-    aside_m = shift_m * np.mean(directions / np.linalg.norm(directions, axis=1)[:, None], 0)
-    return replace(now, frame=now.frame.shifted_inside(aside_m))
-
-
-def _turned_away(frame: GraspFrame, yaw_window_rad: tuple[float, float]) -> GraspFrame:
-    """A quarter turn, as far as the arm's yaw window allows, toward its middle."""
-    low, high = yaw_window_rad
-    turn = -np.pi / 2 if frame.yaw_rad > (low + high) / 2 else np.pi / 2
-    return replace(frame, yaw_rad=float(np.clip(frame.yaw_rad + turn, low, high)))

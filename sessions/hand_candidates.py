@@ -22,7 +22,7 @@ from drivers.shadow.closing import Closing, closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.cycle_settings import CycleSettings
 from sessions.explorer import ExplorationSettings, KnownShape, closing_rays
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.motion import GraspFrame
 from sessions.next_grasp import PlanSettings
 from sessions.safety import SafetySettings

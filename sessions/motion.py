@@ -188,12 +188,25 @@ class Motion:
         travel_s = float(np.linalg.norm(q[:3] - self._base_q[:3])) / speed_m_s
         return max(travel_s, float(np.max(np.abs(q[3:] - self._base_q[3:]))) / turn_rad_s)
 
-    def follow(self, pose_at: Callable[[float], Array], duration_s: float, each: Callable[[], None]) -> None:
-        """Positioner joints as a function of smooth progress 0..1; ``each`` acts before every cycle."""
+    def follow(self, pose_at: Callable[[float], Array], duration_s: float, each: Callable[[], bool]) -> float:
+        """Positioner joints as a function of smooth progress 0..1.
+
+        Args:
+            pose_at: the joints, shape (6,).
+            duration_s: of the whole way.
+            each: acts before every cycle, and says whether to go on.
+
+        Returns:
+            The progress made.
+        """
+        made = 0.0
         for share in self.shares(duration_s):
-            self.set_base(pose_at(smooth(share)))
-            each()
+            if not each():
+                break
+            made = smooth(share)
+            self.set_base(pose_at(made))
             self.tick()
+        return made
 
     # --- the fingers -------------------------------------------------------------------------------------------
 
@@ -242,11 +255,20 @@ class Motion:
 
     def _measured_targets(self, closing: Closing, progress: Mapping[str, float]) -> dict[str, float]:
         """Where the motors stand now, for the names that ``progress`` will command."""
-        joints = dict(zip(JOINTS, self.bench.perception.joints_rad.tolist(), strict=True))
-        for finger in FINGERS[:4]:
-            joints[f"{finger}J0"] = joints[f"{finger}J1"] + joints[f"{finger}J2"]
+        measured = self._measured_rad()
         names = [*_HOLD_WRIST, *(name for finger in FINGERS for name in closing.joints(finger, progress[finger]))]
-        return {name: joints[name] for name in names}
+        return {name: measured[name] for name in names}
+
+    def _measured_rad(self) -> dict[str, float]:
+        """Where joints stand now, and what the coupled ones are together."""
+        joints = dict(zip(JOINTS, self.bench.perception.joints_rad.tolist(), strict=True))
+        return joints | {f"{finger}J0": joints[f"{finger}J1"] + joints[f"{finger}J2"] for finger in FINGERS[:4]}
+
+    def bent(self, least_rad: float) -> tuple[str, ...]:
+        """Fingers with a joint that is farther off its target: something holds it, felt by the fingertip or not."""
+        measured = self._measured_rad()
+        off = [name for name, angle in self._targets_rad.items() if abs(measured[name] - angle) > least_rad]
+        return tuple(finger for finger in FINGERS if any(name.startswith(finger) for name in off))
 
     def loads_N(self) -> dict[str, float]:
         """Contact force on each fingertip at the end of the last cycle, beyond what it showed at rest untared."""

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from drivers.shadow.closing import PRESHAPES
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.motion import GraspFrame
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.geometry.poses import transform_points

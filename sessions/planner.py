@@ -11,7 +11,7 @@ from drivers.shadow.closing import Closing, closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.bounding_box import BoundingBox
 from sessions.explorer import ExplorationSettings, KnownShape, choose_grasp, known_shape
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.motion import GraspFrame
 from sessions.next_grasp import FixedRule, PlanSettings, contact_centre
 from sessions.policy_choice import Choice, Knowledge, PolicyChooser

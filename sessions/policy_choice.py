@@ -13,7 +13,7 @@ from gtsam import Pose2
 from numpy.typing import NDArray
 
 from sessions.explorer import KnownShape
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.hand_candidates import HandCandidate, HandLimits, HasRoom, Offer, anywhere, offer
 from sessions.motion import GraspFrame
 from sessions.turn_choice import TurnChooser, with_contacts

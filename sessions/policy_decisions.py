@@ -12,7 +12,7 @@ from sessions.bench import Bench
 from sessions.cycle_settings import CycleSettings
 from sessions.decisions import AutonomousDecisions, Decision, End
 from sessions.explorer import ExplorationSettings
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.hand_candidates import HandLimits
 from sessions.next_grasp import PlanSettings
 from sessions.policy_choice import Choice, PolicyChooser

@@ -13,7 +13,7 @@ from gtsam import Pose3
 
 from sessions.bounding_box import BoundingBox
 from sessions.explorer import KnownShape
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.planner import Planner, Reorientation
 from sessions.policy_choice import Choice
 from sessions.slam_memory import SlamMemory

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from sessions.explorer import KnownShape
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from tactile_lab.geometry.contacts import Array
 
 

@@ -8,7 +8,7 @@ from gtsam import Pose3
 from drivers.shadow.closing import closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.cycle_settings import CycleSettings
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.guided.desk import Desk
 from sessions.guided.motion import GuidedMotion
 from sessions.guided.operator import Ask, Stage
@@ -31,6 +31,7 @@ class GraspByHand:
         self._motion, self.settings, self._desk, self._tip = motion, settings, desk, tip
         self._plan: GraspPlan | None = None
         self.landings_world_m: list[Array] = []
+        self.jammed: tuple[str, ...] = ()
 
     @property
     def plan(self) -> GraspPlan:

@@ -13,7 +13,8 @@ from gtsam import Pose3
 
 from drivers.shadow.posture import TipEllipsoid
 from sessions.cycle_settings import CycleSettings
-from sessions.grasp_cycle import GraspCycle, GraspPlan
+from sessions.grasp_cycle import GraspCycle
+from sessions.grasp_plan import GraspPlan
 from sessions.guided.desk import Desk
 from sessions.guided.motion import GuidedMotion
 from sessions.guided.operator import Ask, Request, Stage

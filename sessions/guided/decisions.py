@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sessions.decisions import AutonomousDecisions, Decision, End, Pause, UndoGrasp, Veto, Wait
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.guided.desk import Desk
 from sessions.guided.operator import Ask, Stage
 from sessions.guided.words import plan_in_words, unknown_in_words

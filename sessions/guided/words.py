@@ -11,7 +11,7 @@ import numpy as np
 from gtsam import Pose2
 
 from sessions.explorer import KnownShape
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from tactile_lab.exploration.policy import Surface
 from tactile_lab.geometry.contacts import Array
 

@@ -34,7 +34,7 @@ class SweepRow:
 
     Attributes:
         run: the session.
-        evaluation: content of its ``evaluation.json``, or None when it did not get that far.
+        evaluation: content of its ``evaluation.json``, and why it ``ended_early``; None when it did not get that far.
         problem: why it did not, "" otherwise.
     """
 
@@ -47,6 +47,8 @@ class SweepRow:
         """Why the run counts as failed, or ""."""
         if self.evaluation is None:
             return self.problem or "no evaluation"
+        if early := self.evaluation.get("ended_early"):
+            return f"ended {early}"
         if self.evaluation.get("status") != "ok":
             return f"object {self.evaluation.get('status')}"
         if self.evaluation.get("failed"):

@@ -23,7 +23,7 @@ from gtsam import Pose3
 
 from sessions.decisions import Decision, End, Veto
 from sessions.explorer import KnownShape
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.planner import Reorientation
 from sessions.policy_choice import Choice
 from sessions.policy_decisions import PolicyDecisions

@@ -18,7 +18,7 @@ from drivers.shadow.closing import closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.conductor import holds
 from sessions.cycle_settings import CycleSettings
-from sessions.grasp_cycle import GraspPlan, evaded
+from sessions.grasp_plan import GraspPlan, evaded
 from sessions.hand_candidates import Verdicts, grasp_time_s, table_of
 from sessions.motion import GraspFrame
 from sessions.planner import Reorientation

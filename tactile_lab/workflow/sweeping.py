@@ -9,6 +9,7 @@ from typing import Any
 from drivers.simulation.objects import CATALOGUE
 from sessions.progress import NullProgress
 from sessions.session import Session
+from sessions.session_outcome import Ending, SessionOutcome
 from tactile_lab.errors import SessionError
 from tactile_lab.evaluation.sweep import SweepRun
 from tactile_lab.rigs.build import check_calibration, simulated_world
@@ -42,7 +43,7 @@ def check_sweep(rig: str, objects: Sequence[str] | None, root: Path, method: str
 def run_for_sweep(
     run: SweepRun, *, rig: str, method: str, grasps: int, root: Path, check_replay: bool = False
 ) -> dict[str, Any]:
-    """One session of a sweep: the content of its ``evaluation.json``.
+    """One session of a sweep: the content of its ``evaluation.json``, and why it ``ended_early``, "" if it did not.
 
     Args:
         check_replay: replay the session from its bytes, too; a run whose replay is not identical counts as failed.
@@ -56,7 +57,14 @@ def run_for_sweep(
         raise SessionError(finished.problem, where=str(finished.folder))
     if check_replay:
         _check_replay(Session.open(finished.folder))
-    return finished.evaluation.as_json()
+    return {**finished.evaluation.as_json(), "ended_early": _early_end(finished.outcome)}
+
+
+def _early_end(outcome: SessionOutcome | None) -> str:
+    """After how many grasps a session ended that was to go on, and why; "" for one that is complete."""
+    if outcome is None or outcome.ending is Ending.COMPLETE:
+        return ""
+    return f"after {len(outcome.grasps)} grasps: {outcome.reason}"
 
 
 def _check_replay(session: Session) -> None:

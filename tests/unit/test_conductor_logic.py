@@ -17,7 +17,7 @@ from sessions.conductor import Conductor
 from sessions.conductor_settings import ConductorSettings
 from sessions.decisions import AutonomousDecisions, Decision, End, Pause, UndoGrasp, Veto
 from sessions.explorer import closing_rays
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.marks import MarkKind
 from sessions.motion import GraspFrame
 from sessions.next_grasp import FixedRule, PlanSettings, contact_centre
@@ -184,7 +184,7 @@ def test_no_way_down_ends_the_session() -> None:
     watcher = Watcher()
     outcome = run(DiscWorld(disc(radius_m=0.2)), grasps=3, watcher=watcher)
     assert outcome.ending is Ending.OBJECT_LOST
-    assert outcome.reason == "no way down to the table in 3 approaches"
+    assert outcome.reason == "no way down to the table in 6 approaches"
     assert outcome.grasps == ()
     assert watcher.messages[0] == "the hand came down on the object 4 times: another grasp"
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.motion import GraspFrame
 from sessions.policy_decisions import Proposal
 from tactile_lab.cli import approval, wizard

@@ -12,7 +12,7 @@ from gtsam import Pose2, Pose3, Rot3
 from drivers.shadow.closing import Closing, closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.explorer import ExplorationSettings, KnownShape, choose_grasp, known_shape
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.next_grasp import FixedRule, PlanSettings
 from sessions.planner import Planner
 from tactile_lab.geometry.contacts import FINGERS, Array, Contact, Grasp

@@ -69,6 +69,8 @@ def test_spread_is_median_p90_and_maximum_of_what_is_known() -> None:
         (evaluation(3.0), ""),
         (evaluation(3.0, status="lost"), "object lost"),
         (evaluation(3.0, failed=True), "registration above 5 mm"),
+        ({**evaluation(3.0), "ended_early": "after 3 grasps: stopped"}, "ended after 3 grasps: stopped"),
+        ({**evaluation(3.0), "ended_early": ""}, ""),
         ({**evaluation(3.0), "shape_best_fit": None}, "no shape"),
         (None, "no evaluation"),
     ],

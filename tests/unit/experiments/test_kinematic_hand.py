@@ -8,7 +8,7 @@ from gtsam import Pose2, Pose3
 
 from drivers.shadow.posture import TipEllipsoid
 from sessions.cycle_settings import CycleSettings
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.motion import GraspFrame
 from sessions.planner import Reorientation
 from tactile_lab.experiments.cells import Cell

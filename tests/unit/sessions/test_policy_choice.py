@@ -15,7 +15,7 @@ from drivers.shadow.posture import TipEllipsoid
 from sessions.cycle_settings import CycleSettings
 from sessions.decisions import DoGrasp, End, Pause
 from sessions.explorer import ExplorationSettings, KnownShape, known_shape
-from sessions.grasp_cycle import GraspPlan
+from sessions.grasp_plan import GraspPlan
 from sessions.guided.attended import AttendedDecisions
 from sessions.guided.operator import Ask, Panel, Request
 from sessions.hand_candidates import (

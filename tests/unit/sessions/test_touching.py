@@ -10,7 +10,8 @@ from drivers.shadow.kinematics import joint_vector, palm_T_distal_matrices
 from drivers.shadow.posture import TipEllipsoid
 from drivers.shadow.tip_motion import motor_rates
 from sessions.cycle_settings import CycleSettings
-from sessions.grasp_cycle import GraspCycle, GraspPlan
+from sessions.grasp_cycle import GraspCycle
+from sessions.grasp_plan import GraspPlan
 from sessions.marks import MarkKind
 from sessions.motion import GraspFrame, Motion
 from sessions.next_grasp import FixedRule, PlanSettings, contact_centre
