@@ -18,7 +18,7 @@ from tactile_lab.geometry.contacts import Array
 from tactile_lab.tracking.branching import Branching
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.facet_placing import placed_on_solid
+from tactile_lab.tracking.facet_placing import placed_on_object
 from tactile_lab.tracking.fixed_lag import unfolded
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost, likeliest, weights
 from tactile_lab.tracking.joint_settings import JointSettings
@@ -196,13 +196,8 @@ class JointTracker:
         limit = self._judge.rated(best.map).cost
         others = self._judge.unlike(self._regrouped(best), known, by_contacts=False)
         ranked = sorted(found + [sharp.better(one.map) for one in others if one.cost < limit], key=cost)
-        return [self._on_solid(self._placed_again(sharp.released(ranked[0]), sharp), sharp), *ranked[1:]]
-
-    def _on_solid(self, best: Hypothesis, sharp: SharpJudge) -> Hypothesis:
-        """In space, with grasps where they belong on the object's faces; an outline tells them apart as it grows."""
-        if self.map.dimension == 2:
-            return best
-        return placed_on_solid(best, sharp, self._noise, self._settings.proposals)
+        best = self._placed_again(sharp.released(ranked[0]), sharp)
+        return [placed_on_object(best, sharp, self._noise, self._settings.proposals), *ranked[1:]]
 
     def _placed_again(self, best: Hypothesis, sharp: SharpJudge) -> Hypothesis:
         """With grasps placed that found no place while a wrong contact spoilt the shape, if that is likelier."""
@@ -254,7 +249,7 @@ class JointTracker:
         gain = self._hypotheses[0].cost - best.cost
         expected = contacts >= _LEAST_TO_RELOCATE and known >= _LEAST_KNOWN
         asked = expected and gain <= _POOR_GAIN * contacts
-        return relocated(best, self._relocate, self._judge) if self._relocate and asked else []
+        return relocated(best, self._relocate, self._judge, self._noise) if self._relocate and asked else []
 
     def _likeliest(self, hypotheses: list[Hypothesis], count: int) -> list[Hypothesis]:
         return likeliest(hypotheses, count, self._settings.evidence_gap)

@@ -49,6 +49,7 @@ _MOST_PULLS = 4
 
 _SAME_nats = 1e-6
 _SETTLING_STEPS = 15
+_FIELD_STEPS = 10
 
 
 class SharpJudge:
@@ -122,6 +123,10 @@ class SharpJudge:
             return None
         found = FacetSmoother(contact_map, self._noise, ends).fitted(contact_map.rows, faces, _SETTLING_STEPS)
         return self._sharp(contact_map.with_rows(found.rows))
+
+    def smoothed(self, contact_map: ContactMap) -> Hypothesis:
+        """As :meth:`better`, after the poses were smoothed with the field, and contacts left out that do not fit it."""
+        return self.better(self._judge.smoothed(contact_map, _FIELD_STEPS).map)
 
     def faceted(self, contact_map: ContactMap) -> Hypothesis | None:
         """Poses and faces smoothed together; None if there are no faces that enclose anything."""

@@ -8,7 +8,7 @@ import pytest
 from tactile_lab.shape.polyhedron import Polyhedron
 from tactile_lab.shape.solid_field import SolidField
 from tactile_lab.tracking.contact_map import ContactMap
-from tactile_lab.tracking.facet_placing import placed_on_solid
+from tactile_lab.tracking.facet_placing import placed_on_object
 from tactile_lab.tracking.facet_smoothing import FacetSmoother
 from tactile_lab.tracking.flat_faces import flat_faces
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge
@@ -90,7 +90,7 @@ def test_the_distance_from_a_solid_is_signed(l_block: ContactMap) -> None:
 def test_a_grasp_that_closed_on_the_wrong_faces_is_found_its_place(l_block: ContactMap) -> None:
     wrong = rated(moved(l_block, 9, [0.012, -0.02, np.deg2rad(90.0)]))
     right = rated(l_block)
-    found = placed_on_solid(wrong, judge_of(l_block), NOISE, ProposalSettings())
+    found = placed_on_object(wrong, judge_of(l_block), NOISE, ProposalSettings())
     assert wrong.cost > right.cost + 5
     assert found.cost < wrong.cost - 5
     gap = l_block.space.deviation(found.map.rows[9:10], l_block.rows[9])[0]
@@ -101,4 +101,26 @@ def test_a_grasp_that_closed_on_the_wrong_faces_is_found_its_place(l_block: Cont
 def test_what_is_round_has_no_other_places() -> None:
     contact_map = true_map("ellipsoid", count=12, dimension=3)
     smooth = Judge(NOISE, 2.0).rated(contact_map)
-    assert placed_on_solid(smooth, judge_of(contact_map), NOISE, ProposalSettings()) is smooth
+    assert placed_on_object(smooth, judge_of(contact_map), NOISE, ProposalSettings()) is smooth
+
+
+@pytest.fixture(scope="module")
+def outline() -> ContactMap:
+    return true_map("rectangle", count=COUNT, dimension=2)
+
+
+def test_a_grasp_whose_contacts_fit_badly_is_found_its_place_on_an_outline(outline: ContactMap) -> None:
+    """Driven onto the others' field: two of its contacts are left out where it is, none where it belongs."""
+    elsewhere = moved(outline, 7, [0.02, -0.015, np.deg2rad(60.0)])
+    wrong = judge_of(outline).better(elsewhere.without_contact(7, 0).without_contact(7, 1))
+    found = placed_on_object(wrong, judge_of(outline), NOISE, ProposalSettings())
+    assert found.cost < wrong.cost - 10
+    gap = outline.space.deviation(found.map.rows[7:8], outline.rows[7])[0]
+    assert np.linalg.norm(gap[:2]) < 0.006
+    assert abs(gap[2]) < 0.15
+    assert not found.map.placed[7].left_out
+
+
+def test_grasps_that_fit_an_outline_stay(outline: ContactMap) -> None:
+    right = judge_of(outline).better(outline)
+    assert placed_on_object(right, judge_of(outline), NOISE, ProposalSettings()) is right
