@@ -115,10 +115,9 @@ def relocation_candidates(
     return Relocations(*_in_world(poses, np.asarray(np.linalg.inv(information), dtype=np.float64)), scores)
 
 
-def relocated_rows(contact_map: ContactMap, contacts: ContactSet) -> tuple[Array, Array]:
-    """The poses of :func:`relocation_candidates`, the best first, shape (m, 3), and their scores, shape (m,)."""
-    found = relocation_candidates(contact_map, contacts)
-    return found.rows, found.scores
+def relocated_rows(contact_map: ContactMap, contacts: ContactSet) -> Array:
+    """The poses of :func:`relocation_candidates` alone, the best first, shape (m, 3)."""
+    return relocation_candidates(contact_map, contacts).rows
 
 
 def _sideways(contacts: ContactSet) -> ContactSet:

@@ -249,7 +249,7 @@ class JointTracker:
         gain = self._hypotheses[0].cost - best.cost
         expected = contacts >= _LEAST_TO_RELOCATE and known >= _LEAST_KNOWN
         asked = expected and gain <= _POOR_GAIN * contacts
-        return relocated(best, self._relocate, self._judge, self._noise) if self._relocate and asked else []
+        return relocated(best, self._relocate, self._judge) if self._relocate and asked else []
 
     def _likeliest(self, hypotheses: list[Hypothesis], count: int) -> list[Hypothesis]:
         return likeliest(hypotheses, count, self._settings.evidence_gap)

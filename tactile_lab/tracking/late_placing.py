@@ -22,12 +22,10 @@ from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost
 from tactile_lab.tracking.motion import MotionNoise
-from tactile_lab.tracking.motion_cost import FREELY
 from tactile_lab.tracking.proposals import ProposalSettings, propose
 
-Relocate: TypeAlias = Callable[[ContactMap, ContactSet], tuple[Array, Array]]
-"""Poses of a grasp's contacts anywhere on the object that a map describes, shape (m, size), and half the squared
-deviations of all contacts there, shape (m,)."""
+Relocate: TypeAlias = Callable[[ContactMap, ContactSet], Array]
+"""Poses of a grasp's contacts anywhere on the object that a map describes, the best first, shape (m, size)."""
 
 _TRIED = 3
 _TRIED_NEAR = 8
@@ -38,16 +36,18 @@ _DOUBTFUL = 2
 """So many contacts of a grasp have to be left out for its place to be looked for again."""
 
 
-def relocated(hypothesis: Hypothesis, relocate: Relocate, judge: Judge, noise: MotionNoise) -> list[Hypothesis]:
+def relocated(hypothesis: Hypothesis, relocate: Relocate, judge: Judge) -> list[Hypothesis]:
     """The hypothesis with its last grasp at other places on the object.
 
     Args:
         hypothesis: whose last grasp is aside, or on ground that nothing else supports.
         relocate: proposes places.
         judge: rates them.
-        noise: of the motion model.
     """
-    return _anywhere(hypothesis, len(hypothesis.map.placed) - 1, relocate, judge, noise)
+    last = len(hypothesis.map.placed) - 1
+    others, contacts = _without(hypothesis.map, last)
+    anywhere = relocate(others, contacts)[:_TRIED]
+    return _placed_at(hypothesis, last, anywhere, judge, _most(contacts), moved_freely=True)
 
 
 def placed_late(
@@ -72,22 +72,10 @@ def placed_late(
         fitting = max(_LEAST_FITTING, len(hypothesis.map.placed[index].kept) + 1)
         candidates = _placed_at(hypothesis, index, near[:_TRIED_NEAR], judge, fitting, moved_freely=False)
         if relocate is not None and not grasp.used:
-            candidates += _anywhere(hypothesis, index, relocate, judge, noise)
+            anywhere = relocate(others, contacts)[:_TRIED]
+            candidates += _placed_at(hypothesis, index, anywhere, judge, _most(contacts), moved_freely=True)
         hypothesis = min([hypothesis, *candidates], key=cost)
     return hypothesis
-
-
-def _anywhere(
-    hypothesis: Hypothesis, index: int, relocate: Relocate, judge: Judge, noise: MotionNoise
-) -> list[Hypothesis]:
-    """The hypothesis with one grasp wherever it fits best, of places that fit alike the nearest."""
-    others, contacts = _without(hypothesis.map, index)
-    rows, misfits = relocate(others, contacts)
-    space, grasp = hypothesis.map.space, hypothesis.map.placed[index]
-    away = space.deviation(rows, space.compose(grasp.motion, hypothesis.map.placed[index - 1].row))
-    costs = misfits + 0.5 * np.sum((away / space.sigmas(noise) * FREELY) ** 2, axis=1)
-    likeliest = rows[np.argsort(costs, kind="stable")[:_TRIED]]
-    return _placed_at(hypothesis, index, likeliest, judge, _most(contacts), moved_freely=True)
 
 
 def _most(contacts: ContactSet) -> int:

@@ -18,9 +18,8 @@ _STIFFNESS = 10.0
 """Slips are bounded by the hand's grip: beyond some sigma the motion prior gets stiffer than a Gaussian."""
 
 
-FREELY = 0.1
-"""Certainty of a motion that the object did not follow. It was pushed or slid, by some centimetres, and not lifted and
-turned by half: of the places that contacts on a symmetric object do not tell apart, the nearest is meant."""
+_HARDLY = 1e-3
+"""Certainty of a motion that the object did not follow: not zero, so that a pose nothing touches is still a pose."""
 
 
 _CONFIGURED_SLIPS = 6.0
@@ -44,7 +43,7 @@ class MotionCost:
                 nothing. None: always.
         """
         self._motions, self._space = motions, space
-        certainty = np.ones(len(motions)) if follows is None else np.where(follows, 1.0, FREELY)
+        certainty = np.ones(len(motions)) if follows is None else np.where(follows, 1.0, _HARDLY)
         carried = np.asarray(motions.any(axis=1))
         certainty = np.where(carried, certainty, certainty / noise.left_lying)
         self._weights = certainty[1:, None] / space.sigmas(noise)
