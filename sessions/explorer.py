@@ -41,7 +41,7 @@ class ExplorationSettings(StrictModel):
         least_observability: smallest eigenvalue of (3.18) that the predicted contacts should have; where no candidate
             reaches it (a round object can not tell its turn) it does not count.
         policy: name of the policy that chooses among everything the hand can do (:mod:`tactile_lab.exploration`);
-            None for the reward of equation 4.20 alone, as above.
+            None for the reward of equation 4.20 alone, as above, every object being carried.
         information: of the policy ``information``, whether it is named here or on the command line.
         side_closings: closings with the hand leaning to one side that policies may choose besides, where a surface is
             wanted.
@@ -55,7 +55,7 @@ class ExplorationSettings(StrictModel):
     shifts_m: tuple[float, ...] = Field(default=(-0.015, 0.0, 0.015), min_length=1)
     least_contacts: int = Field(default=4, ge=0)
     least_observability: float = Field(default=0.15, ge=0.0)
-    policy: str | None = None
+    policy: str | None = "information"
     information: InformationSettings = InformationSettings()
     side_closings: tuple[str, ...] = tuple(LEANING)
     caution: float = Field(default=0.5, ge=0.0)

@@ -17,6 +17,7 @@ from sessions.autonomous_crew import autonomous_crew
 from sessions.bench import Bench
 from sessions.conductor import Conductor
 from sessions.conductor_settings import ConductorSettings
+from sessions.explorer import ExplorationSettings
 from sessions.marks import Mark, MarkKind
 from sessions.progress import GraspReport, NullProgress
 from sessions.recorder import Recorder
@@ -89,7 +90,8 @@ def run(
     world, sink = SimulatedWorld(simulation, SEED), MemorySink()
     bench = build_bench(rig, world, Recorder(sink))
     watcher, truth = Watcher(lambda number, name: act(world, number, name)), watch_truth(bench, world)
-    settings = ConductorSettings(grasps=grasps, safety=safety or SafetySettings())
+    carrying = ExplorationSettings(policy=None)
+    settings = ConductorSettings(grasps=grasps, safety=safety or SafetySettings(), exploration=carrying)
     bench.connect()
     try:
         slam = TactileSlam(SlamSettings(), SEED)

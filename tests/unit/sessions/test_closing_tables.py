@@ -33,7 +33,8 @@ def test_a_contour_needs_every_closing_at_its_height(solved: list[tuple[str, flo
 
 
 def test_a_surface_needs_every_height_and_the_taps(solved: list[tuple[str, float]]) -> None:
-    solve(MonotonicClock(), 3, plan={"closings": ["pinch"], "surface_heights_m": [0.018, 0.026]})
+    plan = {"closings": ["pinch"], "surface_heights_m": [0.018, 0.026]}
+    solve(MonotonicClock(), 3, plan=plan, exploration={"policy": None})
     assert solved == [("pinch", 0.018), ("pinch", 0.026), ("radial", 0.022)]
 
 
