@@ -24,7 +24,7 @@ _HARDLY = 1e-3
 
 _CONFIGURED_SLIPS = 6.0
 
-PUSHED_SHARE = 0.05
+PUSHED_SHARE = 0.01
 """Of the grasps that were to leave the object where it is: a hand that closes on a corner turns it all the same."""
 
 
