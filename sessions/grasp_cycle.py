@@ -11,7 +11,7 @@ from drivers.shadow.closing import Closing, closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.cycle_settings import CycleSettings
 from sessions.grasp_plan import GraspPlan, evaded
-from sessions.motion import Motion
+from sessions.motion import GraspFrame, Motion
 from sessions.touching import Toucher
 from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
 
@@ -174,9 +174,9 @@ class GraspCycle:
             float(np.linalg.norm(shift_world_m)) / self.settings.carry_m_s,
         )
 
-        def base_at(share: float) -> Array:
+        def frame_at(share: float) -> GraspFrame:
             dx, dy = share * shift_world_m
-            return motion.base_joints(start.moved(float(dx), float(dy), share * turn_rad), table)
+            return start.moved(float(dx), float(dy), share * turn_rad)
 
         self.jammed, pressed_cycles = (), 0
 
@@ -191,13 +191,12 @@ class GraspCycle:
 
         world_T_before = motion.bench.perception.world_T_palm
         motion.bench.begin_hold()
-        share = motion.follow(base_at, duration_s, hold)
+        share = motion.follow(lambda share: motion.base_joints(frame_at(share), table), duration_s, hold)
         if self.jammed:
             self._build_up(targets_N, self.settings.squeeze_s)
         motion.wait(self.settings.rest_s)
         motion.bench.end_hold()
-        dx, dy = share * shift_world_m
-        self._plan = replace(self.plan, frame=start.moved(float(dx), float(dy), share * turn_rad))
+        self._plan = replace(self.plan, frame=frame_at(share))
         return motion.bench.perception.world_T_palm * world_T_before.inverse()
 
     def _balanced_forces_N(self, touching: frozenset[str], force_N: float) -> dict[str, float]:
@@ -221,10 +220,10 @@ class GraspCycle:
         pressed hard. Strained fingers without a force to keep give way.
         """
         s, table, loads_N = self.settings, self._table(), self._motion.loads_N()
-        held_up = FINGERS if self._pressed(s.pressed_N) else self._motion.bent(s.held_up_rad)
-        errors_N = dict.fromkeys(self._strained(), -_HASTE_N)
+        pressed, held_up = self._pressed(s.pressed_N), self._motion.bent(s.held_up_rad)
+        errors_N = dict.fromkeys((*pressed, *held_up), -_HASTE_N)
         for finger, target_N in targets_N.items():
-            most_N = 0.0 if finger in held_up else _HASTE_N
+            most_N = 0.0 if pressed or finger in held_up else _HASTE_N
             errors_N[finger] = float(np.clip(target_N - loads_N.get(finger, 0.0), -_FLIGHT_N, most_N))
         for finger, error_N in errors_N.items():
             path = table.path(finger)

@@ -96,15 +96,12 @@ class GraspByKeys(GraspCycle):
         for share in self._motion.shares(max(way_m / jog.jog_m_s, turn_rad / jog.jog_rad_s)):
             self._motion.set_base(start + share * (end - start))
             self._motion.tick()
-            if met := self._met(self.settings.landing_force_N):
+            if met := self._pressed(self.settings.landing_force_N):
                 self._motion.set_base(start)
                 self._motion.wait(self.settings.rest_s)
                 self._desk.tell(f"{', '.join(met)} met something: back by one step", Level.WARNING)
                 return False
         return True
-
-    def _met(self, force_N: float) -> list[str]:
-        return [finger for finger, load_N in self._motion.loads_N().items() if load_N > force_N]
 
     def _free_the_hand(self) -> None:
         """After a failure the hand may still be around the object: open and up before anything else."""
@@ -129,7 +126,7 @@ class GraspByKeys(GraspCycle):
                     begun = True
                 self._step_fingers(request)
             elif request.ask in (Ask.NEXT, Ask.CAPTURE):
-                self._touching = frozenset(self._met(self.settings.touch_force_N))
+                self._touching = frozenset(self._pressed(self.settings.touch_force_N))
                 return
 
     def _step_fingers(self, request: Request) -> None:
@@ -140,7 +137,7 @@ class GraspByKeys(GraspCycle):
         cycles = self._motion.cycles(abs(way_m) / (self.settings.closing_m_s * self._motion.supervisor.speed_scale))
         for _ in range(cycles):
             if way_m > 0.0:
-                moving -= set(self._met(self.settings.touch_force_N))
+                moving -= set(self._pressed(self.settings.touch_force_N))
                 moving = {finger for finger in moving if self._may_close(finger)}
             for finger in moving:
                 step = way_m / cycles / table.path(finger).length_m

@@ -75,7 +75,7 @@ class Branching:
         motions = np.array([self.motion, *(grasp.motion for grasp in placed[len(placed) - unplaced :])])
         expected = self.noise.after(motions)
         proposed = self._matched(hypothesis, expected.accumulated(1 + unplaced), 0.0)
-        if expected is not self.noise:
+        if expected != self.noise:
             price = pushed_nats(self.noise.left_lying, self.space)
             proposed += self._matched(hypothesis, self.noise.accumulated(1 + unplaced), price)
         return proposed

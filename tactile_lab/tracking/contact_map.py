@@ -154,6 +154,10 @@ class ContactMap:
         """The map with one grasp placed otherwise."""
         return replace(self, placed=(*self.placed[:index], grasp, *self.placed[index + 1 :]))
 
+    def without_grasp(self, index: int) -> ContactMap:
+        """The map of all other grasps."""
+        return replace(self, placed=self.placed[:index] + self.placed[index + 1 :])
+
     def without_contact(self, grasp: int, contact: int) -> ContactMap:
         """The map with one contact left out."""
         emptier = replace(self.placed[grasp], left_out=self.placed[grasp].left_out | {contact})

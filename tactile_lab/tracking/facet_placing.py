@@ -102,10 +102,10 @@ def _tried(contact_map: ContactMap, place: _Place, sharp: SharpJudge) -> Hypothe
 def _places(best: Hypothesis, sharp: SharpJudge, noise: MotionNoise, settings: ProposalSettings) -> list[_Place]:
     """The most promising other places of all grasps but the first, the best first."""
     search, known = _search(best.map), best.map
-    if known.dimension == 2:
-        onto = {i: _field_without(known, i) for i, grasp in enumerate(known.placed) if i and _is_doubtful(grasp)}
-    else:
+    if known.dimension == 3:
         onto, settings = _onto_solid(best, sharp), settings.model_copy(update={"samples": _SAMPLES})
+    else:
+        onto = {i: known.without_grasp(i).fit() for i, grasp in enumerate(known.placed) if i and _is_doubtful(grasp)}
     found = [place for i, field in onto.items() for place in _places_of(known, i, field, noise, settings)]
     return sorted(found, key=lambda place: place.change)[: search.tried]
 
@@ -117,11 +117,6 @@ def _onto_solid(best: Hypothesis, sharp: SharpJudge) -> dict[int, Matched]:
         return {}
     solid = SolidField(mesh, _SURFACE_SIGMA_m)
     return {i: solid for i, grasp in enumerate(best.map.placed) if i and len(grasp.contacts_world)}
-
-
-def _field_without(contact_map: ContactMap, index: int) -> Matched:
-    """The field of all other grasps."""
-    return replace(contact_map, placed=contact_map.placed[:index] + contact_map.placed[index + 1 :]).fit()
 
 
 def _is_doubtful(grasp: PlacedGrasp) -> bool:

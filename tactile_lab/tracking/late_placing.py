@@ -45,8 +45,8 @@ def relocated(hypothesis: Hypothesis, relocate: Relocate, judge: Judge) -> list[
         judge: rates them.
     """
     last = len(hypothesis.map.placed) - 1
-    others, contacts = _without(hypothesis.map, last)
-    anywhere = relocate(others, contacts)[:_TRIED]
+    contacts = hypothesis.map.placed[last].contacts_world
+    anywhere = relocate(hypothesis.map.without_grasp(last), contacts)[:_TRIED]
     return _placed_at(hypothesis, last, anywhere, judge, _most(contacts), moved_freely=True)
 
 
@@ -65,7 +65,7 @@ def placed_late(
     for index, grasp in enumerate(hypothesis.map.placed[1:], start=1):
         if len(grasp.left_out) < _DOUBTFUL or len(grasp.contacts_world) < _LEAST_CONTACTS:
             continue
-        others, contacts = _without(hypothesis.map, index)
+        others, contacts = hypothesis.map.without_grasp(index), grasp.contacts_world
         space = hypothesis.map.space
         predicted = space.compose(grasp.motion, hypothesis.map.placed[index - 1].row)
         near, _ = propose(predicted, contacts, others.fit(), noise.accumulated(2), settings, space)
@@ -80,12 +80,6 @@ def placed_late(
 
 def _most(contacts: ContactSet) -> int:
     return len(contacts) // 2 + 1
-
-
-def _without(contact_map: ContactMap, index: int) -> tuple[ContactMap, ContactSet]:
-    """The map without a grasp, and the grasp's contacts in the world."""
-    placed = contact_map.placed[:index] + contact_map.placed[index + 1 :]
-    return replace(contact_map, placed=placed), contact_map.placed[index].contacts_world
 
 
 def _placed_at(
