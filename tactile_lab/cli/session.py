@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli import session_files
+from tactile_lab.cli import session_files, session_slips
 from tactile_lab.cli.options import METHOD_HELP, Json, Method, NoInput, Root, SessionName
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ app = typer.Typer(help="Recorded sessions: list them, look at one, understand on
 app.command("extract")(session_files.extract)
 app.command("export")(session_files.export)
 app.command("import")(session_files.bring_in)
+app.command("slips")(session_slips.slips)
 
 
 @app.command("list")

@@ -1,9 +1,8 @@
 """Grasps that could not be placed when they came, or not well: where they belong is looked for with more known.
 
 Three ways lead there: the motion model from the neighbouring grasps; if the object was to be left lying, a push of the
-closing hand; and, if the object was lost, poses anywhere on the known object, which need no motion at all
-(relocation). Nothing is forced: a grasp stays where it is or aside unless
-the evidence for all contacts gets better.
+closing hand; and, if the object was lost, poses anywhere on the known object, which need no motion at all (relocation).
+Nothing is forced: a grasp stays where it is or aside unless the evidence for all contacts gets better.
 
 While the object is explored, and anywhere on it, a grasp needs most of its contacts to be placed. On a known object
 near where the motion leads, two of them with their normals can be enough: fingers with two or three wrong contacts of
