@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 def slips(
     sessions: Annotated[
-        list[str] | None, typer.Argument(metavar="[SESSION]...", help="Sessions of one rig.", show_default="all")
+        list[str] | None,
+        typer.Argument(
+            metavar="SESSION...", help="Sessions of one rig: folders, or names under --root.", show_default="all closed"
+        ),
     ] = None,
     root: Root = Path("runs"),
     as_json: Json = False,
@@ -86,9 +89,9 @@ def _show(found: Slips, sessions: list[str]) -> None:
     from tactile_lab.cli.console import counted, say, show_table
     from tactile_lab.evaluation.slips import LEAST_STEPS
 
-    titles = ["the object was", "steps", "mm per axis, rms", "mm", "°, rms", "°"]
+    titles = ["the object was", "steps", "mm, rms", "mm", "°, rms", "°"]
     rows = [_row("carried", found.carried), _row("left where it was", found.left)]
-    title = f"Slips in {counted(len(sessions), 'session')} (median / 90 % below / maximum)"
+    title = f"Slips in {counted(len(sessions), 'session')} (rms per axis; median / p90 / maximum)"
     show_table(title, titles, rows, right=(1, 2, 3, 4, 5))
     motion = found.motion
     if motion is None:
