@@ -14,7 +14,6 @@ from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge, likeliest
 from tactile_lab.tracking.joint_settings import JointSettings
 from tactile_lab.tracking.motion import MotionNoise
-from tactile_lab.tracking.motion_cost import pushed_nats
 from tactile_lab.tracking.pose_rows import PoseRows
 from tactile_lab.tracking.proposals import propose
 
@@ -73,24 +72,17 @@ class Branching:
         """Continuations of a hypothesis, rated contact by contact only."""
         unplaced, placed = hypothesis.map.trailing_unplaced, hypothesis.map.placed
         motions = np.array([self.motion, *(grasp.motion for grasp in placed[len(placed) - unplaced :])])
-        expected = self.noise.after(motions)
-        proposed = self._matched(hypothesis, expected.accumulated(1 + unplaced), 0.0)
-        if expected != self.noise:
-            price = pushed_nats(self.noise.left_lying, self.space)
-            proposed += self._matched(hypothesis, self.noise.accumulated(1 + unplaced), price)
-        return proposed
-
-    def _matched(self, hypothesis: Hypothesis, noise: MotionNoise, price: float) -> list[Hypothesis]:
-        """Continuations to where the contacts fit, for an object that moves with some noise, which has its price."""
+        noise = self.noise.after(motions).accumulated(1 + unplaced)
         predicted = self.space.compose(self.motion, hypothesis.map.placed[-1].row)
         fitted = hypothesis.map.fit()
         rows, fit = propose(predicted, self.contacts, fitted, noise, self.settings.proposals, self.space)
         places, _ = self.space.to_object(rows[:, None], self.contacts.free_m, self.contacts.free_m)
         intrusions = hypothesis.intrusion + free_space_costs(fitted, places)
         found = zip(rows, np.linalg.inv(fit.information), fit.cost, intrusions, strict=True)
-        matched = []
+        proposed = []
         for row, covariance, misfit, intrusion in found:
             longer = hypothesis.map.with_grasp(PlacedGrasp(self.contacts, row, covariance, self.motion))
-            misfit_nats = hypothesis.misfit + float(misfit) + price
-            matched.append(Hypothesis(longer, misfit_nats, float(intrusion), hypothesis.left_out))
-        return matched
+            proposed.append(
+                Hypothesis(longer, hypothesis.misfit + float(misfit), float(intrusion), hypothesis.left_out)
+            )
+        return proposed

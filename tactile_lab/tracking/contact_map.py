@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +22,17 @@ WHILE_TRACKING_m = 0.080
 """Longest kernel while more is to come: contacts on a smooth side would else rule out the edge behind it."""
 
 
+class Moved(Enum):
+    """How the object came to where it is from where it was at the grasp before."""
+
+    AS_MEANT = "as meant"
+    """It was carried and went with the hand but for its slip, or was left where it was and lay nearly still."""
+    PUSHED = "pushed"
+    """It was to be left, and the closing hand pushed or turned it, nearly as far as it slips when it is carried."""
+    FREELY = "freely"
+    """It did not follow the hand: it fell, or someone moved it."""
+
+
 @dataclass(frozen=True)
 class PlacedGrasp:
     """One grasp and where the object was.
@@ -31,7 +43,7 @@ class PlacedGrasp:
         covariance: of the pose, shape (3, 3).
         motion: the hand's motion since the grasp before, as a row.
         left_out: indices of the contacts that are kept aside; the others are part of the shape.
-        moved_freely: the object did not follow the hand since the grasp before: it fell, or someone moved it.
+        moved: how the object came there from the grasp before.
     """
 
     contacts_world: ContactSet
@@ -39,7 +51,7 @@ class PlacedGrasp:
     covariance: Array
     motion: Array
     left_out: frozenset[int] = frozenset()
-    moved_freely: bool = False
+    moved: Moved = Moved.AS_MEANT
 
     @cached_property
     def kept(self) -> NDArray[np.intp]:
@@ -101,9 +113,9 @@ class ContactMap:
         return np.array([grasp.motion for grasp in self.placed])
 
     @property
-    def follows_hand(self) -> NDArray[np.bool_]:
-        """Whether the object followed the hand's motion before each grasp, shape (n,)."""
-        return np.array([not grasp.moved_freely for grasp in self.placed])
+    def moved(self) -> tuple[Moved, ...]:
+        """How the object came to where it is at each grasp."""
+        return tuple(grasp.moved for grasp in self.placed)
 
     @cached_property
     def contacts(self) -> ContactSet:
@@ -191,13 +203,19 @@ class ContactMap:
     def reread(self, backward: ContactMap) -> ContactMap:
         """This map with the poses and doubts of another one, of the same grasps in the opposite order.
 
-        The other's poses are brought into this map's object frame.
+        The other's poses are brought into this map's object frame. Steps in which the object moved freely here stay so.
         """
         space, theirs = self.space, backward.placed[::-1]
         frame_T_ours = space.compose(space.inverse(theirs[0].row), self.placed[0].row)
+        steps = (Moved.AS_MEANT, *(their.moved for their in theirs[:-1]))  # what came before ours came after theirs
         placed = [
-            replace(our, row=space.compose(their.row, frame_T_ours), left_out=their.left_out)
-            for our, their in zip(self.placed, theirs, strict=True)
+            replace(
+                our,
+                row=space.compose(their.row, frame_T_ours),
+                left_out=their.left_out,
+                moved=our.moved if our.moved is Moved.FREELY else step,
+            )
+            for our, their, step in zip(self.placed, theirs, steps, strict=True)
         ]
         first = replace(placed[0], row=self.placed[0].row)  # equal but for rounding
         return replace(self, placed=(first, *placed[1:]))

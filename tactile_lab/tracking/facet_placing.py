@@ -17,7 +17,7 @@ import numpy as np
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.solid_field import SolidField
-from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_map import ContactMap, Moved, PlacedGrasp
 from tactile_lab.tracking.hypotheses import Hypothesis, cost
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
@@ -94,7 +94,7 @@ def _search(contact_map: ContactMap) -> _Search:
 
 def _tried(contact_map: ContactMap, place: _Place, sharp: SharpJudge) -> Hypothesis | None:
     """The map with a grasp at another place, smoothed; None where its faces enclose nothing."""
-    whole = replace(contact_map.placed[place.index], row=place.row, left_out=frozenset(), moved_freely=False)
+    whole = replace(contact_map.placed[place.index], row=place.row, left_out=frozenset(), moved=Moved.AS_MEANT)
     moved = contact_map.with_placed(place.index, whole)
     return sharp.settled(moved) if contact_map.dimension == 3 else sharp.smoothed(moved)
 

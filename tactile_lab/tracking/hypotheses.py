@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.contact_map import ContactMap, Moved
 from tactile_lab.tracking.fixed_lag import condensed
 from tactile_lab.tracking.free_space import free_space_costs
 from tactile_lab.tracking.motion import MotionNoise
-from tactile_lab.tracking.motion_cost import MotionCost
+from tactile_lab.tracking.motion_cost import MotionCost, pushed_nats
 from tactile_lab.tracking.pose_evidence import PoseEvidence
 from tactile_lab.tracking.pose_rows import PoseRows
 
@@ -159,7 +159,7 @@ class Judge:
         return self._informed[id(contact_map)][1]
 
     def price(self, contact_map: ContactMap) -> float:
-        """What the contacts cost that are left out, and the steps in which the object did not follow the hand.
+        """What the contacts cost that are left out, and the steps in which the object moved otherwise than meant.
 
         The more contacts are wrong, the less surprising is one more (Beta-binomial: the share of wrong contacts is
         one in a hundred until the contacts say otherwise).
@@ -168,8 +168,9 @@ class Judge:
         right = len(contact_map.contacts) + _EXPECTED_RIGHT
         share = float(gammaln(wrong + 1.0) + gammaln(right) - gammaln(wrong + right + 1.0))
         anywhere = self._unexplained_cost - float(np.log(_EXPECTED_RIGHT + 1.0))
-        breaks = int(np.sum(~contact_map.follows_hand))
-        return wrong * anywhere - share + _BREAK_COST * breaks
+        breaks, pushes = contact_map.moved.count(Moved.FREELY), contact_map.moved.count(Moved.PUSHED)
+        moves = _BREAK_COST * breaks + pushed_nats(self._noise, contact_map.space) * pushes
+        return wrong * anywhere - share + moves
 
     def _misfit(self, contact_map: ContactMap) -> float:
         """As :meth:`PoseEvidence.value`, by the field, which is needed anyway."""

@@ -22,7 +22,7 @@ from tactile_lab.tracking.facet_placing import placed_on_object
 from tactile_lab.tracking.fixed_lag import unfolded
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost, likeliest, weights
 from tactile_lab.tracking.joint_settings import JointSettings
-from tactile_lab.tracking.late_placing import Relocate, placed_late, relocated
+from tactile_lab.tracking.late_placing import Relocate, placed_late, pushed, relocated
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import estimated_noise
 from tactile_lab.tracking.particle_filter import PoseEstimate
@@ -120,6 +120,7 @@ class JointTracker:
         step = Branching(contacts, self._motion, self._noise, self._judge, self._settings, self._space)
         branches = likeliest(step.branches(self._hypotheses), self._settings.smoothed, self._settings.branch_gap)
         smoothed = [self._judge.smoothed(branch.map, self._settings.iterations) for branch in branches]
+        smoothed += pushed(min(smoothed, key=cost), self._noise, self._settings.proposals, self._judge)
         smoothed += self._relocated(min(smoothed, key=cost))
         self._branches = self._likeliest(self._judge.different(smoothed), self._settings.hypotheses)
         self.effective_count = float(1 / np.sum(weights(self._branches) ** 2))

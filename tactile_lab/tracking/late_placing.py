@@ -1,8 +1,8 @@
 """Grasps that could not be placed when they came, or not well: where they belong is looked for with more known.
 
-Two ways lead there: the motion model from the neighbouring grasps, and, if the object was lost, poses anywhere on the
-known object, which need no motion at all (relocation). Nothing is forced: a grasp stays where it is or aside unless
-the evidence for all contacts gets better.
+Three ways lead there: the motion model from the neighbouring grasps; if the object was to be left lying, a push of the
+closing hand; and, if the object was lost, poses anywhere on the known object, which need no motion at all (relocation).
+Nothing is forced: a grasp stays where it is or aside unless the evidence for all contacts gets better.
 
 While the object is explored, and anywhere on it, a grasp needs most of its contacts to be placed. On a known object
 near where the motion leads, two of them with their normals can be enough: fingers with two or three wrong contacts of
@@ -18,7 +18,7 @@ from typing import TypeAlias
 import numpy as np
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.tracking.contact_map import ContactMap, Moved, PlacedGrasp
 from tactile_lab.tracking.contact_set import ContactSet
 from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost
 from tactile_lab.tracking.motion import MotionNoise
@@ -47,7 +47,24 @@ def relocated(hypothesis: Hypothesis, relocate: Relocate, judge: Judge) -> list[
     last = len(hypothesis.map.placed) - 1
     contacts = hypothesis.map.placed[last].contacts_world
     anywhere = relocate(hypothesis.map.without_grasp(last), contacts)[:_TRIED]
-    return _placed_at(hypothesis, last, anywhere, judge, _most(contacts), moved_freely=True)
+    return _placed_at(hypothesis, last, anywhere, judge, _most(contacts), Moved.FREELY)
+
+
+def pushed(hypothesis: Hypothesis, noise: MotionNoise, settings: ProposalSettings, judge: Judge) -> list[Hypothesis]:
+    """The hypothesis with its last grasp where a push brought the object, if it was to be left and fits badly so.
+
+    Args:
+        hypothesis: to improve.
+        noise: of the motion model.
+        settings: of the search.
+        judge: rates them.
+    """
+    last = len(hypothesis.map.placed) - 1
+    grasp = hypothesis.map.placed[last]
+    if not _is_doubtful(grasp) or not _was_left(grasp, noise):
+        return []
+    near = _near(hypothesis, last, noise, settings)
+    return _placed_at(hypothesis, last, near, judge, _most(grasp.contacts_world), Moved.PUSHED)
 
 
 def placed_late(
@@ -63,19 +80,35 @@ def placed_late(
         judge: rates them.
     """
     for index, grasp in enumerate(hypothesis.map.placed[1:], start=1):
-        if len(grasp.left_out) < _DOUBTFUL or len(grasp.contacts_world) < _LEAST_CONTACTS:
+        if not _is_doubtful(grasp):
             continue
-        others, contacts = hypothesis.map.without_grasp(index), grasp.contacts_world
-        space = hypothesis.map.space
-        predicted = space.compose(grasp.motion, hypothesis.map.placed[index - 1].row)
-        near, _ = propose(predicted, contacts, others.fit(), noise.accumulated(2), settings, space)
-        fitting = max(_LEAST_FITTING, len(hypothesis.map.placed[index].kept) + 1)
-        candidates = _placed_at(hypothesis, index, near[:_TRIED_NEAR], judge, fitting, moved_freely=False)
+        near, contacts = _near(hypothesis, index, noise.accumulated(2), settings), grasp.contacts_world
+        fitting = max(_LEAST_FITTING, len(grasp.kept) + 1)
+        candidates = _placed_at(hypothesis, index, near, judge, fitting, Moved.AS_MEANT)
+        if _was_left(grasp, noise):
+            candidates += _placed_at(hypothesis, index, near, judge, fitting, Moved.PUSHED)
         if relocate is not None and not grasp.used:
-            anywhere = relocate(others, contacts)[:_TRIED]
-            candidates += _placed_at(hypothesis, index, anywhere, judge, _most(contacts), moved_freely=True)
+            anywhere = relocate(hypothesis.map.without_grasp(index), contacts)[:_TRIED]
+            candidates += _placed_at(hypothesis, index, anywhere, judge, _most(contacts), Moved.FREELY)
         hypothesis = min([hypothesis, *candidates], key=cost)
     return hypothesis
+
+
+def _is_doubtful(grasp: PlacedGrasp) -> bool:
+    return len(grasp.left_out) >= _DOUBTFUL and len(grasp.contacts_world) >= _LEAST_CONTACTS
+
+
+def _was_left(grasp: PlacedGrasp, noise: MotionNoise) -> bool:
+    """Whether the hand was to leave the object where it was before a grasp, and it is expected to lie stiller so."""
+    return noise.after(grasp.motion) != noise
+
+
+def _near(hypothesis: Hypothesis, index: int, noise: MotionNoise, settings: ProposalSettings) -> Array:
+    """Poses of a grasp on the object of all others, near where the motion leads, the best first."""
+    space, grasp = hypothesis.map.space, hypothesis.map.placed[index]
+    predicted = space.compose(grasp.motion, hypothesis.map.placed[index - 1].row)
+    field = hypothesis.map.without_grasp(index).fit()
+    return propose(predicted, grasp.contacts_world, field, noise, settings, space)[0][:_TRIED_NEAR]
 
 
 def _most(contacts: ContactSet) -> int:
@@ -83,12 +116,12 @@ def _most(contacts: ContactSet) -> int:
 
 
 def _placed_at(
-    hypothesis: Hypothesis, index: int, rows: Array, judge: Judge, fitting: int, *, moved_freely: bool
+    hypothesis: Hypothesis, index: int, rows: Array, judge: Judge, fitting: int, moved: Moved
 ) -> list[Hypothesis]:
     """The hypothesis with one grasp at the likeliest poses that enough contacts fit, smoothed."""
     found = []
     for row in rows:
-        grasp = replace(hypothesis.map.placed[index], row=row, left_out=frozenset(), moved_freely=moved_freely)
+        grasp = replace(hypothesis.map.placed[index], row=row, left_out=frozenset(), moved=moved)
         cleaned, _ = judge.cleaned(_with(hypothesis.map, index, grasp), index)
         if len(cleaned.placed[index].kept) >= fitting:
             found.append(judge.rated(cleaned))
@@ -98,7 +131,7 @@ def _placed_at(
 
 def _following(hypothesis: Hypothesis, index: int, judge: Judge) -> Hypothesis:
     """The hypothesis with one grasp as the motion model has it after all, if that is no less likely."""
-    bound = replace(hypothesis.map.placed[index], moved_freely=False)
+    bound = replace(hypothesis.map.placed[index], moved=Moved.AS_MEANT)
     return min(judge.rated(hypothesis.map.with_placed(index, bound)), hypothesis, key=cost)
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.special import expit
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.contact_map import ContactMap, Moved
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.pose_rows import PoseRows
 
@@ -24,54 +23,57 @@ _HARDLY = 1e-3
 
 _CONFIGURED_SLIPS = 6.0
 
-PUSHED_SHARE = 0.05
-"""Of the grasps that were to leave the object where it is: a hand that closes on a corner turns it all the same."""
+_PUSHED = 0.6
+"""How far a closing hand pushes an object that was to be left, in shares of how far a carried one slips."""
+
+_PUSHED_SHARE = 0.01
+"""Of such grasps. More are pushed than that; but while little is known of an object much fits badly that was not."""
 
 
 class MotionCost:
     """Negative log probability of the slips between successive poses, up to a constant."""
 
     def __init__(
-        self, motions: Array, noise: MotionNoise, space: PoseRows, follows: NDArray[np.bool_] | None = None
+        self, motions: Array, noise: MotionNoise, space: PoseRows, moved: Sequence[Moved] | None = None
     ) -> None:
         """
         Args:
             motions: of the hand before each grasp, shape (k, size); the first is not used.
             noise: of a re-orientation.
             space: what the rows mean.
-            follows: whether the object followed the hand before each grasp, shape (k,); slips of other steps cost
-                nothing. None: always.
+            moved: how the object came to where it is at each grasp, k of them; slips of steps in which it moved freely
+                cost next to nothing, and where it was pushed little. None: always as meant.
         """
         self._motions, self._space = motions, space
-        certainty = np.ones(len(motions)) if follows is None else np.where(follows, 1.0, _HARDLY)
-        carried = np.asarray(motions.any(axis=1))
-        certainty = np.where(carried, certainty, certainty / noise.left_lying)
+        certainty = np.ones(len(motions))
+        certainty[~motions.any(axis=1)] = 1 / noise.left_lying
+        for step, how in enumerate(moved or ()):
+            if how is not Moved.AS_MEANT:
+                certainty[step] = 1 / _pushed(noise) if how is Moved.PUSHED else _HARDLY
         self._weights = certainty[1:, None] / space.sigmas(noise)
-        self._left = noise.left_lying
-        self._is_left: NDArray[np.bool_] = ~carried[1:] & np.bool_(noise.left_lying < 1)
 
     @classmethod
     def of(cls, contact_map: ContactMap, noise: MotionNoise) -> Self:
         """Along the trajectory of a map."""
-        return cls(contact_map.motions, noise, contact_map.space, contact_map.follows_hand)
+        return cls(contact_map.motions, noise, contact_map.space, contact_map.moved)
 
     def value(self, rows: Array) -> float:
         """The cost of poses of shape (k, size)."""
-        return self._cost(self._lengths(self._scaled(rows)))
+        slip = self._lengths(self._scaled(rows))
+        return _cost(slip, np.maximum(slip - STIFF_BEYOND_SIGMA, 0.0))
 
     def value_and_gradient(self, rows: Array) -> tuple[float, Array]:
         """The cost and its derivative by each pose, shape (k, size)."""
         scaled = self._scaled(rows)
         slip = self._lengths(scaled)
         excess = np.maximum(slip - STIFF_BEYOND_SIGMA, 0.0)
-        stiff = 1 + _STIFFNESS * excess / np.maximum(slip, 1e-12)
-        held = np.where(self._is_left[:, None], self._held(slip)[:, None], stiff)
-        pull = scaled * np.repeat(held, self._parts, axis=1) * self._weights
+        stretch = np.repeat(1 + _STIFFNESS * excess / np.maximum(slip, 1e-12), self._parts, axis=1)
+        pull = scaled * stretch * self._weights
         later, earlier = self._space.slip_derivatives(rows, self._motions)
         gradient = np.zeros_like(rows)
         gradient[1:] += np.einsum("kij,ki->kj", later, pull)
         gradient[:-1] += np.einsum("kij,ki->kj", earlier, pull)
-        return self._cost(slip), gradient
+        return _cost(slip, excess), gradient
 
     def information(self, rows: Array) -> Array:
         """Second derivative by all poses but the first, slips taken as Gaussian; shape ((k - 1) size, (k - 1) size)."""
@@ -81,14 +83,12 @@ class MotionCost:
         index = np.arange(count)
         by_rows[index, :, index] = later
         by_rows[index[1:], :, index[:-1]] = earlier[1:]
-        weights = self._weights * np.sqrt(self._held(self._lengths(self._scaled(rows))))[:, None]
-        scaled = (by_rows * weights[:, :, None, None]).reshape(count * size, count * size)
+        scaled = (by_rows * self._weights[:, :, None, None]).reshape(count * size, count * size)
         return np.asarray(scaled.T @ scaled)
 
     def slips_in_sigma(self, rows: Array) -> Array:
         """Lengths of translation and rotation of each slip over their standard deviations, shape (k - 1, 2)."""
-        slip = self._lengths(self._scaled(rows))
-        return np.asarray(slip * np.sqrt(self._held(slip))[:, None])
+        return self._lengths(self._scaled(rows))
 
     @property
     def _parts(self) -> list[int]:
@@ -101,34 +101,28 @@ class MotionCost:
     def _lengths(self, scaled: Array) -> Array:
         return np.sqrt(np.add.reduceat(scaled**2, [0, self._space.translations], axis=1))
 
-    def _cost(self, slip: Array) -> float:
-        carried = slip[~self._is_left]
-        excess = np.maximum(carried - STIFF_BEYOND_SIGMA, 0.0)
-        left, pushed = self._left_or_pushed(slip[self._is_left])
-        bound = 0.5 * np.sum(carried**2) + 0.5 * _STIFFNESS * np.sum(excess**2)
-        return float(bound - np.sum(np.logaddexp(left, pushed)))
 
-    def _held(self, slip: Array) -> Array:
-        """What is left of a Gaussian's pull at each slip, shape (k - 1,): less where the object was pushed."""
-        left, pushed = self._left_or_pushed(slip)
-        return np.where(self._is_left, 1 - expit(pushed - left) * (1 - self._left**2), 1.0)
-
-    def _left_or_pushed(self, slip: Array) -> tuple[Array, Array]:
-        """Log probabilities of slips of an object that was left where it is, or was pushed, less the former's norm."""
-        squared = np.sum(slip**2, axis=1)
-        pushed = -pushed_nats(self._left, self._space) - 0.5 * self._left**2 * squared
-        return np.log1p(-PUSHED_SHARE) - 0.5 * squared, pushed
+def _cost(slip: Array, excess: Array) -> float:
+    return float(0.5 * np.sum(slip**2) + 0.5 * _STIFFNESS * np.sum(excess**2))
 
 
-def pushed_nats(left_lying: float, space: PoseRows) -> float:
-    """What it costs that an object was pushed that was to be left where it is, before how far is looked at."""
-    return -float(np.log(PUSHED_SHARE) + space.size * np.log(left_lying))
+def pushed_nats(noise: MotionNoise, space: PoseRows) -> float:
+    """What it costs that an object was pushed that was to be left where it is, before how far is looked at.
+
+    The share of such grasps, and the norm of the wider normal distribution over that of the narrower one.
+    """
+    return -float(np.log(_PUSHED_SHARE) + space.size * np.log(noise.left_lying / _pushed(noise)))
+
+
+def _pushed(noise: MotionNoise) -> float:
+    return max(_PUSHED, noise.left_lying)
 
 
 def estimated_noise(contact_map: ContactMap, configured: MotionNoise) -> MotionNoise:
     """The noise that the slips of a trajectory speak for, the configured one counting as several of them."""
     cost = MotionCost.of(contact_map, configured)
-    slips = cost.slips_in_sigma(contact_map.rows)[contact_map.follows_hand[1:]]
+    bound = [how is not Moved.FREELY for how in contact_map.moved[1:]]
+    slips = cost.slips_in_sigma(contact_map.rows)[bound]
     translations, size = contact_map.space.translations, contact_map.space.size
     freedom = np.array([translations, size - translations])
     variance = (_CONFIGURED_SLIPS + np.sum(slips**2, axis=0) / freedom) / (_CONFIGURED_SLIPS + len(slips))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gtsam import Pose2
@@ -9,8 +11,11 @@ from gtsam import Pose2
 from tactile_lab.experiments.outlines import OUTLINES_m
 from tactile_lab.experiments.planar_hand import PlanarHand
 from tactile_lab.geometry.poses import planar
+from tactile_lab.shape.settings import GpisSettings
 from tactile_lab.slam import SlamSettings, TactileSlam
-from tactile_lab.tracking import branching
+from tactile_lab.tracking import late_placing
+from tactile_lab.tracking.contact_map import ContactMap, Moved, PlacedGrasp
+from tactile_lab.tracking.contact_set import ContactSet
 
 PALMS = [Pose2(0.0, 0.0, float(yaw)) for yaw in np.deg2rad([0, 60, -60, 30, -30, 90, 15, 75])]
 MOTION = {"translation_m": 0.007, "rotation_rad": 0.21, "left_lying": 0.15}
@@ -34,15 +39,33 @@ def test_an_object_that_a_closing_hand_turned_is_followed(turn_deg: float) -> No
     assert np.ptp(np.unwrap(errors_deg, period=360)) < 6
 
 
-@pytest.mark.parametrize(("left_lying", "times"), [(0.15, 2), (1.0, 1)])
-def test_a_push_is_looked_for_apart_only_where_it_is_another_motion(
-    monkeypatch: pytest.MonkeyPatch, left_lying: float, times: int
+@pytest.mark.parametrize(
+    ("left_lying", "turn_deg", "is_asked"), [(0.15, 0.0, False), (0.15, 15.0, True), (1.0, 15.0, False)]
+)
+def test_a_push_is_looked_for_only_where_a_grasp_on_an_object_left_lying_fits_badly(
+    monkeypatch: pytest.MonkeyPatch, left_lying: float, turn_deg: float, is_asked: bool
 ) -> None:
     hand = PlanarHand(OUTLINES_m["rectangle"], np.random.default_rng(4))
     motion = MOTION | {"left_lying": left_lying}
     slam = TactileSlam(SlamSettings.model_validate({"method": "joint", "dimension": 2, "motion": motion}), seed=4)
-    slam.step(hand.grasp(0, PALMS[0], Pose2()))
-    asked, propose = [], branching.propose
-    monkeypatch.setattr(branching, "propose", lambda *given: asked.append(given) or propose(*given))
-    slam.step(hand.grasp(1, PALMS[1], Pose2()))
-    assert len(asked) == times
+    for index, palm in enumerate(PALMS[:3]):
+        slam.step(hand.grasp(index, palm, Pose2()))
+    asked, propose = [], late_placing.propose
+    monkeypatch.setattr(late_placing, "propose", lambda *given: asked.append(given) or propose(*given))
+    slam.step(hand.grasp(3, PALMS[3], Pose2(0.006, 0.002, float(np.deg2rad(turn_deg)))))
+    assert bool(asked) is is_asked
+
+
+def test_pushes_stay_with_their_steps_when_a_session_is_read_backwards() -> None:
+    """What came before a grasp came after it then, and what moved freely here did so."""
+    none = np.empty((0, 2))
+    contacts = ContactSet(none, none, np.empty(0), np.empty(0))
+    grasp = PlacedGrasp(contacts, np.zeros(3), np.eye(3), np.zeros(3))
+    ahead = ContactMap((grasp, grasp, replace(grasp, moved=Moved.FREELY), grasp), GpisSettings())
+    pushed_between_1_and_0 = ContactMap((grasp, grasp, grasp, replace(grasp, moved=Moved.PUSHED)), GpisSettings())
+    assert ahead.reread(pushed_between_1_and_0).moved == (
+        Moved.AS_MEANT,
+        Moved.PUSHED,
+        Moved.FREELY,
+        Moved.AS_MEANT,
+    )
