@@ -33,6 +33,7 @@ def slips(
     """
     from tactile_lab.cli.console import emit_json
     from tactile_lab.errors import SessionError
+    from tactile_lab.evaluation.slips import Slips
 
     del no_input
     measured = _measured(_chosen(root, sessions))
@@ -40,8 +41,6 @@ def slips(
     if not told:
         hint = "Slips are told where the marker camera saw the object at two grasps in a row"
         raise SessionError("no session shows a slip", where=str(root), hint=hint)
-    from tactile_lab.evaluation.slips import Slips
-
     found = Slips.joined(measured.values())
     if as_json:
         emit_json(_document(found, told))
@@ -58,7 +57,7 @@ def _chosen(root: Path, names: list[str] | None) -> list[Session]:
     if names:
         found = [find_session(root, name) for name in names]
     else:
-        found = [Session.open(each.folder) for each in list_sessions(root) if each.status == "closed" and each.readable]
+        found = [Session.open(each.folder) for each in list_sessions(root) if each.status == "closed"]
     if not found:
         raise SessionError("holds no closed session", where=str(root), hint="Record one with: tactile-lab run")
     rigs = sorted({session.manifest.rig for session in found})
@@ -106,8 +105,6 @@ def _show(found: Slips, sessions: list[str]) -> None:
 
 
 def _row(name: str, slips: Array) -> tuple[str, ...]:
-    from math import degrees
-
     import numpy as np
 
     from tactile_lab.evaluation.slips import lengths_m, root_mean_squares
@@ -117,7 +114,7 @@ def _row(name: str, slips: Array) -> tuple[str, ...]:
         return name, "0", "", "", "", ""
     per_axis_m, turn_rad = root_mean_squares(slips)
     far, turned = Spread.of(list(1e3 * lengths_m(slips))), Spread.of(list(np.rad2deg(np.abs(slips[:, 2]))))
-    return name, str(len(slips)), f"{1e3 * per_axis_m:.1f}", far.text(), f"{degrees(turn_rad):.1f}", turned.text()
+    return name, str(len(slips)), f"{1e3 * per_axis_m:.1f}", far.text(), f"{np.rad2deg(turn_rad):.1f}", turned.text()
 
 
 def _settings(motion: MotionNoise) -> dict[str, float]:

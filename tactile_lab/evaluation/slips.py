@@ -16,6 +16,7 @@ from gtsam import Pose3
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.geometry.poses import planar
 from tactile_lab.tracking.motion import MotionNoise, compose, deviation, planar_motion, pose_row
+from tactile_lab.tracking.motion_cost import STIFF_BEYOND_SIGMA
 
 LEAST_STEPS = 10
 """Fewer tell no standard deviation."""
@@ -26,7 +27,6 @@ _SIGMAS_OF_LENGTH, _SIGMAS_OF_TURN = 1.665, 1.150
 share of a normal distribution lies, in two dimensions and in one. The others push it (decision 30)."""
 
 _LEAST_LEFT_LYING = 0.02
-PUSHED_SIGMAS = 3.2
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ class Slips:
     def pushed_count(self, motion: MotionNoise) -> int:
         """How many of the grasps that were to leave the object moved it beyond what ``left_lying`` makes likely."""
         lying = motion.after(np.zeros(3))
-        far = lengths_m(self.left) > PUSHED_SIGMAS * lying.translation_m
-        return int(np.sum(far | (np.abs(self.left[:, 2]) > PUSHED_SIGMAS * lying.rotation_rad)))
+        far = lengths_m(self.left) > STIFF_BEYOND_SIGMA * lying.translation_m
+        return int(np.sum(far | (np.abs(self.left[:, 2]) > STIFF_BEYOND_SIGMA * lying.rotation_rad)))
 
 
 def lengths_m(slips: Array) -> Array:

@@ -115,6 +115,7 @@ def pushed_nats(noise: MotionNoise, space: PoseRows) -> float:
 
 
 def _pushed(noise: MotionNoise) -> float:
+    """How far pushes go, in shares of a carried object's slips; never less far than an object moves that lies still."""
     return max(_PUSHED, noise.left_lying)
 
 

@@ -56,10 +56,18 @@ def test_a_folder_without_sessions_says_what_to_do(inside, tmp_path: Path):
     assert "tactile-lab run" in answer.err
 
 
-def test_a_session_whose_camera_saw_nothing_shows_no_slip(inside, recorded, tmp_path):
+def test_a_session_without_its_markers_says_which_file_is_missing(inside, recorded, tmp_path):
     copy = tmp_path / "blind"
     shutil.copytree(recorded, copy)
     (copy / "calibration" / "markers.yaml").unlink()
     answer = inside("session", "slips", "blind", "--root", tmp_path)
     assert answer.code != 0
     assert "markers.yaml" in answer.err
+
+
+def test_sessions_whose_camera_saw_nothing_show_no_slip(inside, recorded_root, monkeypatch):
+    monkeypatch.setattr("tactile_lab.workflow.measuring_slips.session_slips", lambda session: Slips.between([], []))
+    answer = inside("session", "slips", "--root", recorded_root)
+    assert answer.code != 0
+    assert "no session shows a slip" in answer.err
+    assert "marker camera saw the object at two grasps in a row" in answer.err
