@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 from drivers.shadow.closing import closing
 from drivers.shadow.posture import TipEllipsoid
 from sessions.conductor_settings import ConductorSettings
@@ -18,11 +20,11 @@ def solve_closings(clock: Clock, settings: ConductorSettings, tip: TipEllipsoid,
         return
     plan = settings.plan
     heights_m = plan.contour_heights_m if dimension == 2 else plan.surface_heights_m
-    wanted = {(name, height_m) for name in plan.closings for height_m in heights_m}
+    wanted = set(product(plan.closings, heights_m))
     if dimension == 3:
         wanted.add((TAP.closing, TAP_HEIGHT_m))
-        if settings.exploration.policy:
-            wanted |= {(name, plan.side_height_m) for name in settings.exploration.side_closings}
+        if (exploration := settings.exploration).policy:
+            wanted |= set(product(exploration.side_closings, exploration.side_heights_m))
     if settings.probing.enabled:
         wanted |= {(TAP.closing, TAP_HEIGHT_m), (ROW.closing, settings.cycle.touch.rake_height_m)}
     for name, height_m in sorted(wanted):

@@ -45,6 +45,7 @@ class ExplorationSettings(StrictModel):
         information: of the policy ``information``, whether it is named here or on the command line.
         side_closings: closings with the hand leaning to one side that policies may choose besides, where a surface is
             wanted.
+        side_heights_m: of the lowest fingertip there: from lower down it lifts what it grasps.
         caution: standard deviations of the estimated surface that the open fingertips keep clear of besides, of at
             most the clearance each; for policies.
         clearance_m: distance from the estimated surface that the open fingertips' centres must keep.
@@ -58,6 +59,7 @@ class ExplorationSettings(StrictModel):
     policy: str | None = "information"
     information: InformationSettings = InformationSettings()
     side_closings: tuple[str, ...] = tuple(LEANING)
+    side_heights_m: tuple[float, ...] = (0.026, 0.034)
     caution: float = Field(default=0.5, ge=0.0)
     clearance_m: float = Field(default=0.012, ge=0.0)
     contour_resolution_m: float = Field(default=0.002, gt=0.0)

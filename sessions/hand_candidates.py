@@ -4,7 +4,7 @@ A candidate is a grasp frame (every yaw of the arm's window, shifts across it), 
 and, where a surface is wanted, perhaps a tap on the top before it, or a hand that leans to one side. Its expected
 contacts follow from the kinematics: the closing's lines against the estimated surface. What the arm can not reach,
 where the open fingers would come down on the object or the palm rest on it, and what the hand has just landed on, is no
-candidate.
+candidate; nor is what would push the object by a link that feels nothing, as long as there is anything else.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from drivers.shadow.posture import TipEllipsoid
 from sessions.cycle_settings import CycleSettings
 from sessions.explorer import ExplorationSettings, KnownShape, closing_rays
 from sessions.grasp_plan import GraspPlan
+from sessions.link_clearance import links_are_clear, standing
 from sessions.motion import GraspFrame
 from sessions.next_grasp import PlanSettings
 from sessions.safety import SafetySettings
@@ -47,6 +48,7 @@ _OWN_TIME_s = 1.6  # opening, closing and waiting for motors, beside what the se
 OUT_OF_REACH = "the arm does not reach there"
 NO_ROOM = "no room for the open hand"
 TOO_TALL = "the object is as high as the palm"
+PUSHES = "a link above the fingertips would push the object"
 LANDED = "the hand has just landed there, or the bounding box is in the way"
 
 
@@ -127,15 +129,16 @@ def offer(
         if failed := int(np.count_nonzero(~passed)):
             ruled_out[reason] += failed
         plans = [plan for plan, fine in zip(plans, passed, strict=True) if fine]
+    gentle = _gentle(plans, limits, known, world_T_object)
+    if pushing := len(plans) - len(gentle):
+        ruled_out[PUSHES] += pushing
+    plans = gentle
     tap_from_m = (known.top_height_m or 0.0) + _TAP_FROM_m
     return Offer(tuple(_as_candidate(plan, limits, here, tap_from_m) for plan in plans), dict(ruled_out))
 
 
 def _plans(limits: HandLimits, centre_world_m: Array) -> Iterator[GraspPlan]:
-    """Every combination; a tap only where the hand stands in the middle and at one height, as the rest changes none.
-
-    A hand that leans has its fingers at several heights, so one height is enough.
-    """
+    """Every combination; a tap only where the hand stands in the middle and at one height, as the rest changes none."""
     shifts, heights = limits.exploration.shifts_m, limits.heights_m
     for yaw in np.linspace(*limits.plan.yaw_window_rad, limits.exploration.yaws):
         for shift in shifts:
@@ -148,7 +151,8 @@ def _plans(limits: HandLimits, centre_world_m: Array) -> Iterator[GraspPlan]:
                     if limits.dimension == 3 and shift == shifts[len(shifts) // 2] and height_m == heights[0]:
                         yield replace(plan, tap=True)
             for name in limits.side_closings:
-                yield GraspPlan(frame, name, limits.plan.side_height_m)
+                for height_m in limits.exploration.side_heights_m:
+                    yield GraspPlan(frame, name, height_m)
 
 
 def table_of(plan: GraspPlan, tip: TipEllipsoid) -> Closing:
@@ -195,6 +199,15 @@ def _are_clear(places_m: Array, settings: ExplorationSettings, known: KnownShape
         sigma_m = np.minimum(np.sqrt(known.field.variance(places_m[decisive])), settings.clearance_m)
         clear[decisive] = spare_m[decisive] > settings.caution * sigma_m
     return np.asarray(clear)
+
+
+def _gentle(plans: list[GraspPlan], limits: HandLimits, known: KnownShape, world_T_object: Pose2) -> list[GraspPlan]:
+    """The plans that keep all links above the fingertips off the object; all plans where none does."""
+    target = standing(known, world_T_object, limits.plan.contour_top_m)
+    if target is None or not plans:
+        return plans
+    clear = links_are_clear(plans, limits.tip, target)
+    return [plan for plan, is_clear in zip(plans, clear, strict=True) if is_clear] or plans
 
 
 def _open_tips_m(plan: GraspPlan, tip: TipEllipsoid) -> Array:

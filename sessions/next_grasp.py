@@ -26,8 +26,10 @@ class PlanSettings(StrictModel):
     Attributes:
         closings: closings to alternate between; radial first, as its contacts tell the pose of the object frame
             that is born then, while a pinch leaves the place along the fingers open.
-        contour_heights_m: heights of the fingertip centres above the table, taken in turn, when a contour is wanted.
-        surface_heights_m: the same when the whole surface is wanted.
+        contour_heights_m: heights of the fingertip centres above the table, in turn, when a contour is wanted.
+        surface_heights_m: the same when the whole surface is wanted; what is above the object's top is left out as
+            soon as that was felt.
+        contour_top_m: height that objects are taken to have where a contour is wanted: nothing feels their top then.
         yaw_window_rad: lowest and highest yaw of the grasp frame that the arm can reach.
         start_m: where the object is expected before the first grasp, world x, y.
         turn_rad: smallest and largest re-orientation.
@@ -37,7 +39,8 @@ class PlanSettings(StrictModel):
 
     closings: tuple[str, ...] = Field(default=("radial", "pinch"), min_length=1)
     contour_heights_m: tuple[float, ...] = Field(default=(0.022,), min_length=1)
-    surface_heights_m: tuple[float, ...] = Field(default=(0.018, 0.026, 0.034), min_length=1)
+    surface_heights_m: tuple[float, ...] = Field(default=(0.034, 0.018, 0.048), min_length=1)
+    contour_top_m: float = Field(default=0.06, gt=0.0)
     yaw_window_rad: tuple[float, float] = (-1.31, 1.31)
     start_m: tuple[float, float] = (0.0, 0.0)
     turn_rad: tuple[float, float] = (0.23, 0.79)
@@ -56,13 +59,9 @@ class PlanSettings(StrictModel):
             raise ValueError("the re-orientation's first value must be the smaller one, and not negative")
         return self
 
-    @property
-    def side_height_m(self) -> float:
-        """Of the lowest fingertip where the hand leans: in the middle, as from lower down it lifts what it grasps."""
-        return self.surface_heights_m[len(self.surface_heights_m) // 2]
-
 
 _OTHER_YAWS = 12
+_BELOW_TOP_m = 0.005
 _TYPICAL_HALF_WIDTH_m = 0.030  # between one side's contacts and the middle, where only one side touches
 _MISSED_SIDE_m = {"FF": -0.012, "MF": -0.004, "RF": 0.004, "LF": 0.012}  # a finger that met nothing: object is aside
 
@@ -118,6 +117,9 @@ class FixedRule:
         self.centre_m: Array = np.array(settings.start_m)
         """Where the object is thought to be, world x, y."""
 
+        self.top_m: float | None = None
+        """Height of its top over the table, where that was felt."""
+
     def plan(self, index: int, has_room: Callable[[GraspPlan], bool] = lambda plan: True) -> GraspPlan:
         """The grasp number ``index``, from 0: on the side whose turn it is, or wherever else there is room."""
         side = 0.53 if index % 2 else -0.53
@@ -144,8 +146,10 @@ class FixedRule:
         return self._wants_top and self.settings.tap_every > 0 and index % self.settings.tap_every == 0
 
     def height_m(self, index: int) -> float:
-        """The contact height whose turn it is."""
-        return self._heights_m[index % len(self._heights_m)]
+        """The contact height whose turn it is, for each closing from both sides, among those below the object's top."""
+        highest_m = np.inf if self.top_m is None else self.top_m - _BELOW_TOP_m
+        below_m = [height_m for height_m in self._heights_m if height_m < highest_m] or [min(self._heights_m)]
+        return below_m[(index // 4) % len(below_m)]
 
     def turn(self, yaw_rad: float) -> float:
         """A re-orientation that keeps the hand in its yaw window."""

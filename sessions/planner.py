@@ -24,6 +24,9 @@ from tactile_lab.slam import TactileSlam
 _LANDING_m = 0.020
 """An open fingertip's centre must stay this far from where one has landed on the object."""
 
+_UPWARD = 0.7
+"""Least vertical part of the normal of a contact on the object's top."""
+
 _LEAST_BY_POLICY = 2
 """A policy may be after few contacts; with fewer than that the object is not where it was expected."""
 
@@ -188,6 +191,8 @@ class Planner:
         self._doubted = self._by_estimate and len(grasp.touching) < least
         if grasp.touching and (self._doubted or not self._by_estimate):
             self._rule.centre_m = contact_centre(grasp, plan)
+        if tops_m := [float(c.point_world_m[2]) for c in grasp.contacts if c.probed and c.normal_world[2] > _UPWARD]:
+            self._rule.top_m = max(tops_m)
         turn_rad = self._turn(grasp, plan)
         self._hand_motion, self._here = Pose3(), plan.frame
         shift_m = np.zeros(2) if turn_rad is None else self._rule.step_back(self.centre_m)

@@ -15,10 +15,10 @@ import mujoco
 import numpy as np
 from gtsam import Pose3, Rot3
 
+from drivers.shadow.bodies import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Ellipsoid, Shape
 from drivers.shadow.kinematics import JOINT_TABLE, Joint, JOINT_LIMITS_rad
 from drivers.shadow.motors import DRIVEN_JOINTS
 from drivers.simulation.geared_motors import DISTAL_COUPLING, motor_class
-from drivers.simulation.hand_bodies import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Ellipsoid, Shape
 from drivers.simulation.objects import Hull, ObjectModel, Piece
 from drivers.simulation.surfaces import GLASS, HAND, OBJECT, RUBBER, TABLE, TIP, WOOD, surface
 from tactile_lab.geometry.contacts import FINGERS, Array

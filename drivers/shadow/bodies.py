@@ -1,4 +1,4 @@
-"""Bodies of the simulated hand: collision shapes and masses of every link, capsules, balls and one box.
+"""Bodies of the hand: outer shapes and masses of every link but the fingertips, capsules, balls and one box.
 
 Lengths in metres, masses in kilograms. Shapes follow the outer dimensions of Shadow's E-series hand; they only have to
 touch what the real links would touch. Kinematics come from :mod:`drivers.shadow.kinematics`.
