@@ -4,7 +4,7 @@ A candidate is a grasp frame (every yaw of the arm's window, shifts across it), 
 and, where a surface is wanted, perhaps a tap on the top before it, or a hand that leans to one side. Its expected
 contacts follow from the kinematics: the closing's lines against the estimated surface. What the arm can not reach,
 where the open fingers would come down on the object or the palm rest on it, and what the hand has just landed on, is no
-candidate; nor is what would push the object by a link that feels nothing, as long as there is anything else.
+candidate. What would push the object by a link that feels nothing is marked.
 """
 
 from __future__ import annotations
@@ -48,7 +48,6 @@ _OWN_TIME_s = 1.6  # opening, closing and waiting for motors, beside what the se
 OUT_OF_REACH = "the arm does not reach there"
 NO_ROOM = "no room for the open hand"
 TOO_TALL = "the object is as high as the palm"
-PUSHES = "a link above the fingertips would push the object"
 LANDED = "the hand has just landed there, or the bounding box is in the way"
 
 
@@ -129,12 +128,12 @@ def offer(
         if failed := int(np.count_nonzero(~passed)):
             ruled_out[reason] += failed
         plans = [plan for plan, fine in zip(plans, passed, strict=True) if fine]
-    gentle = _gentle(plans, limits, known, world_T_object)
-    if pushing := len(plans) - len(gentle):
-        ruled_out[PUSHES] += pushing
-    plans = gentle
     tap_from_m = (known.top_height_m or 0.0) + _TAP_FROM_m
-    return Offer(tuple(_as_candidate(plan, limits, here, tap_from_m) for plan in plans), dict(ruled_out))
+    pushing = _pushing(plans, limits, known, world_T_object)
+    candidates = [_as_candidate(plan, limits, here, tap_from_m) for plan in plans]
+    flagged = [replace(one, pushes=bool(pushes)) for one, pushes in zip(candidates, pushing, strict=True)]
+    found = tuple(HandCandidate(plan, candidate) for plan, candidate in zip(plans, flagged, strict=True))
+    return Offer(found, dict(ruled_out))
 
 
 def _plans(limits: HandLimits, centre_world_m: Array) -> Iterator[GraspPlan]:
@@ -201,13 +200,12 @@ def _are_clear(places_m: Array, settings: ExplorationSettings, known: KnownShape
     return np.asarray(clear)
 
 
-def _gentle(plans: list[GraspPlan], limits: HandLimits, known: KnownShape, world_T_object: Pose2) -> list[GraspPlan]:
-    """The plans that keep all links above the fingertips off the object; all plans where none does."""
+def _pushing(plans: Sequence[GraspPlan], limits: HandLimits, known: KnownShape, world_T_object: Pose2) -> Verdicts:
+    """Which plans have a link above the fingertips in the object."""
     target = standing(known, world_T_object, limits.plan.contour_top_m)
-    if target is None or not plans:
-        return plans
-    clear = links_are_clear(plans, limits.tip, target)
-    return [plan for plan, is_clear in zip(plans, clear, strict=True) if is_clear] or plans
+    if target is None:
+        return np.zeros(len(plans), dtype=bool)
+    return ~links_are_clear(plans, limits.tip, target)
 
 
 def _open_tips_m(plan: GraspPlan, tip: TipEllipsoid) -> Array:
@@ -219,13 +217,13 @@ def _open_tips_m(plan: GraspPlan, tip: TipEllipsoid) -> Array:
 # --- what policies see ---------------------------------------------------------------------------------------------
 
 
-def _as_candidate(plan: GraspPlan, limits: HandLimits, here: GraspFrame | None, tap_from_m: float) -> HandCandidate:
+def _as_candidate(plan: GraspPlan, limits: HandLimits, here: GraspFrame | None, tap_from_m: float) -> Candidate:
     rays = closing_rays(table_of(plan, limits.tip))
     if limits.dimension == 3:
         rays = _with_tap(rays, plan.tap, tap_from_m, limits.tip)
     frame = plan.frame
     pose = Pose2(frame.x_m, frame.y_m, frame.yaw_rad)
-    return HandCandidate(plan, Candidate(pose, plan.closing, rays, grasp_time_s(plan, limits.cycle, here)))
+    return Candidate(pose, plan.closing, rays, grasp_time_s(plan, limits.cycle, here))
 
 
 def _with_tap(rays: ClosingRays, taps: bool, from_m: float, tip: TipEllipsoid) -> ClosingRays:

@@ -40,12 +40,14 @@ class Candidate:
         closing: name of the closing ("pinch", "radial").
         rays: its closing rays in the grasp frame.
         time_s: how long it takes to go there from where the hand is, to close, and to open again.
+        pushes: a part of the hand that feels nothing is expected to meet the object, and may push it along.
     """
 
     world_T_grasp: Pose2
     closing: str
     rays: ClosingRays
     time_s: float = 1.0
+    pushes: bool = False
 
 
 @dataclass(frozen=True)

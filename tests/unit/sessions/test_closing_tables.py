@@ -29,7 +29,7 @@ def solve(clock: Clock, dimension: int, **settings: Any) -> None:
 
 def test_a_contour_needs_every_closing_at_its_height(solved: list[tuple[str, float]]) -> None:
     solve(MonotonicClock(), 2)
-    assert solved == [("pinch", 0.022), ("radial", 0.022)]
+    assert solved == [("pinch", 0.034), ("radial", 0.034)]
 
 
 def test_a_surface_needs_every_height_and_the_taps(solved: list[tuple[str, float]]) -> None:

@@ -137,6 +137,29 @@ def test_fingers_come_down_clear_of_what_bulges_above_them() -> None:
         assert outside.min() > 0.008
 
 
+def test_grasps_with_links_on_the_object_are_marked() -> None:
+    """A hand with its fingertips at 34 mm has room above a box of 4 cm, and rests on one of 7 cm."""
+
+    def marked(top_m: float) -> list[bool]:
+        found = offer(limits(plan=PlanSettings(contour_top_m=top_m)), FLAT_BOX, Pose2())
+        return [one.candidate.pushes for one in found.usable]
+
+    assert np.mean(marked(0.04)) < 0.5
+    assert np.mean(marked(0.07)) > 0.9
+
+
+def test_information_counts_less_where_links_push() -> None:
+    one, known = chooser("information"), knowledge()
+    tall = PolicyChooser(
+        one.policy, limits(plan=PlanSettings(contour_top_m=0.2)), MotionNoise(), np.random.default_rng(0)
+    )
+    low = PolicyChooser(
+        one.policy, limits(plan=PlanSettings(contour_top_m=0.01)), MotionNoise(), np.random.default_rng(0)
+    )
+    spoilt, whole = (each.choose(3, known).decision.scores for each in (tall, low))
+    assert spoilt == pytest.approx([0.55 * score for score in whole])
+
+
 def test_time_grows_with_the_way_to_the_grasp() -> None:
     plan = GraspPlan(GraspFrame(0.0, 0.0, 1.0), "pinch", HEIGHT_m)
     near = grasp_time_s(plan, CycleSettings(), GraspFrame(0.0, 0.0, 0.9))
@@ -271,7 +294,7 @@ def turn_of_a_box_with_untouched_sides(
     field = Gpis.fit(points, normals, 0.001, 0.05)
     known = known_shape(field, 2, HEIGHT_m, ExplorationSettings())
     found = Knowledge(known, Pose2(), 1e-6 * np.eye(3), np.zeros(len(field.contacts_m), dtype=int), 5)
-    hand = limits(plan=PlanSettings(yaw_window_rad=window_rad, closings=closings))
+    hand = limits(plan=PlanSettings(yaw_window_rad=window_rad, closings=closings, contour_top_m=0.03))
     one = PolicyChooser(make_policy("information"), hand, noise, np.random.default_rng(0))
     return one.turn(GraspFrame(0.0, 0.0, 0.4), found, Grasp(2, 0, (), Pose3()), 0.3, has_room)
 

@@ -51,14 +51,17 @@ CHANGES: tuple[tuple[int, str, float, Content], ...] = (
     (2, "least_gain", 1e6, {}),
     (2, "known_sigma_m", 1.0, {"enough": 0.3}),
     (2, "enough", 0.3, {"known_sigma_m": 1.0}),
+    (2, "pushed_share", 1.0, {}),
 )
 """Dimension, setting, another value, and what else has to be set for it to matter."""
 
 
 def description(information: Content) -> RigDescription:
     content = yaml.safe_load(shipped_rigs()["sim"].read_text())
-    content["conductor"]["exploration"] = {"policy": "information", **FEW, "information": information}
-    content["conductor"]["plan"] = {"closings": ["radial"], "surface_heights_m": [0.018]}
+    content["conductor"] = {
+        "exploration": {"policy": "information", **FEW, "information": information},
+        "plan": {"closings": ["radial"], "surface_heights_m": [0.018]},
+    }
     return validate(content, RigDescription, where="rig")
 
 
@@ -131,7 +134,7 @@ def test_the_policies_of_the_thesis_stay_as_printed(name: str) -> None:
 def lab(tmp_path: Path) -> Path:
     shutil.copytree(shipped_rigs()["sim"].parent / "calibrations", tmp_path / "calibrations")
     content = yaml.safe_load(shipped_rigs()["sim"].read_text())
-    content["conductor"]["exploration"] = {"information": {"pose_weight": 0.25}}
+    content["conductor"] = {"exploration": {"information": {"pose_weight": 0.25}}}
     path = tmp_path / "lab.yaml"
     path.write_text(yaml.safe_dump(content))
     return path
