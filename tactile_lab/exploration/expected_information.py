@@ -61,8 +61,8 @@ class InformationSettings(StrictModel):
         least_gain: stop when no grasp promises so many nats; 0 never does.
         known_sigma_m: stop when the surface is explored to ``enough`` and known so well everywhere; None never does.
         enough: share of the surface near contacts at which that question is asked.
-        pushed_share: share of the grasps that push the object among those that are expected to; they count as telling
-            nothing.
+        push_worth: share of what it promises that counts of a grasp that is expected to push the object: such a one often
+            fits nowhere, and spoils what was known of the pose for those that follow.
     """
 
     worlds: int = Field(default=48, ge=1)
@@ -80,7 +80,7 @@ class InformationSettings(StrictModel):
     least_gain: float = Field(default=0.0, ge=0)
     known_sigma_m: float | None = Field(default=None, gt=0)
     enough: float = Field(default=0.9, gt=0, le=1)
-    pushed_share: float = Field(default=0.45, ge=0, le=1)
+    push_worth: float = Field(default=0.15, ge=0, le=1)
 
     def reach(self, dimension: int) -> float:
         """How far a contact tells about a contour (2) or a surface (3), metres."""
@@ -134,7 +134,7 @@ def promised(
     new_share = chance @ (fresh * surface.sizes) / max(float(surface.sizes[touchable].sum()), _SMALLEST_VARIANCE)
     touching = touches.touching.sum(axis=2).mean(axis=1)
     together = float((1 - np.prod(1 - chance, axis=0)) @ worth.max(axis=0, initial=0.0))
-    kept = 1 - settings.pushed_share * np.array([candidate.pushes for candidate in candidates])
+    kept = np.where([candidate.pushes for candidate in candidates], settings.push_worth, 1.0)
     return Promise(kept * pose, kept * np.sum(chance * worth, axis=1), together, touching, new_share)
 
 

@@ -51,7 +51,7 @@ CHANGES: tuple[tuple[int, str, float, Content], ...] = (
     (2, "least_gain", 1e6, {}),
     (2, "known_sigma_m", 1.0, {"enough": 0.3}),
     (2, "enough", 0.3, {"known_sigma_m": 1.0}),
-    (2, "pushed_share", 1.0, {}),
+    (2, "push_worth", 0.5, {}),
 )
 """Dimension, setting, another value, and what else has to be set for it to matter."""
 
