@@ -120,6 +120,7 @@ def _plain(candidate: HandCandidate, score: float) -> dict[str, Any]:
         "height_m": plan.height_m,
         "tap": plan.tap,
         "time_s": candidate.candidate.time_s,
+        "pushes": candidate.candidate.pushes,
         "score": score if np.isfinite(score) else None,
     }
 

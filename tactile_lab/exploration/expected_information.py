@@ -61,8 +61,8 @@ class InformationSettings(StrictModel):
         least_gain: stop when no grasp promises so many nats; 0 never does.
         known_sigma_m: stop when the surface is explored to ``enough`` and known so well everywhere; None never does.
         enough: share of the surface near contacts at which that question is asked.
-        push_worth: share of what it promises that counts of a grasp that is expected to push the object: such a one often
-            fits nowhere, and spoils what was known of the pose for those that follow.
+        push_worth: share that counts of what a grasp promises that is expected to push the object: such a one often fits
+            nowhere, and spoils what was known of the pose for those that follow.
     """
 
     worlds: int = Field(default=48, ge=1)
@@ -134,8 +134,7 @@ def promised(
     new_share = chance @ (fresh * surface.sizes) / max(float(surface.sizes[touchable].sum()), _SMALLEST_VARIANCE)
     touching = touches.touching.sum(axis=2).mean(axis=1)
     together = float((1 - np.prod(1 - chance, axis=0)) @ worth.max(axis=0, initial=0.0))
-    kept = np.where([candidate.pushes for candidate in candidates], settings.push_worth, 1.0)
-    return Promise(kept * pose, kept * np.sum(chance * worth, axis=1), together, touching, new_share)
+    return Promise(pose, np.sum(chance * worth, axis=1), together, touching, new_share)
 
 
 def pose_nats(covariance: Array, settings: InformationSettings) -> float:

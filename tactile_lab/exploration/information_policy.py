@@ -61,7 +61,8 @@ class InformationPolicy:
         promise = promised(candidates, belief, belief.surface, self.settings, rng)
         times = seconds + _AHEAD * np.array([candidate.time_s for candidate in candidates])
         shape = np.minimum(_AHEAD * promise.shape, promise.together)
-        rates = (self.settings.pose_weight * (promise.pose - lost_nats) + shape) / times
+        told = self.settings.pose_weight * promise.pose + shape
+        rates = (self._worth(candidates) * told - self.settings.pose_weight * lost_nats) / times
         return float(np.max(rates[promise.touching > 0], initial=0.0))
 
     def _decided(
@@ -74,15 +75,19 @@ class InformationPolicy:
     ) -> Decision:
         times = np.array([candidate.time_s for candidate in candidates])
         nats = self.settings.pose_weight * promise.pose + promise.shape
-        rates = np.where(promise.touching > 0, nats / times, -np.inf)
+        rates = np.where(promise.touching > 0, self._worth(candidates) * nats / times, -np.inf)
         decision = best_of(self.name, rates, "", rng)
         if decision.chosen is None:
             return decision
         if why := self._stops(surface, belief, nats):
             return Decision(self.name, "stop", None, decision.scores, why)
         best = decision.chosen
-        reason = _reason(promise, best) + decision.reason
+        reason = _reason(promise, best, candidates[best].pushes) + decision.reason
         return Decision(self.name, "grasp", best, decision.scores, reason, float(promise.new_share[best]))
+
+    def _worth(self, candidates: Sequence[Candidate]) -> Array:
+        """Share of what each candidate promises that counts."""
+        return np.where([candidate.pushes for candidate in candidates], self.settings.push_worth, 1.0)
 
     def _stops(self, surface: Surface, belief: Belief, nats: Array) -> str:
         """Why to end here, or ""."""
@@ -101,9 +106,10 @@ class InformationPolicy:
         return f"{100 * share:.0f} % of the surface has been touched and it is known to {1e3 * limit:.3g} mm"
 
 
-def _reason(promise: Promise, best: int) -> str:
+def _reason(promise: Promise, best: int, pushes: bool) -> str:
+    push = ", though it may push the object" if pushes else ""
     pose = f" and {promise.pose[best]:.1f} nats about the pose" if promise.pose[best] > 0.05 else ""
     return (
         f"{promise.touching[best]:.1f} contacts are expected to tell {promise.shape[best]:.1f} nats about the shape"
-        f"{pose}, {100 * promise.new_share[best]:.1f} % of the surface new"
+        f"{pose}, {100 * promise.new_share[best]:.1f} % of the surface new{push}"
     )

@@ -156,8 +156,11 @@ def test_information_counts_less_where_links_push() -> None:
     low = PolicyChooser(
         one.policy, limits(plan=PlanSettings(contour_top_m=0.01)), MotionNoise(), np.random.default_rng(0)
     )
-    spoilt, whole = (each.choose(3, known).decision.scores for each in (tall, low))
-    assert spoilt == pytest.approx([0.15 * score for score in whole])
+    spoilt, whole = (each.choose(3, known) for each in (tall, low))
+    assert spoilt.decision.scores == pytest.approx([0.15 * score for score in whole.decision.scores])
+    assert spoilt.decision.reason.endswith("though it may push the object")
+    assert not whole.decision.reason.endswith("though it may push the object")
+    assert all(one["pushes"] for one in spoilt.as_plain()["candidates"])
 
 
 def test_time_grows_with_the_way_to_the_grasp() -> None:
