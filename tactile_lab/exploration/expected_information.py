@@ -61,8 +61,8 @@ class InformationSettings(StrictModel):
         least_gain: stop when no grasp promises so many nats; 0 never does.
         known_sigma_m: stop when the surface is explored to ``enough`` and known so well everywhere; None never does.
         enough: share of the surface near contacts at which that question is asked.
-        push_worth: share that counts of what a grasp promises that is expected to push the object: such a one often fits
-            nowhere, and spoils what was known of the pose for those that follow.
+        push_worth, push_worth_in_space: share that counts of what a grasp promises which is expected to push the
+            object: it often fits nowhere, and spoils what was known of the pose. In the plane even that is a guess.
     """
 
     worlds: int = Field(default=48, ge=1)
@@ -80,11 +80,16 @@ class InformationSettings(StrictModel):
     least_gain: float = Field(default=0.0, ge=0)
     known_sigma_m: float | None = Field(default=None, gt=0)
     enough: float = Field(default=0.9, gt=0, le=1)
-    push_worth: float = Field(default=0.15, ge=0, le=1)
+    push_worth: float = Field(default=0.55, ge=0, le=1)
+    push_worth_in_space: float = Field(default=0.15, ge=0, le=1)
 
     def reach(self, dimension: int) -> float:
         """How far a contact tells about a contour (2) or a surface (3), metres."""
         return self.reach_m if dimension == 2 else self.reach_in_space_m
+
+    def worth_of_push(self, dimension: int) -> float:
+        """Share that counts of a grasp that is expected to push the object."""
+        return self.push_worth if dimension == 2 else self.push_worth_in_space
 
     def accuracy(self, dimension: int) -> float:
         """To which a contour (2) or a surface (3) is to be known, metres."""

@@ -62,7 +62,7 @@ class InformationPolicy:
         times = seconds + _AHEAD * np.array([candidate.time_s for candidate in candidates])
         shape = np.minimum(_AHEAD * promise.shape, promise.together)
         told = self.settings.pose_weight * promise.pose + shape
-        rates = (self._worth(candidates) * told - self.settings.pose_weight * lost_nats) / times
+        rates = (self._worth(candidates, belief) * told - self.settings.pose_weight * lost_nats) / times
         return float(np.max(rates[promise.touching > 0], initial=0.0))
 
     def _decided(
@@ -75,7 +75,7 @@ class InformationPolicy:
     ) -> Decision:
         times = np.array([candidate.time_s for candidate in candidates])
         nats = self.settings.pose_weight * promise.pose + promise.shape
-        rates = np.where(promise.touching > 0, self._worth(candidates) * nats / times, -np.inf)
+        rates = np.where(promise.touching > 0, self._worth(candidates, belief) * nats / times, -np.inf)
         decision = best_of(self.name, rates, "", rng)
         if decision.chosen is None:
             return decision
@@ -85,9 +85,10 @@ class InformationPolicy:
         reason = _reason(promise, best, candidates[best].pushes) + decision.reason
         return Decision(self.name, "grasp", best, decision.scores, reason, float(promise.new_share[best]))
 
-    def _worth(self, candidates: Sequence[Candidate]) -> Array:
+    def _worth(self, candidates: Sequence[Candidate], belief: Belief) -> Array:
         """Share of what each candidate promises that counts."""
-        return np.where([candidate.pushes for candidate in candidates], self.settings.push_worth, 1.0)
+        pushing = self.settings.worth_of_push(belief.dimension)
+        return np.where([candidate.pushes for candidate in candidates], pushing, 1.0)
 
     def _stops(self, surface: Surface, belief: Belief, nats: Array) -> str:
         """Why to end here, or ""."""

@@ -157,7 +157,7 @@ def test_information_counts_less_where_links_push() -> None:
         one.policy, limits(plan=PlanSettings(contour_top_m=0.01)), MotionNoise(), np.random.default_rng(0)
     )
     spoilt, whole = (each.choose(3, known) for each in (tall, low))
-    assert spoilt.decision.scores == pytest.approx([0.15 * score for score in whole.decision.scores])
+    assert spoilt.decision.scores == pytest.approx([0.55 * score for score in whole.decision.scores])
     assert spoilt.decision.reason.endswith("though it may push the object")
     assert not whole.decision.reason.endswith("though it may push the object")
     assert all(one["pushes"] for one in spoilt.as_plain()["candidates"])

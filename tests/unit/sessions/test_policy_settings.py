@@ -26,10 +26,12 @@ from tactile_lab.rigs.description import Rig, RigDescription, load_rig, shipped_
 from tactile_lab.rigs.in_force import flat, settings_in_force
 from tactile_lab.strict_yaml import validate
 from tactile_lab.tracking.motion import MotionNoise
-from tests.support.box_shapes import FLAT_BOX, SOLID_BOX
+from tests.support.box_shapes import FLAT_BOX, solid_box
 
 FEW = {"yaws": 2, "shifts_m": [0.0], "side_closings": []}
 """Two candidates of the hand, and a tap in space."""
+TALL_BOX = solid_box(0.055)
+"""Of its grasps some have links above the fingertips on it."""
 COVARIANCE = np.diag([0.01, 0.01, 0.2]) ** 2
 
 Content = dict[str, Any]
@@ -52,6 +54,7 @@ CHANGES: tuple[tuple[int, str, float, Content], ...] = (
     (2, "known_sigma_m", 1.0, {"enough": 0.3}),
     (2, "enough", 0.3, {"known_sigma_m": 1.0}),
     (2, "push_worth", 0.5, {}),
+    (3, "push_worth_in_space", 0.5, {}),
 )
 """Dimension, setting, another value, and what else has to be set for it to matter."""
 
@@ -71,7 +74,7 @@ def decision(dimension: int, information: Content) -> Decision:
     assert own.exploration.policy is not None
     limits = own.plan, own.exploration, own.cycle, own.safety
     chooser = chooser_for(own.exploration.policy, limits, TipEllipsoid(), dimension, MotionNoise(), 0)
-    known = FLAT_BOX if dimension == 2 else SOLID_BOX
+    known = FLAT_BOX if dimension == 2 else TALL_BOX
     grasps = np.arange(len(known.field.contacts_m)) // 5
     return chooser.choose(3, Knowledge(known, Pose2(0.0, 0.0, 0.2), COVARIANCE, grasps)).decision
 
