@@ -48,6 +48,7 @@ _OWN_TIME_s = 1.6  # opening, closing and waiting for motors, beside what the se
 OUT_OF_REACH = "the arm does not reach there"
 NO_ROOM = "no room for the open hand"
 TOO_TALL = "the object is as high as the palm"
+TOO_HIGH = "the fingers would close above the object"
 LANDED = "the hand has just landed there, or the bounding box is in the way"
 
 
@@ -121,6 +122,7 @@ def offer(
         (OUT_OF_REACH, lambda some: np.array([_reachable(plan, limits) for plan in some])),
         (LANDED, lambda some: np.array([has_room(plan) for plan in some])),
         (TOO_TALL, lambda some: np.array([_palm_is_clear(plan, limits, known) for plan in some])),
+        (TOO_HIGH, lambda some: np.array([_is_below_top(plan, known) for plan in some])),
         (NO_ROOM, lambda some: _tips_are_clear(some, limits, known, world_T_object)),
     ]
     for reason, test in tests:
@@ -170,6 +172,10 @@ def _palm_is_clear(plan: GraspPlan, limits: HandLimits, known: KnownShape) -> bo
     if known.top_height_m is None:
         return True
     return float(table_of(plan, limits.tip).grasp_T_palm.z()) - _PALM_THICKNESS_m > known.top_height_m
+
+
+def _is_below_top(plan: GraspPlan, known: KnownShape) -> bool:
+    return known.top_height_m is None or plan.height_m < known.top_height_m
 
 
 def _tips_are_clear(plans: Sequence[GraspPlan], limits: HandLimits, known: KnownShape, pose: Pose2) -> Verdicts:

@@ -27,8 +27,8 @@ class PlanSettings(StrictModel):
         closings: closings to alternate between; radial first, as its contacts tell the pose of the object frame
             that is born then, while a pinch leaves the place along the fingers open.
         contour_heights_m: heights of the fingertip centres above the table, in turn, when a contour is wanted.
-        surface_heights_m: the same when the whole surface is wanted; what is above the object's top is left out as
-            soon as that was felt.
+        surface_heights_m: the same when the whole surface is wanted; what does not fit the object's height is left out
+            as soon as its top was felt.
         contour_top_m: height that objects are taken to have where a contour is wanted: nothing feels their top then.
         yaw_window_rad: lowest and highest yaw of the grasp frame that the arm can reach.
         start_m: where the object is expected before the first grasp, world x, y.
@@ -61,7 +61,7 @@ class PlanSettings(StrictModel):
 
 
 _OTHER_YAWS = 12
-_BELOW_TOP_m = 0.005
+_BELOW_TOP_m, _ROOM_m = 0.005, 0.033  # above the fingertips' centres, the lowest proximal link being 33 mm higher
 _TYPICAL_HALF_WIDTH_m = 0.030  # between one side's contacts and the middle, where only one side touches
 _MISSED_SIDE_m = {"FF": -0.012, "MF": -0.004, "RF": 0.004, "LF": 0.012}  # a finger that met nothing: object is aside
 
@@ -146,10 +146,12 @@ class FixedRule:
         return self._wants_top and self.settings.tap_every > 0 and index % self.settings.tap_every == 0
 
     def height_m(self, index: int) -> float:
-        """The contact height whose turn it is, for each closing from both sides, among those below the object's top."""
-        highest_m = np.inf if self.top_m is None else self.top_m - _BELOW_TOP_m
-        below_m = [height_m for height_m in self._heights_m if height_m < highest_m] or [min(self._heights_m)]
-        return below_m[(index // 4) % len(below_m)]
+        """The contact height whose turn it is, among those at which the hand has room over the object."""
+        heights_m, top_m = self._heights_m, self.top_m
+        if top_m is not None:
+            fitting_m = [height_m for height_m in heights_m if height_m + _BELOW_TOP_m < top_m < height_m + _ROOM_m]
+            heights_m = tuple(fitting_m) or (min(heights_m, key=lambda height_m: abs(height_m - top_m)),)
+        return heights_m[(index + index // 4) % len(heights_m)]
 
     def turn(self, yaw_rad: float) -> float:
         """A re-orientation that keeps the hand in its yaw window."""

@@ -337,14 +337,22 @@ def test_fixed_rule_alternates_sides_closings_and_heights() -> None:
     plans = [rule(contour_heights_m=(0.018, 0.03)).plan(index) for index in range(8)]
     assert [plan.closing for plan in plans] == ["radial", "radial", "pinch", "pinch"] * 2
     assert [plan.frame.yaw_rad > 0 for plan in plans] == [False, True] * 4
-    assert [plan.height_m for plan in plans] == [0.018] * 4 + [0.03] * 4
+    assert [plan.height_m for plan in plans] == [0.018, 0.03, 0.018, 0.03, 0.03, 0.018, 0.03, 0.018]
 
 
 @pytest.mark.parametrize(
     ("top_m", "used_m"),
-    [(None, {0.034, 0.018, 0.048}), (0.06, {0.034, 0.018, 0.048}), (0.04, {0.034, 0.018}), (0.01, {0.018})],
+    [
+        (None, {0.034, 0.018, 0.048}),
+        (0.01, {0.018}),
+        (0.04, {0.034, 0.018}),
+        (0.06, {0.034, 0.048}),
+        (0.12, {0.048}),
+    ],
 )
-def test_a_surface_is_touched_at_several_heights_below_its_top(top_m: float | None, used_m: set[float]) -> None:
+def test_a_surface_is_touched_below_its_top_and_with_room_for_the_hand_above_it(
+    top_m: float | None, used_m: set[float]
+) -> None:
     planner = FixedRule(PlanSettings(), np.random.default_rng(0), dimension=3)
     planner.top_m = top_m
     assert {planner.height_m(index) for index in range(12)} == used_m
