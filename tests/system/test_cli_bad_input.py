@@ -51,7 +51,7 @@ def one_line(answer, code: int, *words: str) -> None:
         (r"\Z", "cycle_s: 0.01\n", ("line ", "key 'cycle_s' appears twice")),
         (r"\Z", "hand: [1, 2\n", ("is not valid YAML", "line")),
         (
-            r"(?s)^conductor:.*",
+            r"\Z",
             "conductor: {grasps: 0, cycle: {grip: 1}}\n",
             ("conductor.grasps", "conductor.cycle.grip"),
         ),
