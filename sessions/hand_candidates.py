@@ -16,9 +16,9 @@ from typing import TypeAlias
 
 import numpy as np
 from gtsam import Pose2
-from numpy.typing import NDArray
 
 from drivers.shadow.closing import Closing, closing
+from drivers.shadow.link_balls import Verdicts
 from drivers.shadow.posture import TipEllipsoid
 from sessions.cycle_settings import CycleSettings
 from sessions.explorer import ExplorationSettings, KnownShape, closing_rays
@@ -32,7 +32,6 @@ from tactile_lab.exploration.candidates import Candidate, ClosingRays
 from tactile_lab.geometry.contacts import FINGERS, Array
 from tactile_lab.tracking.contact_set import planar_rotation
 
-Verdicts = NDArray[np.bool_]
 HasRoom: TypeAlias = Callable[[GraspPlan], bool]
 """Whether nothing that only the session knows of stands against a plan."""
 

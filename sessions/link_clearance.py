@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from gtsam import Pose2
@@ -57,9 +58,13 @@ class StandingObject:
             found = np.where(above_m > 0.0, over, np.maximum(beside_m, above_m))
         return np.asarray(found.reshape(places_world_m.shape[:-1]))
 
+    @cached_property
+    def _vertices(self) -> KDTree:
+        return KDTree(self.surface.points_m)
+
     def _beside(self, places_m: Array) -> Array:
         """Distances to the nearest vertices; of places behind those, to the tangent planes."""
-        nearest = KDTree(self.surface.points_m).query(places_m)[1]
+        nearest = self._vertices.query(places_m)[1]
         ways_m = places_m - self.surface.points_m[nearest]
         along_m = np.sum(ways_m * self.surface.normals[nearest], axis=1)
         return np.asarray(np.where(along_m > 0.0, np.linalg.norm(ways_m, axis=1), along_m))

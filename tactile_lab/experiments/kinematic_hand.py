@@ -15,12 +15,12 @@ from gtsam import Pose2, Pose3, Rot3
 from numpy.typing import NDArray
 
 from drivers.shadow.closing import closing
-from drivers.shadow.link_balls import PROGRESS, link_balls
+from drivers.shadow.link_balls import PROGRESS, Verdicts, link_balls
 from drivers.shadow.posture import TipEllipsoid
 from sessions.conductor import holds
 from sessions.cycle_settings import CycleSettings
 from sessions.grasp_plan import GraspPlan, evaded
-from sessions.hand_candidates import Verdicts, grasp_time_s, table_of
+from sessions.hand_candidates import grasp_time_s, table_of
 from sessions.motion import GraspFrame
 from sessions.planner import Reorientation
 from sessions.touching import TAP, TAP_HEIGHT_m
