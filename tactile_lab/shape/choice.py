@@ -29,6 +29,7 @@ FINGERTIP_RADIUS_m = 0.006
 
 _FREE_WEIGHT = 0.5
 _ON_OUTLINE_SIGMAS = 5.0
+_ON_FACE_SIGMAS, _BEYOND_m = 3.0, 0.010
 
 
 class GpisShape:
@@ -135,6 +136,18 @@ def free_evidence(contour: Contour, free_points_m: Array, gpis: Gpis) -> float:
 
 
 def _holds_contacts(polygon: Polygon) -> bool:
-    """All contacts but a few lie on the outline itself, not only on the lines of its faces."""
-    away = distances_to_polygon(polygon.contacts.points_m, polygon.outline_m)
-    return bool(np.mean(away > _ON_OUTLINE_SIGMAS * polygon.contacts.point_sigma_m) <= 0.05)
+    """All contacts but a few lie on the outline itself, not only on the lines of its faces, and none far along those.
+
+    A wrong contact may lie anywhere. One that continues a face in place and direction, far beyond its end, tells that
+    the object goes on there: faces that nobody has touched are missing.
+    """
+    contacts, faces = polygon.contacts, polygon.faces
+    away_m = distances_to_polygon(contacts.points_m, polygon.outline_m)
+    normals = faces.normals[faces.labels]
+    across_m = np.abs(np.sum(contacts.points_m * normals, axis=1) - faces.offsets_m[faces.labels])
+    turned_rad = np.arccos(np.clip(np.sum(contacts.normals * normals, axis=1), -1.0, 1.0))
+    continues = (across_m < _ON_FACE_SIGMAS * contacts.point_sigma_m) & (
+        turned_rad < _ON_FACE_SIGMAS * contacts.normal_sigma_rad
+    )
+    astray = np.mean(away_m > _ON_OUTLINE_SIGMAS * contacts.point_sigma_m)
+    return bool(astray <= 0.05 and not np.any(continues & (away_m > _BEYOND_m)))

@@ -69,6 +69,17 @@ def test_places_known_to_be_free_speak_against_a_model() -> None:
     assert best_shape(field, 1.2 * rectangle()).name == "polygon"
 
 
+@pytest.mark.parametrize(("turn_deg", "name"), [(0, "gpis"), (60, "polygon")])
+def test_a_contact_that_continues_a_face_far_beyond_its_end_speaks_against_a_model(turn_deg: float, name: str) -> None:
+    """It tells of sides that nobody has touched; one that points elsewhere is just wrong."""
+    points, normals = contacts_on_polygon(rectangle(), 40, seed=0)
+    turn = np.radians(-90 + turn_deg)
+    corner = rectangle().max(axis=0)
+    beyond = np.vstack([points, [corner[0] + 0.02, -corner[1]]])
+    with_one = Gpis.fit(beyond, np.vstack([normals, [np.cos(turn), np.sin(turn)]])).optimise()
+    assert best_shape(with_one).name == name
+
+
 def test_evidence_of_the_chosen_model_is_the_larger_one() -> None:
     field = Gpis.fit(*contacts_on_polygon(rectangle(), 40, seed=0)).optimise()
     sharp, smooth = best_shape(field).log_evidence, GpisShape(field).log_evidence
