@@ -40,7 +40,7 @@ class PlanSettings(StrictModel):
     closings: tuple[str, ...] = Field(default=("radial", "pinch"), min_length=1)
     contour_heights_m: tuple[float, ...] = Field(default=(0.034,), min_length=1)
     surface_heights_m: tuple[float, ...] = Field(default=(0.034, 0.018, 0.048), min_length=1)
-    contour_top_m: float = Field(default=0.06, gt=0.0)
+    contour_top_m: float = Field(default=0.05, gt=0.0)
     yaw_window_rad: tuple[float, float] = (-1.31, 1.31)
     start_m: tuple[float, float] = (0.0, 0.0)
     turn_rad: tuple[float, float] = (0.23, 0.79)

@@ -63,7 +63,7 @@ def description(information: Content) -> RigDescription:
     content = yaml.safe_load(shipped_rigs()["sim"].read_text())
     content["conductor"] = {
         "exploration": {"policy": "information", **FEW, "information": information},
-        "plan": {"closings": ["radial"], "surface_heights_m": [0.018]},
+        "plan": {"closings": ["radial"], "surface_heights_m": [0.018], "contour_top_m": 0.07},
     }
     return validate(content, RigDescription, where="rig")
 
