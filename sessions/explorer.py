@@ -15,7 +15,7 @@ import numpy as np
 from gtsam import Pose2
 from pydantic import Field, field_validator
 
-from drivers.shadow.closing import LEANING, Closing
+from drivers.shadow.closing import LEANING, Closing, within_reach
 from sessions.grasp_plan import GraspPlan
 from sessions.motion import GraspFrame
 from tactile_lab.errors import ShapeError
@@ -78,6 +78,13 @@ class ExplorationSettings(StrictModel):
         if unknown := sorted(set(names) - set(LEANING)):
             raise ValueError(f"closings {unknown} are not known; choose from {', '.join(LEANING)}")
         return names
+
+    @field_validator("side_heights_m")
+    @classmethod
+    def _can_be_worked_at(cls, heights_m: tuple[float, ...]) -> tuple[float, ...]:
+        if not all(map(within_reach, heights_m)):
+            raise ValueError("contact heights lie between 0.015 and 0.12 m")
+        return heights_m
 
 
 @dataclass(frozen=True)

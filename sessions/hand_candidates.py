@@ -130,11 +130,9 @@ def offer(
             ruled_out[reason] += failed
         plans = [plan for plan, fine in zip(plans, passed, strict=True) if fine]
     tap_from_m = (known.top_height_m or 0.0) + _TAP_FROM_m
-    pushing = _pushing(plans, limits, known, world_T_object)
-    candidates = [_as_candidate(plan, limits, here, tap_from_m) for plan in plans]
-    flagged = [replace(one, pushes=bool(pushes)) for one, pushes in zip(candidates, pushing, strict=True)]
-    found = tuple(HandCandidate(plan, candidate) for plan, candidate in zip(plans, flagged, strict=True))
-    return Offer(found, dict(ruled_out))
+    marked = zip(plans, _pushing(plans, limits, known, world_T_object), strict=True)
+    usable = tuple(_as_candidate(plan, limits, here, tap_from_m, bool(pushes)) for plan, pushes in marked)
+    return Offer(usable, dict(ruled_out))
 
 
 def _plans(limits: HandLimits, centre_world_m: Array) -> Iterator[GraspPlan]:
@@ -222,13 +220,15 @@ def _open_tips_m(plan: GraspPlan, tip: TipEllipsoid) -> Array:
 # --- what policies see ---------------------------------------------------------------------------------------------
 
 
-def _as_candidate(plan: GraspPlan, limits: HandLimits, here: GraspFrame | None, tap_from_m: float) -> Candidate:
+def _as_candidate(
+    plan: GraspPlan, limits: HandLimits, here: GraspFrame | None, tap_from_m: float, pushes: bool
+) -> HandCandidate:
     rays = closing_rays(table_of(plan, limits.tip))
     if limits.dimension == 3:
         rays = _with_tap(rays, plan.tap, tap_from_m, limits.tip)
     frame = plan.frame
     pose = Pose2(frame.x_m, frame.y_m, frame.yaw_rad)
-    return Candidate(pose, plan.closing, rays, grasp_time_s(plan, limits.cycle, here))
+    return HandCandidate(plan, Candidate(pose, plan.closing, rays, grasp_time_s(plan, limits.cycle, here), pushes))
 
 
 def _with_tap(rays: ClosingRays, taps: bool, from_m: float, tip: TipEllipsoid) -> ClosingRays:

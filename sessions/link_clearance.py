@@ -16,8 +16,8 @@ from gtsam import Pose2
 from scipy.spatial import KDTree
 
 from drivers.shadow.closing import closing
-from drivers.shadow.link_balls import PROGRESS, Verdicts, link_balls
-from drivers.shadow.posture import TipEllipsoid
+from drivers.shadow.link_balls import Verdicts, link_balls
+from drivers.shadow.posture import PROGRESS, TipEllipsoid
 from sessions.explorer import KnownShape
 from sessions.grasp_plan import GraspPlan
 from tactile_lab.exploration.policy import Surface

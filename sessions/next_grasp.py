@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from pydantic import Field, model_validator
 
-from drivers.shadow.closing import PRESHAPES
+from drivers.shadow.closing import PRESHAPES, within_reach
 from sessions.grasp_plan import GraspPlan
 from sessions.motion import GraspFrame
 from tactile_lab.geometry.contacts import Array, Grasp
@@ -51,7 +51,7 @@ class PlanSettings(StrictModel):
     def _sensible(self) -> PlanSettings:
         if unknown := sorted(set(self.closings) - set(PRESHAPES)):
             raise ValueError(f"closings {unknown} are not known; choose from {', '.join(PRESHAPES)}")
-        if not all(0.015 <= height_m <= 0.12 for height_m in self.contour_heights_m + self.surface_heights_m):
+        if not all(map(within_reach, self.contour_heights_m + self.surface_heights_m)):
             raise ValueError("contact heights lie between 0.015 and 0.12 m")
         if not self.yaw_window_rad[0] < self.yaw_window_rad[1]:
             raise ValueError("the yaw window's first value must be the smaller one")

@@ -166,6 +166,11 @@ CLOSINGS = frozenset({*PRESHAPES, *LEANING})
 """Names of all closings."""
 
 
+def within_reach(height_m: float) -> bool:
+    """Whether the hand can work with its fingertips' centres at that height above the table."""
+    return 0.015 <= height_m <= 0.12
+
+
 @lru_cache(maxsize=64)
 def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Closing:
     """The closing path table of one preshape at one height of the fingertip centres; kept in memory.
@@ -177,7 +182,7 @@ def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Clos
     """
     if name not in CLOSINGS:
         raise ConfigurationError(f"no closing called {name!r}", hint=f"Choose from {', '.join(sorted(CLOSINGS))}")
-    if not 0.015 <= height_m <= 0.12:
+    if not within_reach(height_m):
         raise ConfigurationError(
             f"contact height {height_m * 1e3:.0f} mm is outside 15 to 120 mm", hint="Choose a height in that range"
         )

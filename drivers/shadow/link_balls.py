@@ -16,16 +16,12 @@ from numpy.typing import NDArray
 from drivers.shadow.bodies import LINK_SHAPES, Ball, Capsule, Shape
 from drivers.shadow.closing import Closing, closing
 from drivers.shadow.kinematics import JOINT_INDEX, JOINT_TABLE, JOINTS, link_T_matrices
-from drivers.shadow.posture import NODES, TipEllipsoid, finger_joints
+from drivers.shadow.posture import NODES, PROGRESS, TipEllipsoid, finger_joints
 from tactile_lab.geometry.contacts import FINGERS, Array
-
-_SPACING_m = 0.008
-
 
 Verdicts: TypeAlias = NDArray[np.bool_]
 
-PROGRESS = np.linspace(0.0, 1.0, NODES)
-"""Progress of a closing's fingertips along their lines at the tabulated postures."""
+_SPACING_m = 0.008
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,9 @@ from tactile_lab.geometry.contacts import FINGERS, Array
 NODES = 16
 """Tabulated postures along a path."""
 
+PROGRESS: Array = np.linspace(0.0, 1.0, NODES)
+"""How far along it they are."""
+
 LEAN_rad = float(np.deg2rad(25.0))
 """Inward lean of the fingertips against the vertical."""
 
@@ -172,8 +175,7 @@ class _Solver:
 
     def _checked(self, palm: Array, table: Array) -> Postures:
         """The solved table with the part of each line that is kept to :data:`_TOLERANCE_m`."""
-        progress = np.linspace(0.0, 1.0, NODES)
-        targets_m = self._starts_m + progress[:, None, None] * (self._ends_m - self._starts_m)
+        targets_m = self._starts_m + PROGRESS[:, None, None] * (self._ends_m - self._starts_m)
         tips = self._tips(np.broadcast_to(palm, (NODES, 5)), table)
         error_m = np.abs(tips.centres_m - targets_m) * [1.0, 0.5, 0.0]
         good = (error_m.max(axis=-1) < _TOLERANCE_m) & (tips.lowest_m > _CLEARANCE_m - 0.003)

@@ -15,8 +15,8 @@ from gtsam import Pose2, Pose3, Rot3
 from numpy.typing import NDArray
 
 from drivers.shadow.closing import closing
-from drivers.shadow.link_balls import PROGRESS, Verdicts, link_balls
-from drivers.shadow.posture import TipEllipsoid
+from drivers.shadow.link_balls import Verdicts, link_balls
+from drivers.shadow.posture import PROGRESS, TipEllipsoid
 from sessions.conductor import holds
 from sessions.cycle_settings import CycleSettings
 from sessions.grasp_plan import GraspPlan, evaded
