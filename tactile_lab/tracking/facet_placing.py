@@ -5,6 +5,9 @@ width further along, fits about as well as the right one. Flat faces tell such p
 together from the wrong place does not lead to the right one: it has to be proposed. Each grasp is driven onto the
 object from many samples of the motion model, and the most promising other places are tried, one at a time.
 
+A trajectory that took a wrong turn goes on from there: the grasps that follow fit each other, and none of them can go
+back alone. So in space those after a grasp are driven onto the object from its other place too, and tried with it.
+
 In space grasps are driven onto the solid that the faces make. An outline tells its grasps apart as it grows; only those
 are asked again there that it explains badly or that say little, and they are driven onto the field of all others.
 """
@@ -14,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.solid_field import SolidField
@@ -24,7 +28,6 @@ from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.proposals import GraspMatch, Matched, ProposalSettings, elsewhere, propose
 from tactile_lab.tracking.sharp_judge import SharpJudge
 
-_MOST_ROUNDS = 3
 _OF_A_GRASP = 2
 _SAMPLES = 48
 """Enough on a solid, which pulls from farther away than a field that is vague between contacts."""
@@ -39,38 +42,42 @@ class _Search:
     """How far to look.
 
     Attributes:
+        rounds: at most so many places are taken, one after the other.
         tried: so many places in a round, each with the best place of the round before.
         hopeless_nats: a place that is foreseen to cost so much more is not tried; neighbours and faces that yield bring
             a few nats, and wrong contacts that turn out to be right some more.
         least_gain_nats: what a place has to bring. A grasp that has wrong contacts fits elsewhere nearly as well.
+        longest_run: so many successive grasps are placed elsewhere together.
     """
 
+    rounds: int
     tried: int
     hopeless_nats: float
     least_gain_nats: float
+    longest_run: int
 
 
-_IN_SPACE = _Search(tried=4, hopeless_nats=6.0, least_gain_nats=0.5)
-_IN_PLANE = _Search(tried=6, hopeless_nats=15.0, least_gain_nats=3.0)
+_IN_SPACE = _Search(rounds=12, tried=4, hopeless_nats=6.0, least_gain_nats=0.5, longest_run=6)
+_IN_PLANE = _Search(rounds=3, tried=6, hopeless_nats=15.0, least_gain_nats=3.0, longest_run=1)
 
 
 @dataclass(frozen=True)
 class _Place:
-    """One grasp at another place.
+    """A grasp at another place, or a few successive ones.
 
     Attributes:
-        index: of the grasp.
-        row: its pose there.
+        index: of the first grasp.
+        rows: their poses there, shape (k, size).
         change: foreseen in the cost, the rest staying where it is.
     """
 
     index: int
-    row: Array
+    rows: Array
     change: float
 
 
 def placed_on_object(best: Hypothesis, sharp: SharpJudge, noise: MotionNoise, settings: ProposalSettings) -> Hypothesis:
-    """The hypothesis with single grasps at other places of its object, as long as that makes it likelier.
+    """The hypothesis with grasps at other places of its object, as long as that makes it likelier.
 
     Args:
         best: a hypothesis; one in space without flat faces or upright walls stays as it is.
@@ -79,7 +86,7 @@ def placed_on_object(best: Hypothesis, sharp: SharpJudge, noise: MotionNoise, se
         settings: of the search.
     """
     search = _search(best.map)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(search.rounds):
         tried = [_tried(best.map, place, sharp) for place in _places(best, sharp, noise, settings)]
         found = min((each for each in tried if each is not None), key=cost, default=best)
         if found.cost > best.cost - search.least_gain_nats:
@@ -93,9 +100,11 @@ def _search(contact_map: ContactMap) -> _Search:
 
 
 def _tried(contact_map: ContactMap, place: _Place, sharp: SharpJudge) -> Hypothesis | None:
-    """The map with a grasp at another place, smoothed; None where its faces enclose nothing."""
-    whole = replace(contact_map.placed[place.index], row=place.row, left_out=frozenset(), moved=Moved.AS_MEANT)
-    moved = contact_map.with_placed(place.index, whole)
+    """The map with grasps at another place, smoothed; None where its faces enclose nothing."""
+    moved = contact_map
+    for index, row in enumerate(place.rows, start=place.index):
+        whole = replace(moved.placed[index], row=row, left_out=frozenset(), moved=Moved.AS_MEANT)
+        moved = moved.with_placed(index, whole)
     return sharp.settled(moved) if contact_map.dimension == 3 else sharp.smoothed(moved)
 
 
@@ -106,7 +115,8 @@ def _places(best: Hypothesis, sharp: SharpJudge, noise: MotionNoise, settings: P
         onto, settings = _onto_solid(best, sharp), settings.model_copy(update={"samples": _SAMPLES})
     else:
         onto = {i: known.without_grasp(i).fit() for i, grasp in enumerate(known.placed) if i and _is_doubtful(grasp)}
-    found = [place for i, field in onto.items() for place in _places_of(known, i, field, noise, settings)]
+    outlook = _Outlook(known, onto, noise, settings)
+    found = [place for index in onto for place in outlook.places(index)]
     return sorted(found, key=lambda place: place.change)[: search.tried]
 
 
@@ -124,26 +134,94 @@ def _is_doubtful(grasp: PlacedGrasp) -> bool:
     return len(grasp.contacts_world) >= _LITTLE and (bool(grasp.left_out) or len(grasp.kept) <= _LITTLE)
 
 
-def _places_of(
-    contact_map: ContactMap, index: int, field: Matched, noise: MotionNoise, settings: ProposalSettings
-) -> list[_Place]:
-    """Other places of one grasp on the object."""
-    space, grasp, rows = contact_map.space, contact_map.placed[index], contact_map.rows
-    contacts, wide, motion = grasp.contacts_world, noise.accumulated(2), MotionCost.of(contact_map, noise)
-    predicted = space.compose(grasp.motion, rows[index - 1])
-    proposed, _ = propose(predicted, contacts, field, wide, settings, space)
-    match = GraspMatch(predicted, contacts, field, wide, settings, space)
-    asked = np.vstack([rows[index : index + 1], proposed])
-    away = space.deviation(asked, predicted) / space.sigmas(wide)
-    told = match.fit(asked, match.variance(asked)).cost - 0.5 * np.sum(away**2, axis=1)
-    steps = np.array([motion.value(_moved(rows, index, row)) for row in asked])
-    changes = (told - told[0] + steps - steps[0])[1:]
-    hopeful = changes < _search(contact_map).hopeless_nats
-    chosen = np.flatnonzero(elsewhere(proposed, rows[index], settings, space) & hopeful)
-    return [_Place(index, proposed[i], float(changes[i])) for i in chosen[np.argsort(changes[chosen])][:_OF_A_GRASP]]
+class _Outlook:
+    """Other places of a trajectory's grasps, and what they would cost.
 
+    Args:
+        contact_map: the trajectory.
+        onto: what grasps are driven onto, by their number; the others stay where they are.
+        noise: of the motion model.
+        settings: of the proposals.
+    """
 
-def _moved(rows: Array, index: int, row: Array) -> Array:
-    changed = rows.copy()
-    changed[index] = row
-    return changed
+    def __init__(
+        self, contact_map: ContactMap, onto: dict[int, Matched], noise: MotionNoise, settings: ProposalSettings
+    ) -> None:
+        self._map, self._onto, self._settings = contact_map, onto, settings
+        self._rows, self._search = contact_map.rows, _search(contact_map)
+        self._wide, self._motion = noise.accumulated(2), MotionCost.of(contact_map, noise)
+        self._now = self._motion.steps(self._rows)
+        self._known: dict[int, tuple[Array, Array]] = {}
+
+    def places(self, index: int) -> list[_Place]:
+        """Of one grasp, and of those that follow it as far as a wrong turn may reach."""
+        rows, told = self._elsewhere(index, *self._driven_now(index))
+        alone = [self._place(index, row[None], each) for row, each in zip(rows, told, strict=True)]
+        paid = told + [self._entering(index, row) for row in rows]
+        first = [i for i in np.argsort(paid)[:_OF_A_GRASP] if paid[i] < self._search.hopeless_nats]
+        together = [place for i in first for place in self._runs(index, rows[i], float(told[i]), float(paid[i]))]
+        return self._best(alone) + self._best(together)
+
+    def _best(self, places: list[_Place]) -> list[_Place]:
+        hopeful = [place for place in places if place.change < self._search.hopeless_nats]
+        return sorted(hopeful, key=lambda place: place.change)[:_OF_A_GRASP]
+
+    def _runs(self, index: int, row: Array, told: float, paid: float) -> list[_Place]:
+        """A grasp elsewhere, with one and more of those after it where they then belong.
+
+        Args:
+            index: of the grasp.
+            row: its pose there.
+            told: change of its contacts' cost there.
+            paid: the same with that of the step to it.
+        """
+        found, run = [], row[None]
+        for following in range(index + 1, min(index + self._search.longest_run, len(self._rows))):
+            if following not in self._onto or paid > self._search.hopeless_nats:
+                break
+            rows, changes = self._elsewhere(following, *self._driven(following, run[-1]))
+            if len(rows) == 0:
+                break
+            steps = changes + [self._entering(following, row, run[-1]) for row in rows]
+            best = int(np.argmin(steps))
+            run, told, paid = np.vstack([run, rows[best]]), told + float(changes[best]), paid + float(steps[best])
+            found.append(self._place(index, run, told))
+        return found
+
+    def _elsewhere(self, index: int, rows: Array, costs: Array) -> tuple[Array, Array]:
+        """Those of the poses of a grasp that are other places, and its contacts' costs there over those where it is."""
+        now, costs_now = self._driven_now(index)
+        other, here = self._is_elsewhere(index, rows), ~self._is_elsewhere(index, now)
+        return rows[other], costs[other] - np.min(costs_now[here])
+
+    def _is_elsewhere(self, index: int, rows: Array) -> NDArray[np.bool_]:
+        return elsewhere(rows, self._rows[index], self._settings, self._map.space)
+
+    def _driven_now(self, index: int) -> tuple[Array, Array]:
+        """As :meth:`_driven`, the grasp before it staying where it is; asked for once."""
+        if index not in self._known:
+            self._known[index] = self._driven(index, self._rows[index - 1])
+        return self._known[index]
+
+    def _driven(self, index: int, before: Array) -> tuple[Array, Array]:
+        """Where a grasp is, and where it is driven onto the object after the one before, with its contacts' costs."""
+        space, grasp, field = self._map.space, self._map.placed[index], self._onto[index]
+        predicted = space.compose(grasp.motion, before)
+        proposed, _ = propose(predicted, grasp.contacts_world, field, self._wide, self._settings, space)
+        match = GraspMatch(predicted, grasp.contacts_world, field, self._wide, self._settings, space)
+        rows = np.vstack([self._rows[index], proposed])
+        away = space.deviation(rows, predicted) / space.sigmas(self._wide)
+        return rows, match.fit(rows, match.variance(rows)).cost - 0.5 * np.sum(away**2, axis=1)
+
+    def _place(self, index: int, rows: Array, told: float) -> _Place:
+        moved = self._rows.copy()
+        moved[index : index + len(rows)] = rows
+        return _Place(index, rows, told + float(np.sum(self._motion.steps(moved) - self._now)))
+
+    def _entering(self, index: int, row: Array, before: Array | None = None) -> float:
+        """Change in the cost of the step to a grasp alone, if it lies at another pose, and perhaps the one before."""
+        moved = self._rows.copy()
+        moved[index] = row
+        if before is not None:
+            moved[index - 1] = before
+        return float(self._motion.steps(moved)[index - 1] - self._now[index - 1])

@@ -59,8 +59,12 @@ class MotionCost:
 
     def value(self, rows: Array) -> float:
         """The cost of poses of shape (k, size)."""
+        return float(np.sum(self.steps(rows)))
+
+    def steps(self, rows: Array) -> Array:
+        """The cost of each step between poses of shape (k, size), shape (k - 1,)."""
         slip = self._lengths(self._scaled(rows))
-        return _cost(slip, np.maximum(slip - STIFF_BEYOND_SIGMA, 0.0))
+        return _costs(slip, np.maximum(slip - STIFF_BEYOND_SIGMA, 0.0))
 
     def value_and_gradient(self, rows: Array) -> tuple[float, Array]:
         """The cost and its derivative by each pose, shape (k, size)."""
@@ -73,7 +77,7 @@ class MotionCost:
         gradient = np.zeros_like(rows)
         gradient[1:] += np.einsum("kij,ki->kj", later, pull)
         gradient[:-1] += np.einsum("kij,ki->kj", earlier, pull)
-        return _cost(slip, excess), gradient
+        return float(np.sum(_costs(slip, excess))), gradient
 
     def information(self, rows: Array) -> Array:
         """Second derivative by all poses but the first, slips taken as Gaussian; shape ((k - 1) size, (k - 1) size)."""
@@ -102,8 +106,8 @@ class MotionCost:
         return np.sqrt(np.add.reduceat(scaled**2, [0, self._space.translations], axis=1))
 
 
-def _cost(slip: Array, excess: Array) -> float:
-    return float(0.5 * np.sum(slip**2) + 0.5 * _STIFFNESS * np.sum(excess**2))
+def _costs(slip: Array, excess: Array) -> Array:
+    return np.asarray(0.5 * np.sum(slip**2 + _STIFFNESS * excess**2, axis=1))
 
 
 def pushed_nats(noise: MotionNoise, space: PoseRows) -> float:

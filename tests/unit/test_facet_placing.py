@@ -98,6 +98,20 @@ def test_a_grasp_that_closed_on_the_wrong_faces_is_found_its_place(l_block: Cont
     assert abs(gap[2]) < 0.15
 
 
+def test_grasps_that_took_a_wrong_turn_together_are_turned_back_together() -> None:
+    """A third of a turn of a prism with three equal sides: only the motion tells, and only at both ends of the run."""
+    prism = true_map("triangular-prism", count=COUNT, dimension=3)
+    turned = prism
+    for index in (5, 6, 7, 8):
+        turned = moved(turned, index, [0.0, 0.0, 2 * np.pi / 3])
+    wrong, right = rated(turned), rated(prism)
+    found = placed_on_object(wrong, judge_of(prism), NOISE, ProposalSettings())
+    assert wrong.cost > right.cost + 5
+    assert found.cost < right.cost + 0.5
+    gaps = prism.space.deviation(found.map.rows[5:9], right.map.rows[5:9])
+    assert np.abs(gaps[:, 2]).max() < 0.15
+
+
 def test_what_is_round_has_no_other_places() -> None:
     contact_map = true_map("ellipsoid", count=12, dimension=3)
     smooth = Judge(NOISE, 2.0).rated(contact_map)
