@@ -53,7 +53,7 @@ class ExplorationSettings(StrictModel):
     """
 
     yaws: int = Field(default=12, ge=1)
-    shifts_m: tuple[float, ...] = Field(default=(-0.015, 0.0, 0.015), min_length=1)
+    shifts_m: tuple[float, ...] = Field(default=(-0.036, -0.024, -0.012, 0.0, 0.012, 0.024, 0.036), min_length=1)
     least_contacts: int = Field(default=4, ge=0)
     least_observability: float = Field(default=0.15, ge=0.0)
     policy: str | None = "information"
@@ -159,6 +159,7 @@ def closing_rays(table: Closing) -> ClosingRays:
         starts_m=np.array([path.centre_m(path.valid[0]) for path in paths]),
         directions=np.array([path.direction for path in paths]),
         lengths_m=np.array([path.length_m * (path.valid[1] - path.valid[0]) for path in paths]),
+        radius_m=table.radius_m,
     )
 
 

@@ -241,6 +241,7 @@ def _with_tap(rays: ClosingRays, taps: bool, from_m: float, tip: TipEllipsoid) -
         starts_m=np.vstack([rays.starts_m, above_m]),
         directions=np.vstack([rays.directions, np.tile([0.0, 0.0, -1.0], (len(FINGERS), 1))]),
         lengths_m=np.append(rays.lengths_m, np.full(len(FINGERS), from_m if taps else 0.0)),
+        radius_m=rays.radius_m,
     )
 
 

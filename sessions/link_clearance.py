@@ -95,5 +95,5 @@ def _are_clear(plans: Sequence[GraspPlan], tip: TipEllipsoid, target: StandingOb
     frames = np.array([plan.frame.pose.matrix() for plan in plans])[:, None, None]
     distances_m = target.distances_m((frames[..., :3, :3] @ places_m[..., None])[..., 0] + frames[..., :3, 3])
     links_m, tips_m = np.split(distances_m, [-len(FINGERS)], axis=-1)
-    touching = (tips_m < tip.semi_axes_m[1]) & balls.usable[_POSTURES]
+    touching = (tips_m < tip.radius_m) & balls.usable[_POSTURES]
     return ~balls.met(links_m - _MARGIN_m, ~np.logical_or.accumulate(touching, axis=1), _POSTURES)

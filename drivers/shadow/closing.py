@@ -62,6 +62,7 @@ class Closing:
     Attributes:
         name: a key of :data:`PRESHAPES` or :data:`LEANING`.
         height_m: height of the fingertip centres above the table; where the hand leans, of the lowest one.
+        radius_m: of the fingertips, across the finger.
         grasp_T_palm: the palm in the grasp frame, wrist straight.
         paths: each finger's line.
         tables: each finger's joint angles along its line, shape (NODES, joints of the finger), radians, in the order
@@ -70,6 +71,7 @@ class Closing:
 
     name: str
     height_m: float
+    radius_m: float
     grasp_T_palm: Pose3
     paths: Mapping[str, TipPath]
     tables: Mapping[str, Array]
@@ -192,11 +194,12 @@ def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Clos
         np.array([(*points[finger], height_m) for finger in FINGERS])
         for points in (PRESHAPES[name].starts_m, PRESHAPES[name].ends_m)
     )
-    postures = solve_postures(starts_m, ends_m, tip or TipEllipsoid())
+    tip = tip or TipEllipsoid()
+    postures = solve_postures(starts_m, ends_m, tip)
     paths = {
         finger: TipPath(starts_m[index], ends_m[index], postures.valid[finger]) for index, finger in enumerate(FINGERS)
     }
-    return Closing(name, height_m, postures.grasp_T_palm, paths, postures.tables_rad)
+    return Closing(name, height_m, tip.radius_m, postures.grasp_T_palm, paths, postures.tables_rad)
 
 
 def _leaning(name: str, height_m: float, tip: TipEllipsoid | None) -> Closing:
@@ -208,7 +211,7 @@ def _leaning(name: str, height_m: float, tip: TipEllipsoid | None) -> Closing:
         finger: TipPath(lean.transformFrom(path.start_m), lean.transformFrom(path.end_m), path.valid)
         for finger, path in upright.paths.items()
     }
-    return Closing(name, height_m, lean * upright.grasp_T_palm, paths, upright.tables)
+    return Closing(name, height_m, upright.radius_m, lean * upright.grasp_T_palm, paths, upright.tables)
 
 
 _COUPLED = {f"{finger}{joint}": f"{finger}J0" for finger in LONG_FINGERS for joint in ("J1", "J2")}

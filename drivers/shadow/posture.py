@@ -44,6 +44,11 @@ class TipEllipsoid:
     semi_axes_m: tuple[float, float, float] = (0.0085, 0.0085, 0.013)
     centre_distal_m: tuple[float, float, float] = (0.0, 0.0, 0.019)
 
+    @property
+    def radius_m(self) -> float:
+        """Across the finger: as far from its centre it touches what it closes on."""
+        return self.semi_axes_m[1]
+
 
 @dataclass(frozen=True)
 class Postures:
@@ -122,8 +127,7 @@ class _Solver:
 
     def _middle_progress(self) -> Array:
         """Progress of each finger when the tips touch an object of typical width."""
-        radius = self._tip.semi_axes_m[1]
-        touch_m = np.where(np.array(FINGERS) == "TH", -1.0, 1.0) * (_MID_WIDTH_m / 2 + radius)
+        touch_m = np.where(np.array(FINGERS) == "TH", -1.0, 1.0) * (_MID_WIDTH_m / 2 + self._tip.radius_m)
         progress = (self._starts_m[:, 0] - touch_m) / (self._starts_m[:, 0] - self._ends_m[:, 0])
         return np.asarray(np.clip(progress, 0.0, 1.0))
 

@@ -82,7 +82,7 @@ class KinematicHand:
         rng: np.random.Generator,
     ) -> None:
         self._solid, self._cycle, self._tip, self._window_rad, self._rng = solid, cycle, tip, yaw_window_rad, rng
-        self._radius_m = tip.semi_axes_m[0]
+        self._radius_m = tip.radius_m
         place = planar_pose(rng.normal(0.0, PLACE_SIGMA_m, 2), rng.uniform(-np.pi, np.pi))
         self.world_T_body = spatial(place, -solid.foot_m)
         self.elapsed_s = 0.0

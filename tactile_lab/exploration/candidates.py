@@ -16,19 +16,22 @@ _STEP_m = 0.001
 
 @dataclass(frozen=True)
 class ClosingRays:
-    """Straight approximations of the fingertips' paths in the grasp frame.
+    """Straight approximations of the paths of the fingertips' centres in the grasp frame.
 
     Attributes:
         fingers: name of each ray's finger.
         starts_m: shape (n, 3), grasp frame: x along the fingers, z up, z = 0 the table.
         directions: unit vectors, shape (n, 3).
         lengths_m: how far each finger closes, shape (n,).
+        radius_m: of the fingertips, taken as balls; 0 for points. A ball that comes upon a face at an angle touches it
+            beside its way, at 45 degrees by its radius.
     """
 
     fingers: tuple[str, ...]
     starts_m: Array
     directions: Array
     lengths_m: Array
+    radius_m: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class PredictedContacts:
-    """Where the rays of a candidate first meet the modelled surface.
+    """Where the fingertips of a candidate first meet the modelled surface.
 
     Attributes:
         fingers: those expected to touch.
@@ -104,23 +107,36 @@ def ring_of_candidates(
 
 
 def predict_contacts(candidate: Candidate, known: ModelledObject) -> PredictedContacts:
-    """First change of the field from outside to inside along each closing ray; rays that meet nothing are left out."""
+    """Where the field first falls to the fingertips' radius along each closing ray; others are left out.
+
+    Close to the surface the field is the distance from it.
+    """
     starts, directions = _in_object_frame(candidate, known)
     rays = candidate.rays
     steps = np.arange(0.0, float(rays.lengths_m.max()) + _STEP_m, _STEP_m)
     samples = starts[:, None] + steps[:, None] * directions[:, None]
     asked = steps <= rays.lengths_m[:, None]
     values = np.full(asked.shape, np.inf)
-    values[asked] = known.field.predict(samples[asked]).mean_m
+    values[asked] = known.field.predict(samples[asked]).mean_m - rays.radius_m
     crossing = (values[:, :-1] > 0) & (values[:, 1:] <= 0)
     touching = np.flatnonzero(crossing.any(axis=1))
     before = crossing[touching].argmax(axis=1)
     outside, inside = values[touching, before], values[touching, before + 1]
     distances = steps[before] + _STEP_m * outside / (outside - inside)
-    points = starts[touching] + distances[:, None] * directions[touching]
+    centres = starts[touching] + distances[:, None] * directions[touching]
+    points = centres - rays.radius_m * _outward(known.field, centres)
     variances = known.field.predict(points, variance=True).variance_m2 if len(points) else np.empty(0)
     assert variances is not None
     return PredictedContacts(tuple(rays.fingers[index] for index in touching), points, variances)
+
+
+def _outward(field: Field, points_m: Array) -> Array:
+    """Unit vectors along the field's gradient, shape (n, d)."""
+    if len(points_m) == 0:
+        return points_m
+    slopes = field.predict(points_m, gradient=True).gradient
+    assert slopes is not None
+    return np.asarray(slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-9))
 
 
 def _in_object_frame(candidate: Candidate, known: ModelledObject) -> tuple[Array, Array]:

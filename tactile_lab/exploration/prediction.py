@@ -130,17 +130,24 @@ def most_fingers(candidates: Sequence[Candidate]) -> int:
 
 
 def expected_touches(candidates: Sequence[Candidate], belief: Belief, worlds: PossibleWorlds) -> ExpectedTouches:
-    """Cast the fingers' ways of all candidates in all worlds; candidates with fewer fingers touch with fewer."""
+    """Cast the fingers' ways of all candidates in all worlds; candidates with fewer fingers touch with fewer.
+
+    A fingertip's centre comes to rest on the surface moved outward by its radius, which all candidates share, and
+    touches the place that this part of it was moved from.
+    """
     fingers = worlds.finger_errors_m.shape[1]
     padded = [_padded(candidate.rays, fingers) for candidate in candidates]
     starts, ways, longest = (np.array(parts) for parts in zip(*padded, strict=True))
     frames = np.array([pose_row(candidate.world_T_grasp) for candidate in candidates])
     starts, ways, longest = *_in_worlds(frames, starts, ways, belief, worlds), longest.ravel()
-    distances = first_hits(worlds.corners_m, worlds.surface.cells, starts, ways, longest)
+    outward_m = candidates[0].rays.radius_m * worlds.surface.normals
+    around_m = worlds.corners_m + outward_m
+    distances = first_hits(around_m, worlds.surface.cells, starts, ways, longest)
     touching = np.isfinite(distances)
     points = starts + np.where(touching, distances, np.nan)[..., None] * ways
     vertices = np.full(distances.shape, -1, dtype=np.int64)
-    vertices[touching] = _nearest(worlds, points, touching)
+    vertices[touching] = _nearest(around_m, points, touching)
+    points[touching] -= outward_m[vertices[touching]]
     shape = (len(distances), len(candidates), fingers)
     return ExpectedTouches(
         vertices.reshape(shape).transpose(1, 0, 2), points.reshape(*shape, belief.dimension).transpose(1, 0, 2, 3)
@@ -156,9 +163,9 @@ def _padded(rays: ClosingRays, fingers: int) -> tuple[Array, Array, Array]:
     return np.pad(rays.starts_m, ((0, absent), (0, 0))), ways, np.pad(rays.lengths_m, (0, absent))
 
 
-def _nearest(worlds: PossibleWorlds, points: Array, touching: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _nearest(corners_m: Array, points: Array, touching: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Index of the vertex, in its own world, nearest to each touch."""
-    worldwise = zip(worlds.corners_m, points, touching, strict=True)
+    worldwise = zip(corners_m, points, touching, strict=True)
     return np.concatenate([cKDTree(corners).query(own[met])[1] for corners, own, met in worldwise]).astype(np.int64)
 
 

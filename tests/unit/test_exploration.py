@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gtsam import Pose2
@@ -50,6 +52,21 @@ def test_rays_touch_where_they_first_meet_the_surface() -> None:
     found = predict_contacts(Candidate(Pose2(), "radial", rays(0.0, 2.0)), known())
     assert found.fingers == ("FF", "MF")
     assert np.allclose(found.points_object_m, RADIUS_m * np.array([[1, 0], [np.cos(2), np.sin(2)]]), atol=1e-5)
+
+
+def test_a_round_fingertip_touches_beside_its_way_what_it_meets_at_an_angle() -> None:
+    """A ball that passes a disc 24 mm beside its middle, at rest when the centres are both radii apart."""
+    aside_m = 0.024
+    ball = rays(0.0)
+    starts = ball.starts_m + np.array([0.0, aside_m, 0.0])
+    thick = ClosingRays(("FF",), starts, ball.directions, ball.lengths_m, radius_m=0.008)
+    found = predict_contacts(Candidate(Pose2(), "pinch", thick), known())
+    rest = np.array([np.sqrt((RADIUS_m + 0.008) ** 2 - aside_m**2), aside_m])
+    assert np.allclose(found.points_object_m, RADIUS_m * rest / np.linalg.norm(rest), atol=2e-5)
+    assert found.points_object_m[0, 1] < aside_m - 0.004
+    passing = replace(thick, starts_m=ball.starts_m + np.array([0.0, RADIUS_m + 0.007, 0.0]))
+    assert predict_contacts(Candidate(Pose2(), "pinch", passing), known()).fingers == ("FF",)
+    assert predict_contacts(Candidate(Pose2(), "pinch", replace(passing, radius_m=0.006)), known()).fingers == ()
 
 
 def test_rays_that_pass_by_or_end_early_touch_nothing() -> None:

@@ -34,6 +34,36 @@ def test_the_nominal_touches_are_those_on_the_field() -> None:
         assert points[0][met[0]] == pytest.approx(expected, abs=1.5e-3)
 
 
+@pytest.mark.parametrize("turn_rad", [0.0, 0.5, -0.8])
+def test_balls_touch_a_long_side_beside_their_way(turn_rad: float) -> None:
+    """Upward onto the lower side, at an angle: by ``radius * tan(angle)`` beside where the middle's way meets it."""
+    belief, radius_m = belief_of_right_end_unknown(POSE), 0.008
+    assert belief.surface is not None
+    way = np.array([np.sin(turn_rad), np.cos(turn_rad), 0.0])
+    start = np.array([-0.02, -0.03, 0.0]) - 0.06 * way
+    points = {}
+    for radius in (0.0, radius_m):
+        ball = ClosingRays(("FF",), start[None], way[None], np.array([0.1]), radius)
+        touches = expected_touches([Candidate(POSE, "one", ball)], belief, nominal_world(belief, belief.surface, 1))
+        points[radius] = touches.points_m[0, 0, 0]
+    assert points[0.0] == pytest.approx([-0.02, -0.03], abs=1.5e-3)
+    aside_m = radius_m * np.tan(turn_rad)
+    assert points[radius_m] == pytest.approx([-0.02 - aside_m, -0.03], abs=1.5e-3)
+
+
+def test_balls_touch_where_they_meet_the_field() -> None:
+    belief = belief_of_right_end_unknown(POSE)
+    assert belief.surface is not None
+    for candidate in ten(POSE):
+        thick = replace(candidate, rays=replace(candidate.rays, radius_m=0.008))
+        touches = expected_touches([thick], belief, nominal_world(belief, belief.surface, 5))
+        expected = predict_contacts(thick, belief.modelled).points_object_m
+        met = touches.touching[0, 0]
+        apart_m = np.linalg.norm(touches.points_m[0, 0][met] - expected, axis=1)
+        assert np.median(apart_m) < 0.002
+        assert apart_m.max() < 0.005  # around a corner the field is rounder than the surface moved outward
+
+
 @pytest.mark.parametrize("name", ["l-block", "sphere"])
 def test_compiled_hits_on_a_mesh_are_the_plain_ones(name: str) -> None:
     mesh = solid(name).mesh
