@@ -47,6 +47,9 @@ from tactile_lab.shape.gpis import Gpis
 from tactile_lab.tracking.motion import MotionNoise
 from tests.support.box_shapes import FLAT_BOX, SOLID_BOX, HEIGHT_m, flat_box
 
+YAWS, SHIFTS, CLOSINGS, HEIGHTS, LEANING_HEIGHTS = 12, 7, 2, 3, 2
+IN_PLANE = YAWS * SHIFTS * CLOSINGS
+
 
 def limits(dimension: int = 2, **changes: object) -> HandLimits:
     made = HandLimits(
@@ -60,16 +63,19 @@ def limits(dimension: int = 2, **changes: object) -> HandLimits:
 
 def test_every_yaw_shift_and_closing_is_considered() -> None:
     found = offer(limits(), FLAT_BOX, Pose2())
-    assert len(found.usable) + sum(found.ruled_out.values()) == 12 * 3 * 2
+    assert len(found.usable) + sum(found.ruled_out.values()) == IN_PLANE
     assert {one.plan.closing for one in found.usable} == {"pinch", "radial"}
     assert not any(one.plan.tap for one in found.usable)
 
 
 def test_in_space_heights_and_taps_come_on_top() -> None:
     found = offer(limits(3), SOLID_BOX, Pose2())
-    assert len(found.usable) + sum(found.ruled_out.values()) == 12 * 3 * 2 * 3 + 12 * 2 + 12 * 3 * 2
+    assert (
+        len(found.usable) + sum(found.ruled_out.values())
+        == IN_PLANE * HEIGHTS + YAWS * CLOSINGS + YAWS * SHIFTS * LEANING_HEIGHTS
+    )
     assert {one.plan.height_m for one in found.usable} == {0.018, 0.026, 0.034}
-    assert found.ruled_out[TOO_HIGH] == 12 * 3 * 2  # the box is 40 mm high, and the third height 48
+    assert found.ruled_out[TOO_HIGH] == IN_PLANE  # the box is 40 mm high, and the third height 48
     taps = [one for one in found.usable if one.plan.tap]
     assert taps
     assert len({len(one.candidate.rays.fingers) for one in found.usable}) == 1  # policies compare like with like
@@ -107,15 +113,15 @@ def test_a_tap_is_expected_on_the_top() -> None:
 def test_object_out_of_reach_offers_nothing_and_says_so() -> None:
     found = offer(limits(), FLAT_BOX, Pose2(0.6, 0.0, 0.0))
     assert found.usable == ()
-    assert found.ruled_out == {OUT_OF_REACH: 72}
-    assert found.obstacles == f"72: {OUT_OF_REACH}"
+    assert found.ruled_out == {OUT_OF_REACH: IN_PLANE}
+    assert found.obstacles == f"{IN_PLANE}: {OUT_OF_REACH}"
 
 
 def test_object_too_large_for_the_opening_offers_nothing() -> None:
     huge = flat_box(0.09, 0.09)
     found = offer(limits(), huge, Pose2())
     assert found.usable == ()
-    assert found.ruled_out[NO_ROOM] == 72
+    assert found.ruled_out[NO_ROOM] == IN_PLANE
 
 
 def test_object_as_high_as_the_palm_offers_nothing() -> None:
@@ -127,7 +133,7 @@ def test_object_as_high_as_the_palm_offers_nothing() -> None:
 def test_places_the_hand_has_landed_at_are_ruled_out() -> None:
     found = offer(limits(), FLAT_BOX, Pose2(), has_room=lambda plan: plan.closing == "pinch")
     assert {one.plan.closing for one in found.usable} == {"pinch"}
-    assert found.ruled_out[LANDED] == 36
+    assert found.ruled_out[LANDED] == IN_PLANE // 2
 
 
 def test_fingers_come_down_clear_of_what_bulges_above_them() -> None:
