@@ -19,7 +19,7 @@ from drivers.shadow.closing import LEANING, Closing, within_reach
 from sessions.grasp_plan import GraspPlan
 from sessions.motion import GraspFrame
 from tactile_lab.errors import ShapeError
-from tactile_lab.exploration.candidates import Candidate, ClosingRays, ModelledObject, ring_of_candidates
+from tactile_lab.exploration.candidates import Candidate, ClosingRays, ModelledObject, outward, ring_of_candidates
 from tactile_lab.exploration.expected_information import InformationSettings
 from tactile_lab.exploration.policies import POLICIES
 from tactile_lab.exploration.policy import Surface
@@ -209,9 +209,7 @@ def _observability(item: RatedCandidate, known: ModelledObject) -> float:
     points_m = item.contacts.points_object_m
     if not len(points_m):
         return 0.0
-    slopes = known.field.predict(points_m, gradient=True).gradient
-    assert slopes is not None
-    return planar_observability(points_m, slopes / np.linalg.norm(slopes, axis=1, keepdims=True)).smallest
+    return planar_observability(points_m, outward(known.field, points_m)).smallest
 
 
 def _plan(candidate: Candidate, table: Callable[[str], Closing]) -> GraspPlan:

@@ -2,9 +2,9 @@
 
 A candidate is a grasp frame (every yaw of the arm's window, shifts across it), a closing, a height of the fingertips
 and, where a surface is wanted, perhaps a tap on the top before it, or a hand that leans to one side. Its expected
-contacts follow from the kinematics: the closing's lines against the estimated surface. What the arm can not reach,
-where the open fingers would come down on the object or the palm rest on it, and what the hand has just landed on, is no
-candidate. What would push the object by a link that feels nothing is marked.
+contacts follow from the kinematics: round fingertips on the closing's lines against the estimated surface. What the arm
+can not reach, where the open fingers would come down on the object or the palm rest on it, and what the hand has just
+landed on, is no candidate. What would push the object by a link that feels nothing is marked.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import TypeAlias
 
 import numpy as np
@@ -130,8 +131,9 @@ def offer(
             ruled_out[reason] += failed
         plans = [plan for plan, fine in zip(plans, passed, strict=True) if fine]
     tap_from_m = (known.top_height_m or 0.0) + _TAP_FROM_m
+    rays_of = cache(partial(_rays, limits, tap_from_m))  # yaws and shifts of one closing share them
     marked = zip(plans, _pushing(plans, limits, known, world_T_object), strict=True)
-    usable = tuple(_as_candidate(plan, limits, here, tap_from_m, bool(pushes)) for plan, pushes in marked)
+    usable = tuple(_as_candidate(plan, limits, here, rays_of, bool(pushes)) for plan, pushes in marked)
     return Offer(usable, dict(ruled_out))
 
 
@@ -221,14 +223,16 @@ def _open_tips_m(plan: GraspPlan, tip: TipEllipsoid) -> Array:
 
 
 def _as_candidate(
-    plan: GraspPlan, limits: HandLimits, here: GraspFrame | None, tap_from_m: float, pushes: bool
+    plan: GraspPlan, limits: HandLimits, here: GraspFrame | None, rays_of: Callable[..., ClosingRays], pushes: bool
 ) -> HandCandidate:
-    rays = closing_rays(table_of(plan, limits.tip))
-    if limits.dimension == 3:
-        rays = _with_tap(rays, plan.tap, tap_from_m, limits.tip)
-    frame = plan.frame
+    frame, rays = plan.frame, rays_of(plan.closing, plan.height_m, plan.tap)
     pose = Pose2(frame.x_m, frame.y_m, frame.yaw_rad)
     return HandCandidate(plan, Candidate(pose, plan.closing, rays, grasp_time_s(plan, limits.cycle, here), pushes))
+
+
+def _rays(limits: HandLimits, tap_from_m: float, name: str, height_m: float, tap: bool) -> ClosingRays:
+    rays = closing_rays(closing(name, height_m, limits.tip))
+    return _with_tap(rays, tap, tap_from_m, limits.tip) if limits.dimension == 3 else rays
 
 
 def _with_tap(rays: ClosingRays, taps: bool, from_m: float, tip: TipEllipsoid) -> ClosingRays:

@@ -124,14 +124,14 @@ def predict_contacts(candidate: Candidate, known: ModelledObject) -> PredictedCo
     outside, inside = values[touching, before], values[touching, before + 1]
     distances = steps[before] + _STEP_m * outside / (outside - inside)
     centres = starts[touching] + distances[:, None] * directions[touching]
-    points = centres - rays.radius_m * _outward(known.field, centres)
+    points = centres - rays.radius_m * outward(known.field, centres)
     variances = known.field.predict(points, variance=True).variance_m2 if len(points) else np.empty(0)
     assert variances is not None
     return PredictedContacts(tuple(rays.fingers[index] for index in touching), points, variances)
 
 
-def _outward(field: Field, points_m: Array) -> Array:
-    """Unit vectors along the field's gradient, shape (n, d)."""
+def outward(field: Field, points_m: Array) -> Array:
+    """Unit vectors along the field's gradient at points of shape (n, d), which is theirs too."""
     if len(points_m) == 0:
         return points_m
     slopes = field.predict(points_m, gradient=True).gradient

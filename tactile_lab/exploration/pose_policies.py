@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from pydantic import Field
 
-from tactile_lab.exploration.candidates import Candidate
+from tactile_lab.exploration.candidates import Candidate, outward
 from tactile_lab.exploration.information.distributions import kl_divergence, mutual_information, renyi_entropy
 from tactile_lab.exploration.information.particles import determinant, mixture_entropy, modes, weighted_covariance
 from tactile_lab.exploration.policy import Belief, Decision, Policy, best_of, nothing_to_choose
@@ -142,13 +142,11 @@ class PoseSwitchPolicy:
 
 def imagined(points_m: Array, belief: Belief, settings: PoseSwitchSettings) -> ContactSet:
     """Contacts in the world as the estimate expects them, at points of shape (m, d) in the object frame."""
-    slopes = np.asarray(belief.field.predict(points_m, gradient=True).gradient)
-    normals = slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-9)
     row = pose_row(belief.world_T_object)
     turn = planar_rotation(float(row[2]))
-    places, directions = points_m.copy(), normals.copy()
+    places, directions = points_m.copy(), outward(belief.field, points_m)
     places[:, :2] = points_m[:, :2] @ turn.T + row[:2]
-    directions[:, :2] = normals[:, :2] @ turn.T
+    directions[:, :2] = directions[:, :2] @ turn.T
     count = len(points_m)
     return ContactSet(
         places, directions, np.full(count, settings.point_sigma_m), np.full(count, settings.normal_sigma_rad)

@@ -157,7 +157,7 @@ class _Outlook:
         """Of one grasp, and of those that follow it as far as a wrong turn may reach."""
         rows, told = self._elsewhere(index, *self._driven_now(index))
         alone = [self._place(index, row[None], each) for row, each in zip(rows, told, strict=True)]
-        paid = told + [self._entering(index, row) for row in rows]
+        paid = told + [self._step_changes(index, row[None])[index - 1] for row in rows]
         first = [i for i in np.argsort(paid)[:_OF_A_GRASP] if paid[i] < self._search.hopeless_nats]
         together = [place for i in first for place in self._runs(index, rows[i], float(told[i]), float(paid[i]))]
         return self._best(alone) + self._best(together)
@@ -182,9 +182,10 @@ class _Outlook:
             rows, changes = self._elsewhere(following, *self._driven(following, run[-1]))
             if len(rows) == 0:
                 break
-            steps = changes + [self._entering(following, row, run[-1]) for row in rows]
-            best = int(np.argmin(steps))
-            run, told, paid = np.vstack([run, rows[best]]), told + float(changes[best]), paid + float(steps[best])
+            longer = [np.vstack([run, each]) for each in rows]
+            prices = changes + [self._step_changes(index, each)[following - 1] for each in longer]
+            best = int(np.argmin(prices))
+            run, told, paid = longer[best], told + float(changes[best]), paid + float(prices[best])
             found.append(self._place(index, run, told))
         return found
 
@@ -214,14 +215,10 @@ class _Outlook:
         return rows, match.fit(rows, match.variance(rows)).cost - 0.5 * np.sum(away**2, axis=1)
 
     def _place(self, index: int, rows: Array, told: float) -> _Place:
+        return _Place(index, rows, told + float(np.sum(self._step_changes(index, rows))))
+
+    def _step_changes(self, index: int, rows: Array) -> Array:
+        """How the cost of each step changes with a run of grasps, from one on, at other poses, shape (k - 1,)."""
         moved = self._rows.copy()
         moved[index : index + len(rows)] = rows
-        return _Place(index, rows, told + float(np.sum(self._motion.steps(moved) - self._now)))
-
-    def _entering(self, index: int, row: Array, before: Array | None = None) -> float:
-        """Change in the cost of the step to a grasp alone, if it lies at another pose, and perhaps the one before."""
-        moved = self._rows.copy()
-        moved[index] = row
-        if before is not None:
-            moved[index - 1] = before
-        return float(self._motion.steps(moved)[index - 1] - self._now[index - 1])
+        return self._motion.steps(moved) - self._now
