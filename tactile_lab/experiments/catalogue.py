@@ -15,6 +15,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         solids.METHODS_3D,
         solids.KNOWN_SHAPE,
         solids.METHODS_6DOF,
+        planar.CONTOUR_LIMIT,
         planar.RANDOM_CONTACTS,
         thesis_figures.FIGURE_2_7,
         thesis_figures.FIGURE_2_12,

@@ -62,8 +62,18 @@ def sample_mesh_with_normals(mesh: TriangleMesh, count: int, seed: int = 0) -> t
 def distances_to_polygon(points_m: Array, polygon_m: Array) -> Array:
     """Exact distances from points of shape (q, 2) to the outline of a closed polygon of shape (n, 2)."""
     size = max(1, _PAIRS_AT_ONCE // len(polygon_m))
-    blocks = [_distances_to_segments(points_m[i : i + size], polygon_m) for i in range(0, len(points_m), size)]
-    return np.concatenate(blocks)
+    blocks = [distances_to_sides(points_m[i : i + size], polygon_m) for i in range(0, len(points_m), size)]
+    return np.concatenate([block.min(axis=1) for block in blocks])
+
+
+def distances_to_sides(points_m: Array, polygon_m: Array) -> Array:
+    """Exact distances, shape (q, n), from points of shape (q, 2) to each side of a closed polygon of shape (n, 2)."""
+    starts_x, starts_y = polygon_m.T
+    edges_x, edges_y = (np.roll(polygon_m, -1, axis=0) - polygon_m).T
+    squared_lengths = np.maximum(edges_x**2 + edges_y**2, np.finfo(float).tiny)
+    from_x, from_y = points_m[:, :1] - starts_x, points_m[:, 1:] - starts_y
+    share = np.clip((from_x * edges_x + from_y * edges_y) / squared_lengths, 0.0, 1.0)
+    return np.asarray(np.hypot(from_x - share * edges_x, from_y - share * edges_y))
 
 
 def distances_to_mesh(points_m: Array, mesh: TriangleMesh) -> Array:
@@ -83,12 +93,3 @@ def nearest_on_mesh(points_m: Array, mesh: TriangleMesh) -> tuple[Array, Array]:
 def mesh_arrays(mesh: TriangleMesh) -> tuple[Array, Any]:
     """Vertices and faces as contiguous arrays of float64 and int64."""
     return np.ascontiguousarray(mesh.vertices, dtype=float), np.ascontiguousarray(mesh.faces, dtype=np.int64)
-
-
-def _distances_to_segments(points_m: Array, polygon_m: Array) -> Array:
-    starts_x, starts_y = polygon_m.T
-    edges_x, edges_y = (np.roll(polygon_m, -1, axis=0) - polygon_m).T
-    squared_lengths = np.maximum(edges_x**2 + edges_y**2, np.finfo(float).tiny)
-    from_x, from_y = points_m[:, :1] - starts_x, points_m[:, 1:] - starts_y
-    share = np.clip((from_x * edges_x + from_y * edges_y) / squared_lengths, 0.0, 1.0)
-    return np.asarray(np.hypot(from_x - share * edges_x, from_y - share * edges_y).min(axis=1))

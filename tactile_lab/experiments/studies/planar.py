@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from tactile_lab.experiments import shape_runs, tracking_runs
+from tactile_lab.experiments import contour_limit, shape_runs, tracking_runs
 from tactile_lab.experiments.cells import Setting, grid
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.study_columns import (
+    AGAINST_KNOWN,
+    MEAN_DISTANCE,
     SHAPE_COLUMNS,
     TRACKING_COLUMNS,
 )
@@ -24,6 +26,11 @@ def _methods_in_plane(grasps: int) -> list[Setting]:
     ]
 
 
+def _limits_in_plane(grasps: int) -> list[Setting]:
+    shapes, methods = contour_limit.POLYGONS, contour_limit.METHODS
+    return grid(noise=[100, 50], sides=contour_limit.SIDES, shape=shapes, method=methods, grasps=[grasps])
+
+
 METHODS_2D = Experiment(
     "methods-2d",
     "All methods on all planar shapes, at 100 % and 50 % motion noise and with 10 % outliers.",
@@ -31,6 +38,17 @@ METHODS_2D = Experiment(
     tracking_runs.track_in_plane,
     TRACKING_COLUMNS,
     ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", condition),
+    pooled=("shape",),
+    grasps=PLANAR_GRASPS,
+)
+
+CONTOUR_LIMIT = Experiment(
+    "contour-limit",
+    "How well grasps can tell a polygon at all, its poses known or estimated.",
+    _limits_in_plane,
+    contour_limit.limit_of_contour,
+    (AGAINST_KNOWN, MEAN_DISTANCE),
+    ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: f"{cell['noise']} %, sides {cell['sides']}"),
     pooled=("shape",),
     grasps=PLANAR_GRASPS,
 )
