@@ -3,7 +3,8 @@
 The faces take the place of the field in :mod:`pose_evidence`: every contact lies on its face and its normal is the
 face's, up to the sensors' noise, and successive poses follow the motion model. All of it is one least-squares
 problem in the poses and the faces, in the plane and in space alike. A few faces bind contacts all over the object
-together where the field only binds neighbours, so that poses become as certain as the contacts are.
+together where the field only binds neighbours, so that poses become as certain as the contacts are. Faces that are
+parallel, at right angles, upright or level (:mod:`regular_faces`) stay so: what holds one of them holds the others.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e6
 _LARGEST_FOLD = float(np.cos(np.deg2rad(35.0)))
 """Faces that meet at a larger angle are never one."""
+
+_REGULAR_rad = 3e-4
+"""Faces miss their regularities by no more: far less than contacts can tell, and loose enough for the steps."""
 
 _LEAST_FREEDOM = 1e-6
 """Keeps the leverage of a contact below one, where it alone holds something."""
@@ -134,7 +138,7 @@ class FacetSmoother:
         is in the others' (the leave-one-out statistics of linear regression, here for all residuals of a contact).
 
         Args:
-            rows, faces: as fitted.
+            rows, faces: as fitted, the faces without regularities.
         """
         at = self._rated(rows, faces)
         count, jacobian = len(self._grasp_of), self._jacobian(at)
@@ -149,7 +153,7 @@ class FacetSmoother:
         return FacetedTrajectory(rows, faces, chi_square, self._motion.value(rows))
 
     def _residuals(self, rows: Array, faces: FlatFaces) -> Array:
-        """Of values, of the normals' components one after the other, and in the plane beyond the faces' ends."""
+        """Of values, of the normals' components one after the other, beyond the faces' ends, and of regularities."""
         points, normals = self._space.to_object(rows[self._grasp_of], self._world.points_m, self._world.normals)
         outward = faces.normals[faces.labels]
         away = np.einsum("nd,nd->n", outward, points) - faces.offsets_m[faces.labels]
@@ -160,6 +164,7 @@ class FacetSmoother:
             parts.append(over.beyond_m * faces.bounded / self._world.point_sigma_m)
         if self._ends is not None:
             parts.append(np.maximum(self._ends.beyond(points, faces.normals, faces.offsets_m), 0.0))
+        parts.append(faces.irregularity() / _REGULAR_rad)
         return np.concatenate(parts)
 
     def _normal_equations(self, at: FacetedTrajectory) -> tuple[Array, Array]:
@@ -206,8 +211,10 @@ class FacetSmoother:
         if self._ends is not None:
             ended = self._by_ends(self._ends, at, points, normals)
             by_poses, by_faces = np.concatenate([by_poses, ended[0]]), np.concatenate([by_faces, ended[1]])
-        free = by_poses[:, 1:].reshape(len(by_poses), -1)
-        return np.hstack([free, by_faces.reshape(len(by_faces), -1)])
+        tied = faces.irregularity_by_faces() / _REGULAR_rad
+        by_faces = np.concatenate([by_faces, tied])
+        free = np.pad(by_poses[:, 1:], ((0, len(tied)), (0, 0), (0, 0)))
+        return np.hstack([free.reshape(len(free), -1), by_faces.reshape(len(by_faces), -1)])
 
     def _by_ends(self, ends: SolidEnds, at: FacetedTrajectory, points: Array, normals: Array) -> tuple[Array, Array]:
         """Derivatives of how far contacts lie beyond the ends of a solid's faces, by poses and by faces."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.choice import outlined
 from tactile_lab.shape.polyhedron_planes import segment_planes
+from tactile_lab.shape.regularities import Regularity
 from tactile_lab.shape.surface import extract_contour
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.face_ends import between_ends
@@ -29,6 +30,7 @@ class FlatFaces:
         offsets_m: shape (s,).
         leaning: contacts at corners, on their face but with a normal that is not the face's, shape (n,).
         bounded: contacts that can not lie beyond the ends of their face, shape (n,).
+        regularities: of the faces, which they keep.
     """
 
     labels: NDArray[np.int64]
@@ -36,13 +38,14 @@ class FlatFaces:
     offsets_m: Array
     leaning: NDArray[np.bool_]
     bounded: NDArray[np.bool_]
+    regularities: tuple[Regularity, ...] = ()
 
     @property
     def count(self) -> int:
         return len(self.offsets_m)
 
     def merged(self, kept: int, dropped: int) -> FlatFaces:
-        """The same with two faces made one, in between by the number of their contacts."""
+        """The same with two faces made one, in between by the number of their contacts; regularities are forgotten."""
         weights = np.bincount(self.labels, minlength=self.count)[[kept, dropped]].astype(float)
         weights /= weights.sum()
         normals, offsets = self.normals.copy(), self.offsets_m.copy()
@@ -52,6 +55,18 @@ class FlatFaces:
         labels = labels - (labels > dropped)
         normals, offsets = np.delete(normals, dropped, axis=0), np.delete(offsets, dropped)
         return FlatFaces(labels, normals, offsets, self.leaning, self.bounded)
+
+    def irregularity(self) -> Array:
+        """By how much the faces miss their regularities, radians, shape (r,)."""
+        return np.concatenate([np.empty(0), *(each.stated(self.normals).gap for each in self.regularities)])
+
+    def irregularity_by_faces(self) -> Array:
+        """Its derivatives by each face's tilt and offset, shape (r, s, d)."""
+        count, dimension = self.normals.shape
+        stated = [each.stated(self.normals).rows for each in self.regularities]
+        rows = np.concatenate([np.empty((0, count * dimension)), *stated]).reshape(-1, count, dimension)
+        by_tilts = np.einsum("rsd,sdt->rst", rows, tangents(self.normals))
+        return np.concatenate([by_tilts, np.zeros((len(rows), count, 1))], axis=2)
 
 
 Neighbours = Callable[[FlatFaces], list[tuple[int, int]]]

@@ -198,7 +198,8 @@ class JointTracker:
         others = self._judge.unlike(self._regrouped(best), known, by_contacts=False)
         ranked = sorted(found + [sharp.better(one.map) for one in others if one.cost < limit], key=cost)
         best = self._placed_again(sharp.released(ranked[0]), sharp)
-        return [placed_on_object(best, sharp, self._noise, self._settings.proposals), *ranked[1:]]
+        placed = placed_on_object(best, sharp, self._noise, self._settings.proposals)
+        return [sharp.regular(placed), *ranked[1:]]
 
     def _placed_again(self, best: Hypothesis, sharp: SharpJudge) -> Hypothesis:
         """With grasps placed that found no place while a wrong contact spoilt the shape, if that is likelier."""

@@ -26,6 +26,7 @@ from tactile_lab.tracking.hypotheses import Hypothesis, Judge, cost
 from tactile_lab.tracking.motion import MotionNoise
 from tactile_lab.tracking.motion_cost import MotionCost
 from tactile_lab.tracking.pose_rows import PLANAR
+from tactile_lab.tracking.regular_faces import made_regular
 from tactile_lab.tracking.solid_ends import solid_ends
 
 _ORDERING_RESOLUTION_m = 0.002
@@ -97,8 +98,7 @@ class SharpJudge:
 
     def _without_pulls(self, best: Hypothesis) -> list[ContactMap]:
         """The map without each of the contacts that pull the most; nothing for an object without flat faces."""
-        sharp = self._sharp(best.map)
-        if sharp is None or sharp.cost > best.cost + _SAME_nats:
+        if not self._is_sharp(best):
             return []
         faces, _ = flat_faces(best.map)
         pulls = 0.5 * FacetSmoother(best.map, self._noise).pulls(best.map.rows, faces)
@@ -124,6 +124,22 @@ class SharpJudge:
         found = FacetSmoother(contact_map, self._noise, ends).fitted(contact_map.rows, faces, _SETTLING_STEPS)
         return self._sharp(contact_map.with_rows(found.rows))
 
+    def regular(self, best: Hypothesis) -> Hypothesis:
+        """A faceted hypothesis with faces as regular as contacts and motion allow, poses giving way, if likelier."""
+        if not self._is_sharp(best):
+            return best
+        try:
+            faces, _ = flat_faces(best.map)
+            ends = solid_ends(best.map, faces) if best.map.dimension == 3 else None
+        except ShapeError:
+            return best
+        smoother = FacetSmoother(best.map, self._noise, ends)
+        at = smoother.fitted(best.map.rows, faces, _SETTLING_STEPS)
+        settled = best.map.with_rows(at.rows)
+        faces = made_regular(settled, at.faces, smoother.information(at.rows, at.faces))
+        found = smoother.fitted(at.rows, faces, _SETTLING_STEPS)
+        return _likelier(best, self._sharp(best.map.with_rows(found.rows)))
+
     def smoothed(self, contact_map: ContactMap) -> Hypothesis:
         """As :meth:`better`, after the poses were smoothed with the field, and contacts left out that do not fit it."""
         return self.better(self._judge.smoothed(contact_map, _FIELD_STEPS).map)
@@ -132,6 +148,11 @@ class SharpJudge:
         """Poses and faces smoothed together; None if there are no faces that enclose anything."""
         faceted = smoothed_with_faces(contact_map, self._noise)
         return self._sharp(contact_map.with_rows(faceted.rows)) if faceted else None
+
+    def _is_sharp(self, best: Hypothesis) -> bool:
+        """Whether it is flat faces that explain a hypothesis best."""
+        sharp = self._sharp(best.map)
+        return sharp is not None and sharp.cost <= best.cost + _SAME_nats
 
     def _sharp(self, contact_map: ContactMap) -> Hypothesis | None:
         """The map as it is, its contacts explained by a sharp shape; None if there is none."""

@@ -1,0 +1,50 @@
+"""Faces made as regular as contacts and motion allow, the poses giving way.
+
+With the poses held, what a pose is off by seems to be a face askew. So what is known of the faces here is what is left
+when all poses may move with them: that decides which faces are parallel, at right angles, upright or level.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.regularities import regular_normals
+from tactile_lab.tracking.contact_map import ContactMap
+from tactile_lab.tracking.flat_faces import FlatFaces, tangents
+from tactile_lab.tracking.pose_rows import PLANAR
+
+
+def made_regular(contact_map: ContactMap, faces: FlatFaces, information: Array) -> FlatFaces:
+    """The faces of a map turned to be regular, each where its contacts are.
+
+    Args:
+        contact_map: with contacts where its poses have them.
+        faces: fitted to these.
+        information: by all poses but the first, then by each face's tilt and offset, square.
+    """
+    on_table = contact_map.space is PLANAR and contact_map.dimension == 3
+    known = _covariance_of_normals(faces.normals, information)
+    found = regular_normals(faces.normals, known, upright=on_table)
+    turned = replace(faces, normals=found.normals, regularities=found.regularities)
+    return replace(turned, offsets_m=_offsets_m(contact_map, turned))
+
+
+def _covariance_of_normals(normals: Array, information: Array) -> Array:
+    """Of all their components, shape (s d, s d), square radians."""
+    (count, dimension), turned = normals.shape, tangents(normals)
+    covariance = np.linalg.inv(information)[-normals.size :, -normals.size :]
+    of_tilts = covariance.reshape(count, dimension, count, dimension)[:, :-1, :, :-1]
+    spread = np.einsum("sdt,stru,reu->sdre", turned, of_tilts, turned)
+    return np.asarray(spread.reshape(normals.size, normals.size))
+
+
+def _offsets_m(contact_map: ContactMap, faces: FlatFaces) -> Array:
+    """Where faces of given directions lie by their contacts, shape (s,)."""
+    seen = contact_map.contacts
+    weights = seen.point_sigma_m**-2.0
+    heights_m = np.einsum("nd,nd->n", faces.normals[faces.labels], seen.points_m)
+    totals = np.bincount(faces.labels, weights, faces.count)
+    return np.asarray(np.bincount(faces.labels, weights * heights_m, faces.count) / totals)
