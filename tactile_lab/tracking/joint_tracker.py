@@ -42,6 +42,9 @@ _LEAST_FOR_FACES = 3
 _MOST_REGROUPINGS = 3
 """A trajectory that took several wrong turns is mended at one after the other."""
 
+_PLACED, _HOPEFUL_nats = 3, 30.0
+"""Hypotheses whose grasps are looked at again on their object: so many, less likely than the likeliest by no more."""
+
 _BACKWARD_SPREAD = {2: (4, 8), 3: (3, 4)}
 """Hypotheses kept, and branches smoothed, when a session is read backwards, by the dimension of the contacts: a second
 opinion need not be as thorough as the first, and in space it costs as much."""
@@ -188,7 +191,8 @@ class JointTracker:
         """The hypotheses in the light of flat faces, the likeliest first.
 
         Where the likeliest one can be joined otherwise and then is likelier without faces, that is looked at too. Faces
-        decide anew which contacts are aside, so that trajectories that differ in these alone are looked at once.
+        decide anew which contacts are aside, so that trajectories that differ in these alone are looked at once. Grasps
+        are placed on the objects of a few: the way back from a wrong turn may be open from one and not from another.
         """
         sharp = SharpJudge(self._judge, self._noise)
         known = self._judge.different(self._hypotheses, by_contacts=False)
@@ -197,9 +201,14 @@ class JointTracker:
         limit = self._judge.rated(best.map).cost
         others = self._judge.unlike(self._regrouped(best), known, by_contacts=False)
         ranked = sorted(found + [sharp.better(one.map) for one in others if one.cost < limit], key=cost)
-        best = self._placed_again(sharp.released(ranked[0]), sharp)
-        placed = placed_on_object(best, sharp, self._noise, self._settings.proposals)
-        return [sharp.regular(placed), *ranked[1:]]
+        hopeful = [one for one in self._judge.different(ranked) if one.cost < ranked[0].cost + _HOPEFUL_nats][:_PLACED]
+        placed = [self._placed_on_object(one, sharp) for one in hopeful]
+        return [sharp.regular(min(placed, key=cost)), *ranked[1:]]
+
+    def _placed_on_object(self, hypothesis: Hypothesis, sharp: SharpJudge) -> Hypothesis:
+        """Without contacts that it is better off without, and with grasps where they belong on its object."""
+        freed = self._placed_again(sharp.released(hypothesis), sharp)
+        return placed_on_object(freed, sharp, self._noise, self._settings.proposals)
 
     def _placed_again(self, best: Hypothesis, sharp: SharpJudge) -> Hypothesis:
         """With grasps placed that found no place while a wrong contact spoilt the shape, if that is likelier."""
