@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from tactile_lab.geometry.contacts import Array
+from tactile_lab.shape.field_grid import FieldGrid
 from tactile_lab.shape.posterior import Prediction
 from tactile_lab.shape.sampling import TriangleMesh, mesh_arrays
+
+_MARGIN_m, _FINEST_m, _NODES = 0.015, 0.002, 150_000
 
 
 class SolidField:
@@ -33,3 +36,28 @@ class SolidField:
     def variance(self, points_m: Array, *, rough: bool = False) -> Array:
         """The surface's variance at points of shape (q, 3), shape (q,); nothing is saved by a rough one."""
         return np.full(len(points_m), self._sigma_m**2)
+
+
+class TabulatedSolid:
+    """A solid's field on a grid around it: twenty times faster to ask at some hundred places, a moment to make.
+
+    Edges are rounded by the spacing of the nodes: 2 mm for what a hand spans, more for larger objects.
+
+    Args:
+        mesh, sigma_m: as of a :class:`SolidField`.
+    """
+
+    def __init__(self, mesh: TriangleMesh, sigma_m: float) -> None:
+        self._solid, vertices = SolidField(mesh, sigma_m), np.asarray(mesh.vertices)
+        lower_m, upper_m = vertices.min(axis=0) - _MARGIN_m, vertices.max(axis=0) + _MARGIN_m
+        spacing_m = max(_FINEST_m, float(np.cbrt(np.prod(upper_m - lower_m) / _NODES)))
+        self._grid = FieldGrid.tabulate(self._solid, lower_m, upper_m, spacing_m, gradient=True)
+
+    def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
+        """As :meth:`SolidField.predict`; beyond the grid it goes on as if straight away from it."""
+        found = self._grid.predict(points_m, gradient=gradient)
+        return Prediction(found.mean_m, found.gradient, self.variance(points_m) if variance else np.empty(0))
+
+    def variance(self, points_m: Array, *, rough: bool = False) -> Array:
+        """As :meth:`SolidField.variance`."""
+        return self._solid.variance(points_m, rough=rough)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.solid_field import SolidField
+from tactile_lab.shape.solid_field import TabulatedSolid
 from tactile_lab.tracking.contact_map import ContactMap, Moved, PlacedGrasp
 from tactile_lab.tracking.hypotheses import Hypothesis, cost
 from tactile_lab.tracking.motion import MotionNoise
@@ -125,7 +125,7 @@ def _onto_solid(best: Hypothesis, sharp: SharpJudge) -> dict[int, Matched]:
     mesh = sharp.solid(best)
     if mesh is None:
         return {}
-    solid = SolidField(mesh, _SURFACE_SIGMA_m)
+    solid = TabulatedSolid(mesh, _SURFACE_SIGMA_m)
     return {i: solid for i, grasp in enumerate(best.map.placed) if i and len(grasp.contacts_world)}
 
 

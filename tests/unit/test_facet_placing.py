@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tactile_lab.shape.polyhedron import Polyhedron
-from tactile_lab.shape.solid_field import SolidField
+from tactile_lab.shape.solid_field import SolidField, TabulatedSolid
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.facet_placing import placed_on_object
 from tactile_lab.tracking.facet_smoothing import FacetSmoother
@@ -85,6 +87,20 @@ def test_the_distance_from_a_solid_is_signed(l_block: ContactMap) -> None:
     assert found.mean_m[-1] > 0.009
     assert np.median(np.einsum("nd,nd->n", found.gradient[:-2], l_block.contacts.normals)) > 0.95
     assert found.variance_m2 == pytest.approx(1e-6)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_a_tabulated_solid_is_like_the_solid(l_block: ContactMap, scale: float) -> None:
+    given = Polyhedron.fit(l_block.fit(), l_block.free_points_m).mesh(0.006)
+    mesh = replace(given, vertices=scale * given.vertices)
+    exact, tabulated = SolidField(mesh, 0.001), TabulatedSolid(mesh, 0.001)
+    spread = np.random.default_rng(0).normal(0.0, 0.008 * scale, l_block.contacts.points_m.shape)
+    places = scale * l_block.contacts.points_m + spread
+    one, other = (field.predict(places, gradient=True, variance=True) for field in (exact, tabulated))
+    assert np.abs(one.mean_m - other.mean_m).max() < 0.001 * scale
+    assert np.mean(np.abs(one.mean_m - other.mean_m) < 1e-4 * scale) > 0.8
+    assert np.median(np.sum(one.gradient * other.gradient, axis=1)) > 0.99
+    assert np.array_equal(one.variance_m2, other.variance_m2)
 
 
 def test_a_grasp_that_closed_on_the_wrong_faces_is_found_its_place(l_block: ContactMap) -> None:
