@@ -27,7 +27,7 @@ check: $(READY)  ## Linters, types and the layer contract
 bench: $(READY)  ## Speed and memory, printed beside the reference
 	$(BIN)/tactile-lab bench
 
-METHODS := methods-2d contour-limit methods-3d known-shape methods-6dof random-contacts graph-stress
+METHODS := methods-2d contour-limit methods-3d known-shape solid-limit methods-6dof random-contacts graph-stress
 FIGURES := figure-2.7 figure-2.12 figure-3.12 figure-3.14 figure-3.15 figure-3.16
 
 results: $(READY)  ## Methods and the thesis's figures over the reported seeds (hours), with tables and plots, into docs

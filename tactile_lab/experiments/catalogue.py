@@ -14,6 +14,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         planar.METHODS_2D,
         solids.METHODS_3D,
         solids.KNOWN_SHAPE,
+        solids.SOLID_LIMIT,
         solids.METHODS_6DOF,
         planar.CONTOUR_LIMIT,
         planar.RANDOM_CONTACTS,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from tactile_lab.experiments import contour_limit, shape_runs, tracking_runs
+from tactile_lab.experiments import contact_limit, contour_limit, shape_runs, tracking_runs
 from tactile_lab.experiments.cells import Setting, grid
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.study_columns import (
     AGAINST_KNOWN,
     MEAN_DISTANCE,
+    REGISTRATION,
     SHAPE_COLUMNS,
     TRACKING_COLUMNS,
 )
@@ -27,8 +28,8 @@ def _methods_in_plane(grasps: int) -> list[Setting]:
 
 
 def _limits_in_plane(grasps: int) -> list[Setting]:
-    shapes, methods = contour_limit.POLYGONS, contour_limit.METHODS
-    return grid(noise=[100, 50], sides=contour_limit.SIDES, shape=shapes, method=methods, grasps=[grasps])
+    shapes, methods = contour_limit.POLYGONS, contact_limit.METHODS
+    return grid(noise=[100, 50], sides=contact_limit.SIDES, shape=shapes, method=methods, grasps=[grasps])
 
 
 METHODS_2D = Experiment(
@@ -47,7 +48,7 @@ CONTOUR_LIMIT = Experiment(
     "How well grasps can tell a polygon at all, its poses known or estimated.",
     _limits_in_plane,
     contour_limit.limit_of_contour,
-    (AGAINST_KNOWN, MEAN_DISTANCE),
+    (AGAINST_KNOWN, MEAN_DISTANCE, REGISTRATION),
     ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: f"{cell['noise']} %, sides {cell['sides']}"),
     pooled=("shape",),
     grasps=PLANAR_GRASPS,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from tactile_lab.errors import ConfigurationError
-from tactile_lab.experiments import known_shape, tracking_runs
+from tactile_lab.experiments import contact_limit, known_shape, solid_limit, tracking_runs
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.solids import YCB_NAMES, YCB_PREFIX, ycb_path
 from tactile_lab.experiments.studies.planar import METHODS
-from tactile_lab.experiments.study_columns import REGISTRATION, TRACKING_COLUMNS
+from tactile_lab.experiments.study_columns import AGAINST_KNOWN, MEAN_DISTANCE, REGISTRATION, TRACKING_COLUMNS
 from tactile_lab.experiments.study_plots import HAUSDORFF_LABEL, ranges
 
 FACETED_SOLIDS = ("box-12x6x6", "triangular-prism", "hexagonal-prism", "l-block")
@@ -36,6 +36,11 @@ def _methods_on_table(grasps: int) -> list[Setting]:
 
 def _known_on_table(grasps: int) -> list[Setting]:
     return grid(noise=[100], shape=_solids(), grasps=[grasps], particles=[known_shape.PARTICLES])
+
+
+def _limits_on_table(grasps: int) -> list[Setting]:
+    methods = contact_limit.METHODS
+    return grid(noise=[100], sides=contact_limit.SIDES, shape=FACETED_SOLIDS, method=methods, grasps=[grasps])
 
 
 def _methods_in_space(grasps: int) -> list[Setting]:
@@ -70,6 +75,17 @@ KNOWN_SHAPE = Experiment(
     pooled=("shape",),
     grasps=SPATIAL_GRASPS,
     left_out=_scans_left_out,
+)
+
+SOLID_LIMIT = Experiment(
+    "solid-limit",
+    "How well grasps can tell a solid with flat faces on a table at all, its poses known or estimated.",
+    _limits_on_table,
+    solid_limit.limit_of_solid,
+    (AGAINST_KNOWN, MEAN_DISTANCE, REGISTRATION),
+    ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: f"sides {cell['sides']}"),
+    pooled=("shape",),
+    grasps=SPATIAL_GRASPS,
 )
 
 METHODS_6DOF = Experiment(
