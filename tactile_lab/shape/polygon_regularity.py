@@ -13,6 +13,7 @@ import numpy as np
 
 from tactile_lab.geometry.contacts import Array
 from tactile_lab.shape.polygon_segmentation import Faces, PlanarContacts
+from tactile_lab.shape.regularities import offsets_of_faces
 
 _QUARTER_rad = np.pi / 2
 
@@ -86,9 +87,6 @@ def _assembled(contacts: PlanarContacts, faces: Faces, groups: list[_Group]) -> 
         numbers[members] = number
     directions = np.arctan2(np.sin(directions), np.cos(directions))
     normals = np.column_stack([np.cos(directions), np.sin(directions)])
-    weights = contacts.point_sigma_m**-2.0
-    heights = np.sum(contacts.points_m * normals[faces.labels], axis=1)
-    totals = np.bincount(faces.labels, weights, faces.count)
-    offsets = np.bincount(faces.labels, weights * heights, faces.count) / totals
+    offsets = offsets_of_faces(contacts.points_m, contacts.point_sigma_m, faces.labels, normals)
     chi_square = sum(chi_square_at(group.angle_rad, group.moments) for group in groups)
     return replace(faces, directions_rad=directions, offsets_m=offsets, chi_square=chi_square, direction_groups=numbers)

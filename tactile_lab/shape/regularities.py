@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_lab.geometry.contacts import Array
 
@@ -79,6 +80,14 @@ class RegularNormals:
     covariance: Array
     regularities: tuple[Regularity, ...]
     saved: int
+
+
+def offsets_of_faces(points_m: Array, sigma_m: Array, labels: NDArray[np.int64], normals: Array) -> Array:
+    """Where faces of given normals (s, d) lie by their contacts: means weighted by their sigmas, shape (s,)."""
+    weights = sigma_m**-2.0
+    heights_m = np.einsum("nd,nd->n", normals[labels], points_m)
+    totals = np.bincount(labels, weights, len(normals))
+    return np.asarray(np.bincount(labels, weights * heights_m, len(normals)) / totals)
 
 
 def regular_normals(normals: Array, covariance: Array, *, upright: bool) -> RegularNormals:

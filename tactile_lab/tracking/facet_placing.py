@@ -114,7 +114,7 @@ def _places(best: Hypothesis, sharp: SharpJudge, noise: MotionNoise, settings: P
     if known.dimension == 3:
         onto, settings = _onto_solid(best, sharp), settings.model_copy(update={"samples": _SAMPLES})
     else:
-        onto = {i: known.without_grasp(i).fit() for i, grasp in enumerate(known.placed) if i and _is_doubtful(grasp)}
+        onto = {i: known.without_grasp(i).fit() for i, grasp in enumerate(known.placed) if i and _fits_poorly(grasp)}
     outlook = _Outlook(known, onto, noise, settings)
     found = [place for index in onto for place in outlook.places(index)]
     return sorted(found, key=lambda place: place.change)[: search.tried]
@@ -129,7 +129,7 @@ def _onto_solid(best: Hypothesis, sharp: SharpJudge) -> dict[int, Matched]:
     return {i: solid for i, grasp in enumerate(best.map.placed) if i and len(grasp.contacts_world)}
 
 
-def _is_doubtful(grasp: PlacedGrasp) -> bool:
+def _fits_poorly(grasp: PlacedGrasp) -> bool:
     """Whether a grasp has contacts that do not fit where it is, or hardly any that do."""
     return len(grasp.contacts_world) >= _LITTLE and (bool(grasp.left_out) or len(grasp.kept) <= _LITTLE)
 

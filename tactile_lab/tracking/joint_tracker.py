@@ -202,8 +202,8 @@ class JointTracker:
         others = self._judge.unlike(self._regrouped(best), known, by_contacts=False)
         ranked = sorted(found + [sharp.better(one.map) for one in others if one.cost < limit], key=cost)
         hopeful = [one for one in self._judge.different(ranked) if one.cost < ranked[0].cost + _HOPEFUL_nats][:_PLACED]
-        placed = [self._placed_on_object(one, sharp) for one in hopeful]
-        return [sharp.regular(min(placed, key=cost)), *ranked[1:]]
+        best, *placed = sorted((self._placed_on_object(one, sharp) for one in hopeful), key=cost)
+        return [sharp.regular(best), *self._judge.unlike(placed + ranked, [best])]
 
     def _placed_on_object(self, hypothesis: Hypothesis, sharp: SharpJudge) -> Hypothesis:
         """Without contacts that it is better off without, and with grasps where they belong on its object."""

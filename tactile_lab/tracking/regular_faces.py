@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.regularities import regular_normals
+from tactile_lab.shape.regularities import offsets_of_faces, regular_normals
 from tactile_lab.tracking.contact_map import ContactMap
 from tactile_lab.tracking.flat_faces import FlatFaces, tangents
 from tactile_lab.tracking.pose_rows import PLANAR
@@ -28,8 +28,9 @@ def made_regular(contact_map: ContactMap, faces: FlatFaces, information: Array) 
     on_table = contact_map.space is PLANAR and contact_map.dimension == 3
     known = _covariance_of_normals(faces.normals, information)
     found = regular_normals(faces.normals, known, upright=on_table)
-    turned = replace(faces, normals=found.normals, regularities=found.regularities)
-    return replace(turned, offsets_m=_offsets_m(contact_map, turned))
+    seen = contact_map.contacts
+    offsets_m = offsets_of_faces(seen.points_m, seen.point_sigma_m, faces.labels, found.normals)
+    return replace(faces, normals=found.normals, offsets_m=offsets_m, regularities=found.regularities)
 
 
 def _covariance_of_normals(normals: Array, information: Array) -> Array:
@@ -39,12 +40,3 @@ def _covariance_of_normals(normals: Array, information: Array) -> Array:
     of_tilts = covariance.reshape(count, dimension, count, dimension)[:, :-1, :, :-1]
     spread = np.einsum("sdt,stru,reu->sdre", turned, of_tilts, turned)
     return np.asarray(spread.reshape(normals.size, normals.size))
-
-
-def _offsets_m(contact_map: ContactMap, faces: FlatFaces) -> Array:
-    """Where faces of given directions lie by their contacts, shape (s,)."""
-    seen = contact_map.contacts
-    weights = seen.point_sigma_m**-2.0
-    heights_m = np.einsum("nd,nd->n", faces.normals[faces.labels], seen.points_m)
-    totals = np.bincount(faces.labels, weights, faces.count)
-    return np.asarray(np.bincount(faces.labels, weights * heights_m, faces.count) / totals)
