@@ -85,7 +85,7 @@ class Polygon:
         chi_square = faces.chi_square + float(self.corners.chi_squares(at_corners).sum())
         point_sigma_m = np.append(on_faces.point_sigma_m, at_corners.point_sigma_m)
         normal_sigma_rad = np.append(on_faces.normal_sigma_rad, at_corners.normal_sigma_rad)
-        return log_evidence(chi_square, faces.count, point_sigma_m, normal_sigma_rad)
+        return log_evidence(chi_square, faces.count, point_sigma_m, normal_sigma_rad) + faces.regularity_nats
 
     @property
     def corners(self) -> Corners:

@@ -40,11 +40,14 @@ class _Group:
 
 def with_right_angles(contacts: PlanarContacts, faces: Faces) -> Faces:
     """The same faces, those that may be parallel or at right angles to each other made so."""
-    groups = [_alone(contacts, faces, face) for face in range(faces.count)]
-    while (pair := _best_pair(groups)) is not None:
+    groups, gained = [_alone(contacts, faces, face) for face in range(faces.count)], 0.0
+    while (found := _most_gained(groups)) is not None:
+        gain, *pair = found
+        gained += gain
         joined = _joined(groups[pair[0]], groups[pair[1]])
         groups = [group for i, group in enumerate(groups) if i not in pair] + [joined]
-    return _assembled(contacts, faces, groups)
+    regular = _assembled(contacts, faces, groups)
+    return replace(regular, regularity_nats=0.5 * (gained + regular.chi_square - faces.chi_square))
 
 
 def _alone(contacts: PlanarContacts, faces: Faces, face: int) -> _Group:
@@ -57,14 +60,14 @@ def _alone(contacts: PlanarContacts, faces: Faces, face: int) -> _Group:
     return _Group((face,), (0,), moments, float(faces.directions_rad[face]))
 
 
-def _best_pair(groups: list[_Group]) -> tuple[int, int] | None:
-    """The two groups that gain most by sharing a direction; None if none do."""
+def _most_gained(groups: list[_Group]) -> tuple[float, int, int] | None:
+    """Chi-square's worth that two groups gain by sharing a direction, the most, and these two; None if none do."""
     from tactile_lab.shape.polygon_runs import most_gained  # here: compiled loops are slow to import
 
     moments, angles = np.array([group.moments for group in groups]), np.array([group.angle_rad for group in groups])
     sizes = np.array([float(len(group.faces)) for group in groups])
-    gain, first, second = most_gained(moments.reshape(-1, 6), angles, sizes, _LONERS)
-    return (first, second) if gain > 0 else None
+    found = most_gained(moments.reshape(-1, 6), angles, sizes, _LONERS)
+    return found if found[0] > 0 else None
 
 
 def _joined(one: _Group, other: _Group) -> _Group:

@@ -40,6 +40,7 @@ class Faces:
             the contacts of face 0.
         chi_square: of all points and normals.
         direction_groups: faces of the same number share one direction up to quarter turns, shape (s,).
+        regularity_nats: log evidence of the shared directions, their misfit apart: angles that need not be known.
     """
 
     labels: NDArray[np.int64]
@@ -48,6 +49,7 @@ class Faces:
     order: NDArray[np.int64]
     chi_square: float
     direction_groups: NDArray[np.int64]
+    regularity_nats: float = 0.0
 
     @property
     def count(self) -> int:

@@ -160,6 +160,19 @@ def test_right_angles_make_a_rectangle_better_and_leave_a_triangle_alone() -> No
     assert with_right_angles(contacts, faces).directions_rad == pytest.approx(faces.directions_rad, abs=1e-6)
 
 
+def test_angles_that_need_not_be_known_count_in_the_evidence() -> None:
+    for seed in range(8):
+        contacts = contacts_on(rectangle(), 40, seed)
+        free = faces_of(contacts, rectangle())
+        tied = with_right_angles(contacts, free)
+        gained = Polygon.of(contacts, tied).log_evidence - Polygon.of(contacts, free).log_evidence
+        assert free.regularity_nats == 0.0
+        assert gained == pytest.approx(tied.regularity_nats - 0.5 * (tied.chi_square - free.chi_square))
+        assert gained > 3 * np.log(2)  # three angles, each far better known than to a quarter turn
+    contacts = contacts_on(triangle(), 40, seed=0)
+    assert with_right_angles(contacts, faces_of(contacts, triangle())).regularity_nats == pytest.approx(0.0, abs=1e-9)
+
+
 def test_stated_sigmas_cover_the_error_of_faces_and_corners() -> None:
     covered, corner_distances = [], []
     for seed in range(20):
