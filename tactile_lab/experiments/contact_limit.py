@@ -29,8 +29,9 @@ from tactile_lab.experiments.sensing import (
 )
 from tactile_lab.experiments.summary import REFERENCE_METHOD
 from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import planar, spatial
+from tactile_lab.geometry.poses import planar, spatial, transform_points
 from tactile_lab.tracking.motion import MotionNoise, compose, deviation, inverse, planar_motion, pose_row, row_pose
+from tactile_lab.tracking.pose_rows import PLANAR
 
 SIDES = ("free", "regular")
 METHODS = (REFERENCE_METHOD, "estimated-pose")
@@ -120,15 +121,14 @@ class SeenSession:
         motions = np.array([planar_motion(grasp.hand_motion_world) for grasp in data.grasps[1:]]).reshape(-1, 3)
         slips = compose(inverse(compose(motions, rows[:-1])), rows[1:])
         sigmas = MotionNoise(translation_m=scale * SLIP_SIGMA_m, rotation_rad=scale * SLIP_SIGMA_rad).sigmas
-        to_frame = inverse(rows[index])
-        points = moved_points(to_frame, np.concatenate([grasp.points_world_m for grasp in data.grasps]))
+        points = np.concatenate([grasp.points_world_m for grasp in data.grasps])
         normals = np.concatenate([[each.normal_world for each in grasp.contacts] for grasp in data.grasps])
-        return cls(rows, slips, sigmas, index, points, turned(to_frame, normals))
+        return cls(rows, slips, sigmas, index, *PLANAR.to_object(rows[index], points, normals))
 
     def in_frame(self, world_T_body: Pose3, points_body_m: Array) -> Array:
         """Points (n, 3) of the object's model in the tracked frame, from its first pose."""
-        placed = np.array([world_T_body.transformFrom(point) for point in points_body_m])
-        return moved_points(np.tile(inverse(self.world_T_frame[:1]), (len(placed), 1)), placed)
+        placed = transform_points(world_T_body, points_body_m)
+        return PLANAR.to_object(self.world_T_frame[0], placed, placed)[0]
 
     def estimated(self, error: EstimateError) -> list[Pose3]:
         """``world_T_frame`` of somebody with this error."""
@@ -150,9 +150,13 @@ class Limit:
     touched: NDArray[np.int64]
 
     def drawn_error(self, rng: np.random.Generator, *, known_poses: bool) -> EstimateError:
-        """One error of an estimate that wastes nothing."""
+        """One error of an estimate that wastes nothing.
+
+        Drawn by Cholesky's factor: axes of equal variance, which symmetric objects have, are any in a spectral one, so
+        that rounding would choose the error.
+        """
         covariance = np.linalg.inv(self._information(known_poses=known_poses))
-        return self._error(rng.multivariate_normal(np.zeros(len(covariance)), covariance))
+        return self._error(rng.multivariate_normal(np.zeros(len(covariance)), covariance, method="cholesky"))
 
     def _information(self, *, known_poses: bool) -> Array:
         """In everything that is seen, about all unknowns or the sides' alone: square."""
@@ -174,11 +178,10 @@ class Limit:
         """Of places, of normals and of slips, in standard deviations of their noise; the contacts where they touch."""
         error, seen, dimension = self._error(unknowns), self.session, self.sides.normals.shape[1]
         normals, distances_m = self.sides.at(error.angles_rad, error.displacements_m)
-        by = error.rows[seen.grasps]
-        placed = moved_points(by, seen.contacts_m)[:, :dimension]
+        contacts_m, true = seen.contacts_m[:, :dimension], self.sides.normals[self.touched]
+        placed, turned = PLANAR.to_object(inverse(error.rows[seen.grasps]), contacts_m, true)
         beside_m = np.sum(normals[self.touched] * placed, axis=1) - distances_m[self.touched]
-        true = np.pad(self.sides.normals[self.touched], ((0, 0), (0, 3 - dimension)))
-        tilted = normals[self.touched] - turned(by, true)[:, :dimension]
+        tilted = normals[self.touched] - turned
         slipped = compose(error.rows[:-1], compose(seen.slips, inverse(error.rows[1:])))
         away = deviation(slipped, seen.slips) / seen.sigmas
         return np.concatenate([beside_m / POINT_SIGMA_m, tilted.ravel() / np.tan(NORMAL_SIGMA_rad), away.ravel()])
@@ -189,15 +192,3 @@ def together(angles_rad: Array) -> Array:
     away = angles_rad[:, None] - angles_rad
     alike = np.abs((away + np.pi / 4) % (np.pi / 2) - np.pi / 4) < _ALIKE_rad
     return np.asarray(np.unique(alike, axis=0).T, dtype=float)
-
-
-def moved_points(rows: Array, points_m: Array) -> Array:
-    """Points of shape (n, 3), each moved on the table by its own row (x, y, heading)."""
-    return turned(rows, points_m) + np.pad(rows[:, :2], ((0, 0), (0, 1)))
-
-
-def turned(rows: Array, directions: Array) -> Array:
-    """Directions of shape (n, 3), each turned about the vertical by the heading of its row."""
-    cosine, sine = np.cos(rows[:, 2]), np.sin(rows[:, 2])
-    x, y, z = directions.T
-    return np.column_stack([cosine * x - sine * y, sine * x + cosine * y, z])

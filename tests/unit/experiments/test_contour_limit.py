@@ -10,11 +10,11 @@ from tactile_lab.experiments.contour_limit import POLYGONS, limit_of_contour
 
 
 def error_mm(
-    shape: str, *, method: str = "known-pose", sides: str = "free", noise: int = 100, grasps: int = 16
+    shape: str, *, method: str = "known-pose", sides: str = "free", noise: int = 100, grasps: int = 16, seeds: int = 8
 ) -> float:
     """The mean Hausdorff distance over some seeds."""
     setting = (("noise", noise), ("sides", sides), ("shape", shape), ("method", method), ("grasps", grasps))
-    return float(np.mean([limit_of_contour(Cell(setting, seed))["hausdorff_mm"] for seed in range(8)]))
+    return float(np.mean([limit_of_contour(Cell(setting, seed))["hausdorff_mm"] for seed in range(seeds)]))
 
 
 @pytest.mark.parametrize("shape", POLYGONS)
@@ -24,7 +24,8 @@ def test_four_times_the_contacts_halve_the_error(shape: str) -> None:
 
 @pytest.mark.parametrize("shape", ["triangle", "hexagon"])
 def test_poses_that_have_to_be_estimated_cost_accuracy(shape: str) -> None:
-    assert 1.1 * error_mm(shape) < error_mm(shape, method="estimated-pose") < 3 * error_mm(shape)
+    known = error_mm(shape, seeds=24)
+    assert 1.1 * known < error_mm(shape, method="estimated-pose", seeds=24) < 3 * known
 
 
 def test_poses_that_hardly_slip_are_as_good_as_known_ones() -> None:
