@@ -15,8 +15,8 @@ import numpy as np
 from gtsam import Pose2
 from pydantic import Field, field_validator
 
-from drivers.shadow.closing import LEANING, Closing, within_reach
-from sessions.grasp_plan import GraspPlan
+from drivers.shadow.closing import LEANING, Closing
+from sessions.grasp_plan import ContactHeight, GraspPlan
 from sessions.motion import GraspFrame
 from tactile_lab.errors import ShapeError
 from tactile_lab.exploration.candidates import Candidate, ClosingRays, ModelledObject, outward, ring_of_candidates
@@ -59,7 +59,7 @@ class ExplorationSettings(StrictModel):
     policy: str | None = "information"
     information: InformationSettings = InformationSettings()
     side_closings: tuple[str, ...] = tuple(LEANING)
-    side_heights_m: tuple[float, ...] = (0.026, 0.034)
+    side_heights_m: tuple[ContactHeight, ...] = (0.026, 0.034)
     caution: float = Field(default=0.5, ge=0.0)
     clearance_m: float = Field(default=0.012, ge=0.0)
     contour_resolution_m: float = Field(default=0.002, gt=0.0)
@@ -78,13 +78,6 @@ class ExplorationSettings(StrictModel):
         if unknown := sorted(set(names) - set(LEANING)):
             raise ValueError(f"closings {unknown} are not known; choose from {', '.join(LEANING)}")
         return names
-
-    @field_validator("side_heights_m")
-    @classmethod
-    def _can_be_worked_at(cls, heights_m: tuple[float, ...]) -> tuple[float, ...]:
-        if not all(map(within_reach, heights_m)):
-            raise ValueError("contact heights lie between 0.015 and 0.12 m")
-        return heights_m
 
 
 @dataclass(frozen=True)

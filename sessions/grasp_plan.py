@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated, TypeAlias
 
 import numpy as np
+from pydantic import Field
 
-from drivers.shadow.closing import Closing
+from drivers.shadow.closing import Closing, HIGHEST_m, LOWEST_m
 from sessions.motion import GraspFrame
+
+ContactHeight: TypeAlias = Annotated[float, Field(ge=LOWEST_m, le=HIGHEST_m)]
+"""A setting: height of the fingertips' centres above the table, metres."""
 
 
 @dataclass(frozen=True)

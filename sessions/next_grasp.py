@@ -12,8 +12,8 @@ from collections.abc import Callable
 import numpy as np
 from pydantic import Field, model_validator
 
-from drivers.shadow.closing import PRESHAPES, within_reach
-from sessions.grasp_plan import GraspPlan
+from drivers.shadow.closing import PRESHAPES
+from sessions.grasp_plan import ContactHeight, GraspPlan
 from sessions.motion import GraspFrame
 from tactile_lab.geometry.contacts import Array, Grasp
 from tactile_lab.geometry.poses import transform_points
@@ -38,8 +38,8 @@ class PlanSettings(StrictModel):
     """
 
     closings: tuple[str, ...] = Field(default=("radial", "pinch"), min_length=1)
-    contour_heights_m: tuple[float, ...] = Field(default=(0.034,), min_length=1)
-    surface_heights_m: tuple[float, ...] = Field(default=(0.034, 0.018, 0.048), min_length=1)
+    contour_heights_m: tuple[ContactHeight, ...] = Field(default=(0.034,), min_length=1)
+    surface_heights_m: tuple[ContactHeight, ...] = Field(default=(0.034, 0.018, 0.048), min_length=1)
     contour_top_m: float = Field(default=0.05, gt=0.0)
     yaw_window_rad: tuple[float, float] = (-1.31, 1.31)
     start_m: tuple[float, float] = (0.0, 0.0)
@@ -51,8 +51,6 @@ class PlanSettings(StrictModel):
     def _sensible(self) -> PlanSettings:
         if unknown := sorted(set(self.closings) - set(PRESHAPES)):
             raise ValueError(f"closings {unknown} are not known; choose from {', '.join(PRESHAPES)}")
-        if not all(map(within_reach, self.contour_heights_m + self.surface_heights_m)):
-            raise ValueError("contact heights lie between 0.015 and 0.12 m")
         if not self.yaw_window_rad[0] < self.yaw_window_rad[1]:
             raise ValueError("the yaw window's first value must be the smaller one")
         if not 0.0 <= self.turn_rad[0] <= self.turn_rad[1]:

@@ -25,6 +25,9 @@ from tactile_lab.geometry.contacts import FINGERS, Array
 
 Point = tuple[float, float]
 
+LOWEST_m, HIGHEST_m = 0.015, 0.12
+"""Heights of the fingertips' centres above the table at which the hand can work."""
+
 
 @dataclass(frozen=True)
 class TipPath:
@@ -168,11 +171,6 @@ CLOSINGS = frozenset({*PRESHAPES, *LEANING})
 """Names of all closings."""
 
 
-def within_reach(height_m: float) -> bool:
-    """Whether the hand can work with its fingertips' centres at that height above the table."""
-    return 0.015 <= height_m <= 0.12
-
-
 @lru_cache(maxsize=64)
 def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Closing:
     """The closing path table of one preshape at one height of the fingertip centres; kept in memory.
@@ -184,9 +182,10 @@ def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Clos
     """
     if name not in CLOSINGS:
         raise ConfigurationError(f"no closing called {name!r}", hint=f"Choose from {', '.join(sorted(CLOSINGS))}")
-    if not within_reach(height_m):
+    if not LOWEST_m <= height_m <= HIGHEST_m:
+        allowed = f"{LOWEST_m * 1e3:.0f} to {HIGHEST_m * 1e3:.0f} mm"
         raise ConfigurationError(
-            f"contact height {height_m * 1e3:.0f} mm is outside 15 to 120 mm", hint="Choose a height in that range"
+            f"contact height {height_m * 1e3:.0f} mm is outside {allowed}", hint="Choose a height in that range"
         )
     if name in LEANING:
         return _leaning(name, height_m, tip)

@@ -69,7 +69,7 @@ class FlatSides:
         turned /= np.linalg.norm(turned, axis=1, keepdims=True)
         return turned, self.distances_m + self.sliding @ displacements_m
 
-    def corners(self, corners_m: Array, meeting: NDArray[np.bool_], error: EstimateError) -> Array:
+    def corners(self, corners_m: Array, meeting: NDArray[np.bool_], error: EstimateOffset) -> Array:
         """Where corners of shape (k, d) are moved to by an error, ``meeting`` (k, n) sides each."""
         normals, distances_m = self.at(error.angles_rad, error.displacements_m)
         moved = corners_m.copy()
@@ -79,7 +79,7 @@ class FlatSides:
 
 
 @dataclass(frozen=True)
-class EstimateError:
+class EstimateOffset:
     """What an estimate is off by.
 
     Attributes:
@@ -130,7 +130,7 @@ class SeenSession:
         placed = transform_points(world_T_body, points_body_m)
         return PLANAR.to_object(self.world_T_frame[0], placed, placed)[0]
 
-    def estimated(self, error: EstimateError) -> list[Pose3]:
+    def estimated(self, error: EstimateOffset) -> list[Pose3]:
         """``world_T_frame`` of somebody with this error."""
         return [spatial(row_pose(row)) for row in compose(self.world_T_frame, inverse(error.rows))]
 
@@ -149,7 +149,7 @@ class Limit:
     sides: FlatSides
     touched: NDArray[np.int64]
 
-    def drawn_error(self, rng: np.random.Generator, *, known_poses: bool) -> EstimateError:
+    def drawn_error(self, rng: np.random.Generator, *, known_poses: bool) -> EstimateOffset:
         """One error of an estimate that wastes nothing.
 
         Drawn by Cholesky's factor: axes of equal variance, which symmetric objects have, are any in a spectral one, so
@@ -166,13 +166,13 @@ class Limit:
         weak = np.repeat([_REACH_rad**-2, _REACH_m**-2, 0.0], [angles, displacements, poses])
         return np.asarray(change.T @ change + np.diag(weak))
 
-    def _error(self, unknowns: Array) -> EstimateError:
+    def _error(self, unknowns: Array) -> EstimateOffset:
         """From one row; what is left out of it is zero."""
         angles, displacements = self.sides.unknown
         given = np.zeros(angles + displacements + self.session.slips.size)
         given[: len(unknowns)] = unknowns
         first, second, rows = np.split(given, [angles, angles + displacements])
-        return EstimateError(first, second, np.vstack([np.zeros(3), rows.reshape(-1, 3)]))
+        return EstimateOffset(first, second, np.vstack([np.zeros(3), rows.reshape(-1, 3)]))
 
     def _misfit(self, unknowns: Array) -> Array:
         """Of places, of normals and of slips, in standard deviations of their noise; the contacts where they touch."""

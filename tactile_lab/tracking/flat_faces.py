@@ -63,8 +63,10 @@ class FlatFaces:
     def irregularity_by_faces(self) -> Array:
         """Its derivatives by each face's tilt and offset, shape (r, s, d)."""
         count, dimension = self.normals.shape
-        stated = [each.stated(self.normals).rows for each in self.regularities]
-        rows = np.concatenate([np.empty((0, count * dimension)), *stated]).reshape(-1, count, dimension)
+        if not self.regularities:
+            return np.empty((0, count, dimension))
+        rows = np.concatenate([each.stated(self.normals).rows for each in self.regularities])
+        rows = rows.reshape(-1, count, dimension)
         by_tilts = np.einsum("rsd,sdt->rst", rows, tangents(self.normals))
         return np.concatenate([by_tilts, np.zeros((len(rows), count, 1))], axis=2)
 

@@ -115,7 +115,7 @@ def test_a_grasp_is_refused_where_the_rig_asks_for_more_than_it_promises() -> No
         ({"information": {"execution": {"palm": 0.1}}}, r"execution.palm: unknown key \(did you mean palm_m\?\)"),
         ({"information": {"pose_weight": -1}}, "pose_weight: must be greater than or equal to 0, not -1"),
         ({"policy": "best"}, "no policy is called 'best'; policies are random, .*information"),
-        ({"side_heights_m": [0.026, 0.5]}, "side_heights_m: contact heights lie between 0.015 and 0.12 m"),
+        ({"side_heights_m": [0.026, 0.5]}, r"side_heights_m.1: must be less than or equal to 0.12, not 0.5"),
     ],
 )
 def test_a_setting_that_does_not_exist_is_named(changes: Content, words: str) -> None:
