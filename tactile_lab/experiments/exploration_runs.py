@@ -10,11 +10,10 @@ import numpy as np
 
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.clairvoyant import fewest_grasps
-from tactile_lab.experiments.explored import GOAL, CONTACT_m, Definition, ExploredMap
+from tactile_lab.experiments.explored import GOAL, Definition, ExploredMap
 from tactile_lab.experiments.explored_objects import ExploredObject, FixedObject, MovingObject
-from tactile_lab.experiments.fewest_in_the_mean import GraspsStillNeeded, Law, fewest_in_the_mean
 from tactile_lab.experiments.outlines import OUTLINES_m
-from tactile_lab.experiments.planar_hand import PlanarHand, measured_landings, planned_rays
+from tactile_lab.experiments.planar_hand import PlanarHand, planned_rays
 from tactile_lab.exploration.information_policy import InformationPolicy
 from tactile_lab.exploration.policies import make_policy
 from tactile_lab.exploration.policy import Decision, Policy, Surface
@@ -26,14 +25,9 @@ from tactile_lab.shape.surface import Contour
 OUTLINE_m = OUTLINES_m["rectangle"]
 TRUE_POINTS_m = sample_polygon(OUTLINE_m, 0.001)
 MOST_GRASPS = 80
-CLAIRVOYANT, INFORMED, LOWER_BOUND = "clairvoyant", "outline known", "lower bound"
-"""Bounds: one knows even the errors of execution beforehand, one the true outline and how large errors are; the last is
-what nobody goes below in the mean who does not know the errors beforehand."""
+CLAIRVOYANT, INFORMED = "clairvoyant", "outline known"
+"""Bounds: one knows even the errors of execution beforehand, the other the true outline and how large errors are."""
 
-_PLACES_m = sample_polygon(OUTLINE_m, 0.002)
-_OUTCOMES = {"10": 4000, "100": 600}
-_PARABOLAS = {"10": (0.70, 0.81, -0.005), "100": (0.70, 0.74, -0.018)}
-"""That make the bound high, found on other seeds."""
 _SHIFT_m, _TURN_rad = 0.006, float(np.deg2rad(8.0))
 
 
@@ -50,7 +44,7 @@ def palms_called(name: str, seed: int) -> Array:
 def fixed_settings(grasps: int) -> list[Setting]:
     """Table 4.2: every policy with the ten candidates, the main ones with the others."""
     thesis = ("random", "variance", "clusters", "clusters-appendix", "entropy", "igef", "igef-shape")
-    ours = ("information", INFORMED, LOWER_BOUND, CLAIRVOYANT)
+    ours = ("information", INFORMED, CLAIRVOYANT)
     return [
         *grid(candidates=["10"], policy=[*thesis, *ours], grasps=[grasps]),
         *grid(candidates=["100"], policy=["random", "variance", *ours], grasps=[grasps]),
@@ -74,24 +68,9 @@ def explore_fixed(cell: Cell) -> dict[str, Any]:
     palms = palms_called(cell["candidates"], cell.seed)
     if cell["policy"] == CLAIRVOYANT:
         return {"actions_B": fewest_grasps(hand, palms, "B", TRUE_POINTS_m, GOAL, cell["grasps"])}
-    if cell["policy"] == LOWER_BOUND:
-        return {"actions_B": at_least(palms, cell["candidates"], np.random.default_rng([cell.seed, 7]))}
     rng = np.random.default_rng([cell.seed, 5])
     run = Exploration(FixedObject(hand), palms, ("A3", "B"), cell["policy"], rng)
     return run.until_explored(cell["grasps"])
-
-
-def at_least(palms: Array, called: str, rng: np.random.Generator) -> float:
-    """Grasps that nobody goes below in the mean; one drawing of it.
-
-    Args:
-        palms: candidates, shape (n, 3).
-        called: what these candidates are called.
-        rng: of the law of the errors, and of the drawing.
-    """
-    contacts = np.stack([measured_landings(OUTLINE_m, palm, _OUTCOMES[called], rng) for palm in palms])
-    law = Law.of(contacts, _PLACES_m, CONTACT_m, GOAL)
-    return fewest_in_the_mean(GraspsStillNeeded(law, _PARABOLAS[called]), rng)
 
 
 def explore_moving(cell: Cell) -> dict[str, Any]:

@@ -12,18 +12,10 @@ import numpy as np
 from gtsam import Pose2
 
 from tactile_lab.experiments.outlines import first_crossing
-from tactile_lab.experiments.sensing import (
-    IN_PLANE,
-    POINT_SIGMA_m,
-    line_to_contact,
-    measured_contact,
-    planar_pose,
-)
+from tactile_lab.experiments.sensing import IN_PLANE, line_to_contact, measured_contact, planar_pose
 from tactile_lab.exploration.candidates import ClosingRays
-from tactile_lab.exploration.first_hits import first_hits
 from tactile_lab.geometry.contacts import FINGERS, Array, ClosingLine, Contact, Grasp
 from tactile_lab.geometry.poses import spatial
-from tactile_lab.tracking.motion import compose
 
 FAN_rad = np.deg2rad([-75.0, -25.0, 25.0, 75.0, 180.0])
 AIM_m = np.array([[-0.006, -0.006], [0.0, -0.004], [0.0, 0.004], [-0.006, 0.006], [0.0, 0.0]])
@@ -91,37 +83,8 @@ def slipped(world_T_body: Pose2, body_T_frame: Pose2, sigmas: Array, rng: np.ran
     return moved.compose(body_T_frame.inverse())
 
 
-def measured_landings(outline_m: Array, palm: Array, count: int, rng: np.random.Generator) -> Array:
-    """Contacts of many grasps with one palm pose on the object at the origin, by the law of :class:`PlanarHand`.
-
-    Args:
-        outline_m: counter-clockwise polygon, shape (n, 2).
-        palm: x, y (m) and yaw (rad), shape (3,).
-        count: of the grasps.
-        rng: of execution and measurement.
-
-    Returns:
-        Shape (count, 5, 2), metres; not finite where a finger meets nothing.
-    """
-    reached = compose(np.broadcast_to(palm, (count, 3)), PALM_SIGMAS * rng.normal(size=(count, 3)))
-    starts, ways = _ways(
-        FAN_rad + rng.normal(0.0, FAN_SIGMA_rad, (count, 5)), AIM_m + rng.normal(0.0, AIM_SIGMA_m, (count, 5, 2))
-    )
-    starts, tips = _placed(reached, starts), _placed(reached, starts + ways)
-    ways = tips - starts
-    outlines = np.broadcast_to(outline_m, (count, *outline_m.shape))
-    edges = np.arange(len(outline_m))
-    along_m = first_hits(outlines, edges, starts, ways, np.full(5, 2 * REACH_m))
-    return np.asarray(starts + along_m[..., None] * ways + rng.normal(0.0, POINT_SIGMA_m, starts.shape))
-
-
-def _placed(rows: Array, points_m: Array) -> Array:
-    """Points (n, f, 2) of the frames whose poses are the rows (n, 3), in the world."""
-    return np.asarray(compose(rows[:, None], np.pad(points_m, ((0, 0), (0, 0), (0, 1))))[..., :2])
-
-
 def _ways(fan_rad: Array, aim_m: Array) -> tuple[Array, Array]:
-    """Starts and unit directions in the grasp frame, each of shape (..., 5, 2)."""
-    starts = REACH_m * np.stack([np.cos(fan_rad), np.sin(fan_rad)], axis=-1)
+    """Starts and unit directions in the grasp frame, each of shape (5, 2)."""
+    starts = REACH_m * np.column_stack([np.cos(fan_rad), np.sin(fan_rad)])
     ways = aim_m - starts
-    return starts, ways / np.linalg.norm(ways, axis=-1, keepdims=True)
+    return starts, ways / np.linalg.norm(ways, axis=1, keepdims=True)

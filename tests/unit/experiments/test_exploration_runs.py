@@ -12,7 +12,6 @@ from tactile_lab.experiments.decision_times import box_belief, box_candidates, d
 from tactile_lab.experiments.exploration_runs import (
     CLAIRVOYANT,
     INFORMED,
-    LOWER_BOUND,
     OUTLINE_m,
     TRUE_POINTS_m,
     explore_fixed,
@@ -166,17 +165,7 @@ def test_a_moving_run_states_its_registration() -> None:
 
 def test_the_tables_hold_every_policy_and_the_bounds() -> None:
     fixed = {dict(setting)["policy"] for setting in fixed_settings(80)}
-    assert {
-        "random",
-        "variance",
-        "clusters",
-        "entropy",
-        "igef",
-        "information",
-        INFORMED,
-        LOWER_BOUND,
-        CLAIRVOYANT,
-    } <= fixed
+    assert {"random", "variance", "clusters", "entropy", "igef", "information", INFORMED, CLAIRVOYANT} <= fixed
     moving = {(dict(setting)["tracking"], dict(setting)["policy"]) for setting in moving_settings(80)}
     assert {("thesis-pf", "det"), ("thesis-pf", "random"), ("joint", "det"), ("joint", "kl")} <= moving
     assert ("joint", INFORMED) in moving
