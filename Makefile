@@ -10,7 +10,7 @@ READY  := $(VENV)/ready
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: demo test check bench results lock clean
+.PHONY: demo test check bench results experiments coverage lock clean mutants
 
 demo: $(READY)  ## A whole autonomous session on the simulated rig, evaluated, with its report
 	$(BIN)/tactile-lab run --rig sim --object box-10x6x4 --grasps 16 --seed 1 --out runs
@@ -27,12 +27,22 @@ check: $(READY)  ## Linters, types and the layer contract
 bench: $(READY)  ## Speed and memory, printed beside the reference
 	$(BIN)/tactile-lab bench
 
-METHODS := methods-2d contour-limit methods-3d known-shape solid-limit methods-6dof random-contacts graph-stress
-FIGURES := figure-2.7 figure-2.12 figure-3.12 figure-3.14 figure-3.15 figure-3.16
+results: $(READY)  ## Pages and plots in docs from the stored results (seconds)
+	$(BIN)/tactile-lab experiment pages
+MUTATIONS ?= 204
+SEED      ?= 1
+PROCESSES ?= 1
 
-results: $(READY)  ## Methods and the thesis's figures over the reported seeds (hours), with tables and plots, into docs
-	for name in $(METHODS); do $(BIN)/tactile-lab experiment $$name --into docs/results.md || exit 1; done
-	for name in $(FIGURES); do $(BIN)/tactile-lab experiment $$name --into docs/thesis-figures.md || exit 1; done
+mutants: $(READY)  ## Random single mutations of the packages: which of them do the nearest tests notice? (an hour or two)
+	$(BIN)/python -m tests.mutants --count $(MUTATIONS) --seed $(SEED) --processes $(PROCESSES) --out build/mutants.json
+
+
+experiments: $(READY)  ## The stored experiments again, by their commands, stored with their pages (days; goes on where it stopped)
+	$(BIN)/tactile-lab experiment commands | while read -r command; do eval "$(BIN)/$$command --store" </dev/null || exit 1; done
+
+coverage: $(READY)  ## All tests, and how much of each package they run through, as a stored result
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --cov --cov-report=json
+	$(BIN)/python -m tests.support.package_coverage coverage.json --store
 
 lock:  ## Resolve the dependencies again, with hashes
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-config \

@@ -1,0 +1,1 @@
+"""Recording, replaying and conducting sessions, whoever estimates and decides."""

@@ -1,34 +1,20 @@
-"""How a rig file says where a Nano17's readings come from, and the link and wire that this makes."""
+"""The ways in which a Nano17's readings arrive: what a rig file says of each."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 import can
 from pydantic import Field
 
-from drivers.ati import cal_file, rdt_codec
-from drivers.ati.can_codec import DEFAULT_BASE
-from drivers.ati.can_wire import CanWire
-from drivers.ati.controller_wire import ControllerWire
-from drivers.ati.digital_wire import DigitalWire
-from drivers.ati.gauge_volts import GaugeVoltsWire
-from drivers.ati.rdt_wire import BoxPages, RdtWire
-from drivers.ati.wire import ForceWire
-from drivers.hardware.can_bus import CanLink
-from drivers.hardware.serial_port import SerialLink
-from drivers.hardware.udp import UdpLink
-from drivers.links import Link
-from tactile_lab.clock import Clock
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.strict_yaml import StrictModel
+from drivers.ati.protocols import rdt_codec
+from drivers.ati.protocols.can_codec import DEFAULT_BASE
+from drivers.force.wire_settings import Port, WireSettings
 
-Port = Annotated[int, Field(ge=1, le=65535)]
 Scale = Annotated[float, Field(gt=0.0)]
 
 
-class NetBoxWiring(StrictModel):
+class NetBoxWiring(WireSettings):
     """A Net F/T box.
 
     Attributes:
@@ -48,7 +34,7 @@ class NetBoxWiring(StrictModel):
     counts_per_Nm: Scale = 1_000_000.0
 
 
-class DigitalWiring(StrictModel):
+class DigitalWiring(WireSettings):
     """A Digital F/T sensor on RS-485.
 
     Attributes:
@@ -66,7 +52,7 @@ class DigitalWiring(StrictModel):
     serial: str = ""
 
 
-class ControllerWiring(StrictModel):
+class ControllerWiring(WireSettings):
     """A stand-alone F/T controller on RS-232.
 
     Attributes:
@@ -84,7 +70,7 @@ class ControllerWiring(StrictModel):
     counts_per_Nm: Scale
 
 
-class CanWiring(StrictModel):
+class CanWiring(WireSettings):
     """A Net CAN OEM board.
 
     Attributes:
@@ -104,7 +90,7 @@ class CanWiring(StrictModel):
     serial: str = ""
 
 
-class VoltsWiring(StrictModel):
+class VoltsWiring(WireSettings):
     """Gauge volts from a data acquisition program.
 
     Attributes:
@@ -119,54 +105,6 @@ class VoltsWiring(StrictModel):
     serial: str = ""
     host: str = "127.0.0.1"
     local_port: Port
-
-
-Wiring = Annotated[
-    NetBoxWiring | DigitalWiring | ControllerWiring | CanWiring | VoltsWiring, Field(discriminator="wire")
-]
-
-
-def make_link(wiring: Wiring, name: str, clock: Clock) -> Link:
-    """The link to the device, not yet open."""
-    match wiring:
-        case NetBoxWiring():
-            return UdpLink(name, wiring.host, wiring.port, clock)
-        case DigitalWiring():
-            return SerialLink(name, wiring.port, wiring.baud, clock, parity=wiring.parity)
-        case ControllerWiring():
-            return SerialLink(name, wiring.port, wiring.baud, clock)
-        case CanWiring():
-            return CanLink(name, lambda: open_bus(wiring), clock)
-        case VoltsWiring():
-            return UdpLink(name, wiring.host, 0, clock, local=("", wiring.local_port))
-
-
-def make_wire(wiring: Wiring, folder: Path) -> ForceWire:
-    """How the device's messages are read; ``folder`` is that of the rig file.
-
-    Raises:
-        ConfigurationError: the calibration file can not be used; CodecError: it is in counts, not volts.
-    """
-    match wiring:
-        case NetBoxWiring():
-            pages = BoxPages(wiring.host, wiring.http_port, wiring.rate_hz, wiring.serial)
-            return RdtWire(wiring.counts_per_N, wiring.counts_per_Nm, pages)
-        case DigitalWiring():
-            return DigitalWire(wiring.slot, wiring.serial)
-        case ControllerWiring():
-            return ControllerWire(wiring.mode, wiring.counts_per_N, wiring.counts_per_Nm)
-        case CanWiring():
-            return CanWire(wiring.base, wiring.slot, wiring.serial)
-        case VoltsWiring():
-            return GaugeVoltsWire(_own_calibration(folder / wiring.calibration, wiring.serial))
-
-
-def _own_calibration(path: Path, serial: str) -> cal_file.AtiCalibration:
-    calibration = cal_file.load(path)
-    if serial and calibration.serial != serial:
-        what = f"is the calibration of {calibration.serial}, and the sensor is {serial}"
-        raise ConfigurationError(what, where=str(path), hint="Name the file that came with this sensor")
-    return calibration
 
 
 def open_bus(wiring: CanWiring) -> can.BusABC:

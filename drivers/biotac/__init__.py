@@ -1,0 +1,1 @@
+"""BioTac fingertips: channels, contact points and learned normals."""

@@ -14,15 +14,15 @@ import numpy as np
 
 from drivers.biotac.channels import Channels
 from drivers.biotac.electrodes import electrode_layout
-from drivers.biotac.estimator import contact_from_electrodes, squeezed
+from drivers.biotac.estimator import contact_from_electrodes, squeeze_counts
 from drivers.biotac.learned_normal import LearnedNormals
 from drivers.biotac.settings import BioTacCalibration, BioTacSettings, EllipsoidSkinSettings, load_biotacs
 from drivers.biotac.slot_codec import PALM_SLOT_BYTES, SLOT_BYTES, SLOTS, Channel, Slot, decode_slot, electrode_channel
-from drivers.fingertip import TipContact
-from drivers.shadow.tactile_names import TactileAnswers
-from tactile_lab.clock import NANOSECONDS
-from tactile_lab.errors import CodecError, ConfigurationError, DeviceError
-from tactile_lab.geometry.contacts import FINGERS, Array
+from drivers.core.clock import NANOSECONDS
+from drivers.core.contacts import FINGERS, Array
+from drivers.core.errors import CodecError, ConfigurationError, DeviceError
+from drivers.core.fingertip import TipContact
+from drivers.shadow.protocol.tactile_names import TactileAnswers
 
 _NOT_FITTED = "no sensor fitted: readings outside the converter's range"
 
@@ -37,7 +37,7 @@ class TactileReading(TactileAnswers, Protocol):
 
 
 class BioTac:
-    """One BioTac (a :class:`~drivers.fingertip.FingertipSensor`).
+    """One BioTac (a :class:`~drivers.core.fingertip.FingertipSensor`).
 
     Args:
         finger: where it sits.
@@ -123,7 +123,7 @@ class BioTac:
         change = self.channels.newest(self._electrodes) - self._tare_electrodes
         rises = self.channels.recent(Channel.PDC) - (self._tare_pdc or 0.0)
         near_touch = np.abs(rises).max() > 0.5 * self.calibration.touch_pdc_counts
-        if near_touch or any(self._touches) or squeezed(change, self.calibration.electrode_noise_counts).any():
+        if near_touch or any(self._touches) or squeeze_counts(change, self.calibration.electrode_noise_counts).any():
             return
         share = 1.0 - math.exp(-max(elapsed_s, 0.0) / self._settings.follow_s)
         self._tare_pdc = (self._tare_pdc or 0.0) + share * float(rises[-1])
@@ -199,7 +199,7 @@ class BioTac:
         return float(self.channels.newest((Channel.PDC,))[0]) - (self._tare_pdc or 0.0)
 
     def _force_N(self, pdc_rise: float, change: Array) -> float:
-        squeeze = squeezed(change, self.calibration.electrode_noise_counts).sum()
+        squeeze = squeeze_counts(change, self.calibration.electrode_noise_counts).sum()
         return float(
             max(0.0, self.calibration.N_per_pdc_count * pdc_rise, self.calibration.N_per_electrode_count * squeeze)
         )

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from drivers.biotac.slot_codec import LARGEST_COUNT, Channel, Slot
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
 
 
 class Channels:
@@ -81,3 +81,13 @@ class Channels:
         """How many channels have not been heard for that long, against the newest slot's stamp."""
         limit_ns = self.newest_ns - age_ms * 1e6
         return sum(self._stamps_ns.get(channel, 0) < limit_ns for channel in self._readings)
+
+
+def core_temperature_degC(counts: Array) -> Array:
+    """Temperature of the heated core from counts of the TDC channel (n,), degrees Celsius, shape (n,).
+
+    Approximate: only its changes mean something (manufacturer's manual; protocols: BioTac units).
+    """
+    share = np.asarray(counts, float) / LARGEST_COUNT
+    with np.errstate(divide="ignore"):
+        return np.asarray(4025.0 / np.log((155183.0 - 46555.0 * share) / share) - 273.15)

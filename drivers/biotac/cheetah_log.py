@@ -1,8 +1,8 @@
 """The text log of stand-alone BioTacs on SPI, as the maker's program for the Cheetah adapter writes it.
 
 Header lines, an empty line and ``Begin File``, then one line a sample: time, batch, frame, channel, and value and
-parity for each sensor (protocols D.1). Some logs lack the header, and some programs leave the time at zero: the
-sensors sample one channel every 1/4400 s, so times are then counted from the lines.
+parity for each sensor (protocols: BioTac on SPI). Some logs lack the header, and some programs leave the time at
+zero: the sensors sample one channel every 1/4400 s, so times are then counted from the lines.
 
 Channels are the maker's: 0 PAC, 1 PDC, 2 TAC, 3 TDC, 17 to 40 electrodes 1 to 24. Electrodes 20 to 24 exist on the
 BioTac SP alone.
@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.biotac.slot_codec import LARGEST_COUNT, Channel, Slot, electrode_channel
-from tactile_lab.clock import NANOSECONDS
-from tactile_lab.errors import CodecError
+from drivers.core.clock import NANOSECONDS
+from drivers.core.errors import CodecError
 
 SAMPLE_RATE_Hz = 4400.0
 BEGIN = "Begin File"

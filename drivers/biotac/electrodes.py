@@ -1,4 +1,4 @@
-"""Where a BioTac's electrodes and skin are (protocols D.3).
+"""Where a BioTac's electrodes and skin are (protocols: BioTac electrodes).
 
 BioTac frame: x along the finger to its tip, y to the side, z to the back of the finger; the electrodes lie in -z. The
 19-electrode model has its origin in the centre of the ball that ends the finger, the 24-electrode model (BioTac SP)
@@ -12,7 +12,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
 
 ElectrodeCount = Literal[19, 24]
 
@@ -91,7 +91,7 @@ class ElectrodeLayout:
 
 
 def electrodes_of(serial: str) -> ElectrodeCount:
-    """How many electrodes the sensor with this serial number has (protocols A.10)."""
+    """How many electrodes the sensor with this serial number has (protocols: BioTac slots)."""
     return 24 if serial.startswith(("BTSP", "BTTB")) else 19
 
 

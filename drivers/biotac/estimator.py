@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivers.biotac.electrodes import ElectrodeLayout
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class ElectrodeContact:
     squeeze: Array
 
 
-def squeezed(change: Array, noise_counts: float) -> Array:
+def squeeze_counts(change: Array, noise_counts: float) -> Array:
     """How much each electrode is squeezed, counts >= 0, shape as ``change`` (reading minus tare)."""
     lowered = -np.minimum(change, 0.0)
     return np.asarray(np.where(lowered > noise_counts, lowered, 0.0))
@@ -49,7 +49,7 @@ def contact_from_electrodes(
         noise_counts: smaller changes are noise.
         power: exponent of the weights; 1 is best on real recordings.
     """
-    squeeze = squeezed(change, noise_counts)
+    squeeze = squeeze_counts(change, noise_counts)
     weights = squeeze**power
     with np.errstate(invalid="ignore"):
         inside = weights @ layout.positions_m / weights.sum(axis=1, keepdims=True)
@@ -62,6 +62,6 @@ def force_direction(change: Array, layout: ElectrodeLayout, *, noise_counts: flo
 
     The direction out of the finger from which the force comes; NaN where no electrode is squeezed.
     """
-    pressed = squeezed(change, noise_counts) @ layout.normals
+    pressed = squeeze_counts(change, noise_counts) @ layout.normals
     with np.errstate(invalid="ignore"):
         return np.asarray(pressed / np.linalg.norm(pressed, axis=1, keepdims=True))

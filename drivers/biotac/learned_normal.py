@@ -19,10 +19,10 @@ from pydantic import Field
 
 from drivers.biotac.electrodes import ElectrodeCount, electrode_layout
 from drivers.biotac.estimator import contact_from_electrodes
-from tactile_lab.calibration_file import load_parameters
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.geometry.contacts import FINGERS, Array
-from tactile_lab.strict_yaml import StrictModel
+from drivers.core.calibration_file import load_parameters
+from drivers.core.configuration import StrictModel
+from drivers.core.contacts import FINGERS, Array
+from drivers.core.errors import ConfigurationError
 
 PositiveFloat = Annotated[float, Field(gt=0.0)]
 
@@ -160,7 +160,7 @@ class NormalsFile(StrictModel):
     normals: Annotated[dict[str, StoredNormals], Field(min_length=1)]
 
 
-def stored(learned: LearnedNormals) -> StoredNormals:
+def as_stored(learned: LearnedNormals) -> StoredNormals:
     """A regression in the form of a file."""
     return StoredNormals(
         electrodes=learned.electrodes,
@@ -168,8 +168,8 @@ def stored(learned: LearnedNormals) -> StoredNormals:
         spread=learned.spread,
         noise_counts=learned.noise_counts,
         examples=len(learned.examples),
-        changes_base64=_packed(learned.examples.changes),
-        normals_base64=_packed(learned.examples.normals),
+        changes_base64=_pack(learned.examples.changes),
+        normals_base64=_pack(learned.examples.normals),
     )
 
 
@@ -183,20 +183,20 @@ def load_normals(path: Path) -> dict[str, LearnedNormals]:
     if unknown := sorted(set(found) - set(FINGERS)):
         hint = f"The fingers are {', '.join(FINGERS)}"
         raise ConfigurationError(f"unknown finger {', '.join(unknown)}", where=str(path), hint=hint)
-    return {finger: _restored(each, f"{path}: normals.{finger}") for finger, each in found.items()}
+    return {finger: _restore(each, f"{path}: normals.{finger}") for finger, each in found.items()}
 
 
-def _restored(file: StoredNormals, where: str) -> LearnedNormals:
-    changes = _unpacked(file.changes_base64, (file.examples, file.electrodes), where)
-    normals = _unpacked(file.normals_base64, (file.examples, 3), where)
+def _restore(file: StoredNormals, where: str) -> LearnedNormals:
+    changes = _unpack(file.changes_base64, (file.examples, file.electrodes), where)
+    normals = _unpack(file.normals_base64, (file.examples, 3), where)
     return LearnedNormals(file.electrodes, Presses(changes, normals), file.kernel, file.spread, file.noise_counts)
 
 
-def _packed(values: Array) -> str:
+def _pack(values: Array) -> str:
     return base64.b64encode(values.astype("<f4").tobytes()).decode()
 
 
-def _unpacked(text: str, shape: tuple[int, int], where: str) -> Array:
+def _unpack(text: str, shape: tuple[int, int], where: str) -> Array:
     try:
         values = np.frombuffer(base64.b64decode(text, validate=True), "<f4").reshape(shape).astype(float)
     except (binascii.Error, ValueError) as error:

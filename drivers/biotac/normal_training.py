@@ -21,8 +21,8 @@ from drivers.biotac.learned_normal import (
     patterns,
     usual_normals,
 )
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
+from drivers.core.errors import ConfigurationError
 
 STRETCHES = 5
 """Stretches of time left out in turn."""
@@ -71,7 +71,7 @@ def rotation_between(source: Array, target: Array) -> Array:
     return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
 
 
-def turned_to_sensor(presses: Presses, electrodes: ElectrodeCount, noise_counts: float) -> Array:
+def rotation_to_sensor(presses: Presses, electrodes: ElectrodeCount, noise_counts: float) -> Array:
     """Rotation reference_R_sensor of normals that were measured in another fixed frame than the BioTac's.
 
     The frame's orientation is the one in which the normals agree best with those of equation 2.24.
@@ -101,7 +101,7 @@ def train(
     best: tuple[float, KernelSettings, Spread] | None = None
     for saturation, length, ridge in product(_SATURATIONS_counts, _LENGTHS, _RIDGES):
         kernel = KernelSettings(saturation_counts=saturation, length=length, ridge=ridge)
-        found, variance = _left_out(kept, usual, kernel)
+        found, variance = _predict_left_out(kept, usual, kernel)
         errors = angles_rad(found, kept.normals)
         if best is None or errors.mean() < best[0]:
             best = float(errors.mean()), kernel, fitted_spread(errors, variance)
@@ -118,7 +118,7 @@ def _check(presses: Presses, electrodes: int) -> None:
         raise ConfigurationError(what, where="BioTac normals", hint="Name the right number of electrodes")
 
 
-def _left_out(presses: Presses, usual: Array, kernel: KernelSettings) -> tuple[Array, Array]:
+def _predict_left_out(presses: Presses, usual: Array, kernel: KernelSettings) -> tuple[Array, Array]:
     """Normals of each stretch as the others tell them (n, 3), and the variances of the regression (n,).
 
     In closed form from one inverse for all stretches (Rasmussen and Williams, Gaussian Processes, 5.4.2, by blocks).
@@ -177,7 +177,7 @@ def compare_methods(
         ).normals,
         "sum of squeezed normals": force_direction(presses.changes, layout, noise_counts=noise_counts),
     }
-    rows = [_judged(name, normals, presses.normals, half, in_sensor_frame) for name, normals in ways.items()]
+    rows = [_score(name, normals, presses.normals, half, in_sensor_frame) for name, normals in ways.items()]
     return [*rows, _judged_learning(presses, electrodes, noise_counts, half, in_sensor_frame, most)]
 
 
@@ -188,7 +188,7 @@ def _all_electrodes(changes: Array, electrodes: ElectrodeCount, power: float) ->
         return layout.skin.project(weights @ layout.positions_m / weights.sum(axis=1, keepdims=True))[1]
 
 
-def _judged(name: str, found: Array, measured: Array, half: int, in_sensor_frame: bool) -> MethodErrors:
+def _score(name: str, found: Array, measured: Array, half: int, in_sensor_frame: bool) -> MethodErrors:
     known = np.asarray(np.isfinite(found).all(axis=1))
     first, second = np.flatnonzero(known[:half]), half + np.flatnonzero(known[half:])
     turn = np.eye(3) if in_sensor_frame else rotation_between(found[first], measured[first])
@@ -201,7 +201,7 @@ def _judged_learning(
     presses: Presses, electrodes: ElectrodeCount, noise_counts: float, half: int, in_sensor_frame: bool, most: int
 ) -> MethodErrors:
     first, second = presses.part(slice(0, half)), presses.part(slice(half, None))
-    turn = np.eye(3) if in_sensor_frame else turned_to_sensor(first, electrodes, noise_counts)
+    turn = np.eye(3) if in_sensor_frame else rotation_to_sensor(first, electrodes, noise_counts)
     learned = train(Presses(first.changes, first.normals @ turn), electrodes, noise_counts=noise_counts, most=most)
     found, sigma = learned.normals(second.changes)
     return _errors("learned", angles_rad(found @ turn.T, second.normals), sigma)

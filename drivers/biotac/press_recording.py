@@ -16,8 +16,8 @@ import numpy as np
 
 from drivers.biotac.electrodes import ElectrodeCount
 from drivers.biotac.learned_normal import Presses
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
+from drivers.core.errors import ConfigurationError
 
 _NORMAL = ("nx", "ny", "nz")
 _COUNTS: tuple[ElectrodeCount, ...] = get_args(ElectrodeCount)
@@ -39,7 +39,7 @@ def read_presses(path: Path, normals: Path | None = None) -> PressRecording:
         normals: the text file of normals, shape (3, n).
 
     Raises:
-        ConfigurationError: a file can not be read or does not fit; says where.
+        ConfigurationError: a file cannot be read or does not fit; says where.
     """
     changes, directions = _table(path) if normals is None else (_matrix(path), _matrix(normals))
     where = str(path if normals is None else normals)
@@ -51,16 +51,6 @@ def read_presses(path: Path, normals: Path | None = None) -> PressRecording:
         hint = "A BioTac has 19, a BioTac SP 24"
         raise ConfigurationError(f"{changes.shape[1]} electrodes", where=str(path), hint=hint)
     return PressRecording(Presses(changes, _units(directions, where)), electrodes)
-
-
-def write_presses(path: Path, readings: Array, normals: Array) -> None:
-    """Write a table: counts (n, electrodes) and normals (n, 3), NaN where nothing was touched. Raises OSError."""
-    names = [f"e{number}" for number in range(1, readings.shape[1] + 1)]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow([*names, *_NORMAL])
-        for counts, normal in zip(readings.tolist(), normals.tolist(), strict=True):
-            table.writerow([*counts, *("" if value != value else value for value in normal)])
 
 
 def _units(directions: Array, where: str) -> Array:
@@ -81,7 +71,7 @@ def _matrix(path: Path) -> Array:
         values = np.loadtxt(path, ndmin=2)
     except (OSError, ValueError) as error:
         hint = "Give a text file of numbers, one column a sample"
-        raise ConfigurationError(f"can not be read ({_reason(error)})", where=str(path), hint=hint) from error
+        raise ConfigurationError(f"cannot be read ({_reason(error)})", where=str(path), hint=hint) from error
     if not np.isfinite(values).all():
         raise ConfigurationError("holds values that are no numbers", where=str(path), hint="Leave those samples out")
     return np.asarray(values.T)
@@ -93,7 +83,7 @@ def _table(path: Path) -> tuple[Array, Array]:
             rows = list(csv.reader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         hint = "Give a CSV table"
-        raise ConfigurationError(f"can not be read ({_reason(error)})", where=str(path), hint=hint) from error
+        raise ConfigurationError(f"cannot be read ({_reason(error)})", where=str(path), hint=hint) from error
     electrodes = len(rows[0]) - len(_NORMAL) if rows else 0
     names = [f"e{number}" for number in range(1, electrodes + 1)]
     if not rows or [name.strip().lower() for name in rows[0]] != [*names, *_NORMAL]:

@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from drivers.biotac.electrodes import BallAndCylinder, ElectrodeCount, EllipsoidSkin, Skin
-from drivers.fingertip import RigidTransform, Vector3
-from tactile_lab.calibration_file import load_parameters
-from tactile_lab.strict_yaml import StrictModel
+from drivers.core.calibration_file import load_parameters
+from drivers.core.configuration import StrictModel
+from drivers.core.fingertip import RigidTransform, Vector3
 
 
 class BallAndCylinderSkin(StrictModel):
@@ -45,7 +45,7 @@ class BioTacCalibration(StrictModel):
         skin: the touched surface; the model's own when left out.
         N_per_pdc_count: force per count of fluid pressure while the skin does not rest on the core.
         N_per_electrode_count: force per count of squeezed electrodes, for harder contacts.
-        touch_pdc_counts: pressure above the tare that means contact (10 counts, protocols D.4).
+        touch_pdc_counts: pressure above the tare that means contact (10 counts; protocols: BioTac contact).
         electrode_noise_counts: smaller changes of an electrode are noise.
         weight_power: exponent of equation 2.24's weights.
         point_sigma_m: of the contact point along the skin, per axis; across it a third of that.

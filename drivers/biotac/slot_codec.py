@@ -1,4 +1,4 @@
-"""A BioTac's 16 bytes inside the palm's status (protocols A.10).
+"""A BioTac's 16 bytes inside the palm's status (protocols: BioTac slots).
 
 One request gives two values: the requested one and the next in the channels' order; the vibration channel comes
 along twice. Which request a slot answers is told by the status, not by the slot.
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
-from tactile_lab.errors import CodecError
+from drivers.core.errors import CodecError
 
 SLOT_BYTES = 16
 SLOTS = 5

@@ -1,0 +1,1 @@
+"""Cameras and printed markers: pictures, corners, poses."""

@@ -3,8 +3,8 @@
 The world marker, which does not move, is averaged over frames and gives the camera's pose. The object's marker lies on
 the table, so that only its place and its turn are free: the rays through its corners are cut with the plane in which
 the marker lies, and the square is laid into the four points; from there all corners are fitted together. Unlike the
-pose of a single square (both IPPE solutions are given beside it) this can not flip. The sideways shift of rays in the
-table's glass is taken into account for both markers. What a picture can not tell for certain it does not tell: the
+pose of a single square (both IPPE solutions are given beside it) this cannot flip. The sideways shift of rays in the
+table's glass is taken into account for both markers. What a picture cannot tell for certain it does not tell: the
 reason is given instead of a pose.
 """
 
@@ -27,8 +27,8 @@ from drivers.camera.markers import (
     refine_pose,
 )
 from drivers.camera.world_marker import WorldMarker, table_glass
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import rotate, transform_points
+from drivers.core.contacts import Array
+from drivers.core.poses import rotate, transform_points
 
 FACE_DOWN = Pose3(Rot3(np.diag([1.0, -1.0, -1.0])), np.zeros(3))
 """A marker seen from below: its z points down."""
@@ -84,17 +84,13 @@ class ObjectTracker:
         self._camera, self._settings = camera, settings
         self._object_T_marker = settings.object_T_objectmarker.pose()
 
-    def object_pose(self, frame: Frame) -> ObjectSighting | None:
-        """Where the object is in this frame; None where that can not be told, see :meth:`observe`."""
-        return self.observe(frame).sighting
-
     def observe(self, frame: Frame) -> Observation:
         """Take one frame: the world marker joins its mean, and the object is found, or the reason is told."""
-        found = found_in(frame, self._settings.dictionary)
+        found = detection_in(frame, self._settings.dictionary)
         return self.locate(frame.stamp_ns, found, self.take_world(found))
 
     def take_world(self, found: Detection) -> str:
-        """Let the world marker of one frame join the mean; why the frame can not be used, or ""."""
+        """Let the world marker of one frame join the mean; why the frame cannot be used, or ""."""
         if problem := self._picture_problem(found):
             return problem
         world = found.markers.get(self._settings.world_id)
@@ -111,12 +107,12 @@ class ObjectTracker:
             return Observation(stamp_ns, None, problem)
         if problem := self._blur_problem(self._settings.object_id, marker.blur_px):
             return Observation(stamp_ns, None, problem)
-        return self._judged(self.sighting(stamp_ns, marker.corners_px), stamp_ns)
+        return self._check(self.sighting(stamp_ns, marker.corners_px), stamp_ns)
 
     def sighting(self, stamp_ns: int, corners_px: Array) -> ObjectSighting | None:
         """The object from the corners of its marker, shape (4, 2), which lies on the table, z = 0 of the world.
 
-        None before the world marker was seen, or when the corners can not be on the table.
+        None before the world marker was seen, or when the corners cannot be on the table.
         """
         camera_T_world = self.world.camera_T_world()
         if camera_T_world is None:
@@ -138,10 +134,10 @@ class ObjectTracker:
             return ""
         return f"blurred: the edges of marker {number} are {blur_px:.1f} px wide, at most {largest:g} px are trusted"
 
-    def _judged(self, sighting: ObjectSighting | None, stamp_ns: int) -> Observation:
+    def _check(self, sighting: ObjectSighting | None, stamp_ns: int) -> Observation:
         if sighting is None:
             seen = self.world.frames > 0
-            problem = "the marker's corners can not lie on the table" if seen else "the world marker was not seen yet"
+            problem = "the marker's corners cannot lie on the table" if seen else "the world marker was not seen yet"
         elif self._settings.freedom == "spatial":
             problem = _ambiguity(sighting) if sighting.ambiguous else ""
         else:
@@ -222,7 +218,7 @@ class ObjectTracker:
         return JointPose(found.world_T_object, found.covariance + glue)
 
 
-def found_in(frame: Frame, dictionary: str) -> Detection:
+def detection_in(frame: Frame, dictionary: str) -> Detection:
     """What was found when the frame was taken; else what its picture shows."""
     if frame.detection is not None:
         return frame.detection

@@ -12,8 +12,8 @@ from gtsam import Pose3
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.joint_pose import cross_matrices
 from drivers.camera.markers import MarkerPose, points_reprojection_px, refine_pose
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import rotation_angle_rad, transform_points
+from drivers.core.contacts import Array
+from drivers.core.poses import rotation_angle_rad, transform_points
 
 _SAME_TURN_rad = 0.05
 
@@ -55,9 +55,9 @@ def board_pose(
         return None
     starts = [_pose(r, t) for r, t in zip(rotations, translations, strict=True)]
     starts = [start for start in starts if np.isfinite(start.matrix()).all()]
-    best = min((_refined(s, points_m, pixels, camera) for s in starts), key=lambda found: found.reprojection_px)
+    best = min((_refine(s, points_m, pixels, camera) for s in starts), key=lambda found: found.reprojection_px)
     floor = max(best.reprojection_px, np.sqrt(2.0) * corner_sigma_px)
-    distinct = tuple(_judged(start, points_m, pixels, camera) for start in starts if _differs(start, best))
+    distinct = tuple(_assess(start, points_m, pixels, camera) for start in starts if _differs(start, best))
     return BoardPose(
         camera_T_board=best.camera_T_marker,
         reprojection_px=best.reprojection_px,
@@ -76,11 +76,11 @@ def pose_covariance(camera_T_points: Pose3, points_m: Array, camera: CameraCalib
     return np.asarray(np.linalg.pinv(rows.T @ rows))
 
 
-def _refined(start: Pose3, points_m: Array, pixels: Array, camera: CameraCalibration) -> MarkerPose:
-    return _judged(refine_pose(start, points_m, pixels, camera), points_m, pixels, camera)
+def _refine(start: Pose3, points_m: Array, pixels: Array, camera: CameraCalibration) -> MarkerPose:
+    return _assess(refine_pose(start, points_m, pixels, camera), points_m, pixels, camera)
 
 
-def _judged(pose: Pose3, points_m: Array, pixels: Array, camera: CameraCalibration) -> MarkerPose:
+def _assess(pose: Pose3, points_m: Array, pixels: Array, camera: CameraCalibration) -> MarkerPose:
     return MarkerPose(pose, points_reprojection_px(pose, points_m, pixels, camera))
 
 

@@ -16,9 +16,9 @@ from pydantic import Field, RootModel, field_validator, model_validator
 
 from drivers.camera.frames import Image
 from drivers.camera.markers import detect, dictionary_or_file, opencv_dictionary
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.strict_yaml import StrictModel, load, validate
+from drivers.core.configuration import StrictModel, load, validate
+from drivers.core.contacts import Array
+from drivers.core.errors import ConfigurationError
 
 CHECK_BAR_mm, LARGEST_SCALE_ERROR = 100.0, 0.005
 
@@ -87,7 +87,7 @@ class SingleMarker(Printed):
         """Corners of a board that is seen whole."""
         return 4
 
-    def matched(self, image: Image) -> tuple[Array, Array]:
+    def match_corners(self, image: Image) -> tuple[Array, Array]:
         """Corners on the board (n, 3), metres, and in the picture (n, 2), pixels; n = 0 where it is not seen."""
         found = detect(image, self.dictionary)
         if self.number not in found:
@@ -128,7 +128,7 @@ class GridBoard(Printed):
         """Its markers."""
         return range(self.first_number, self.first_number + self.columns * self.rows)
 
-    def matched(self, image: Image) -> tuple[Array, Array]:
+    def match_corners(self, image: Image) -> tuple[Array, Array]:
         """Corners on the board (n, 3), metres, and in the picture (n, 2), pixels; n = 0 where it is not seen."""
         found = {number: quad for number, quad in detect(image, self.dictionary).items() if number in self.numbers}
         points = [self.marker_corners_m(number) for number in found]
@@ -184,7 +184,7 @@ class CharucoBoard(Printed):
         board.setLegacyPattern(self.legacy)
         return board
 
-    def matched(self, image: Image) -> tuple[Array, Array]:
+    def match_corners(self, image: Image) -> tuple[Array, Array]:
         """Corners on the board (n, 3), metres, and in the picture (n, 2), pixels; n = 0 where it is not seen."""
         corners, numbers, _, _ = self._detector.detectBoard(image)
         if numbers is None or not len(numbers):

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from pydantic import Field, field_validator
 
-from tactile_lab.calibration_file import load_parameters
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.strict_yaml import StrictModel, validate
+from drivers.core.calibration_file import load_parameters
+from drivers.core.configuration import StrictModel, validate
+from drivers.core.contacts import Array
+from drivers.core.errors import ConfigurationError
 
 _DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 _UNDISTORTION = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 40, 1e-9)
@@ -91,7 +91,7 @@ def load_camera(path: Path) -> CameraCalibration:
     """Read a camera calibration: our YAML, or OpenCV's (known by its ``%YAML:1.0`` head).
 
     Raises:
-        ConfigurationError: the file can not be read, or is no calibration.
+        ConfigurationError: the file cannot be read, or is no calibration.
     """
     return _opencv(path) if is_opencv(path) else load_parameters(path, CameraCalibration)
 

@@ -6,10 +6,10 @@ from pydantic import Field
 
 from drivers.camera.frames import Frame
 from drivers.camera.packet import decode_packet
-from drivers.links import Datagram, Link, link_health
-from tactile_lab.clock import Clock
-from tactile_lab.errors import DeviceError
-from tactile_lab.strict_yaml import StrictModel
+from drivers.core.clock import Clock
+from drivers.core.configuration import StrictModel
+from drivers.core.errors import DeviceError
+from drivers.core.transports import Datagram, Transport, link_health
 
 TRIGGER = b"TRIGGER"
 
@@ -24,27 +24,27 @@ class CameraDeviceSettings(StrictModel):
 class Camera:
     """A triggered camera."""
 
-    def __init__(self, link: Link, clock: Clock, settings: CameraDeviceSettings | None = None) -> None:
-        self._link, self._clock, self._settings = link, clock, settings or CameraDeviceSettings()
+    def __init__(self, transport: Transport, clock: Clock, settings: CameraDeviceSettings | None = None) -> None:
+        self._transport, self._clock, self._settings = transport, clock, settings or CameraDeviceSettings()
         self._connected = False
         self._asked_ns: int | None = None
         self._arrived: list[Datagram] = []
 
     def connect(self) -> None:
-        """Open the link; repeatable. Raises DeviceError."""
+        """Open the transport; repeatable. Raises DeviceError."""
         if not self._connected:
-            self._link.open()
+            self._transport.open()
             self._connected = True
 
     def close(self) -> None:
-        """Close the link; idempotent."""
+        """Close the transport; idempotent."""
         if self._connected:
             self._connected = False
-            self._link.close()
+            self._transport.close()
 
     def poll(self) -> None:
         """Take what the camera has sent by itself, so that it is recorded in time. Raises DeviceError."""
-        arrived = self._link.receive()
+        arrived = self._transport.receive()
         if self._asked_ns is not None:
             self._arrived += arrived
 
@@ -52,21 +52,21 @@ class Camera:
         """Trigger; the picture comes with :meth:`taken`. One that was still on its way from before is left out.
 
         Raises:
-            DeviceError: the link failed.
+            DeviceError: the transport failed.
         """
-        self._link.receive()
-        self._link.send(TRIGGER)
+        self._transport.receive()
+        self._transport.send(TRIGGER)
         self._asked_ns, self._arrived = self._clock.now_ns(), []
 
-    def taken(self) -> Frame | None:
+    def take_picture(self) -> Frame | None:
         """The picture asked for, once; None while it is on its way. Never waits.
 
         Raises:
-            DeviceError: nothing was asked for, no picture came within the time-out, or the link failed.
-            CodecError: the picture can not be decoded.
+            DeviceError: nothing was asked for, no picture came within the time-out, or the transport failed.
+            CodecError: the picture cannot be decoded.
         """
         if self._asked_ns is None:
-            raise DeviceError("no picture was asked for", where=self._link.name, hint="Ask first")
+            raise DeviceError("no picture was asked for", where=self._transport.name, hint="Ask first")
         self.poll()
         arrived, self._arrived = self._arrived, []
         frames = [self.receive(datagram) for datagram in arrived]
@@ -74,7 +74,7 @@ class Camera:
         if frame is None and self._clock.now_ns() - self._asked_ns >= 1e6 * self._settings.timeout_ms:
             raise DeviceError(
                 f"no picture within {self._settings.timeout_ms:.0f} ms",
-                where=self._link.name,
+                where=self._transport.name,
                 hint="Check the camera's power, cable and trigger",
             )
         if frame is not None:
@@ -84,7 +84,7 @@ class Camera:
     def capture(self) -> Frame:
         """Trigger and wait for the picture, doing nothing else; see :meth:`ask` and :meth:`taken`."""
         self.ask()
-        while (frame := self.taken()) is None:
+        while (frame := self.take_picture()) is None:
             self._clock.sleep_until_ns(self._clock.now_ns() + round(1e6 * self._settings.look_every_ms))
         return frame
 
@@ -93,5 +93,5 @@ class Camera:
         return decode_packet(datagram)
 
     def health(self) -> tuple[str, ...]:
-        """What the camera's link knows to be wrong, in words."""
-        return link_health(self._link)
+        """What the camera's transport knows to be wrong, in words."""
+        return link_health(self._transport)

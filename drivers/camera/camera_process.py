@@ -1,4 +1,4 @@
-"""The camera in a process of its own, seen from the session: a link like any other.
+"""The camera in a process of its own, seen from the session: a transport like any other.
 
 The process finds the markers of every frame as it comes, 30 a second, whatever the session is busy with; their corners
 come as packets (see :mod:`drivers.camera.packet`), stamped where they arrived. A trigger asks for one picture beside.
@@ -10,20 +10,20 @@ from typing import Any
 
 from drivers.camera.camera import TRIGGER
 from drivers.camera.source_settings import CameraSourceSettings
-from drivers.links import Datagram
-from drivers.record_process import RecordProcess
-from drivers.records import Record, RecordKind
-from tactile_lab.errors import CodecError, DeviceError
+from drivers.core.errors import CodecError, DeviceError
+from drivers.core.record_process import RecordProcess
+from drivers.core.records import Record, RecordKind
+from drivers.core.transports import Datagram
 
 _START_s, _REPORT_s, _END_s = 60.0, 10.0, 5.0
 _LONGEST = 40_000_000
 
 
 class CameraProcess:
-    """A link to a camera that another process watches.
+    """A transport to a camera that another process watches.
 
     Args:
-        name: the link's name, in the rig and in recordings.
+        name: the transport's name, in the rig and in recordings.
         settings: which camera, and what to look for.
     """
 
@@ -37,7 +37,7 @@ class CameraProcess:
         """Start the process and wait until it has the camera; all or nothing, repeatable.
 
         Raises:
-            DeviceError: the camera can not be opened, in its driver's own words.
+            DeviceError: the camera cannot be opened, in its driver's own words.
         """
         if self._child.started:
             return

@@ -17,12 +17,13 @@ import cv2
 from drivers.camera.frames import Frame
 from drivers.camera.markers import detection
 from drivers.camera.packet import encode_packet
+from drivers.camera.pictures import Picture, Source
 from drivers.camera.source_settings import CameraSourceSettings
-from drivers.camera.sources import Picture, Source, open_source
-from drivers.records import RecordKind, RecordPipe
-from tactile_lab.clock import NANOSECONDS, MonotonicClock
-from tactile_lab.errors import DeviceError, TactileLabError
-from tactile_lab.strict_yaml import validate
+from drivers.camera.sources import open_source
+from drivers.core.clock import NANOSECONDS, MonotonicClock
+from drivers.core.configuration import validate
+from drivers.core.errors import DeviceError, TactileLabError
+from drivers.core.records import RecordKind, RecordPipe
 
 _FILES = ("folder", "video")
 

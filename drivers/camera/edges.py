@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from drivers.camera.frames import Image, SeenMarker
 from drivers.camera.profiles import Profiles, fit_profiles
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
 
 _ALONG = np.linspace(0.12, 0.88, 28)  # shares of a side where its edge is looked for; blur rounds the ends
 _STEPS = 25  # samples across the edge
@@ -35,7 +35,7 @@ def refine_square(image: Image, corners_px: Array, modules: int) -> SeenMarker:
     """A dark square on white, from a guess at its corners (4, 2) within a few pixels, clockwise in the picture.
 
     Several passes: noise draws an edge toward where it was looked for, and only a known blur tells how far to look.
-    Where an edge can not be found, the guess is given back, with an infinite blur.
+    Where an edge cannot be found, the guess is given back, with an infinite blur.
 
     Args:
         image: grey levels.

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.errors import CodecError
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
+from drivers.core.errors import CodecError
 
 Image = NDArray[np.uint8]
 LARGEST_PIXELS = 40_000_000

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from gtsam import Pose3
 
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.glass import Glass
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import transform_points
+from drivers.core.contacts import Array
+from drivers.core.poses import transform_points
 
 _PLANAR, _SPATIAL = (3, 4, 2), (0, 1, 2, 3, 4, 5)
 """Which changes of the object's pose are free, of rotation about x, y, z and translation along them: x, y, yaw; all."""
@@ -64,9 +64,9 @@ def solve_jointly(
     problem = _Problem(camera, glass, world, target, _PLANAR if planar else _SPATIAL)
     camera_T_world, world_T_object = start
     for _ in range(_ROUNDS):
-        rows, errors = problem.linearised(camera_T_world, world_T_object)
+        rows, errors = problem.linearise(camera_T_world, world_T_object)
         change = np.asarray(np.linalg.lstsq(rows, -errors, rcond=None)[0], float)
-        camera_T_world, world_T_object = problem.changed(camera_T_world, world_T_object, change)
+        camera_T_world, world_T_object = problem.change(camera_T_world, world_T_object, change)
         if np.abs(change).max() < _ENOUGH:
             break
     return JointPose(world_T_object, np.asarray(np.linalg.pinv(rows.T @ rows)[6:, 6:]))
@@ -80,7 +80,7 @@ class _Problem:
     target: Corners
     free: tuple[int, ...]
 
-    def linearised(self, camera_T_world: Pose3, world_T_object: Pose3) -> tuple[Array, Array]:
+    def linearise(self, camera_T_world: Pose3, world_T_object: Pose3) -> tuple[Array, Array]:
         """Derivatives of all errors by all unknowns, and the errors; in standard deviations.
 
         How the glass's shift changes with the poses is left out: a per cent of a slope, nothing of an error.
@@ -99,7 +99,7 @@ class _Problem:
         misses = pixels - np.vstack([self.world.pixels, self.target.pixels])
         return (slopes / sigmas[..., None]).reshape(-1, slopes.shape[2]), (misses / sigmas).ravel()
 
-    def changed(self, camera_T_world: Pose3, world_T_object: Pose3, change: Array) -> tuple[Pose3, Pose3]:
+    def change(self, camera_T_world: Pose3, world_T_object: Pose3, change: Array) -> tuple[Pose3, Pose3]:
         """Both poses after a small change: the camera's six, then the object's free ones along the world's axes."""
         full = np.zeros(6)
         full[list(self.free)] = change[6:]

@@ -18,10 +18,10 @@ from pydantic import Field, field_validator
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.edges import refine_square
 from drivers.camera.frames import Detection, Image, SeenMarker
-from drivers.fingertip import RigidTransform
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import transform_points
-from tactile_lab.strict_yaml import StrictModel
+from drivers.core.configuration import StrictModel
+from drivers.core.contacts import Array
+from drivers.core.fingertip import RigidTransform
+from drivers.core.poses import transform_points
 
 _DOWN = RigidTransform(translation_m=(0.0, 0.0, 0.0), rpy_rad=(float(np.pi), 0.0, 0.0))
 
@@ -49,7 +49,7 @@ class MarkerSettings(StrictModel):
         ambiguous_sigmas: how sure it has to be which of a single marker's two poses is the right one, in standard
             deviations of the corners' noise.
         moved_px: a world marker that far from its mean is not where it was.
-        world_marker_fixed: the world marker can not move (it is part of the table): where it seems to, the camera
+        world_marker_fixed: the world marker cannot move (it is part of the table): where it seems to, the camera
             did, and its mean begins anew. Otherwise truth ends there, as nobody knows which of them was bumped.
         largest_blur_px: wider edges belong to a picture that is not sharp, or of something that moved.
         largest_misfit_m: a worse fit of the object's square on the table means that it is lifted or tilted.
@@ -145,7 +145,7 @@ def _detector(dictionary: str) -> Any:
 def seen_markers(image: Image, dictionary: str) -> dict[int, SeenMarker]:
     """Markers in a picture by number: corners to a few hundredths of a pixel, and how sharp each of them is.
 
-    A number seen more than once is left out: which of the two it is can not be known.
+    A number seen more than once is left out: which of the two it is cannot be known.
     """
     modules = opencv_dictionary(dictionary).markerSize + 2
     found = coarse_markers(image, dictionary)

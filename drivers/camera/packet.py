@@ -1,4 +1,4 @@
-"""What a camera sends: the markers of every frame, and the picture of those that were asked for.
+"""What a camera sends: the markers of every frame, pictures on request (protocols: Camera packets).
 
 ::
 
@@ -19,8 +19,8 @@ import numpy as np
 
 from drivers.camera.frames import LARGEST_PIXELS, Detection, Frame, SeenMarker, decode_image
 from drivers.camera.markers import DICTIONARIES
-from drivers.links import Datagram
-from tactile_lab.errors import CodecError
+from drivers.core.errors import CodecError
+from drivers.core.transports import Datagram
 
 MAGIC, VERSION = b"TLCP", 1
 _HEAD = struct.Struct("<4sBBHHHIII")

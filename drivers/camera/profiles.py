@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
 
 _ROUNDS, _FIRST_ROUNDS = 1, 4
 _START_EDGES_px = np.linspace(-1.5, 1.5, 5)
@@ -84,7 +84,7 @@ def fit_profiles(
     for _ in range(_FIRST_ROUNDS if blur_px is None else _ROUNDS):
         if np.any(profiles.levels[:, 1] <= 0.0):
             return None
-        profiles = _improved(profiles, levels)
+        profiles = _improve(profiles, levels)
     return None if np.any(profiles.levels[:, 1] <= 0.0) else profiles
 
 
@@ -103,7 +103,7 @@ def _first(across_px: Array, levels: Array, half_module_px: Array, blur_px: Arra
     return Profiles(across_px, half_module_px, edges[side, best], blurs[side, best], found[side, best])
 
 
-def _improved(old: Profiles, levels: Array) -> Profiles:
+def _improve(old: Profiles, levels: Array) -> Profiles:
     """One damped step of Gauss-Newton; in one step the edge moves by at most a pixel, the blur by a third."""
     steps, slopes, scaled = _steps(old.across_px, old.edge_px, old.blur_px, old.half_module_px)
     by_edge = -slopes @ old.levels[:, 1:, None]

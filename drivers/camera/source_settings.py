@@ -8,8 +8,8 @@ from typing import Literal, NamedTuple
 from pydantic import Field, field_validator
 
 from drivers.camera.markers import known_dictionary
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.strict_yaml import StrictModel
+from drivers.core.configuration import StrictModel
+from drivers.core.errors import ConfigurationError
 
 Kind = Literal["device", "gstreamer", "folder", "video", "simulated"]
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")

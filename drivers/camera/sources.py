@@ -7,46 +7,20 @@ in time and counted. A camera that changes the size of its pictures is an error:
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import cv2
 import numpy as np
 
 from drivers.camera.frames import Image
+from drivers.camera.pictures import Picture, Source
 from drivers.camera.source_settings import PICTURES, CameraSourceSettings
-from tactile_lab.clock import NANOSECONDS, Clock
-from tactile_lab.errors import ConfigurationError, DeviceError
+from drivers.core.clock import NANOSECONDS, Clock
+from drivers.core.errors import ConfigurationError, DeviceError
 
 _MANUAL_EXPOSURE_V4L2 = 1.0
 _EXPOSURE_UNITS_PER_ms = 10.0  # V4L2 counts in 100 microseconds
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """One picture as it arrived: stamp (session clock), number, frames lost so far, grey levels (height, width)."""
-
-    stamp_ns: int
-    counter: int
-    dropped: int
-    image: Image
-
-
-class Source(Protocol):
-    """Something that gives pictures."""
-
-    def open(self) -> None:
-        """Begin. Raises DeviceError, ConfigurationError."""
-
-    def read(self) -> Picture | None:
-        """Wait for the next picture; None at the end. Raises DeviceError."""
-
-    def close(self) -> None:
-        """End; idempotent."""
-
-    def notes(self) -> tuple[str, ...]:
-        """What could not be had as it was asked for, in words."""
 
 
 class OpenCvSource:
@@ -79,7 +53,7 @@ class OpenCvSource:
         capture = self._make(number, back_end)
         if not capture.isOpened():
             hint = "Check its cable and permissions" if kind == "device" else "Check the file or pipeline"
-            raise DeviceError("can not be opened", where=f"camera {name}", hint=hint)
+            raise DeviceError("cannot be opened", where=f"camera {name}", hint=hint)
         self._capture = capture
         if kind == "device":
             self._configure()
@@ -171,7 +145,7 @@ class FolderSource:
         self._next = 0
 
     def read(self) -> Picture | None:
-        """The next picture. Raises DeviceError for one that can not be read, or of another size."""
+        """The next picture. Raises DeviceError for one that cannot be read, or of another size."""
         if self._next == len(self._files):
             return None
         file = self._files[self._next]
@@ -200,7 +174,7 @@ def open_source(settings: CameraSourceSettings, clock: Clock) -> Source:
 
     Raises:
         ConfigurationError: nothing of that name.
-        DeviceError: it can not be opened.
+        DeviceError: it cannot be opened.
     """
     source = _source(settings, clock)
     source.open()
@@ -212,7 +186,7 @@ def _source(settings: CameraSourceSettings, clock: Clock) -> Source:
     if kind == "folder":
         return FolderSource(settings, clock)
     if kind == "simulated":
-        from drivers.simulation.board_camera import SimulatedSource
+        from drivers.camera.rendering.board_camera import SimulatedSource
 
         return SimulatedSource(settings, clock)
     return OpenCvSource(settings, clock)

@@ -10,8 +10,8 @@ from gtsam import Pose3
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.glass import Glass
 from drivers.camera.markers import MarkerSettings, marker_poses, points_reprojection_px, refine_pose
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import transform_points
+from drivers.core.contacts import Array
+from drivers.core.poses import transform_points
 
 _AGREEING = 3
 """So many pictures in a row that agree with each other on another place: the marker, or the camera, was moved."""
@@ -23,7 +23,7 @@ class WorldMarker:
     """The world marker in all pictures so far.
 
     A picture that shows it elsewhere is refused. When several in a row agree, it was bumped (or the camera was):
-    from then on every picture is refused, unless the settings say that the marker can not move.
+    from then on every picture is refused, unless the settings say that the marker cannot move.
     """
 
     def __init__(self, camera: CameraCalibration, settings: MarkerSettings) -> None:

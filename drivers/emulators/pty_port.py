@@ -11,9 +11,9 @@ import select
 import struct
 import tty
 
+from drivers.emulators.ati.unit import Unit
 from drivers.emulators.background import Background, Pace
 from drivers.emulators.closing import Closing
-from drivers.emulators.unit import Unit
 
 _TCGETS2 = 0x802C542A
 _SPEED_OFFSET = 40  # of the output speed in struct termios2

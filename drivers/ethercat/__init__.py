@@ -1,0 +1,1 @@
+"""An EtherCAT master on raw frames."""

@@ -1,7 +1,8 @@
 """EtherCAT frames: an Ethernet header, and telegrams that every slave reads and changes as the frame runs by.
 
-Layout after the EtherCAT standard (IEC 61158-4-12): EtherType 0x88A4, a length word with the type in its upper four
-bits, then telegrams of a ten-byte head, data and a working counter. All little-endian but for the Ethernet header.
+Layout after the EtherCAT standard (IEC 61158-4-12; protocols: EtherCAT frames): EtherType 0x88A4, a length word with
+the type in its upper four bits, then telegrams of a ten-byte head, data and a working counter. All little-endian but
+for the Ethernet header.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
-from tactile_lab.errors import CodecError
+from drivers.core.errors import CodecError
 
 ETHERTYPE = 0x88A4
 BROADCAST = b"\xff" * 6
@@ -163,11 +164,11 @@ def _decode_telegrams(frame: bytes, at: int, end: int) -> tuple[Telegram, ...]:
             raise CodecError("a telegram is cut off", where="EtherCAT frame")
         (counter,) = _COUNTER.unpack_from(frame, data_at + size)
         data, circulated = frame[data_at : data_at + size], bool(flags & _CIRCULATED)
-        telegrams.append(Telegram(_known(command), address, data, index, counter, interrupt, circulated))
+        telegrams.append(Telegram(_known_command(command), address, data, index, counter, interrupt, circulated))
     return tuple(telegrams)
 
 
-def _known(command: int) -> Command:
+def _known_command(command: int) -> Command:
     try:
         return Command(command)
     except ValueError:

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 from pydantic import Field
 
+from drivers.core.clock import NANOSECONDS, Clock
+from drivers.core.configuration import StrictModel
+from drivers.core.errors import CodecError, DeviceError
 from drivers.ethercat.frames import Command, Telegram, decode_frame, encode_frame, physical, source_of
 from drivers.ethercat.ports import Port
 from drivers.ethercat.registers import AL_ERROR, AlState, AlStatus, Register
-from tactile_lab.clock import NANOSECONDS, Clock
-from tactile_lab.errors import CodecError, DeviceError
-from tactile_lab.strict_yaml import StrictModel
 
 _INDICES, _NUMBERS = 0x100, 0x10000
 _EEPROM_READ, _EEPROM_BUSY, _EEPROM_ERRORS = 0x0100, 0x8000, 0x7800
@@ -160,7 +160,7 @@ class EtherCatMaster:
             DeviceError: the slave does not answer.
         """
         command = Command.FPRD if slave.station else Command.APRD
-        return self._accepted(Telegram(command, physical(slave.address, register), bytes(length)), slave)
+        return self._accept(Telegram(command, physical(slave.address, register), bytes(length)), slave)
 
     def write(self, slave: Slave, register: int, data: bytes) -> None:
         """Write registers of one slave.
@@ -169,9 +169,9 @@ class EtherCatMaster:
             DeviceError: the slave does not answer.
         """
         command = Command.FPWR if slave.station else Command.APWR
-        self._accepted(Telegram(command, physical(slave.address, register), data), slave)
+        self._accept(Telegram(command, physical(slave.address, register), data), slave)
 
-    def _accepted(self, telegram: Telegram, slave: Slave) -> bytes:
+    def _accept(self, telegram: Telegram, slave: Slave) -> bytes:
         for _ in range(self.settings.tries):
             if (answer := self.ask(telegram)).working_counter == 1:
                 return answer.data

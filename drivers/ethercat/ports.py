@@ -1,15 +1,14 @@
-"""Where EtherCAT frames leave and arrive: a network interface's raw socket, or slaves in the same process."""
+"""Where EtherCAT frames leave and arrive: a network interface's raw socket."""
 
 from __future__ import annotations
 
 import errno
 import select
 import socket
-from collections import deque
 from typing import Protocol
 
+from drivers.core.errors import DeviceError
 from drivers.ethercat.frames import ETHERTYPE
-from tactile_lab.errors import DeviceError
 
 LARGEST_FRAME = 1600
 """Room for any Ethernet frame, bytes."""
@@ -67,7 +66,7 @@ class RawPort:
             self._hardware_address = bytes(raw.getsockname()[4])
         except OSError as error:
             raw.close()
-            raise self._failed(error) from error
+            raise self._failure(error) from error
         self._socket = raw
 
     def close(self) -> None:
@@ -77,14 +76,14 @@ class RawPort:
 
     def send(self, frame: bytes) -> None:
         try:
-            self._opened().send(frame)
+            self._open().send(frame)
         except BlockingIOError:
             return  # the interface's queue is full: the frame is lost as on a bad cable, and counted where it is missed
         except OSError as error:
-            raise self._failed(error) from error
+            raise self._failure(error) from error
 
     def receive(self, timeout_s: float) -> bytes | None:
-        raw = self._opened()
+        raw = self._open()
         try:
             if not select.select([raw], [], [], max(timeout_s, 0.0))[0]:  # poll() would round up to milliseconds
                 return None
@@ -92,13 +91,13 @@ class RawPort:
         except BlockingIOError:
             return None
         except OSError as error:
-            raise self._failed(error) from error
+            raise self._failure(error) from error
 
     def _next(self, raw: socket.socket) -> bytes:
         """The frame that waits. Raises OSError."""
         return raw.recv(LARGEST_FRAME)
 
-    def _opened(self) -> socket.socket:
+    def _open(self) -> socket.socket:
         if self._socket is None:
             raise DeviceError("the interface is not open", where=self.name, hint="Connect the device first")
         return self._socket
@@ -116,47 +115,8 @@ class RawPort:
         except (AttributeError, OSError) as error:
             raise DeviceError(f"no raw sockets here ({error})", where=self.name, hint="Use Linux") from error
 
-    def _failed(self, error: OSError) -> DeviceError:
+    def _failure(self, error: OSError) -> DeviceError:
         if error.errno in (errno.ENETDOWN, errno.ENXIO, errno.ENODEV):
             hint = f"Plug the cable in and set it up: sudo ip link set {self.name} up"
             return DeviceError("the network interface is down or gone", where=self.name, hint=hint)
         return DeviceError(f"the network interface failed ({error})", where=self.name, hint="Check the adapter")
-
-
-class Ring(Protocol):
-    """Slaves that a frame runs through."""
-
-    def process(self, frame: bytes) -> list[bytes]:
-        """What comes back when a frame is sent: usually that frame, nothing when it got lost."""
-
-
-class MemoryPort:
-    """A port whose cable leads to slaves in the same process."""
-
-    def __init__(self, ring: Ring, name: str = "memory") -> None:
-        self.name, self._ring = name, ring
-        self._arrived: deque[bytes] = deque()
-        self._open = False
-
-    @property
-    def hardware_address(self) -> bytes:
-        return bytes(6)
-
-    def open(self) -> None:
-        self._open = True
-
-    def close(self) -> None:
-        self._open = False
-        self._arrived.clear()
-
-    def send(self, frame: bytes) -> None:
-        self._check_open()
-        self._arrived.extend(self._ring.process(frame))
-
-    def receive(self, timeout_s: float) -> bytes | None:
-        self._check_open()
-        return self._arrived.popleft() if self._arrived else None
-
-    def _check_open(self) -> None:
-        if not self._open:
-            raise DeviceError("the interface is not open", where=self.name, hint="Connect the device first")

@@ -1,6 +1,7 @@
 """Registers of an EtherCAT slave controller: addresses, states and their words, SyncManagers and FMMUs.
 
-After Beckhoff's register description of the ET1100 and ET1200 family; the words for status codes after ETG.1020.
+After Beckhoff's register description of the ET1100 and ET1200 family, the words for status codes after ETG.1020
+(protocols: Slave registers).
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import struct
 from dataclasses import dataclass
 from enum import IntEnum
 
-from tactile_lab.errors import CodecError
+from drivers.core.errors import CodecError
 
 
 class Register(IntEnum):
@@ -112,7 +113,7 @@ _CODE_WORDS = {
     AlCode.INVALID_INPUT_MAPPING: "invalid input mapping",
     AlCode.INVALID_OUTPUT_MAPPING: "invalid output mapping",
     AlCode.SETTINGS_CONFLICT: "settings contradict each other",
-    AlCode.EEPROM_NO_ACCESS: "can not reach its EEPROM",
+    AlCode.EEPROM_NO_ACCESS: "cannot reach its EEPROM",
     AlCode.EEPROM_ERROR: "its EEPROM is faulty",
 }
 

@@ -1,1 +1,1 @@
-"""Links to real wires: UDP sockets, serial ports, CAN buses."""
+"""Transports to real wires: UDP sockets, serial ports, CAN buses."""

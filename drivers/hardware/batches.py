@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.clock import NANOSECONDS
+from drivers.core.clock import NANOSECONDS
 
 SO_TIMESTAMPNS = 35
 """Linux: the kernel's stamp of each datagram, two 64-bit words (seconds and nanoseconds of the wall clock)."""
@@ -131,10 +131,10 @@ class BatchReceiver:
         starts = range(0, count * _LARGEST, _LARGEST)
         payloads = [bytes(self._view[start : start + size]) for start, size in zip(starts, lengths, strict=True)]
         names = self._names[:count]
-        walls_ns, drops = self._told(count)
+        walls_ns, drops = self._parse_ancillary(count)
         return Batch(payloads, walls_ns, names["host"].astype(np.uint32), names["port"].astype(np.uint16), drops)
 
-    def _told(self, count: int) -> tuple[NDArray[np.int64], int | None]:
+    def _parse_ancillary(self, count: int) -> tuple[NDArray[np.int64], int | None]:
         """Stamps and drops. They come in this order; a kernel that orders them otherwise is read word by word."""
         control, lengths = self._control[:count], self._heads["control_length"][:count]
         stamp = control["stamp"]

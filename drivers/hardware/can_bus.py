@@ -1,6 +1,6 @@
-"""A CAN bus as a link, through python-can and so through any adapter it knows.
+"""A CAN bus as a transport, through python-can and so through any adapter it knows.
 
-One message of the link is one frame: its 11-bit identifier (two bytes, big-endian), then its data (0 to 8 bytes).
+One message of the transport is one frame: its 11-bit identifier (two bytes, big-endian), then its data (0 to 8 bytes).
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import can
 
-from drivers.links import Datagram
-from tactile_lab.clock import Clock
-from tactile_lab.errors import CodecError, DeviceError
+from drivers.core.clock import Clock
+from drivers.core.errors import CodecError, DeviceError
+from drivers.core.transports import Datagram
 
 _IDENTIFIER = struct.Struct(">H")
 _AT_ONCE = 10_000
@@ -28,14 +28,14 @@ class CanFrame:
 
 
 def encode_frame(frame: CanFrame) -> bytes:
-    """A frame as a message of a link. Raises CodecError when identifier or data are too large."""
+    """A frame as a message of a transport. Raises CodecError when identifier or data are too large."""
     if not 0 <= frame.identifier < 1 << 11 or len(frame.data) > 8:
         raise CodecError(f"identifier 0x{frame.identifier:x} with {len(frame.data)} bytes", where="CAN frame")
     return _IDENTIFIER.pack(frame.identifier) + frame.data
 
 
 def decode_frame(payload: bytes) -> CanFrame:
-    """A message of a link as a frame. Raises CodecError for what can be none."""
+    """A message of a transport as a frame. Raises CodecError for what can be none."""
     if not 2 <= len(payload) <= 10:
         raise CodecError(f"{len(payload)} bytes where a CAN frame has 2 to 10", where="CAN frame")
     (identifier,) = _IDENTIFIER.unpack_from(payload)
@@ -44,7 +44,7 @@ def decode_frame(payload: bytes) -> CanFrame:
     return CanFrame(identifier, payload[2:])
 
 
-class CanLink:
+class CanTransport:
     """A CAN bus; frames with long identifiers, remote and error frames are counted and left out.
 
     Args:
@@ -103,7 +103,7 @@ class CanLink:
                 raise DeviceError(gone, where=self.name, hint="Check the adapter") from error
             if message is None:
                 break
-            if self._wanted(message):
+            if self._is_wanted(message):
                 frame = CanFrame(message.arbitration_id, bytes(message.data))
                 taken.append(Datagram(encode_frame(frame), self._clock.now_ns()))
         return taken
@@ -117,7 +117,7 @@ class CanLink:
         }
         return tuple(f"{count} {text}" for text, count in counts.items() if count)
 
-    def _wanted(self, message: can.Message) -> bool:
+    def _is_wanted(self, message: can.Message) -> bool:
         self.error_frames += message.is_error_frame
         other = message.is_extended_id or message.is_remote_frame or message.is_fd
         self.foreign += other and not message.is_error_frame

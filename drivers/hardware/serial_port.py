@@ -1,4 +1,4 @@
-"""A serial port as a link: a stream of bytes, read in whatever pieces the port gives."""
+"""A serial port as a transport: a stream of bytes, read in whatever pieces the port gives."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Any
 
 import serial
 
-from drivers.links import Datagram
-from tactile_lab.clock import Clock
-from tactile_lab.errors import DeviceError
+from drivers.core.clock import Clock
+from drivers.core.errors import DeviceError
+from drivers.core.transports import Datagram
 
 _AT_ONCE = 1 << 16
 _NO_PERMISSION = "Add yourself to the port's group (often dialout), then log in again"
 
 
-class SerialLink:
+class SerialTransport:
     """A serial port.
 
     Args:
@@ -54,14 +54,14 @@ class SerialLink:
         try:
             self._open_port().write(payload)
         except (serial.SerialException, OSError, termios.error) as error:
-            raise self._lost(error) from error
+            raise self._lost_error(error) from error
 
     def receive(self) -> list[Datagram]:
         """The bytes that wait, as one piece, or nothing. Raises DeviceError when the port is gone."""
         try:
             payload = self._open_port().read(_AT_ONCE)
         except (serial.SerialException, OSError, TypeError) as error:  # TypeError: closed by another thread
-            raise self._lost(error) from error
+            raise self._lost_error(error) from error
         return [Datagram(payload, self._clock.now_ns())] if payload else []
 
     def _open_port(self) -> Any:
@@ -69,14 +69,14 @@ class SerialLink:
             raise DeviceError("link is not open", where=self.name, hint="Connect the device first")
         return self._serial
 
-    def _lost(self, error: Exception) -> DeviceError:
+    def _lost_error(self, error: Exception) -> DeviceError:
         return DeviceError(
             f"the serial port {self.port} is gone ({error})", where=self.name, hint="Check plug and adapter"
         )
 
 
 def _open_failure(name: str, port: str, baud: int, parity: str, error: Exception) -> DeviceError:
-    """Why a port can not be opened, in words."""
+    """Why a port cannot be opened, in words."""
     number = error.args[0] if isinstance(error, termios.error) else getattr(error, "errno", None)
     if number == errno.ENOENT:
         return DeviceError(f"there is no serial port {port}", where=name, hint="Plug the adapter in; compare the path")

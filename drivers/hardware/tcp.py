@@ -1,4 +1,4 @@
-"""A TCP connection as a link: whole messages, each behind its length, for devices whose messages are large."""
+"""A TCP connection as a transport: whole messages, each behind its length, for devices whose messages are large."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import contextlib
 import socket
 import struct
 
-from drivers.links import Datagram
-from tactile_lab.clock import Clock
-from tactile_lab.errors import CodecError, DeviceError
+from drivers.core.clock import Clock
+from drivers.core.errors import CodecError, DeviceError
+from drivers.core.transports import Datagram
 
 _LENGTH = struct.Struct("<I")
 LONGEST = 64 << 20
@@ -17,7 +17,7 @@ LONGEST = 64 << 20
 _CONNECT_s, _SEND_s, _AT_ONCE = 2.0, 1.0, 1 << 20
 
 
-def framed(payload: bytes) -> bytes:
+def frame(payload: bytes) -> bytes:
     """A message as it goes over the wire: its length, 32 bits little-endian, and its bytes."""
     return _LENGTH.pack(len(payload)) + payload
 
@@ -47,7 +47,7 @@ class MessageReader:
         return messages
 
 
-class TcpLink:
+class TcpTransport:
     """Messages to and from one device.
 
     Args:
@@ -81,22 +81,22 @@ class TcpLink:
 
     def send(self, payload: bytes) -> None:
         """Send one message. Raises DeviceError when the device is gone or takes nothing."""
-        wire = self._opened()
+        wire = self._open()
         wire.settimeout(_SEND_s)
         try:
-            wire.sendall(framed(payload))
+            wire.sendall(frame(payload))
         except OSError as error:
-            raise self._lost(error.strerror or str(error)) from error
+            raise self._lost_error(error.strerror or str(error)) from error
 
     def receive(self) -> list[Datagram]:
         """All messages that are complete, never blocking. Raises DeviceError when the device is gone."""
-        wire, messages = self._opened(), list[bytes]()
+        wire, messages = self._open(), list[bytes]()
         wire.setblocking(False)
         with contextlib.suppress(BlockingIOError):
             while data := self._read(wire):
                 messages += self._cut(data)
             if not messages:
-                raise self._lost("it closed the connection")
+                raise self._lost_error("it closed the connection")
         now_ns = self._clock.now_ns()
         return [Datagram(message, now_ns) for message in messages]
 
@@ -106,7 +106,7 @@ class TcpLink:
         except BlockingIOError:
             raise
         except OSError as error:
-            raise self._lost(error.strerror or str(error)) from error
+            raise self._lost_error(error.strerror or str(error)) from error
 
     def _cut(self, data: bytes) -> list[bytes]:
         try:
@@ -114,12 +114,12 @@ class TcpLink:
         except CodecError as error:
             raise self._failure(f"{self._host}:{self._port} speaks another protocol: {error.what}") from error
 
-    def _opened(self) -> socket.socket:
+    def _open(self) -> socket.socket:
         if self._socket is None:
             raise DeviceError("link is not open", where=self.name, hint="Connect the device first")
         return self._socket
 
-    def _lost(self, why: str) -> DeviceError:
+    def _lost_error(self, why: str) -> DeviceError:
         return self._failure(f"lost {self._host}:{self._port} ({why})")
 
     def _failure(self, what: str) -> DeviceError:

@@ -1,4 +1,4 @@
-"""A UDP socket as a link: one device, known by its address, with reception stamped by the kernel."""
+"""A UDP socket as a transport: one device, known by its address, with reception stamped by the kernel."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import time
 
 import numpy as np
 
+from drivers.core.clock import Clock
+from drivers.core.errors import DeviceError
+from drivers.core.transports import Datagram
 from drivers.hardware.batches import SO_RXQ_OVFL, SO_TIMESTAMPNS, Batch, BatchReceiver, can_batch
-from drivers.links import Datagram
-from tactile_lab.clock import Clock
-from tactile_lab.errors import DeviceError
 
 _LARGEST = 65536
 _BATCHES = 160  # a flood must not hold the caller
 
 
-class UdpLink:
+class UdpTransport:
     """Datagrams to and from one device. What comes from any other address is counted and left out.
 
     Args:
@@ -58,7 +58,7 @@ class UdpLink:
         """Bind the receiving end, before anything is asked of the device. Repeatable.
 
         Raises:
-            DeviceError: the name can not be resolved, or the local address can not be used.
+            DeviceError: the name cannot be resolved, or the local address cannot be used.
         """
         if self._socket is not None:
             return
@@ -68,9 +68,9 @@ class UdpLink:
             made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             made.setblocking(False)
             made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, self._buffer)
-            self.kernel_stamps = can_batch() and _enabled(made, SO_TIMESTAMPNS)
+            self.kernel_stamps = can_batch() and _enable(made, SO_TIMESTAMPNS)
             if can_batch():
-                _enabled(made, SO_RXQ_OVFL)
+                _enable(made, SO_RXQ_OVFL)
             made.bind(self._local)
         except OSError as error:
             if made is not None:
@@ -104,7 +104,7 @@ class UdpLink:
                 raise self._failure(f"lost {self._host}:{self._port} ({error.strerror})") from error
             if not batch.payloads:
                 break
-            taken += self._taken(batch, behind_ns)
+            taken += self._take(batch, behind_ns)
         return taken
 
     def health(self) -> tuple[str, ...]:
@@ -116,7 +116,7 @@ class UdpLink:
             found.append(f"{self.dropped} datagrams dropped by the kernel: the program reads too slowly")
         return tuple(found)
 
-    def _taken(self, batch: Batch, behind_ns: int) -> list[Datagram]:
+    def _take(self, batch: Batch, behind_ns: int) -> list[Datagram]:
         """The device's own of a batch, stamped on the session's clock: never in the future, never going back.
 
         The bounds hold the error of a wall clock that was set between arrival and reading.
@@ -156,7 +156,7 @@ def _singly(wire: socket.socket) -> Batch:
     return Batch(payloads, np.zeros(rows, np.int64), hosts, np.full(rows, max(port, 0), np.uint16), None)
 
 
-def _enabled(made: socket.socket, option: int) -> bool:
+def _enable(made: socket.socket, option: int) -> bool:
     """Ask the kernel for an extra; False where it does not have it."""
     try:
         made.setsockopt(socket.SOL_SOCKET, option, 1)

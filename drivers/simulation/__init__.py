@@ -1,0 +1,1 @@
+"""The simulated rig: one physics behind the bytes of all devices."""

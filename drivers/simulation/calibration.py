@@ -6,26 +6,21 @@ The rig that drives it normally uses the same files. Giving the rig others shows
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
-import numpy as np
-from gtsam import Pose3, Rot3
-
-from drivers.biotac.biotac import BioTacCalibration, EllipsoidSkinSettings, load_biotacs
 from drivers.camera.calibration import CameraCalibration, load_camera
 from drivers.camera.markers import MarkerSettings
-from drivers.fingertip import FingertipCalibration, load_fingertips
-from drivers.shadow.joint_calibration import JointCalibration
-from drivers.shadow.motors import MotorMap
-from drivers.simulation.model import TipBody
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.geometry.contacts import FINGERS
-from tactile_lab.strict_yaml import load_model
-
-_BIOTAC_MASS_kg = 0.008
+from drivers.core.configuration import load_model
+from drivers.core.contacts import FINGERS
+from drivers.core.errors import ConfigurationError
+from drivers.core.fingertip import TipBody
+from drivers.fingertips.kind import FingertipKind
+from drivers.fingertips.kinds import FINGERTIPS
+from drivers.shadow.model.joint_calibration import JointCalibration
+from drivers.shadow.model.motors import MotorMap
 
 
 @dataclass(frozen=True)
@@ -35,16 +30,14 @@ class SimulatedCalibration:
     Attributes:
         joints: joint sensors.
         motors: which motor pulls which joint.
-        fingertips: force-sensing tips, by finger.
-        biotacs: BioTac tips, by finger.
+        tips: by kind of fingertip, what that kind's :meth:`FingertipKind.load` gives, by finger.
         camera: lens.
         markers: the markers on the table and under the object; the latter's side and place follow the object.
     """
 
     joints: JointCalibration
     motors: MotorMap
-    fingertips: Mapping[str, FingertipCalibration]
-    biotacs: Mapping[str, BioTacCalibration]
+    tips: Mapping[str, Mapping[str, Any]]
     camera: CameraCalibration
     markers: MarkerSettings
 
@@ -58,53 +51,45 @@ class SimulatedCalibration:
         return cls(
             joints=JointCalibration.load(folder / "joints.yaml"),
             motors=MotorMap.load(folder / "motors.yaml"),
-            fingertips=load_fingertips(folder / "fingertips.yaml"),
-            biotacs=load_biotacs(folder / "biotacs.yaml"),
+            tips={name: kind.load({"fingertips": folder / kind.packaged}) for name, kind in _packaged_kinds().items()},
             camera=load_camera(folder / "camera.yaml"),
             markers=load_model(folder / "markers.yaml", MarkerSettings),
         )
 
     @classmethod
-    def packaged(cls) -> SimulatedCalibration:
+    def from_package(cls) -> SimulatedCalibration:
         """The simulated hand that comes with the program."""
         packaged = resources.files("tactile_lab") / "rigs" / "calibrations" / "simulated-hand"
         with resources.as_file(packaged) as folder:
             return cls.load(folder)
 
-    def tip_body(self, finger: str, kind: Literal["nano17", "biotac"]) -> TipBody:
+    @classmethod
+    def with_tips(cls, kind: str, file: Path) -> SimulatedCalibration:
+        """The same hand; its fingertips as a file says where the program has none of their kind.
+
+        Raises:
+            ConfigurationError: no such kind, or a file that does not fit it.
+        """
+        packaged = cls.from_package()
+        if FINGERTIPS[kind].packaged:
+            return packaged
+        return replace(packaged, tips={**packaged.tips, kind: FINGERTIPS[kind].load({"fingertips": file})})
+
+    def tip_body(self, finger: str, kind: str) -> TipBody:
         """The body of one fingertip.
 
         Raises:
-            ConfigurationError: the finger has no such tip, or its skin is not an ellipsoid.
+            ConfigurationError: no such kind; or the finger has no such tip, or its skin is not an ellipsoid.
         """
-        known: Mapping[str, object] = self.fingertips if kind == "nano17" else self.biotacs
+        known = self.tips.get(kind, {})
         if finger not in known:
             raise ConfigurationError(
                 f"no {kind} calibration for {finger}",
                 where="simulated hand",
                 hint=f"The simulated hand needs one for each of {', '.join(FINGERS)}",
             )
-        return _force_tip(self.fingertips[finger]) if kind == "nano17" else _biotac_tip(finger, self.biotacs[finger])
+        return FINGERTIPS[kind].body(finger, known[finger])
 
 
-def _force_tip(calibration: FingertipCalibration) -> TipBody:
-    return TipBody(
-        distal_T_sensor=calibration.distal_T_sensor.pose(),
-        distal_T_skin=Pose3(Rot3(), np.array(calibration.centre_distal_m)),
-        semi_axes_m=calibration.semi_axes_m,
-        mass_kg=calibration.mass_kg,
-        com_distal_m=calibration.com_distal_m,
-    )
-
-
-def _biotac_tip(finger: str, calibration: BioTacCalibration) -> TipBody:
-    if not isinstance(calibration.skin, EllipsoidSkinSettings):
-        raise ConfigurationError(
-            f"the BioTac of {finger} has no ellipsoid skin",
-            where="simulated hand",
-            hint="State the skin as an ellipsoid: the physics knows no other",
-        )
-    sensor = calibration.distal_T_sensor.pose()
-    skin = sensor * Pose3(Rot3(), np.array(calibration.skin.centre_m))
-    x, y, z = skin.translation()
-    return TipBody(sensor, skin, calibration.skin.semi_axes_m, _BIOTAC_MASS_kg, (float(x), float(y), float(z)))
+def _packaged_kinds() -> dict[str, FingertipKind[Any]]:
+    return {name: FINGERTIPS[name] for name in FINGERTIPS if FINGERTIPS[name].packaged}

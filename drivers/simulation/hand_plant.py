@@ -7,7 +7,7 @@ from typing import Literal, Protocol
 
 from gtsam import Pose3
 
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,14 @@ class TouchedPlant(Protocol):
 
     def world_T_distal(self, finger: str) -> Pose3:
         """True pose of a finger's distal frame."""
+
+
+class TipPlant(LoadedPlant, TouchedPlant, Protocol):
+    """Fingertips, all that can be known of them."""
+
+    @property
+    def stamp_ns(self) -> int:
+        """Present time of the model."""
 
 
 class SeenPlant(Protocol):

@@ -10,8 +10,8 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from tactile_lab.errors import ShapeError
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
+from drivers.core.errors import ShapeError
 
 MESH_PREFIX = "mesh:"
 LARGEST_m, SMALLEST_m = 0.25, 0.01

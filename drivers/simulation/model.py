@@ -8,20 +8,20 @@ Hand links collide with table and object but not with each other.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 from gtsam import Pose3, Rot3
 
-from drivers.shadow.bodies import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Ellipsoid, Shape
-from drivers.shadow.kinematics import JOINT_TABLE, Joint, JOINT_LIMITS_rad
-from drivers.shadow.motors import DRIVEN_JOINTS
-from drivers.simulation.geared_motors import DISTAL_COUPLING, motor_class
+from drivers.core.contacts import FINGERS, Array
+from drivers.core.fingertip import TipBody
+from drivers.shadow.model.bodies import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Ellipsoid, Shape
+from drivers.shadow.model.kinematics import JOINT_TABLE, Joint, JOINT_LIMITS_rad
+from drivers.shadow.model.motors import DRIVEN_JOINTS
+from drivers.simulation.devices.geared_motors import DISTAL_COUPLING, motor_class
 from drivers.simulation.objects import Hull, ObjectModel, Piece
 from drivers.simulation.surfaces import GLASS, HAND, OBJECT, RUBBER, TABLE, TIP, WOOD, surface
-from tactile_lab.geometry.contacts import FINGERS, Array
 
 TIMESTEP_s = 0.002
 BASE_JOINTS = ("base x", "base y", "base z", "base yaw", "base pitch", "base roll")
@@ -55,25 +55,6 @@ _BASE_BANDWIDTH_rad_s = 60.0  # stiff compared with the hand: it follows a path 
 _CARRIED_kg, _CARRIED_kg_m2 = 4.0, 0.15
 _BASE_FORCE_N, _BASE_TORQUE_Nm = 400.0, 60.0
 _TRAIL_Nm_rad, _TRAIL_Nms_rad = 0.25, 0.01  # elastic coupling of J1 to J2
-
-
-@dataclass(frozen=True)
-class TipBody:
-    """One fingertip beyond its sensor.
-
-    Attributes:
-        distal_T_sensor: the sensor's measuring frame in the distal frame.
-        distal_T_skin: centre and axes of the ellipsoid that touches.
-        semi_axes_m: its semi-axes.
-        mass_kg: mass beyond the sensor.
-        com_distal_m: its centre in the distal frame.
-    """
-
-    distal_T_sensor: Pose3
-    distal_T_skin: Pose3
-    semi_axes_m: tuple[float, float, float]
-    mass_kg: float
-    com_distal_m: tuple[float, float, float]
 
 
 def build_model(
@@ -215,10 +196,10 @@ def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody) -> None:
         name=name,
         type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
         size=tip.semi_axes_m,
-        **_placed(tip.distal_T_skin),
+        **_place(tip.distal_T_skin),
         **surface(RUBBER, TIP, OBJECT | TABLE),
     )
-    body.add_site(name=name, **_placed(tip.distal_T_sensor))
+    body.add_site(name=name, **_place(tip.distal_T_sensor))
     body.add_site(name=f"{finger} distal")
     for quantity, kind in (("force", mujoco.mjtSensor.mjSENS_FORCE), ("moment", mujoco.mjtSensor.mjSENS_TORQUE)):
         spec.add_sensor(name=f"{finger} {quantity}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=name)
@@ -284,7 +265,7 @@ def _piece_geometry(spec: Any, piece: Piece, mesh_name: str) -> dict[str, Any]:
     return {"type": kinds[piece.kind], "size": size, "pos": piece.position_object_m}
 
 
-def _placed(pose: Pose3) -> dict[str, Any]:
+def _place(pose: Pose3) -> dict[str, Any]:
     return {"pos": pose.translation(), "quat": _quaternion(pose.rotation())}
 
 

@@ -15,9 +15,9 @@ import trimesh
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
+from drivers.core.contacts import Array
+from drivers.core.errors import ConfigurationError
 from drivers.simulation.mesh_object import MESH_PREFIX, convex_pieces, load_truth_mesh
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.geometry.contacts import Array
 
 _CURVE_SEGMENTS = 64  # chord error 0.06 mm on the largest curve
 _SPHERE_SUBDIVISIONS = 4  # 0.03 mm on a 35 mm sphere
@@ -78,8 +78,6 @@ class ObjectModel:
         name: name in the catalogue, or ``mesh:<path>``.
         pieces: convex pieces whose union the physics collides with.
         mesh: watertight truth surface in the object frame, metres.
-        outline_object_m: horizontal outline, shape (n, 2), counter-clockwise, where every horizontal section is the
-            same; None for shapes that change with height.
         foot_object_m: polygon of the underside, shape (n, 2), what the camera sees dark on the table.
         marker: the marker on the underside.
         rolls: the object can roll, so the contact model needs rolling friction.
@@ -89,7 +87,6 @@ class ObjectModel:
     name: str
     pieces: tuple[Piece, ...]
     mesh: trimesh.Trimesh
-    outline_object_m: Array | None
     foot_object_m: Array
     marker: UndersideMarker
     rolls: bool = False
@@ -114,7 +111,7 @@ def object_model(name: str) -> ObjectModel:
         ShapeError: the mesh file cannot be used.
     """
     if name.startswith(MESH_PREFIX):
-        return _scanned(name)
+        return _scan(name)
     if name not in CATALOGUE:
         known = ", ".join([*CATALOGUE, f"{MESH_PREFIX}<path>"])
         raise ConfigurationError(f"no object called {name!r}", where="object", hint=f"Objects are {known}")
@@ -143,7 +140,7 @@ def _prism(
 ) -> ObjectModel:
     marker = UndersideMarker(MARKER_SIDE_m, (*marker_xy_m, -height_m / 2))
     mesh = prism_mesh(outline_m, height_m)
-    return ObjectModel(name, pieces, mesh, outline_m, outline_m, marker)
+    return ObjectModel(name, pieces, mesh, outline_m, marker)
 
 
 def _box(length_m: float, width_m: float, height_m: float) -> Callable[[str], ObjectModel]:
@@ -191,17 +188,17 @@ def _sphere(name: str) -> ObjectModel:
     mesh = trimesh.creation.icosphere(subdivisions=_SPHERE_SUBDIVISIONS, radius=radius)
     foot = _ring(0.4 * radius, 0.4 * radius, _CURVE_SEGMENTS)
     marker = UndersideMarker(0.020, (0.0, 0.0, -radius))
-    return ObjectModel(name, (Solid("sphere", (radius,)),), mesh, None, foot, marker, rolls=True)
+    return ObjectModel(name, (Solid("sphere", (radius,)),), mesh, foot, marker, rolls=True)
 
 
-def _scanned(name: str) -> ObjectModel:
+def _scan(name: str) -> ObjectModel:
     """A mesh from a file: origin at the centre of volume, axes as in the file but for the turn that makes it stand."""
     mesh = load_truth_mesh(name)
     pieces = tuple(Hull(vertices) for vertices in convex_pieces(mesh))
     lowest = mesh.bounds[0, 2]
     near_table = mesh.vertices[mesh.vertices[:, 2] < lowest + _FOOT_LAYER_m, :2]
     foot = _convex_outline(near_table)
-    return ObjectModel(name, pieces, mesh, None, foot, _largest_marker(foot, lowest), rolls=True, scanned=True)
+    return ObjectModel(name, pieces, mesh, foot, _largest_marker(foot, lowest), rolls=True, scanned=True)
 
 
 def _convex_outline(points_m: Array) -> Array:

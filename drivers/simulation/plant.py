@@ -9,12 +9,12 @@ import numpy as np
 from gtsam import Pose2, Pose3, Rot3
 from numpy.typing import NDArray
 
-from drivers.shadow.kinematics import JOINTS, joint_vector
-from drivers.shadow.motors import DRIVEN_JOINTS
+from drivers.core.clock import NANOSECONDS
+from drivers.core.contacts import FINGERS, Array
+from drivers.shadow.model.kinematics import JOINTS, joint_vector
+from drivers.shadow.model.motors import DRIVEN_JOINTS
 from drivers.simulation.hand_plant import TrueContact
 from drivers.simulation.model import BASE_JOINTS, BASE_LIMITS, TIMESTEP_s
-from tactile_lab.clock import NANOSECONDS
-from tactile_lab.geometry.contacts import FINGERS, Array
 
 STEP_ns = round(TIMESTEP_s * NANOSECONDS)
 START_BASE = np.array([-0.32, 0.0, 0.36, 0.0, 0.0, 0.0])
@@ -84,7 +84,7 @@ class Plant:
 
     @property
     def joints_rad(self) -> Array:
-        """True joint angles, shape (24,), order of :data:`~drivers.shadow.kinematics.JOINTS`."""
+        """True joint angles, shape (24,), order of :data:`~drivers.shadow.model.kinematics.JOINTS`."""
         return np.asarray(self._data.qpos[self._joints])
 
     @property

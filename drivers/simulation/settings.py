@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 from pydantic import Field
 
 from drivers.camera.boards import GridBoard
-from drivers.fingertip import RigidTransform
-from tactile_lab.strict_yaml import StrictModel
+from drivers.camera.rendering.settings import CameraSettings
+from drivers.core.configuration import StrictModel
+from drivers.core.fingertip import RigidTransform
 
 
 class ObjectStart(StrictModel):
@@ -36,7 +36,7 @@ class JointSensorSettings(StrictModel):
 
 
 class ForceSensorSettings(StrictModel):
-    """A Nano17 SI-12-0.12 behind a Net F/T box (protocols C.1, C.6).
+    """A Nano17 SI-12-0.12 behind a Net F/T box (protocols: Net F/T; Nano17 ratings).
 
     Attributes:
         rate_hz: records per second (the box's comrdtrate).
@@ -70,29 +70,6 @@ class BiotacSettings(StrictModel):
     response_length_m: float = Field(default=0.003, gt=0.0)
 
 
-class CameraSettings(StrictModel):
-    """The camera under the table beyond its lens.
-
-    Attributes:
-        world_T_camera: its pose, z along the view (up), x along the picture's rows.
-        glass_thickness_m, glass_index: the table's plate.
-        blur_px: sharpness, one standard deviation.
-        noise_levels: noise of a pixel of 255.
-        jpeg_quality: of the pictures it sends.
-        stream_hz: frames a second whose markers it sends by itself; None for a camera that waits for triggers.
-        late_ms: how long after it was taken a frame arrives, and is stamped.
-    """
-
-    world_T_camera: RigidTransform = RigidTransform(translation_m=(-0.005, -0.04, -0.58), rpy_rad=(-0.07, 0.05, 0.0))
-    glass_thickness_m: float = Field(default=0.008, ge=0.0)
-    glass_index: float = Field(default=1.5, ge=1.0)
-    blur_px: float = Field(default=0.8, gt=0.0)
-    noise_levels: float = Field(default=3.0, ge=0.0)
-    jpeg_quality: int = Field(default=90, ge=1, le=100)
-    stream_hz: float | None = Field(default=None, gt=0.0, le=100.0)
-    late_ms: float = Field(default=0.0, ge=0.0, le=500.0)
-
-
 class HandBoard(StrictModel):
     """A board that the simulated hand carries for calibrating: its markers, and where it is glued to the palm."""
 
@@ -109,6 +86,7 @@ class SimulationSettings(StrictModel):
         start: where it lies at the beginning; drawn from the seed when not given.
         start_sigma_m: spread of the drawn position per axis, about the middle of the table. Any turn is as likely.
         fingertips: the kind on all five fingers.
+        positioner: the kind that carries the hand.
         hand_board: what the hand carries for the camera; nothing when None.
         world_T_mount: where the positioner really stands; a rig's forearm-to-world calibration may be off from it.
     """
@@ -117,7 +95,8 @@ class SimulationSettings(StrictModel):
     object_mass_kg: float = Field(default=0.3, gt=0.0, le=5.0)
     start: ObjectStart | None = None
     start_sigma_m: float = Field(default=0.01, ge=0.0, le=0.1)
-    fingertips: Literal["nano17", "biotac"] = "nano17"
+    fingertips: str = "nano17"
+    positioner: str = "six-axis"
     hand_board: HandBoard | None = None
     world_T_mount: RigidTransform = RigidTransform(translation_m=(0.0, 0.0, 0.0))
     joint_sensors: JointSensorSettings = JointSensorSettings()

@@ -1,4 +1,4 @@
-"""The simulated rig: one physics, one clock, and the far ends of all links.
+"""The simulated rig: one physics, one clock, and the far ends of all transports.
 
 Waiting on the clock is what moves the world: the physics steps on, and every device acts at its own times in between
 (force sensors sample, motors halt for want of demands). Everything random comes from one seed, so that the same
@@ -9,29 +9,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from gtsam import Pose2, Pose3, Rot3
 
 from drivers.camera.markers import MarkerSettings
-from drivers.fingertip import RigidTransform
-from drivers.links import Datagram, Link, MemoryLink, Peer
-from drivers.simulation.biotac_emulator import BiotacSection
+from drivers.camera.rendering.table_camera import Placed, PrintedMarker, TableCamera
+from drivers.core.clock import VirtualClock
+from drivers.core.contacts import FINGERS, Contact
+from drivers.core.fingertip import RigidTransform
+from drivers.core.transports import Datagram, MemoryTransport, Peer, Transport
+from drivers.fingertips.kind import LinkedKind
+from drivers.fingertips.kinds import FINGERTIPS
 from drivers.simulation.calibration import SimulatedCalibration
-from drivers.simulation.camera_emulator import CameraEmulator
-from drivers.simulation.camera_renderer import Placed, PrintedMarker, TableCamera
+from drivers.simulation.devices.camera_emulator import CameraEmulator
+from drivers.simulation.devices.motor_bank import MotorBank
+from drivers.simulation.devices.palm_emulator import JointSensors, PalmEmulator
+from drivers.simulation.fingertips import SIMULATED_FINGERTIPS, SimulatedLinks
 from drivers.simulation.hand_plant import SeenPlant
 from drivers.simulation.model import build_model
-from drivers.simulation.motor_bank import MotorBank
 from drivers.simulation.objects import ObjectModel, object_model
-from drivers.simulation.palm_emulator import JointSensors, NoTactile, PalmEmulator, TactileSection
 from drivers.simulation.plant import Plant, STEP_ns
-from drivers.simulation.positioner_emulator import PositionerEmulator
-from drivers.simulation.rdt_emulator import RdtBank
+from drivers.simulation.positioners import SIMULATED_POSITIONERS
+from drivers.simulation.sections import NoTactile, TactileSection, TimedDevice
 from drivers.simulation.settings import SimulationSettings
-from tactile_lab.clock import VirtualClock
-from tactile_lab.geometry.contacts import FINGERS, Contact
 
 _SETTLING_s = 2.0
 _RANDOM_PARTS = ("object", "joints", "motors", "palm", "forces", "tactile", "camera")
@@ -52,17 +53,6 @@ class TruthSample:
     world_T_object: Pose3
     contacts: tuple[Contact, ...]
     fingers_on_table: tuple[str, ...]
-
-
-class TimedDevice(Protocol):
-    """A device that acts by itself at certain times."""
-
-    @property
-    def next_event_ns(self) -> int | None:
-        """When it acts next; None while nothing is due."""
-
-    def tick(self) -> None:
-        """Act."""
 
 
 class _Plug:
@@ -109,26 +99,26 @@ class SimulatedWorld:
         self, settings: SimulationSettings, seed: int, calibration: SimulatedCalibration | None = None
     ) -> None:
         self.settings = settings
-        self.calibration = calibration or SimulatedCalibration.packaged()
+        self.calibration = calibration or SimulatedCalibration.from_package()
         self.object_model: ObjectModel = object_model(settings.object)
         children = np.random.SeedSequence(seed).spawn(len(_RANDOM_PARTS))
         self._random = dict(zip(_RANDOM_PARTS, map(np.random.default_rng, children), strict=True))
         self._plant = self._build_plant()
         self._peers: dict[str, Peer] = {}
         self._devices: list[TimedDevice] = []
-        self._add_palm()
-        self._peers["base"] = PositionerEmulator(self._plant)
-        if settings.fingertips == "nano17":
-            self._add_force_sensors()
+        tips = self._simulate_fingertips()
+        self._add_palm(NoTactile() if isinstance(tips, SimulatedLinks) else tips)
+        self._peers["base"] = SIMULATED_POSITIONERS[settings.positioner](self._plant)
+        self._add_linked_fingertips(tips)
         camera = self.build_camera(self._plant, self._markers_on_hand)
         self._peers["camera"] = camera
         self._devices.append(camera)
         self._plugs = {name: _Plug(peer) for name, peer in self._peers.items()}
         self.clock = SimulatedClock(self)
 
-    def links(self) -> dict[str, Link]:
-        """New links by device name: ``hand``, ``base``, ``camera``, and ``ft/FF`` to ``ft/TH`` with Nano17 tips."""
-        return {name: MemoryLink(name, plug) for name, plug in self._plugs.items()}
+    def transports(self) -> dict[str, Transport]:
+        """Transports by device name: ``hand``, ``base``, ``camera``, and ``ft/FF`` to ``ft/TH`` of linked tips."""
+        return {name: MemoryTransport(name, plug) for name, plug in self._plugs.items()}
 
     def unplug(self, name: str) -> None:
         """Pull a device's cable: from now on nothing passes either way."""
@@ -200,23 +190,23 @@ class SimulatedWorld:
         yaw = rng.uniform(-np.pi, np.pi)
         return Pose2(given.x_m, given.y_m, given.yaw_rad) if given else Pose2(x, y, yaw)
 
-    def _add_palm(self) -> None:
+    def _add_palm(self, tactile: TactileSection) -> None:
         calibration, random = self.calibration, self._random
         joints = JointSensors(calibration.joints, self.settings.joint_sensors, random["joints"])
         motors = MotorBank(self._plant, calibration.motors, random["motors"])
-        self._peers["hand"] = PalmEmulator(self._plant, joints, motors, self._build_tactile(), random["palm"])
+        self._peers["hand"] = PalmEmulator(self._plant, joints, motors, tactile, random["palm"])
         self._devices.append(motors)
 
-    def _add_force_sensors(self) -> None:
-        bank = RdtBank(self._plant, self.settings.force_sensors, self._random["forces"])
-        self._peers |= {f"ft/{finger}": box for finger, box in bank.boxes.items()}
-        self._devices.append(bank)
+    def _add_linked_fingertips(self, tips: SimulatedLinks | TactileSection) -> None:
+        if isinstance(tips, SimulatedLinks):
+            self._peers |= {f"ft/{finger}": peer for finger, peer in tips.peers.items()}
+            self._devices += [] if tips.device is None else [tips.device]
 
-    def _build_tactile(self) -> TactileSection:
-        if self.settings.fingertips == "nano17":
-            return NoTactile()
-        biotacs, random = self.calibration.biotacs, self._random["tactile"]
-        return BiotacSection.fitted(self._plant, biotacs, self.settings.biotac, random)
+    def _simulate_fingertips(self) -> SimulatedLinks | TactileSection:
+        """Force sensors and tactile sections draw from sources of their own, so that neither depends on the other."""
+        kind = self.settings.fingertips
+        rng = self._random["forces" if isinstance(FINGERTIPS[kind], LinkedKind) else "tactile"]
+        return SIMULATED_FINGERTIPS[kind](self._plant, self.calibration.tips[kind], self.settings, rng)
 
     def build_camera(self, plant: SeenPlant, carried: Callable[[], tuple[Placed, ...]] = tuple) -> CameraEmulator:
         """This rig's camera over a plant, which sees what is carried too."""

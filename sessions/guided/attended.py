@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from sessions.decisions import Decision, End, Pause, UndoGrasp
+from sessions.conductor.decisions import Decision, End, Pause, UndoGrasp
+from sessions.conductor.estimator import PolicyChoice
+from sessions.conductor.estimator_client import EstimatorClient
+from sessions.conductor.policy_decisions import Approve, PolicyDecisions
 from sessions.guided.operator import Ask, Operator
-from sessions.policy_choice import Choice
-from sessions.policy_decisions import Approve, PolicyDecisions
-from sessions.safety import InterruptGuard
-from sessions.thinking import Thinking
+from sessions.motion.safety import InterruptGuard
 
 
 class AttendedDecisions(PolicyDecisions):
     """The planner's decisions, recorded and approved as ever, unless the person asks for something else.
 
     Args:
-        thinking: where a planner with or without a policy is asked.
+        estimator: where a planner with or without a policy is asked.
         tell: told every decision of the policy that is not overtaken by what the person asks for.
         approve: asked before every grasp.
         operator: the person; is heard between grasps.
@@ -26,14 +26,14 @@ class AttendedDecisions(PolicyDecisions):
 
     def __init__(
         self,
-        thinking: Thinking,
-        tell: Callable[[Choice], None],
+        estimator: EstimatorClient,
+        tell: Callable[[PolicyChoice], None],
         approve: Approve,
         operator: Operator,
         guard: InterruptGuard | None = None,
         wait: Callable[[], None] = lambda: None,
     ) -> None:
-        super().__init__(thinking, tell, approve, guard)
+        super().__init__(estimator, tell, approve, guard)
         self._operator, self._wait = operator, wait
         self._paused = False
 

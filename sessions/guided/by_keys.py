@@ -1,4 +1,4 @@
-"""A grasp led by keys: for a hand that can not be moved by hand, and for the simulated one.
+"""A grasp led by keys: for a hand that cannot be moved by hand, and for the simulated one.
 
 The hand moves only on request: a step at a time, or a whole step of the grasp by itself. Whatever moves, it stops
 where a fingertip meets something.
@@ -11,15 +11,15 @@ from dataclasses import replace
 import numpy as np
 from gtsam import Pose3
 
-from drivers.shadow.posture import TipEllipsoid
-from sessions.cycle_settings import CycleSettings
-from sessions.grasp_cycle import GraspCycle
-from sessions.grasp_plan import GraspPlan
-from sessions.guided.desk import Desk
+from drivers.core.contacts import Array, Grasp
+from drivers.shadow.closing.posture import TipEllipsoid
+from sessions.guided.console import OperatorConsole
 from sessions.guided.motion import GuidedMotion
 from sessions.guided.operator import Ask, Request, Stage
-from sessions.recorder import Level
-from tactile_lab.geometry.contacts import Array, Grasp
+from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.grasp_cycle import GraspCycle
+from sessions.motion.grasp_plan import GraspPlan
+from sessions.recording.recorder import Level
 
 AROUND_m = 0.001
 """The hand is around the object when it is no higher than this over the height of its grasp."""
@@ -31,7 +31,7 @@ class GraspByKeys(GraspCycle):
     Args:
         motion: supervised motion that listens to the person.
         settings: speeds, forces, times.
-        desk: where the person sits.
+        console: where the person sits.
         tip: shape of the fingertips.
         yaw_window_rad: yaws the arm can take up.
     """
@@ -40,12 +40,12 @@ class GraspByKeys(GraspCycle):
         self,
         motion: GuidedMotion,
         settings: CycleSettings,
-        desk: Desk,
+        console: OperatorConsole,
         tip: TipEllipsoid,
         yaw_window_rad: tuple[float, float],
     ) -> None:
         super().__init__(motion, settings, tip, yaw_window_rad)
-        self._guided, self._desk = motion, desk
+        self._guided, self._console = motion, console
         self._above_m: float | None = None
         """Height over the grasp's own; None where the hand has not been sent to this grasp."""
 
@@ -54,7 +54,7 @@ class GraspByKeys(GraspCycle):
     def descend(self, plan: GraspPlan) -> bool:
         self._free_the_hand()
         prompt = "Guide the hand around the object. g: go as suggested; arrows, r, f, comma, full stop: steps"
-        self._desk.enter(Stage.GUIDE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.GIVE_UP)
+        self._console.enter(Stage.GUIDE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.GIVE_UP)
         self._plan, self.landings_world_m, self._above_m = plan, [], None
         for request in self._guided.requests():
             if request.ask is Ask.GO:
@@ -64,7 +64,7 @@ class GraspByKeys(GraspCycle):
             if request.ask is Ask.MOVE:
                 self._move_step(request)
             elif request.ask in (Ask.NEXT, Ask.CAPTURE) and self._is_around():
-                self._motion.supervisor.approached()
+                self._motion.supervisor.on_approach()
                 return True
         return False
 
@@ -72,7 +72,7 @@ class GraspByKeys(GraspCycle):
         if self._above_m is not None and self._above_m <= AROUND_m:
             return True
         height = "not over the object yet" if self._above_m is None else f"{1e3 * self._above_m:.0f} mm too high"
-        self._desk.tell(f"the hand is {height}: lower it with f, or g goes by itself")
+        self._console.tell(f"the hand is {height}: lower it with f, or g goes by itself")
         return False
 
     def _move_step(self, request: Request) -> None:
@@ -81,25 +81,25 @@ class GraspByKeys(GraspCycle):
             self._move_above()
             self._above_m = self.settings.lift_m
             return
-        jog = self._desk.settings
-        frame = self.plan.frame.moved(jog.jog_m * request.x, jog.jog_m * request.y, jog.jog_rad * request.turn)
+        jog = self._console.settings
+        frame = self.plan.frame.move(jog.jog_m * request.x, jog.jog_m * request.y, jog.jog_rad * request.turn)
         above_m = max(0.0, self._above_m + jog.jog_m * request.z)
         start = self._motion.base_joints(self.plan.frame, self._table(), self._above_m)
         if self._go_with_care(start, self._motion.base_joints(frame, self._table(), above_m)):
             self._plan, self._above_m = replace(self.plan, frame=frame), above_m
-            self._desk.tell(f"tips {1e3 * above_m:.0f} mm over their grasp")
+            self._console.tell(f"tips {1e3 * above_m:.0f} mm over their grasp")
 
     def _go_with_care(self, start: Array, end: Array) -> bool:
         """Straight to ``end``; back to ``start`` where a fingertip meets something."""
-        jog = self._desk.settings
+        jog = self._console.settings
         way_m, turn_rad = float(np.linalg.norm((end - start)[:3])), float(np.abs((end - start)[3:]).max())
         for share in self._motion.shares(max(way_m / jog.jog_m_s, turn_rad / jog.jog_rad_s)):
             self._motion.set_base(start + share * (end - start))
             self._motion.tick()
-            if met := self._pressed(self.settings.landing_force_N):
+            if met := self._pressed_fingers(self.settings.landing_force_N):
                 self._motion.set_base(start)
                 self._motion.wait(self.settings.rest_s)
-                self._desk.tell(f"{', '.join(met)} met something: back by one step", Level.WARNING)
+                self._console.tell(f"{', '.join(met)} met something: back by one step", Level.WARNING)
                 return False
         return True
 
@@ -114,30 +114,30 @@ class GraspByKeys(GraspCycle):
 
     def close(self) -> None:
         prompt = "Close the fingers. g: all by themselves; 1-5 close, 6-0 open one finger; c, o all; SPACE: done"
-        self._desk.enter(Stage.CLOSE, prompt, Ask.GO, Ask.FINGERS, Ask.NEXT, Ask.GIVE_UP)
-        self._progress, begun = self._opened(), False
+        self._console.enter(Stage.CLOSE, prompt, Ask.GO, Ask.FINGERS, Ask.NEXT, Ask.GIVE_UP)
+        self._progress, begun = self._open_progress(), False
         for request in self._guided.requests():
             if request.ask is Ask.GO:
                 super().close()
                 return
             if request.ask is Ask.FINGERS:
                 if not begun:
-                    self._motion.bench.begin_closing()
+                    self._motion.runtime.begin_closing()
                     begun = True
                 self._step_fingers(request)
             elif request.ask in (Ask.NEXT, Ask.CAPTURE):
-                self._touching = frozenset(self._pressed(self.settings.touch_force_N))
+                self._touching = frozenset(self._pressed_fingers(self.settings.touch_force_N))
                 return
 
     def _step_fingers(self, request: Request) -> None:
         """Close or open fingers by steps along their lines; each stops at its touch."""
         table = self._table()
-        way_m = self._desk.settings.finger_step_m * request.steps
+        way_m = self._console.settings.finger_step_m * request.steps
         moving = set(request.fingers)
         cycles = self._motion.cycles(abs(way_m) / (self.settings.closing_m_s * self._motion.supervisor.speed_scale))
         for _ in range(cycles):
             if way_m > 0.0:
-                moving -= set(self._pressed(self.settings.touch_force_N))
+                moving -= set(self._pressed_fingers(self.settings.touch_force_N))
                 moving = {finger for finger in moving if self._may_close(finger)}
             for finger in moving:
                 step = way_m / cycles / table.path(finger).length_m
@@ -146,33 +146,33 @@ class GraspByKeys(GraspCycle):
             self._motion.tick()
         stopped = [finger for finger in request.fingers if finger not in moving]
         if stopped and way_m > 0.0:
-            self._desk.tell(f"{', '.join(stopped)} stopped")
+            self._console.tell(f"{', '.join(stopped)} stopped")
 
     def settle(self) -> None:
-        self._desk.enter(Stage.HOLD, "Bringing the fingers to the contact force", Ask.GIVE_UP)
+        self._console.enter(Stage.HOLD, "Bringing the fingers to the contact force", Ask.GIVE_UP)
         super().settle()
-        self._desk.enter(Stage.HOLD, "Hold still. SPACE: capture; x: give up", Ask.CAPTURE, Ask.GIVE_UP)
+        self._console.enter(Stage.HOLD, "Hold still. SPACE: capture; x: give up", Ask.CAPTURE, Ask.GIVE_UP)
         hold_N = self._balanced_forces_N(self._touching, self.settings.contact_force_N)
-        while not self._desk.wants_capture():
+        while not self._console.wants_capture():
             self._servo_forces(hold_N)
             self._motion.tick()
 
     def capture(self) -> Grasp:
-        self._desk.enter(Stage.CAPTURE, "Capturing: hold still")
+        self._console.enter(Stage.CAPTURE, "Capturing: hold still")
         return super().capture()
 
     # --- carry and away ----------------------------------------------------------------------------------------
 
     def squeeze(self, touching: frozenset[str]) -> None:
-        self._desk.enter(Stage.ROTATE, "Building up the squeeze")
+        self._console.enter(Stage.ROTATE, "Building up the squeeze")
         super().squeeze(touching)
 
     def reorient(self, turn_rad: float, shift_world_m: Array, touching: frozenset[str]) -> Pose3:
         wanted = f"{np.degrees(turn_rad):+.0f}°"
         prompt = f"Turn the object. g: {wanted} as suggested; comma, full stop, arrows: steps; SPACE: done"
-        self._desk.enter(Stage.ROTATE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.UNDO)
+        self._console.enter(Stage.ROTATE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.UNDO)
         hold_N = self._balanced_forces_N(touching, self.settings.squeeze_force_N)
-        motion, jog = Pose3(), self._desk.settings
+        motion, jog = Pose3(), self._console.settings
         for request in self._guided.requests(lambda: self._servo_forces(hold_N)):
             if request.ask is Ask.GO:
                 return super().reorient(turn_rad, shift_world_m, touching) * motion
@@ -184,7 +184,7 @@ class GraspByKeys(GraspCycle):
         return motion
 
     def release(self) -> None:
-        self._desk.enter(Stage.RELEASE, "Releasing the object")
+        self._console.enter(Stage.RELEASE, "Releasing the object")
         if self._above_m is not None:
             super().release()
 
@@ -194,7 +194,7 @@ class GraspByKeys(GraspCycle):
             self._above_m = None
 
     def idle(self) -> None:
-        if self._desk.paused:
+        if self._console.paused:
             self._guided.rest()
         else:
             super().idle()

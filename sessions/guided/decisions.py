@@ -2,55 +2,52 @@
 
 from __future__ import annotations
 
-from sessions.decisions import AutonomousDecisions, Decision, End, Pause, UndoGrasp, Veto, Wait
-from sessions.grasp_plan import GraspPlan
-from sessions.guided.desk import Desk
+from drivers.core.contacts import Grasp
+from drivers.core.errors import DeviceError, SafetyError, TactileLabError
+from drivers.core.observability import planar_observability
+from sessions.conductor.decisions import AutonomousDecisions, Decision, End, Pause, UndoGrasp, Veto, Wait
+from sessions.conductor.estimator import EstimatorService, PoseStep, Reorientation
+from sessions.conductor.estimator_client import EstimatorClient
+from sessions.guided.console import OperatorConsole
 from sessions.guided.operator import Ask, Stage
-from sessions.guided.words import plan_in_words, unknown_in_words
-from sessions.planner import Reorientation
-from sessions.thinker import Thinker
-from sessions.thinking import Thinking
-from tactile_lab.errors import DeviceError, SafetyError, TactileLabError
-from tactile_lab.geometry.contacts import Grasp
-from tactile_lab.geometry.poses import planar
-from tactile_lab.slam_result import SlamStep
-from tactile_lab.tracking.observability import planar_observability
+from sessions.guided.words import plan_in_words
+from sessions.motion.grasp_plan import GraspPlan
 
 GOOD_OBSERVABILITY = 0.15
 """Smallest eigenvalue of (3.18) from which a grasp tells the whole pose on the table."""
 
 
 class GuidedDecisions(AutonomousDecisions):
-    """What the person asks for at the desk.
+    """What the person asks for at the console.
 
     Args:
-        thinking: where the planner is asked, which suggests.
-        desk: where the person sits.
+        estimator: where the planner is asked, which suggests.
+        console: where the person sits.
     """
 
-    def __init__(self, thinking: Thinking, desk: Desk) -> None:
-        super().__init__(thinking)
-        self._desk = desk
+    def __init__(self, estimator: EstimatorClient, console: OperatorConsole) -> None:
+        super().__init__(estimator)
+        self._console = console
         self._entered: int | None = None
 
-    def think(self, index: int) -> None:
-        super().think(index)
+    def prepare(self, index: int) -> None:
+        super().prepare(index)
         assert self.suggested is not None
-        self._desk.suggestion = plan_in_words(self.suggested)
+        self._console.suggestion = plan_in_words(self.suggested)
         self._entered = None
 
     def decide(self, index: int) -> Decision:
-        desk = self._desk
-        if desk.end_wanted:
+        console = self._console
+        if console.end_wanted:
             return End(f"ended by the operator after {index} grasps")
-        if desk.undo_wanted:
-            desk.undo_wanted = False
+        if console.undo_wanted:
+            console.undo_wanted = False
             return self._again(UndoGrasp("by the operator"))
-        if desk.paused:
-            return Pause(desk.paused)
+        if console.paused:
+            return Pause(console.paused)
         if self._entered != index:
             self._enter(index)
-        for request in desk.take():
+        for request in console.take():
             if request.ask is Ask.UNDO:
                 return self._again(UndoGrasp("by the operator"))
             if request.ask in (Ask.NEXT, Ask.GO):
@@ -62,34 +59,27 @@ class GuidedDecisions(AutonomousDecisions):
         return decision
 
     def _enter(self, index: int) -> None:
-        self._entered, self._desk.grasp = index, index + 1
+        self._entered, self._console.grasp = index, index + 1
         first = "Place the object on the table." if index == 0 else "Ready for the next grasp."
         undo = "" if index == 0 else "; u: take the last grasp back"
-        self._desk.enter(Stage.PLACE, f"{first} SPACE: go on{undo}; e: end", Ask.NEXT, Ask.UNDO, Ask.END)
+        self._console.enter(Stage.PLACE, f"{first} SPACE: go on{undo}; e: end", Ask.NEXT, Ask.UNDO, Ask.END)
 
-    def captured(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
-        self._desk.tell(_in_words(grasp))
-        self._desk.enter(Stage.ROTATE, "Considering how to turn the object")  # it can not be given up any more
-        return super().captured(grasp, plan)
+    def on_capture(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
+        self._console.tell(_in_words(grasp))
+        self._console.enter(Stage.ROTATE, "Considering how to turn the object")  # it cannot be given up any more
+        return super().on_capture(grasp, plan)
 
-    def estimated(self, step: SlamStep) -> None:
-        super().estimated(step)
-        self._desk.unknown = self.thinking.ask(_unknown)
-        self._desk.tell(f"grasp {step.index + 1} {step.verdict}: {step.reason}")
+    def on_estimate(self, step: PoseStep) -> None:
+        super().on_estimate(step)
+        self._console.unknown = self.estimator.ask(EstimatorService.describe_unknown)
+        self._console.tell(f"grasp {step.index + 1} {step.verdict}: {step.reason}")
 
-    def undone(self) -> None:
-        super().undone()
-        self._desk.unknown = self.thinking.ask(_unknown)
+    def on_undo(self) -> None:
+        super().on_undo()
+        self._console.unknown = self.estimator.ask(EstimatorService.describe_unknown)
 
-    def failed(self, error: TactileLabError) -> bool:
-        return isinstance(error, (SafetyError, DeviceError)) and self._desk.fail(str(error))
-
-
-def _unknown(thinker: Thinker) -> str:
-    """Which part of the object is still unknown."""
-    world_T_object = thinker.slam.world_T_object
-    pose = None if world_T_object is None else planar(world_T_object)
-    return unknown_in_words(thinker.known_shape(), pose)
+    def on_failure(self, error: TactileLabError) -> bool:
+        return isinstance(error, (SafetyError, DeviceError)) and self._console.fail(str(error))
 
 
 def _in_words(grasp: Grasp) -> str:

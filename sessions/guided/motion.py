@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from sessions.bench import Bench
-from sessions.guided.desk import Desk
+from sessions.guided.console import OperatorConsole
 from sessions.guided.operator import Request
-from sessions.motion import Motion
-from sessions.safety import SafetySupervisor
+from sessions.motion.motion import Motion
+from sessions.motion.safety import SafetySupervisor
+from sessions.rig_runtime.rig_runtime import RigRuntime
 
 
 class GuidedMotion(Motion):
     """As :class:`Motion`; a pause holds it, and giving up a grasp ends it.
 
     Args:
-        bench: connected.
+        rig runtime: connected.
         supervisor: looks at every cycle.
-        desk: where the person sits.
+        console: where the person sits.
     """
 
-    def __init__(self, bench: Bench, supervisor: SafetySupervisor, desk: Desk) -> None:
-        super().__init__(bench, supervisor)
-        self._desk = desk
+    def __init__(self, runtime: RigRuntime, supervisor: SafetySupervisor, console: OperatorConsole) -> None:
+        super().__init__(runtime, supervisor)
+        self._console = console
 
     def tick(self) -> None:
         """One supervised cycle, and as many more as the person wants the hand to stay where it is.
@@ -32,24 +32,24 @@ class GuidedMotion(Motion):
             SafetyError, DeviceError: as :meth:`Motion.tick`.
         """
         super().tick()
-        self._desk.cycle()
-        while self._desk.holds:
+        self._console.cycle()
+        while self._console.holds:
             super().tick()
-            self._desk.cycle()
-        self._desk.check_given_up()
+            self._console.cycle()
+        self._console.check_given_up()
 
     def requests(self, each: Callable[[], None] = lambda: None) -> Iterator[Request]:
         """What the person asks for in this step, until he wants to be elsewhere; ``each`` acts before every cycle."""
-        while not self._desk.moves_on:
+        while not self._console.moves_on:
             each()
             self.tick()
-            yield from self._desk.take()
+            yield from self._console.take()
 
     def rest(self) -> None:
         """One cycle while the session pauses: a failing device is shown, and fails nothing."""
-        self._desk.rest()
+        self._console.rest()
 
     def begin_anew(self) -> None:
         """After a stop: the next motion begins where everything stands."""
-        self._base_q = self.bench.perception.base_q.copy()
+        self._base_q = self.runtime.perception.base_q.copy()
         self._targets_rad = {}

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any, Protocol
 
-from sessions.guided.sight import Sight
+from sessions.guided.operator_view import OperatorView
 
 
 class Ask(StrEnum):
@@ -101,7 +101,7 @@ class Panel:
     grasp: int
     stage: Stage
     prompt: str
-    sight: Sight
+    view: OperatorView
     capture: str = ""
     suggestion: str = ""
     unknown: str = ""
@@ -113,8 +113,8 @@ class Panel:
     def content(self) -> dict[str, Any]:
         """The panel as plain data."""
         plain = asdict(self)
-        sight = plain.pop("sight")
-        return {**plain, "stage": self.stage.value, "asks": [ask.value for ask in self.asks], "sight": sight}
+        view = plain.pop("view")
+        return {**plain, "stage": self.stage.value, "asks": [ask.value for ask in self.asks], "view": view}
 
 
 class Operator(Protocol):

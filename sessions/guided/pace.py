@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactile_lab.clock import NANOSECONDS, Clock
+from drivers.core.clock import NANOSECONDS, Clock
 
 _GIVEN_UP_ns = NANOSECONDS // 5
 """A simulation that is so far behind stays behind: it does not hurry afterwards."""

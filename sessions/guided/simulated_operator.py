@@ -65,16 +65,16 @@ class SimulatedOperator:
             self._answer(panel)
 
     def _go_on(self, panel: Panel) -> None:
-        if not panel.sight.silent:
+        if not panel.view.silent:
             self._answered = None
             self._waiting.append(Request(Ask.PAUSE))
 
     def _answer(self, panel: Panel) -> None:
-        """One answer to each prompt; in the hold only once the grasp is steady, or after it can not become so."""
+        """One answer to each prompt; in the hold only once the grasp is steady, or after it cannot become so."""
         answer = _ANSWERS.get(panel.stage)
         if answer is None or not panel.prompt:
             return
-        if panel.stage is Stage.HOLD and not (panel.sight.is_steady or panel.sight.steady_s > 1.0):
+        if panel.stage is Stage.HOLD and not (panel.view.is_steady or panel.view.steady_s > 1.0):
             return
         self._answered = (panel.stage, panel.grasp, panel.prompt)
         self._waiting.append(Request(answer))

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tactile_lab.cli import (
-    bench,
-    calibrate,
-    evaluate,
-    experiment,
-    markers,
-    reconstruct,
-    report,
-    rig,
-    run,
-    session,
-    sweep,
-    view,
-)
+from drivers.core.extensions import load_extension, load_named_extensions
+from tactile_lab.cli import bench, experiment, markers, rig
+from tactile_lab.cli.calibrate import calibrate
+from tactile_lab.cli.commands import COMMANDS, Commands
+from tactile_lab.cli.running import run, sweep
+from tactile_lab.cli.sessions import evaluate, reconstruct, report, session, view
 
 app = typer.Typer(
+    cls=Commands,
     help="Tactile SLAM in the laboratory: the shape and pose of an unknown object from a few fingertip contacts.",
     epilog="Exit codes: 0 done, 1 failed, 2 usage, 3 done with data loss or outside a limit, 4 hardware not ready, "
     "130 interrupted.",
@@ -30,18 +24,18 @@ app = typer.Typer(
     rich_markup_mode="markdown",  # lines of a paragraph flow together
     pretty_exceptions_enable=False,
 )
-app.command("run")(run.run)
-app.command("reconstruct")(reconstruct.reconstruct)
-app.command("evaluate")(evaluate.evaluate)
-app.command("report")(report.report)
-app.command("view")(view.view)
-app.command("markers")(markers.markers)
-app.command("sweep")(sweep.sweep)
-app.command("bench")(bench.bench)
-app.command("experiment")(experiment.experiment)
-app.add_typer(calibrate.app, name="calibrate")
-app.add_typer(session.app, name="session")
-app.add_typer(rig.app, name="rig")
+COMMANDS.register("run", run.run)
+COMMANDS.register("reconstruct", reconstruct.reconstruct)
+COMMANDS.register("evaluate", evaluate.evaluate)
+COMMANDS.register("report", report.report)
+COMMANDS.register("view", view.view)
+COMMANDS.register("markers", markers.markers)
+COMMANDS.register("sweep", sweep.sweep)
+COMMANDS.register("bench", bench.bench)
+COMMANDS.register("experiment", experiment.experiment)
+COMMANDS.register("calibrate", calibrate.app)
+COMMANDS.register("session", session.app)
+COMMANDS.register("rig", rig.app)
 
 
 def _show_version(wanted: bool) -> None:
@@ -52,10 +46,26 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _load_extensions(files: list[Path] | None) -> None:
+    load_named_extensions()
+    for file in files or ():
+        load_extension(file)
+
+
 @app.callback()
 def options(
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
     ] = False,
+    extension: Annotated[
+        list[Path] | None,
+        typer.Option(
+            callback=_load_extensions,
+            is_eager=True,
+            metavar="FILE",
+            help="Python file that registers policies, shape models, fingertips, figures or commands of your own "
+            "(docs/extending.md); again for more.",
+        ),
+    ] = None,
 ) -> None:
     """Options of the program itself."""

@@ -30,7 +30,7 @@ _onlookers: list[Onlooker] = []
 
 
 @contextmanager
-def told_to(onlooker: Onlooker) -> Iterator[None]:
+def tell_also(onlooker: Onlooker) -> Iterator[None]:
     """Within the block, whatever people are told here is told there too."""
     _onlookers.append(onlooker)
     try:
@@ -44,7 +44,7 @@ def say(text: str, style: str = "") -> None:
     _tell(Text(text, style=style), style)
 
 
-def counted(number: int, noun: str) -> str:
+def count(number: int, noun: str) -> str:
     """A number of things: "1 grasp", "3 grasps"."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,13 +12,21 @@ import typer
 from tactile_lab.cli.options import Json, NoInput
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from tactile_lab.experiments.cells import Row
+    from tactile_lab.experiments.experiment import Experiment
+    from tactile_lab.experiments.results.stored_result import Part
 
 
 def experiment(
-    name: Annotated[str, typer.Argument(help="Name of the experiment; 'list' shows them all.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="Name of the experiment. 'list' shows them all, 'pages' writes the pages of the stored results, "
+            "'commands' shows what made these."
+        ),
+    ],
     seeds: Annotated[str, typer.Option(help="Seeds, for example 0-2,7. Those from 1000 on are for reports.")] = (
         "1000-1029"
     ),
@@ -29,21 +38,27 @@ def experiment(
     ] = None,
     grasps: Annotated[int | None, typer.Option(min=1, help="Other number of grasps, for a quick look.")] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the results of another version of the program.")] = False,
-    into: Annotated[Path | None, typer.Option(help="Markdown document whose section to replace.")] = None,
+    store: Annotated[
+        bool, typer.Option("--store", help="Keep the outcome in the repository, write its pages.")
+    ] = False,
+    forget: Annotated[bool, typer.Option("--forget", help="With --store: drop what older versions made.")] = False,
+    docs: Annotated[Path, typer.Option(help="Documents that keep stored results and pages.")] = Path("docs"),
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
     """Run an experiment over its seeds; one that was broken off goes on where it stopped."""
     del no_input
-    if name == "list":
-        _list(as_json)
+    if name in _WORDS:
+        _WORDS[name](docs, as_json)
         return
+    if store and keep:
+        raise typer.BadParameter("a result of several versions is not stored: leave out --keep", param_hint="'--store'")
     from tactile_lab.cli.console import emit_json, say, show_table, warn
     from tactile_lab.cli.experiment_progress import ExperimentProgress
     from tactile_lab.experiments.catalogue import experiment
-    from tactile_lab.experiments.reporting import LINES_FILE, document, insert_section, write_report
-    from tactile_lab.experiments.runner import RunnerSettings, run_cells
-    from tactile_lab.experiments.summary import grouped, short_table
+    from tactile_lab.experiments.reporting import LINES_FILE, document, part_of, write_report
+    from tactile_lab.experiments.runner import RunnerSettings, kept_rows, run_cells
+    from tactile_lab.experiments.summary import group_runs, short_table
 
     study, processes = experiment(name), jobs or os.cpu_count() or 1
     folder = out or Path("runs/experiments") / name
@@ -52,23 +67,73 @@ def experiment(
         warn(study.left_out())
     with ExperimentProgress(study.name, len(cells)) as progress:
         settings = RunnerSettings(processes, keep)
-        rows = run_cells(name, cells, study.work, folder / LINES_FILE, settings, progress.finished)
-    write_report(study, rows, folder, processes)
-    if into is not None:
-        insert_section(into, study, rows, processes)
+        rows = run_cells(name, cells, study.work, folder / LINES_FILE, settings, progress.on_finished)
+    command = _command(name, seeds, only or [], grasps, jobs)
+    write_report(study, rows, folder, processes, command)
+    if store:
+        made = _of_study(study, kept_rows(name, folder / LINES_FILE), grasps)
+        _store(docs, study, part_of(study, made, processes, command, grasps), forget)
     if as_json:
         emit_json(document(study, rows, processes))
     else:
-        head, *body = short_table(grouped(rows, over=study.pooled), study.columns)
+        head, *body = short_table(group_runs(rows, over=study.pooled), study.columns)
         show_table(study.sentence, head, body)
     say(f"results  {folder}")
     _end(rows)
 
 
-def _list(as_json: bool) -> None:
+def _command(name: str, seeds: str, only: Sequence[str], grasps: int | None, jobs: int) -> str:
+    """The command that runs this again."""
+    words = ["tactile-lab", "experiment", name, "--seeds", seeds]
+    words += [word for text in only for word in ("--only", text)]
+    words += [] if grasps is None else ["--grasps", str(grasps)]
+    return shlex.join([*words, "--jobs", str(jobs)] if jobs else words)
+
+
+def _of_study(study: Experiment, rows: Sequence[Row], grasps: int | None) -> list[Row]:
+    """The runs with this number of grasps, in the order of the settings: parts may have been run one by one."""
+    seeds = sorted({row.cell.seed for row in rows})
+    places = {cell.key: place for place, cell in enumerate(study.cells(seeds, None, grasps))}
+    return sorted((row for row in rows if row.cell.key in places), key=lambda row: places[row.cell.key])
+
+
+def _store(docs: Path, study: Experiment, part: Part, forget: bool) -> None:
+    from tactile_lab.cli.console import say
+    from tactile_lab.experiments.results.storing import store
+
+    say(f"stored  {store(docs, study.name, study.sentence, part, forget=forget)}")
+    _write_pages(docs)
+
+
+def _write_pages(docs: Path, as_json: bool = False) -> None:
+    from tactile_lab.cli.console import say
+    from tactile_lab.experiments.results.publishing import publish
+
+    del as_json
+    changed = publish(docs)
+    for path in changed:
+        say(f"page  {path}")
+    say(f"{len(changed)} pages and pictures are new")
+
+
+def _show_commands(docs: Path, as_json: bool) -> None:
+    from tactile_lab.cli.console import emit_json
+    from tactile_lab.experiments.results.publishing import stored_results
+
+    made = [command for result in stored_results(docs).values() for part in result.parts for command in part.commands]
+    commands = [command for command in dict.fromkeys(made) if command.startswith("tactile-lab experiment ")]
+    if as_json:
+        emit_json(commands)
+        return
+    for command in commands:
+        typer.echo(command)
+
+
+def _list(docs: Path, as_json: bool) -> None:
     from tactile_lab.cli.console import emit_json, show_table
     from tactile_lab.experiments.catalogue import EXPERIMENTS
 
+    del docs
     found = [(study.name, study.sentence, len(study.cells())) for study in EXPERIMENTS.values()]
     if as_json:
         emit_json([{"name": name, "sentence": sentence, "runs": runs} for name, sentence, runs in found])
@@ -76,6 +141,10 @@ def _list(as_json: bool) -> None:
     show_table(
         "Experiments", ["name", "runs", "what it shows"], [(name, str(runs), text) for name, text, runs in found]
     )
+
+
+_WORDS: Mapping[str, Callable[[Path, bool], None]] = {"list": _list, "pages": _write_pages, "commands": _show_commands}
+"""Words in place of a name, and what they do with the documents."""
 
 
 def _end(rows: Sequence[Row]) -> None:

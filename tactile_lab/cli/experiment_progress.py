@@ -33,7 +33,7 @@ class ExperimentProgress:
     ) -> None:
         self._bar.stop()
 
-    def finished(self, row: Row, done: int, total: int) -> None:
+    def on_finished(self, row: Row, done: int, total: int) -> None:
         """A run has ended."""
         self._bar.update(self._task, completed=done)
         if row.problem:

@@ -28,7 +28,7 @@ def interruptions_heeded() -> Iterator[None]:
     """Within the block Ctrl+C and SIGTERM end what runs by KeyboardInterrupt; where Ctrl+C is ignored it stays so."""
     before = {number: signal.signal(number, _like_ctrl_c) for number in (signal.SIGTERM, signal.SIGALRM)}
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        before[signal.SIGINT] = signal.signal(signal.SIGINT, _interrupted)
+        before[signal.SIGINT] = signal.signal(signal.SIGINT, _on_interrupt)
     told, sys.unraisablehook = sys.unraisablehook, _remembering(sys.unraisablehook)
     try:
         yield
@@ -39,7 +39,7 @@ def interruptions_heeded() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _interrupted(number: int, frame: FrameType | None) -> None:
+def _on_interrupt(number: int, frame: FrameType | None) -> None:
     if _would_be_forgotten(frame):
         _come_again()
     else:
@@ -49,7 +49,7 @@ def _interrupted(number: int, frame: FrameType | None) -> None:
 def _like_ctrl_c(number: int, frame: FrameType | None) -> None:
     """Whoever asks the program to end gets the same careful ending as a person at the keyboard."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        _interrupted(number, frame)
+        _on_interrupt(number, frame)
     else:
         signal.raise_signal(signal.SIGINT)
 

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 
+from drivers.core.errors import TactileLabError
+from drivers.core.extensions import blamed
 from tactile_lab.cli.interruptions import interruptions_heeded
-from tactile_lab.errors import TactileLabError
 
 INTERRUPTED = 130
 
@@ -21,7 +23,7 @@ os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; every error a person can cause ends here as one line.
+    """Run the command line; every error that a person or an extension can cause ends here as one line.
 
     Args:
         arguments: the words behind ``tactile-lab``; those of the process when None.
@@ -29,6 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Raises:
         SystemExit: always, with the exit code.
     """
+    warnings.showwarning = _show_warning
     try:
         with interruptions_heeded():
             from tactile_lab.cli.app import app  # here, so that Ctrl+C while it loads ends without a traceback
@@ -41,6 +44,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
+    except Exception as error:
+        if not (words := blamed(error)):
+            raise
+        from tactile_lab.cli.console import complain
+
+        complain(words)
+        sys.exit(1)
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    """What Python's own warnings mechanism has to say, in the program's form: a line and no source text."""
+    from tactile_lab.cli.console import warn
+
+    warn(str(message))
 
 
 if __name__ == "__main__":

@@ -92,7 +92,7 @@ def _refuse_others(what: str, given: Mapping[str, object]) -> None:
 
 
 def _rig_sheet(rig: str, out: Path, paper: str, measured_mm: float | None) -> PrintedSheet:
-    from tactile_lab.errors import ConfigurationError
+    from drivers.core.errors import ConfigurationError
     from tactile_lab.rigs.description import load_rig
     from tactile_lab.workflow.printing import print_rig_markers
 
@@ -117,7 +117,7 @@ def _board_sheet(
 
 def _board(kind: str, content: dict[str, Any]) -> AnyBoard:
     from drivers.camera.boards import CharucoBoard, GridBoard, SingleMarker
-    from tactile_lab.strict_yaml import validate
+    from drivers.core.configuration import validate
 
     models: dict[str, type[AnyBoard]] = {"single": SingleMarker, "grid": GridBoard, "charuco": CharucoBoard}
     return validate(content, models[kind], where="markers", hint="Change the options")

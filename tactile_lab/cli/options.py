@@ -10,7 +10,7 @@ import typer
 
 
 class Method(StrEnum):
-    """Ways to estimate, by the names :class:`tactile_lab.slam.SlamSettings` knows."""
+    """Ways to estimate, by the names :class:`tactile_lab.slam.tactile_slam.SlamSettings` knows."""
 
     JOINT = "joint"
     PARTICLE = "particle"
@@ -27,20 +27,10 @@ METHOD_HELP = (
 )
 
 
-class Shape(StrEnum):
-    """Models of the final shape, by the names :func:`tactile_lab.shape.models.shape_models` knows."""
-
-    AUTO = "auto"
-    GPIS = "gpis"
-    FACETS = "facets"
-    SUPERQUADRIC = "superquadric"
-    NAGATA = "nagata"
-    OCCUPANCY = "occupancy"
-    POINT_CLOUD = "point-cloud"
-    EDGE_FEATURES = "edge-features"
-
-
-SHAPE_HELP = "Model of the final shape; auto: field or facets, by evidence; the others to compare with."
+SHAPE_HELP = (
+    "Model of the final shape; auto: field or facets, by evidence; to compare with: gpis, facets, superquadric, "
+    "nagata, occupancy, point-cloud, edge-features; or one of an extension."
+)
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
 Root = Annotated[Path, typer.Option(help="Folder of sessions.")]

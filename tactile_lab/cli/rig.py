@@ -44,8 +44,8 @@ def list_rigs(
 def _list_ports(watch_s: float, as_json: bool) -> None:
     from dataclasses import asdict
 
+    from drivers.core.clock import MonotonicClock
     from tactile_lab.cli.console import emit_json, say, show_table
-    from tactile_lab.clock import MonotonicClock
     from tactile_lab.rigs.ports import list_all_ports, wait_for_change
 
     found = list_all_ports()
@@ -78,14 +78,14 @@ def show(
     """Show what a rig works with: its devices, its calibration files beside the rig file, and its unusual settings."""
     from tactile_lab.cli.console import emit_json, say, show_facts, show_table
     from tactile_lab.rigs.description import load_rig
-    from tactile_lab.rigs.in_force import settings_in_force
+    from tactile_lab.rigs.effective_settings import effective_settings
 
     del no_input
     loaded = load_rig(rig)
     if as_json:
         emit_json({"file": loaded.source, **loaded.plain()})
         return
-    settings = settings_in_force(loaded.description)
+    settings = effective_settings(loaded.description)
     shown = [item for item in settings if every or item.value != item.usual]
     show_facts(f"Rig {loaded.description.name}", _facts(loaded))
     say("")
@@ -97,19 +97,19 @@ def show(
 
 
 def _facts(rig: Rig) -> list[tuple[str, str]]:
-    from tactile_lab.rigs.description import gauge_files
-    from tactile_lab.rigs.in_force import flat
+    from tactile_lab.rigs.description import wire_files
+    from tactile_lab.rigs.effective_settings import flat
 
     told = rig.description
     wires = {} if told.wires is None else flat(told.wires.model_dump(mode="json", exclude_unset=True))
-    files = told.calibration.model_dump(exclude_none=True) | gauge_files(told)
+    files = told.calibration.model_dump(exclude_none=True) | wire_files(told)
     return [
         ("summary", told.summary),
         ("file", rig.source),
-        ("kind", told.kind + (", with stand-ins" if told.stand_ins else "")),
+        ("kind", told.kind + (", emulated" if told.emulated else "")),
         ("cycle", f"{1e3 * told.cycle_s:g} ms"),
         ("fingertips", told.fingertips),
-        ("station", rig.installation.rig),
+        ("installation", rig.installation.rig),
         ("devices", ", ".join(f"{device} {serial}" for device, serial in told.devices.items())),
         ("wires", "\n".join(f"{name}: {value}" for name, value in wires.items())),
         ("calibration", "\n".join(f"{role}: {file}" for role, file in files.items())),
@@ -133,7 +133,7 @@ def check(
     Exit code 0: all well; 2: the files; 4: a device is not ready.
     """
     from tactile_lab.cli.console import emit_json, say, show_table
-    from tactile_lab.rigs.check import check_rig
+    from tactile_lab.rigs.checks.check import check_rig
 
     del no_input
     findings = check_rig(rig, seed, move=move)

@@ -1,10 +1,26 @@
-"""The error figures of an evaluation, in the units people read: millimetres, degrees, shares."""
+"""The error figures of an evaluation, in the units people read: millimetres, degrees, shares.
+
+Each is computed by a function that is registered in :data:`FIGURES`; those of extensions stand beside ours. A figure
+that cannot be computed is null in the file and says why among the warnings: it never costs the others.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
-from tactile_lab.shape.metrics import ShapeErrors
+import numpy as np
+
+from drivers.core.registry import Registry
+from tactile_lab.evaluation.files.plain import plain
+from tactile_lab.evaluation.judged import Judged, seen_contacts
+from tactile_lab.evaluation.loops import wrong_loops
+from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
+from tactile_lab.evaluation.shape import contact_distances_m, outline_distances_m
+from tactile_lab.evaluation.trajectory import PoseErrors, pose_errors
+from tactile_lab.slam.shape.metrics.metrics import ShapeErrors
 
 
 @dataclass(frozen=True)
@@ -72,3 +88,124 @@ class TruthFigures:
     seen: int
     missing: int
     mesh: bool
+
+
+Figure: TypeAlias = Callable[[Judged], Any]
+"""Computes a figure: a number, or anything else that :func:`tactile_lab.evaluation.files.plain.plain` can write."""
+
+FIGURES: Registry[Figure] = Registry("evaluation figure")
+"""All figures by the name they have in ``evaluation.json``. See ``docs/extending.md`` for adding one."""
+
+
+def computed(judged: Judged) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """All registered figures by name, None where one cannot be computed; and why, in words."""
+    values: dict[str, Any] = {}
+    warnings: list[str] = []
+    for name in FIGURES:
+        try:
+            values[name] = FIGURES[name](judged)
+            plain(values[name])
+            problem = "" if _is_finite(values[name]) else "is not a finite number"
+        except Exception as error:
+            problem = f"raises {FIGURES.explain(name, error)}"
+        if problem:
+            values[name] = None
+            warnings.append(f"no {name}, as the evaluation figure {name} of {FIGURES.file(name)} {problem}")
+    return values, tuple(warnings)
+
+
+def _is_finite(value: Any) -> bool:
+    """No NaN and no infinity in it; a record of figures says by None itself what is not known."""
+    if isinstance(value, Mapping):
+        return all(map(_is_finite, value.values()))
+    if isinstance(value, list | tuple):
+        return all(map(_is_finite, value))
+    if isinstance(value, np.ndarray | np.generic):
+        return bool(np.isfinite(value).all())
+    return not isinstance(value, float) or math.isfinite(value)
+
+
+# --- ours ----------------------------------------------------------------------------------------------------------
+
+
+def _shape(judged: Judged) -> ShapeFigures | None:
+    """Errors with the estimate tied to the truth at the first grasp."""
+    compared, _ = judged.shape
+    return None if compared is None else ShapeFigures.of(compared.first_grasp)
+
+
+def _shape_best_fit(judged: Judged) -> ShapeFigures | None:
+    compared, _ = judged.shape
+    return None if compared is None else ShapeFigures.of(compared.best_fit)
+
+
+def _uncertainty(judged: Judged) -> UncertaintyFigures | None:
+    if (quantiles_m := judged.results.sigma_quantiles_m) is None:
+        return None
+    median, p95 = 1e3 * np.percentile(quantiles_m, [50, 95])
+    return UncertaintyFigures(float(median), float(p95))
+
+
+def _pose(judged: Judged) -> PoseErrors | None:
+    return pose_errors(judged.poses, judged.truth.world_T_object)
+
+
+def _registration(judged: Judged) -> float | None:
+    return judged.registration_rms_mm
+
+
+def _own_turns(judged: Judged) -> int | None:
+    return judged.symmetry_turns
+
+
+def _sensing(judged: Judged) -> SensingFigures | None:
+    truth, seen = judged.truth, seen_contacts(judged.results, judged.truth)
+    if truth.mesh is not None:
+        distances_m = contact_distances_m(*seen, truth.mesh)
+    elif truth.outline_m is not None:
+        distances_m = outline_distances_m(*seen, truth.outline_m)
+    else:
+        return None
+    if not len(distances_m):
+        return None
+    median, p95 = 1e3 * np.percentile(distances_m, [50, 95])
+    return SensingFigures(float(median), float(p95))
+
+
+def _failed(judged: Judged) -> bool | None:
+    if str(judged.results.slam["status"]) != "ok":
+        return True
+    error_mm = judged.registration_rms_mm
+    return None if error_mm is None else error_mm > FAILURE_LIMIT_MM
+
+
+def _loops(judged: Judged) -> LoopFigures:
+    loops = judged.results.slam["loops"]
+    wrong = wrong_loops(loops, judged.poses, judged.truth.world_T_object)
+    return LoopFigures(len(loops), sum(bool(loop["accepted"]) for loop in loops), wrong)
+
+
+def _time(judged: Judged) -> TimeFigures:
+    if not (step_seconds := judged.results.step_seconds):
+        return TimeFigures(None, None, None)
+    median, p95 = 1e3 * np.percentile(step_seconds, [50, 95])
+    return TimeFigures(float(np.sum(step_seconds)), float(median), float(p95))
+
+
+def _truth(judged: Judged) -> TruthFigures:
+    seen = sum(pose is not None for pose in judged.truth.world_T_object)
+    shape_known = judged.truth.mesh is not None or judged.truth.outline_m is not None
+    return TruthFigures(seen, len(judged.poses) - seen, shape_known)
+
+
+FIGURES.register("shape", _shape)
+FIGURES.register("shape_best_fit", _shape_best_fit)
+FIGURES.register("uncertainty", _uncertainty)
+FIGURES.register("pose", _pose)
+FIGURES.register("registration_rms_mm", _registration)
+FIGURES.register("symmetry_turns", _own_turns)
+FIGURES.register("sensing", _sensing)
+FIGURES.register("failed", _failed)
+FIGURES.register("loops", _loops)
+FIGURES.register("time", _time)
+FIGURES.register("truth", _truth)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from gtsam import Pose2, Pose3
 
+from drivers.core.poses import planar
 from tactile_lab.evaluation.trajectory import Poses, estimate_T_truth
-from tactile_lab.geometry.poses import planar
 
 WRONG_DISTANCE_m = 0.010
 WRONG_ANGLE_rad = np.radians(10.0)
@@ -22,7 +22,7 @@ def first_in_map(estimate: Poses) -> int:
 
 
 def wrong_loops(loops: Sequence[Mapping[str, Any]], estimate: Poses, truth: Poses) -> int | None:
-    """How many accepted loops contradict the truth; None when one of them can not be checked.
+    """How many accepted loops contradict the truth; None when one of them cannot be checked.
 
     Args:
         loops: as in ``slam.json``: grasps in the graph, verdict, relative pose and displacement (3 x 3 each).

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.errors import ShapeError
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
+from drivers.core.errors import ShapeError
 
 Triangles = NDArray[np.int64]
 

@@ -11,22 +11,22 @@ from collections.abc import Sequence
 import numpy as np
 from gtsam import Pose3
 
+from drivers.core.contacts import Array
+from drivers.core.poses import transform_points
 from tactile_lab.evaluation.trajectory import Poses, compared_grasps
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import transform_points
 
 FAILURE_LIMIT_MM = 5.0
 """A run whose registration error is above this limit counts as failed."""
 
 
-def registration_verdict(error_mm: float, own_turns: int | None) -> tuple[bool, str]:
+def registration_verdict(error_mm: float, symmetry_turns: int | None) -> tuple[bool, str]:
     """Whether a run passes, and that in words.
 
     Args:
         error_mm: its registration error.
-        own_turns: see :func:`tactile_lab.evaluation.own_turns.own_turns`.
+        own_turns: see :func:`tactile_lab.evaluation.truth.rotational_symmetry.symmetry_turns`.
     """
-    without = "" if own_turns is None else ", turns about its own axis left out"
+    without = "" if symmetry_turns is None else ", turns about its own axis left out"
     passed = error_mm <= FAILURE_LIMIT_MM
     return passed, f"{'passed: at most' if passed else 'failed: above'} {FAILURE_LIMIT_MM:g} mm{without}"
 
@@ -48,13 +48,13 @@ def registration_rms_mm(
     used = [pair for pair in compared_grasps(estimate, truth) if len(contacts_world_m[pair.index])]
     if len(used) < 2:
         return None
-    placed = _placed([(contacts_world_m[pair.index], pair.estimate) for pair in used])[:, :dimension]
-    true = _placed([(contacts_world_m[pair.index], pair.truth) for pair in used])[:, :dimension]
+    placed = _place([(contacts_world_m[pair.index], pair.estimate) for pair in used])[:, :dimension]
+    true = _place([(contacts_world_m[pair.index], pair.truth) for pair in used])[:, :dimension]
     residuals = _rigid_fit(placed, true) - true
     return 1e3 * float(np.sqrt(np.mean(np.sum(residuals**2, axis=1))))
 
 
-def _placed(grasps: Sequence[tuple[Array, Pose3]]) -> Array:
+def _place(grasps: Sequence[tuple[Array, Pose3]]) -> Array:
     return np.concatenate([transform_points(pose.inverse(), points) for points, pose in grasps])
 
 

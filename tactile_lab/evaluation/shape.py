@@ -12,13 +12,13 @@ import numpy as np
 import trimesh
 from gtsam import Pose3
 
-from tactile_lab.errors import ShapeError
+from drivers.core.contacts import Array
+from drivers.core.errors import ShapeError
+from drivers.core.poses import planar, transform_points
 from tactile_lab.evaluation.prism import open_ring, signed_area_m2
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import planar, transform_points
-from tactile_lab.shape.alignment import align_contours, align_meshes
-from tactile_lab.shape.metrics import ShapeErrors, contour_errors, mesh_errors
-from tactile_lab.shape.sampling import TriangleMesh, distances_to_mesh, distances_to_polygon
+from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
+from tactile_lab.slam.shape.metrics.metrics import ShapeErrors, contour_errors, mesh_errors
+from tactile_lab.slam.shape.surfaces.sampling import TriangleMesh, distances_to_mesh, distances_to_polygon
 
 
 @dataclass(frozen=True)

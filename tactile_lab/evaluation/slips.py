@@ -13,10 +13,10 @@ from itertools import pairwise
 import numpy as np
 from gtsam import Pose3
 
-from tactile_lab.geometry.contacts import Array, Grasp
-from tactile_lab.geometry.poses import planar
-from tactile_lab.tracking.motion import MotionNoise, compose, deviation, planar_motion, pose_row
-from tactile_lab.tracking.motion_cost import STIFF_BEYOND_SIGMA
+from drivers.core.contacts import Array, Grasp
+from drivers.core.poses import planar
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, deviation, planar_motion, pose_row
+from tactile_lab.slam.tracking.evidence.motion_cost import STIFF_BEYOND_SIGMA
 
 LEAST_STEPS = 10
 """Fewer tell no standard deviation."""
@@ -26,7 +26,7 @@ _SIGMAS_OF_LENGTH, _SIGMAS_OF_TURN = 1.665, 1.150
 """So many grasps do no more to an object left lying than closing does, and within how many standard deviations that
 share of a normal distribution lies, in two dimensions and in one. The others push it (decision 30)."""
 
-_LEAST_LEFT_LYING = 0.02
+_LEAST_UNHELD = 0.02
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Slips:
         return cls(*(np.array(found[carried]).reshape(-1, 3) for carried in (True, False)))
 
     @classmethod
-    def joined(cls, parts: Iterable[Slips]) -> Slips:
+    def join(cls, parts: Iterable[Slips]) -> Slips:
         """Of several sessions."""
         known = list(parts)
         none = [np.empty((0, 3))]
@@ -66,7 +66,7 @@ class Slips:
     def motion(self) -> MotionNoise | None:
         """The noise that fits; None where the hand carried the object too seldom to tell.
 
-        ``left_lying`` stays 1, which is always safe, where the object was left too seldom.
+        ``unheld`` stays 1, which is always safe, where the object was left too seldom.
         """
         if len(self.carried) < LEAST_STEPS:
             return None
@@ -75,11 +75,11 @@ class Slips:
         if len(self.left) >= LEAST_STEPS:
             usual_m = float(np.quantile(lengths_m(self.left), _USUAL_SHARE)) / _SIGMAS_OF_LENGTH
             usual_rad = float(np.quantile(np.abs(self.left[:, 2]), _USUAL_SHARE)) / _SIGMAS_OF_TURN
-            share = min(1.0, max(_LEAST_LEFT_LYING, usual_m / translation_m, usual_rad / rotation_rad))
-        return MotionNoise(translation_m=translation_m, rotation_rad=rotation_rad, left_lying=share)
+            share = min(1.0, max(_LEAST_UNHELD, usual_m / translation_m, usual_rad / rotation_rad))
+        return MotionNoise(translation_m=translation_m, rotation_rad=rotation_rad, unheld=share)
 
     def pushed_count(self, motion: MotionNoise) -> int:
-        """How many of the grasps that were to leave the object moved it beyond what ``left_lying`` makes likely."""
+        """How many of the grasps that were to leave the object moved it beyond what ``unheld`` makes likely."""
         lying = motion.after(np.zeros(3))
         far = lengths_m(self.left) > STIFF_BEYOND_SIGMA * lying.translation_m
         return int(np.sum(far | (np.abs(self.left[:, 2]) > STIFF_BEYOND_SIGMA * lying.rotation_rad)))

@@ -6,9 +6,12 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from scipy.stats import t as student
 
 CONFIDENCE = 0.95
+_RESAMPLED, _LEAST_RESAMPLED = 2000, 5
+"""Samples of the bootstrap, and the fewest values that it says something about."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,23 @@ class Interval:
         deviation = math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (count - 1))
         half = float(student.ppf((1 + CONFIDENCE) / 2, count - 1)) * deviation / math.sqrt(count)
         return cls(mean, mean - half, mean + half)
+
+    @classmethod
+    def resampled(cls, values: Sequence[float]) -> Interval:
+        """Of at least one value, by the bootstrap: differences that are mostly zero are nothing like normal.
+
+        The interval is None for fewer than five values.
+        """
+        found = np.asarray(values, dtype=float)
+        if len(found) < _LEAST_RESAMPLED:
+            return cls(float(found.mean()), None, None)
+        drawn = np.random.default_rng(0).integers(len(found), size=(_RESAMPLED, len(found)))
+        low, high = np.quantile(found[drawn].mean(axis=1), [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+        return cls(float(found.mean()), float(low), float(high))
+
+    def excludes_zero(self, margin: float = 0.0) -> bool:
+        """Zero lies outside of it, by more than a margin."""
+        return self.low is not None and self.high is not None and (self.low > margin or self.high < -margin)
 
     def text(self, digits: int = 1) -> str:
         """Mean and interval."""

@@ -8,7 +8,7 @@ from functools import partial
 from itertools import product
 from typing import Any
 
-from tactile_lab.errors import TactileLabError
+from drivers.core.errors import TactileLabError
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
 from tactile_lab.evaluation.spread import Spread
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -28,6 +29,7 @@ def evaluation_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
         *_shape_rows(evaluation.get("shape") or {}, evaluation.get("shape_best_fit") or {}),
         *_pose_rows(evaluation.get("pose") or {}),
         *_run_rows(evaluation),
+        *_further_rows(evaluation.get("further") or {}),
     ]
     return [replace(row, unit="") if row.value == UNKNOWN else row for row in rows]
 
@@ -78,6 +80,17 @@ def _run_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
         EvaluationRow("Step time", _text(time.get("step_ms_median"), 0), "ms", spread),
         EvaluationRow("Tracking", str(evaluation.get("status", UNKNOWN)), "", "ok or lost"),
     ]
+
+
+def _further_rows(further: Mapping[str, Any]) -> list[EvaluationRow]:
+    return [EvaluationRow(name, further_text(value), "", "of an extension") for name, value in further.items()]
+
+
+def further_text(value: Any) -> str:
+    """A figure of an extension, whatever it is; a dash where it is not known."""
+    if value is None:
+        return UNKNOWN
+    return f"{value:.4g}" if isinstance(value, int | float) else json.dumps(value, ensure_ascii=False)
 
 
 def _of(what: str, count: int) -> str:

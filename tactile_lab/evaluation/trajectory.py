@@ -17,9 +17,9 @@ import numpy as np
 from gtsam import Pose3
 from numpy.typing import NDArray
 
-from tactile_lab.errors import SessionError
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import rotation_angle_rad
+from drivers.core.contacts import Array
+from drivers.core.errors import SessionError
+from drivers.core.poses import rotation_angle_rad
 
 COLUMNS = ("stamp_s", *(f"world_T_object_{row}{column}" for row in range(4) for column in range(4)))
 """Columns of ``trajectory.csv``: the stamp, then the 4 x 4 matrix row by row."""

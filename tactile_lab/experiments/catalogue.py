@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tactile_lab.errors import ConfigurationError
+from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.experiment import Experiment
-from tactile_lab.experiments.studies import exploration, laboratory, planar, solids, thesis_figures
+from tactile_lab.experiments.studies import ablation, exploration, laboratory, planar, solids, thesis_figures
 
 EXPERIMENTS: Mapping[str, Experiment] = {
     study.name: study
@@ -16,6 +16,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         solids.KNOWN_SHAPE,
         solids.SOLID_LIMIT,
         solids.METHODS_6DOF,
+        ablation.ABLATION,
         planar.CONTOUR_LIMIT,
         planar.RANDOM_CONTACTS,
         thesis_figures.FIGURE_2_7,

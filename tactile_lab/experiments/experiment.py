@@ -9,14 +9,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from tactile_lab.errors import ConfigurationError
+from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.cells import Cell, Row, Setting, Work, planned_cells
+from tactile_lab.experiments.plot_data import Plot
 from tactile_lab.experiments.summary import Column
 
 REPORTED_SEEDS = tuple(range(1000, 1030))
 DEVELOPMENT_SEEDS = range(100)
 
-Plot: TypeAlias = Callable[[str, Sequence[Row]], str]
+PlotOf: TypeAlias = Callable[[Sequence[Row]], Plot]
 
 
 @dataclass(frozen=True)
@@ -29,10 +30,11 @@ class Experiment:
         settings: what is varied; grasps is the number of grasps asked for.
         work: runs one cell.
         columns: figures of the tables.
-        plot: draws the outcome as an SVG file, from a title and all rows.
+        plot: what the plot of all rows shows.
         pooled: settings over which a second table takes all runs together.
+        kind: of the run, where another table takes all runs of a kind together.
         grasps: number of grasps of a run; None where there are none.
-        left_out: what can not be run on this machine and why, "" if nothing.
+        left_out: what cannot be run on this machine and why, "" if nothing.
     """
 
     name: str
@@ -40,8 +42,9 @@ class Experiment:
     settings: Callable[[int], list[Setting]]
     work: Work
     columns: tuple[Column, ...]
-    plot: Plot
+    plot: PlotOf
     pooled: tuple[str, ...] = ()
+    kind: Callable[[Cell], str] | None = None
     grasps: int | None = None
     left_out: Callable[[], str] = str
 
@@ -63,11 +66,11 @@ class Experiment:
         """
         settings = self.settings(grasps or self.grasps or 0)
         for name, values in (only or {}).items():
-            settings = _limited(settings, name, values)
+            settings = _limit(settings, name, values)
         return planned_cells(settings, seeds)
 
 
-def _limited(settings: list[Setting], name: str, values: Sequence[str]) -> list[Setting]:
+def _limit(settings: list[Setting], name: str, values: Sequence[str]) -> list[Setting]:
     if not any(name in dict(setting) for setting in settings):
         hint = f"Settings are {', '.join(dict(settings[0]))}"
         raise ConfigurationError(f"nothing called {name!r} is varied", where="--only", hint=hint)

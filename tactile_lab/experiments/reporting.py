@@ -1,4 +1,4 @@
-"""The outcome of an experiment as files (``results.json``, ``results.md``, ``plot.svg``) and as part of a document."""
+"""The outcome of an experiment: as files of a run's folder, and as a part of a stored result."""
 
 from __future__ import annotations
 
@@ -6,19 +6,23 @@ import json
 import os
 import platform
 from collections.abc import Sequence
+from dataclasses import replace
+from datetime import date
+from importlib.metadata import version as package_version
 from pathlib import Path
 from typing import Any
 
-from tactile_lab.errors import SessionError
-from tactile_lab.experiments.cells import Row
+from drivers.core.atomic_files import write_whole
+from tactile_lab.experiments.cells import Cell, Row
 from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.plots import draw
+from tactile_lab.experiments.results.pages import page
+from tactile_lab.experiments.results.stored_result import MadeBy, Part, StoredResult, Table
 from tactile_lab.experiments.runner import FORMAT, version
-from tactile_lab.experiments.study_plots import UNITS
-from tactile_lab.experiments.summary import Group, group_json, grouped, markdown, table
-from tactile_lab.whole_files import write_whole
+from tactile_lab.experiments.studies.plots import UNITS
+from tactile_lab.experiments.summary import Group, group_json, group_runs, table
 
 JSON_FILE, TABLE_FILE, PLOT_FILE, LINES_FILE = "results.json", "results.md", "plot.svg", "runs.jsonl"
-PICTURES = "pictures"
 
 
 def document(study: Experiment, rows: Sequence[Row], jobs: int) -> dict[str, Any]:
@@ -30,33 +34,44 @@ def document(study: Experiment, rows: Sequence[Row], jobs: int) -> dict[str, Any
         "version": version(),
         "machine": {"cores": os.cpu_count(), "processor": platform.machine(), "jobs": jobs},
         "seeds": seeds_of(rows),
-        "groups": [group_json(group, study.columns) for group in grouped(rows)],
+        "groups": [group_json(group, study.columns) for group in group_runs(rows)],
         "pooled": [group_json(group, study.columns) for group in pooled_groups(study, rows)],
         "runs": [row.as_json() for row in rows],
     }
 
 
-def section(study: Experiment, rows: Sequence[Row], jobs: int) -> str:
-    """Text and tables in Markdown: all runs together first, then each setting."""
-    seeds = seeds_of(rows)
-    text = f"{study.sentence}\n\n```\ntactile-lab experiment {study.name}\n```\n\n"
-    text += f"Seeds {_ranges(seeds)}; {len(rows)} runs, {jobs} at a time on {os.cpu_count()} cores. "
-    text += "Where a heading says nothing else, three figures are median / p90 / maximum.\n\n"
-    if any(column.key == "hausdorff_mm" for column in study.columns):
-        text += "Hausdorff distances are at the best fit; a run without a shape counts as infinitely wrong.\n\n"
-    if study.left_out():
-        text += f"Not run: {study.left_out()}.\n\n"
-    pooled = pooled_groups(study, rows)
-    if pooled:
-        text += f"All values of {' and '.join(study.pooled)} together:\n\n"
-        text += markdown(table(pooled, study.columns, UNITS)) + "\n"
-    return text + markdown(table(grouped(rows), study.columns, UNITS))
+def made_here(jobs: int = 1) -> MadeBy:
+    """This version of the program, today, on this machine."""
+    machine = f"{os.cpu_count()} cores ({platform.machine()}), {jobs} at a time"
+    return MadeBy(package_version("tactile-lab"), version(), None, date.today().isoformat(), machine)
+
+
+def part_of(study: Experiment, rows: Sequence[Row], jobs: int, command: str, grasps: int | None = None) -> Part:
+    """Tables and plot of the runs: all runs together first, then each setting.
+
+    Args:
+        study: the experiment.
+        rows: the runs, at least one.
+        jobs: runs side by side.
+        command: that made them.
+        grasps: number of grasps instead of the experiment's own.
+    """
+    names = _shown_settings(study, grasps)
+    tables = [_table(study, group_runs(rows), names)]
+    if pooled := pooled_groups(study, rows):
+        left = [name for name in names if name not in study.pooled]
+        together = f"All values of {' and '.join(study.pooled)} together"
+        tables.insert(0, _table(study, pooled, left, together))
+        if study.kind is not None:
+            kinds = pooled_groups(study, [_of_kind(row, study.kind(row.cell)) for row in rows])
+            tables.insert(1, _table(study, kinds, ["kind", *left], f"{together}, by their kind"))
+    return Part(made_here(jobs), (command,), _about(study, rows), tuple(tables), study.plot(rows))
 
 
 def pooled_groups(study: Experiment, rows: Sequence[Row]) -> list[Group]:
     """Groups over the settings that the experiment pools; none if it has only one value of them."""
     distinct = {tuple(row.cell[name] for name in study.pooled) for row in rows}
-    return grouped(rows, over=study.pooled) if len(distinct) > 1 else []
+    return group_runs(rows, over=study.pooled) if len(distinct) > 1 else []
 
 
 def seeds_of(rows: Sequence[Row]) -> list[int]:
@@ -64,48 +79,44 @@ def seeds_of(rows: Sequence[Row]) -> list[int]:
     return sorted({row.cell.seed for row in rows})
 
 
-def write_report(study: Experiment, rows: Sequence[Row], folder: Path, jobs: int) -> None:
+def write_report(study: Experiment, rows: Sequence[Row], folder: Path, jobs: int, command: str = "") -> None:
     """Write the three files.
 
     Raises:
-        WriteError: the folder can not be written.
+        WriteError: the folder cannot be written.
     """
+    part = part_of(study, rows, jobs, command or f"tactile-lab experiment {study.name}")
+    result = StoredResult(study.name, study.sentence, (part,))
     texts = {
         JSON_FILE: json.dumps(document(study, rows, jobs), indent=1, allow_nan=False) + "\n",
-        TABLE_FILE: section(study, rows, jobs),
-        PLOT_FILE: _plot(study, rows),
+        TABLE_FILE: page(result, part.made_by.sources or "", picture=PLOT_FILE),
+        PLOT_FILE: draw(study.sentence.rstrip("."), study.plot(rows)),
     }
     for name, text in texts.items():
         write_whole(folder / name, text, "Choose another folder with --out")
 
 
-def insert_section(page: Path, study: Experiment, rows: Sequence[Row], jobs: int) -> None:
-    """Put an experiment's section between its two marks in a Markdown document, in place of what is there.
-
-    The marks are comments of the form ``<!-- experiment NAME -->`` and ``<!-- end NAME -->``. The plot goes into the
-    folder ``pictures`` beside the document.
-
-    Raises:
-        SessionError: the document can not be read, or does not have the marks.
-        WriteError: it, or the plot, can not be written.
-    """
-    begin, end = f"<!-- experiment {study.name} -->", f"<!-- end {study.name} -->"
-    picture = Path(PICTURES) / f"{study.name}.svg"
-    try:
-        before, found, rest = page.read_text(encoding="utf-8").partition(begin)
-    except OSError as error:
-        raise SessionError(f"can not be read ({error.strerror})", where=str(page), hint="Check the path") from error
-    _, closed, after = rest.partition(end)
-    if not (found and closed):
-        hint = f"Add the lines {begin} and {end} where the section belongs"
-        raise SessionError(f"has no place for {study.name}", where=str(page), hint=hint)
-    text = f"{section(study, rows, jobs)}\n![{study.sentence}]({picture.as_posix()})\n"
-    write_whole(page.parent / picture, _plot(study, rows))
-    write_whole(page, f"{before}{begin}\n\n{text}\n{end}{after}")
+def _of_kind(row: Row, kind: str) -> Row:
+    return replace(row, cell=Cell((("kind", kind), *row.cell.setting), row.cell.seed))
 
 
-def _plot(study: Experiment, rows: Sequence[Row]) -> str:
-    return study.plot(study.sentence.rstrip("."), rows)
+def _table(study: Experiment, groups: Sequence[Group], names: Sequence[str], title: str = "") -> Table:
+    head, *body = table(groups, study.columns, UNITS, names)
+    return Table(title, tuple(head), tuple(map(tuple, body)), keys=len(names))
+
+
+def _shown_settings(study: Experiment, grasps: int | None) -> list[str]:
+    """Settings that the experiment varies, also where the runs at hand do not: their tables have the same columns."""
+    cells = study.cells([0], None, grasps)
+    names = [name for name, _ in cells[0].setting]
+    return [name for name in names if len({dict(cell.setting).get(name) for cell in cells}) > 1] or names
+
+
+def _about(study: Experiment, rows: Sequence[Row]) -> str:
+    text = f"Seeds {_ranges(seeds_of(rows))}; {len(rows)} runs."
+    if any(column.key == "hausdorff_mm" for column in study.columns):
+        text += " Hausdorff distances are at the best fit; a run without a shape counts as infinitely wrong."
+    return text + (f" Not run: {study.left_out()}." if study.left_out() else "")
 
 
 def _ranges(seeds: Sequence[int]) -> str:

@@ -21,20 +21,25 @@ from functools import cache, partial
 from pathlib import Path
 from typing import IO
 
-from tactile_lab.errors import SessionError, TactileLabError
+from drivers.core.atomic_files import write_whole
+from drivers.core.errors import SessionError, TactileLabError
+from drivers.core.extensions import load_named_extensions
 from tactile_lab.experiments.cells import Cell, Row, Work
-from tactile_lab.whole_files import write_whole
 
 FORMAT = "tactile-experiment/1"
+SEVERAL = "several versions"
+"""What a file says whose results are not all of one version: no version takes them for its own again."""
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 """What keeps the libraries of a worker to one thread: small matrices are faster so, and sums come out the same."""
 
 _LOOK_s = 0.5
 """A wait is never longer: a Ctrl+C that comes just before it would be heard when the next run is done."""
 _ROOT = Path(__file__).resolve().parents[2]
+_PLOTS = ("plots", "plot_data", "plot_sheet")
 _PARTS = ("tactile_lab", "calibration", "drivers", "sessions")
-_WITHOUT = ("cli", "workflow", "view", "report")
-"""Parts of tactile_lab that show results or take orders, and compute none."""
+_WITHOUT = ("cli", "workflow", "view", "report", "experiments/results", *(f"experiments/{name}.py" for name in _PLOTS))
+"""Parts of tactile_lab that show results or take orders, and compute none; but for:"""
+_WITH = ("workflow/calibrating_forearm.py",)
 
 Finished = Callable[[Row, int, int], None]
 """Told about each finished run, the number of those done, and of all."""
@@ -72,15 +77,15 @@ def run_cells(
         finished: told about progress.
 
     Raises:
-        SessionError: the file belongs to another experiment, can not be read, or a process died.
-        WriteError: the file can not be written.
+        SessionError: the file belongs to another experiment, cannot be read, or a process died.
+        WriteError: the file cannot be written.
     """
     settings = settings or RunnerSettings()
-    known = _known_rows(name, file, settings.keep)
+    known, by = _known_rows(name, file, settings.keep)
     missing = [cell for cell in cells if cell.key not in known]
     done = len(cells) - len(missing)
-    with _appending(name, file, list(known.values())) as out:
-        for row in _executed(missing, work, settings.jobs):
+    with _appending(name, file, by, list(known.values())) as out:
+        for row in _execute(missing, work, settings.jobs):
             known[row.cell.key] = row
             out.write(_line(row.as_json()))
             out.flush()
@@ -99,7 +104,7 @@ def execute(cell: Cell, work: Work) -> Row:
         return Row(cell, None, f"{type(error).__name__}: {error}")
 
 
-def _executed(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
+def _execute(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
     if jobs == 1 or len(cells) < 2:
         return map(partial(execute, work=work), cells)
     return _in_processes(cells, work, jobs)
@@ -132,14 +137,20 @@ def _end(pool: ProcessPoolExecutor) -> None:
 
 
 def _prepare_worker() -> None:
-    """Ctrl+C reaches every process of a terminal: only the parent answers."""
+    """Ctrl+C reaches every process of a terminal: only the parent answers. Extensions are known here as well."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    load_named_extensions()
 
 
-def _known_rows(name: str, file: Path, keep: bool) -> dict[str, Row]:
-    """Results in the file, by the key of their cell."""
+def kept_rows(name: str, file: Path) -> list[Row]:
+    """All results in the file that this version of the program made. Raises SessionError as :func:`run_cells`."""
+    return list(_known_rows(name, file, keep=False)[0].values())
+
+
+def _known_rows(name: str, file: Path, keep: bool) -> tuple[dict[str, Row], str]:
+    """Results in the file, by the key of their cell, and which version made them."""
     if not file.is_file():
-        return {}
+        return {}, version()
     try:
         head, *lines = file.read_text(encoding="utf-8").splitlines()
         found = json.loads(head)
@@ -149,8 +160,10 @@ def _known_rows(name: str, file: Path, keep: bool) -> dict[str, Row]:
     except (OSError, ValueError, KeyError, TypeError) as error:
         hint = "Remove the file to begin anew, or choose another --out"
         raise SessionError("is not a file of results", where=str(file), hint=hint) from error
-    same = keep or found["version"] == version()
-    return {row.cell.key: row for row in rows} if same else {}
+    same = found["version"] == version()
+    if not (same or keep):
+        return {}, version()
+    return {row.cell.key: row for row in rows}, version() if same else SEVERAL
 
 
 def _whole(lines: list[str]) -> list[str]:
@@ -158,9 +171,9 @@ def _whole(lines: list[str]) -> list[str]:
     return lines[:-1] if lines and not lines[-1].endswith("}") else lines
 
 
-def _appending(name: str, file: Path, rows: list[Row]) -> IO[str]:
+def _appending(name: str, file: Path, by: str, rows: list[Row]) -> IO[str]:
     """The file opened behind its head and the rows that stay."""
-    head = {"format": FORMAT, "experiment": name, "version": version()}
+    head = {"format": FORMAT, "experiment": name, "version": by}
     lines = "".join(map(_line, [head, *(row.as_json() for row in rows)]))
     write_whole(file, lines, "Choose another folder with --out")
     return file.open("a", encoding="utf-8")
@@ -182,5 +195,5 @@ def version() -> str:
 def sources() -> list[Path]:
     """Files that results depend on: programs, and the rigs' descriptions and calibrations."""
     files = (path for part in _PARTS for path in (_ROOT / part).rglob("*") if path.suffix in {".py", ".yaml"})
-    left_out = [_ROOT / "tactile_lab" / name for name in _WITHOUT]
-    return sorted(path for path in files if not any(path.is_relative_to(folder) for folder in left_out))
+    left_out, taken = ([_ROOT / "tactile_lab" / name for name in names] for names in (_WITHOUT, _WITH))
+    return sorted(path for path in files if path in taken or not any(map(path.is_relative_to, left_out)))

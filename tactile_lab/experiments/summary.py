@@ -11,13 +11,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
-from tactile_lab.evaluation.spread import Spread, number, quantile
+import numpy as np
+
+from tactile_lab.evaluation.spread import Interval, Spread, number, quantile
 from tactile_lab.experiments.cells import Row, Setting, Value
 
 REFERENCE_METHOD = "known-pose"
-UNKNOWN = "–"
+LEFT_OUT, NOTHING = "without", "nothing"
+"""The setting that names what a run does without, and its value for the runs that paired differences are taken to."""
 
-Kind: TypeAlias = Literal["spread", "mean", "estimate", "median", "pooled", "percent", "sum", "correlation"]
+UNKNOWN = "–"
+LEAST_PAIRS, _DRAWS = 20, 2000
+"""Pairs of runs from which on a ratio has an interval, and how often they are drawn for it (bootstrap)."""
+
+Kind: TypeAlias = Literal["spread", "mean", "estimate", "median", "pooled", "percent", "sum", "correlation", "paired"]
 
 
 @dataclass(frozen=True)
@@ -30,8 +37,10 @@ class Column:
         digits: behind the point.
         kind: "spread" gives median / p90 / maximum, "median" the median, "mean" the mean, "pooled" median / p95 of all
             numbers in the lists of all runs, "percent" the mean of shares or flags, "sum" the total, "estimate" the
-            mean with its standard error, "correlation" Pearson's of all pairs in the lists of all runs.
+            mean with its standard error, "correlation" Pearson's of all pairs in the lists of all runs, "paired" the
+            mean difference to the same runs with nothing left out, with its 95 % interval by the bootstrap.
         versus: add the ratio of the medians to the reference method's.
+        most: larger values count as this one in differences, so that one hopeless run does not hide all others.
     """
 
     title: str
@@ -39,6 +48,7 @@ class Column:
     digits: int = 1
     kind: Kind = "spread"
     versus: bool = False
+    most: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -80,12 +90,12 @@ class Group:
         """The pairs of numbers in all lists of that name."""
         return [pair for row in self.rows for pair in (row.figures or {}).get(key, [])]
 
-    def pooled(self, key: str) -> list[float]:
+    def pool(self, key: str) -> list[float]:
         """The numbers in all lists of that name."""
         return [value for row in self.rows for value in (row.figures or {}).get(key, [])]
 
 
-def grouped(rows: Sequence[Row], *, over: Sequence[str] = ()) -> list[Group]:
+def group_runs(rows: Sequence[Row], *, over: Sequence[str] = ()) -> list[Group]:
     """Runs of equal settings together, in order of appearance, settings named in ``over`` and seeds mixed."""
     groups: dict[Setting, list[Row]] = {}
     for row in rows:
@@ -94,20 +104,29 @@ def grouped(rows: Sequence[Row], *, over: Sequence[str] = ()) -> list[Group]:
     return [Group(setting, tuple(members)) for setting, members in groups.items()]
 
 
-def varied(groups: Sequence[Group]) -> list[str]:
+def varying_settings(groups: Sequence[Group]) -> list[str]:
     """Names of the settings that are not the same in all groups; of all if there is one group only."""
     names = [name for name, _ in groups[0].setting]
     return [name for name in names if len({group[name] for group in groups}) > 1] or names
 
 
-def table(groups: Sequence[Group], columns: Sequence[Column], units: Mapping[str, str]) -> list[list[str]]:
-    """Head and body of the table as texts."""
-    names = varied(groups)
+def table(
+    groups: Sequence[Group], columns: Sequence[Column], units: Mapping[str, str], names: Sequence[str] | None = None
+) -> list[list[str]]:
+    """Head and body of the table as texts.
+
+    Args:
+        groups: one a row.
+        columns: figures.
+        units: of settings, by their names.
+        names: settings that are shown; None for those that differ.
+    """
+    names = varying_settings(groups) if names is None else names
     head = [f"{name}, {units[name]}" if name in units else name for name in names]
     head += ["runs", *(title for column in columns for title in _titles(column)), "failed", "why"]
     body = []
     for group in groups:
-        cells = [text for column in columns for text in _texts(group, column, _reference(group, groups))]
+        cells = [text for column in columns for text in _texts(group, column, _reference(group, groups), groups)]
         failed = f"{len(group.failures)} ({100 * group.failed_share:.0f} %)" if group.failures else "0"
         body.append([*(str(group[name]) for name in names), str(len(group.rows)), *cells, failed, reasons(group)])
     return [head, *body]
@@ -115,10 +134,10 @@ def table(groups: Sequence[Group], columns: Sequence[Column], units: Mapping[str
 
 def short_table(groups: Sequence[Group], columns: Sequence[Column]) -> list[list[str]]:
     """Head and body of a table that fits a terminal: the settings that differ, the first two figures, failures."""
-    names, shown = varied(groups), columns[:2]
+    names, shown = varying_settings(groups), columns[:2]
     body = [[str(group[name]) for name in names] for group in groups]
     for line, group in zip(body, groups, strict=True):
-        line += [text for column in shown for text in _texts(group, column, _reference(group, groups))]
+        line += [text for column in shown for text in _texts(group, column, _reference(group, groups), groups)]
         line.append(f"{len(group.failures)} of {len(group.rows)}")
     return [[*names, *(title for column in shown for title in _titles(column)), "failed"], *body]
 
@@ -129,10 +148,10 @@ def reasons(group: Group) -> str:
     for seed, reason in group.failures:
         seeds.setdefault(reason, []).append(seed)
     ordered = sorted(seeds.items(), key=lambda item: -len(item[1]))
-    return "; ".join(f"{reason}: {len(found)} ({_shortened(sorted(set(found)))})" for reason, found in ordered)
+    return "; ".join(f"{reason}: {len(found)} ({_shorten(sorted(set(found)))})" for reason, found in ordered)
 
 
-def _shortened(seeds: list[int], most: int = 3) -> str:
+def _shorten(seeds: list[int], most: int = 3) -> str:
     shown = ", ".join(map(str, seeds[:most]))
     return shown if len(seeds) <= most else f"{shown} and {len(seeds) - most} more"
 
@@ -141,13 +160,54 @@ def _titles(column: Column) -> list[str]:
     return [column.title, f"× {REFERENCE_METHOD}"] if column.versus else [column.title]
 
 
-def _texts(group: Group, column: Column, reference: Group | None) -> list[str]:
+def _texts(group: Group, column: Column, reference: Group | None, groups: Sequence[Group] = ()) -> list[str]:
+    if column.kind == "paired":
+        found = paired(group, column, groups)
+        return [UNKNOWN if found is None else found.text(column.digits)]
     text = _SHOWN[column.kind](group, column)
     if not column.versus:
         return [text]
     base = math.inf if reference is None else reference.spread(column.key).median
-    median = group.spread(column.key).median
-    return [text, number(median / base, 2) if math.isfinite(base) else UNKNOWN]
+    if reference is None or not math.isfinite(base):
+        return [text, UNKNOWN]
+    return [text, number(group.spread(column.key).median / base, 2) + _bootstrap_interval(group, reference, column.key)]
+
+
+def _bootstrap_interval(group: Group, reference: Group, key: str) -> str:
+    """95 % of the ratios of medians over drawn pairs of runs that differ in the method alone; "" for few pairs."""
+    others = {_without_method(row): value for row, value in zip(reference.rows, reference.values(key), strict=True)}
+    own = [(value, _without_method(row)) for row, value in zip(group.rows, group.values(key), strict=True)]
+    pairs = np.array([(value, others[run]) for value, run in own if run in others])
+    if group is reference or len(pairs) < LEAST_PAIRS or not np.isfinite(pairs[:, 1]).all():
+        return ""
+    drawn = np.random.default_rng(0).integers(len(pairs), size=(_DRAWS, len(pairs)))
+    medians = np.sort(pairs[drawn], axis=1)[:, [(len(pairs) - 1) // 2, len(pairs) // 2]].mean(axis=1)
+    low, high = np.sort(medians[:, 0] / medians[:, 1])[[int(0.025 * _DRAWS), int(0.975 * _DRAWS)]].tolist()
+    return f" ({number(low, 2)} to {number(high, 2)})"
+
+
+def _without_method(row: Row) -> tuple[Setting, int]:
+    return tuple(pair for pair in row.cell.setting if pair[0] != "method"), row.cell.seed
+
+
+def paired(group: Group, column: Column, groups: Sequence[Group]) -> Interval | None:
+    """Mean difference of a figure to the same runs with nothing left out; None for those themselves."""
+    if dict(group.setting).get(LEFT_OUT, NOTHING) == NOTHING:
+        return None
+    full = {_same_run(row): row for other in groups if other[LEFT_OUT] == NOTHING for row in other.rows}
+    pairs = [(row, full[_same_run(row)]) for row in group.rows if _same_run(row) in full]
+    return Interval.resampled([_of(row, column) - _of(other, column) for row, other in pairs]) if pairs else None
+
+
+def _same_run(row: Row) -> tuple[Setting, int]:
+    """What a run has in common with the one that leaves nothing out."""
+    return tuple(pair for pair in row.cell.setting if pair[0] != LEFT_OUT), row.cell.seed
+
+
+def _of(row: Row, column: Column) -> float:
+    value = (row.figures or {}).get(column.key)
+    found = math.inf if value is None else float(sum(value) if isinstance(value, list) else value)
+    return min(found, column.most)
 
 
 def _reference(group: Group, groups: Sequence[Group]) -> Group | None:
@@ -155,8 +215,8 @@ def _reference(group: Group, groups: Sequence[Group]) -> Group | None:
     return next((other for other in groups if dict(other.setting) == wanted), None)
 
 
-def _pooled(group: Group, column: Column) -> str:
-    values = group.pooled(column.key)
+def _pool(group: Group, column: Column) -> str:
+    values = group.pool(column.key)
     return " / ".join(number(quantile(values, share), column.digits) for share in (0.5, 0.95)) if values else UNKNOWN
 
 
@@ -202,7 +262,7 @@ _SHOWN: Mapping[Kind, Callable[[Group, Column], str]] = {
     "estimate": _estimate,
     "correlation": _correlation,
     "median": lambda group, column: number(group.spread(column.key).median, column.digits),
-    "pooled": _pooled,
+    "pooled": _pool,
     "percent": _percent,
     "sum": _sum,
 }
@@ -229,7 +289,9 @@ def _figure_json(group: Group, column: Column) -> Any:
         return {"correlation": correlation(group.pairs(column.key))}
     if column.kind == "estimate":
         return {**group.spread(column.key).as_json(), "text": _estimate(group, column)}
+    if column.kind == "paired":
+        return [_of(row, column) for row in group.rows]
     if column.kind != "pooled":
         return group.spread(column.key).as_json()
-    values = group.pooled(column.key)
+    values = group.pool(column.key)
     return {"median": quantile(values, 0.5), "p95": quantile(values, 0.95), "max": max(values)} if values else None

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sessions.session import RESULTS, Session
+from drivers.core.atomic_files import write_whole
+from sessions.recording.session import RESULTS, Session
 from tactile_lab.report.gather import gather
 from tactile_lab.report.page import page
-from tactile_lab.whole_files import write_whole
 
 REPORT = "report.html"
 
@@ -24,7 +24,7 @@ def write(folder: Path, results: Path | None = None) -> Path:
     Raises:
         SessionError: no session folder, or no results yet.
         ShapeError: a mesh that cannot be read.
-        WriteError: the file can not be written.
+        WriteError: the file cannot be written.
     """
     results = results or folder / RESULTS
     path = results / REPORT

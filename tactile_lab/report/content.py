@@ -10,11 +10,11 @@ import numpy as np
 from gtsam import Pose3
 from numpy.typing import NDArray
 
-from tactile_lab.evaluation.results import Results
-from tactile_lab.evaluation.tables import ContactRows
+from drivers.core.contacts import Array
+from drivers.core.poses import rotate, transform_points
+from tactile_lab.evaluation.files.results import Results
+from tactile_lab.evaluation.files.tables import ContactRows
 from tactile_lab.evaluation.trajectory import estimate_T_truth
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import rotate, transform_points
 from tactile_lab.report.course import Course
 
 Faces = NDArray[np.int64]

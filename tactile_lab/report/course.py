@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from sessions.schemas import DECISION_TOPIC, SAFETY_TOPIC
-from sessions.session import TRAFFIC, Session
-from sessions.traffic_reader import TrafficMessage
-from sessions.traffic_summary import may_hold
-from tactile_lab.clock import NANOSECONDS
-from tactile_lab.errors import SessionError
+from drivers.core.clock import NANOSECONDS
+from drivers.core.errors import SessionError
+from sessions.recording.session import TRAFFIC, Session
+from sessions.recording.traffic.reader import TrafficMessage, may_hold
+from sessions.recording.traffic.schemas import DECISION_TOPIC, SAFETY_TOPIC
 
 Read = TypeVar("Read")
 
@@ -78,7 +77,7 @@ def read_course(session: Session) -> Course:
     Nothing is told of a session whose recording is kept elsewhere.
 
     Raises:
-        SessionError: the recording can not be read, or a message in it is of another form.
+        SessionError: the recording cannot be read, or a message in it is of another form.
     """
     path = session.folder / TRAFFIC
     if not path.is_file() or not may_hold(path, (DECISION_TOPIC, SAFETY_TOPIC)):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from gtsam import Pose3
 
+from drivers.core.contacts import FINGERS, Array
+from drivers.core.poses import planar
+from tactile_lab.colours import hex_colour, viridis
 from tactile_lab.evaluation.trajectory import aligned_poses, pose_errors
-from tactile_lab.geometry.contacts import FINGERS, Array
-from tactile_lab.geometry.poses import planar
-from tactile_lab.report.colours import hex_colour, viridis
 from tactile_lab.report.content import PlacedContacts, ReportContent
 from tactile_lab.report.svg import Chart, Frame, tick_label
 

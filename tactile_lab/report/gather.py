@@ -9,23 +9,23 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from sessions.manifest import Manifest
-from sessions.session import Session
-from tactile_lab.errors import ShapeError
-from tactile_lab.evaluation.evaluation import Truth, true_outline
-from tactile_lab.evaluation.plain import read_json_object
-from tactile_lab.evaluation.results import Results, read_results
-from tactile_lab.evaluation.session_truth import TRUTH_TRAJECTORY, read_truth_mesh
+from drivers.core.contacts import Array
+from drivers.core.errors import ShapeError
+from drivers.core.poses import spatial, transform_points
+from sessions.recording.manifest import Manifest
+from sessions.recording.session import Session
+from tactile_lab.evaluation.files.mesh_io import read_mesh
+from tactile_lab.evaluation.files.plain import read_json_object
+from tactile_lab.evaluation.files.results import Results, read_results
+from tactile_lab.evaluation.files.tables import read_contour
+from tactile_lab.evaluation.judged import Truth, true_outline
 from tactile_lab.evaluation.shape import horizontal_outline
-from tactile_lab.evaluation.tables import read_contour
 from tactile_lab.evaluation.trajectory import read_trajectory
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.geometry.poses import spatial, transform_points
+from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY, read_truth_mesh
 from tactile_lab.report.content import ReportContent, SessionFacts, Surface, TrueShape, with_plain_lids
 from tactile_lab.report.course import read_course
-from tactile_lab.shape.alignment import align_contours
-from tactile_lab.shape.mesh_io import read_mesh
-from tactile_lab.shape.sampling import sample_polygon
+from tactile_lab.slam.shape.metrics.alignment import align_contours
+from tactile_lab.slam.shape.surfaces.sampling import sample_polygon
 
 SECTION_STEP_m = 0.002
 _EVALUATE = "Run: tactile-lab evaluate"
@@ -39,7 +39,7 @@ def gather(session: Session, folder: Path) -> ReportContent:
         folder: its results, or those of a replay.
 
     Raises:
-        SessionError: there are no results, or a file is not as the program leaves it; the recording can not be read.
+        SessionError: there are no results, or a file is not as the program leaves it; the recording cannot be read.
         ShapeError: a mesh that cannot be read.
     """
     results = read_results(folder)
@@ -54,7 +54,7 @@ def gather(session: Session, folder: Path) -> ReportContent:
         contour_m=contour_m,
         contour_sigma_m=sigma_m,
         truth=truth,
-        fitted_outline_m=_fitted(contour_m, truth),
+        fitted_outline_m=_fit(contour_m, truth),
         course=read_course(session),
     )
 
@@ -139,7 +139,7 @@ def _truth(session: Session, folder: Path, results: Results) -> TrueShape | None
     return TrueShape(truth.world_T_object, mesh, true_outline(results, truth))
 
 
-def _fitted(contour_m: Array | None, truth: TrueShape | None) -> Array | None:
+def _fit(contour_m: Array | None, truth: TrueShape | None) -> Array | None:
     """The true outline, laid best onto the estimated one."""
     if contour_m is None or truth is None or truth.outline_m is None:
         return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactile_lab.report import course_listings, listings, sections
+from tactile_lab.report import listings, sections
 from tactile_lab.report.content import ReportContent
 from tactile_lab.report.markup import Markup, element, join
 
@@ -23,12 +23,12 @@ def page(content: ReportContent) -> str:
     body = element(
         "main",
         sections.head(content),
-        course_listings.stops_card(content.course),
+        listings.stops_card(content.course),
         sections.key_figures(content),
         sections.shape_section(content),
         sections.tracking_section(content),
         listings.grasp_section(content),
-        course_listings.decisions_card(content.course),
+        listings.decisions_card(content.course),
         listings.evaluation_section(content),
         listings.origin_section(content),
         element("footer", "Lengths in millimetres, angles in degrees. Files beside this page: see results/."),

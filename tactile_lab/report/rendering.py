@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
 
 SUPERSAMPLING = 2
 _LIGHT = np.array([-0.35, 0.55, 0.76])

@@ -13,9 +13,8 @@ from html import escape
 
 import numpy as np
 
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
 
-Place = tuple[float, float]
 LEAST_SPAN = 20.0
 """A map shows at least so much (millimetres), however close together its points are."""
 

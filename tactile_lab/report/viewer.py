@@ -9,8 +9,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.report.colours import viridis
+from drivers.core.contacts import Array
+from tactile_lab.colours import viridis
 from tactile_lab.report.content import Faces, ReportContent, Surface
 
 NORMAL_LENGTH_m = 0.008

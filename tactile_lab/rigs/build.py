@@ -2,36 +2,39 @@
 
 from __future__ import annotations
 
-from calibration.forearm import load_forearm
-from drivers.ati.nano17 import Nano17
-from drivers.biotac.biotac import BioTac, BioTacCalibration, EllipsoidSkinSettings, load_biotacs
-from drivers.biotac.learned_normal import load_normals
+from typing import Any
+
+import numpy as np
+
+from calibration.forearm.placement import load_forearm
 from drivers.camera.calibration import load_camera
 from drivers.camera.camera import Camera
 from drivers.camera.markers import MarkerSettings
-from drivers.fingertip import FingertipCalibration, load_fingertips
-from drivers.links import Link, ReplayLink, TappedLink
-from drivers.positioner import Positioner, mount_T_forearm
-from drivers.shadow.hand import ShadowHand
-from drivers.shadow.hand_samples import HandDecoder
-from drivers.shadow.joint_calibration import JointCalibration
-from drivers.shadow.motors import MotorMap
-from drivers.shadow.palm_images import PALMS
-from drivers.shadow.posture import TipEllipsoid
+from drivers.core.clock import NANOSECONDS, Clock, VirtualClock
+from drivers.core.configuration import load_model
+from drivers.core.contacts import FINGERS
+from drivers.core.errors import ConfigurationError
+from drivers.core.fingertip import FingertipCalibration
+from drivers.core.transports import ReplayTransport, TappedTransport, Transport
+from drivers.fingertips.kind import FingertipKind, LinkedFingertip, LinkedKind, PalmKind
+from drivers.positioner.kinematics import mount_T_forearm
+from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.device.hand import ShadowHand
+from drivers.shadow.device.hand_samples import HandDecoder
+from drivers.shadow.model.joint_calibration import JointCalibration
+from drivers.shadow.model.motors import MotorMap
+from drivers.shadow.protocol.palm_images import PALMS
+from drivers.simulation.calibration import SimulatedCalibration
 from drivers.simulation.world import SimulatedWorld
-from sessions.bench import Bench
-from sessions.closing_lines import TipSurface
-from sessions.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, Interpreter, Observer, fingertip_link
-from sessions.perception import Perception
-from sessions.recorder import Recorder
-from sessions.sensor_stream import SensorStream
-from tactile_lab.clock import NANOSECONDS, Clock, VirtualClock
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.geometry.contacts import FINGERS
+from sessions.perception.approach_paths import TipSurface
+from sessions.perception.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, Interpreter, Observer, fingertip_link
+from sessions.perception.perception import Perception
+from sessions.recording.recorder import Recorder
+from sessions.rig_runtime.rig_runtime import RigRuntime
+from sessions.rig_runtime.sensor_stream import SensorStream
 from tactile_lab.rigs.description import Rig
-from tactile_lab.rigs.wired import camera_source, force_wire, hand_setup
+from tactile_lab.rigs.wired import camera_source, force_wire, hand_setup, simulation_settings, tactile_of
 from tactile_lab.rigs.wires import LocalCamera
-from tactile_lab.strict_yaml import load_model
 
 
 def check_calibration(rig: Rig) -> None:
@@ -55,33 +58,34 @@ def simulated_world(rig: Rig, seed: int, object_name: str) -> SimulatedWorld:
     """The world of a simulated rig with an object on its table.
 
     Raises:
-        ConfigurationError: no such object.
-        ShapeError: the object's mesh can not be used.
+        ConfigurationError: no such object; or no calibration of the fingertips for it.
+        ShapeError: the object's mesh cannot be used.
     """
-    description = rig.description
-    changes = {"object": object_name, "fingertips": description.fingertips}
-    return SimulatedWorld(description.simulation.model_copy(update=changes), seed)
+    settings = simulation_settings(rig, object_name)
+    return SimulatedWorld(settings, seed, SimulatedCalibration.with_tips(settings.fingertips, rig.files["fingertips"]))
 
 
-def build_bench(rig: Rig, world: SimulatedWorld, recorder: Recorder) -> Bench:
-    """All devices of a rig on tapped links, not yet connected."""
-    links, description = world.links(), rig.description
+def build_runtime(rig: Rig, world: SimulatedWorld, recorder: Recorder) -> RigRuntime:
+    """All devices of a rig on tapped transports, not yet connected."""
+    transports, description = world.transports(), rig.description
     observer = Observer(recorder, build_interpreter(rig))
 
-    def tapped(name: str) -> Link:
-        return TappedLink(links[name], observer, world.clock)
+    def tapped(name: str) -> Transport:
+        return TappedTransport(transports[name], observer, world.clock)
 
-    def stream(finger: str, calibration: FingertipCalibration) -> SensorStream:
-        link = tapped(fingertip_link(finger))
-        return SensorStream(Nano17(finger, link, world.clock, calibration, description.nano17), link)
+    def stream(kind: LinkedKind[Any], finger: str, calibration: Any) -> SensorStream:
+        transport = tapped(fingertip_link(finger))
+        settings = description.fingertip_settings
+        return SensorStream(kind.device(finger, calibration, settings, transport, world.clock, None), transport)
 
-    return Bench(
+    kind, tips = description.fingertip_kind, fitted_tips(rig)
+    return RigRuntime(
         clock=world.clock,
         cycle_ns=round(description.cycle_s * NANOSECONDS),
         hand=_hand(rig, tapped(HAND_LINK), world.clock),
-        base=Positioner(tapped(BASE_LINK), world.clock, description.base),
+        base=description.positioner_kind.device(tapped(BASE_LINK), world.clock, description.base),
         observer=observer,
-        wrench_devices={finger: stream(finger, calibration) for finger, calibration in force_tips(rig).items()},
+        wrench_devices={f: stream(kind, f, tip) for f, tip in tips.items()} if isinstance(kind, LinkedKind) else {},
         camera=Camera(tapped(CAMERA_LINK), world.clock) if "camera" in rig.files else None,
         fingertip_calibrations=force_tips(rig),
         truth=world.truth,
@@ -92,88 +96,81 @@ def build_bench(rig: Rig, world: SimulatedWorld, recorder: Recorder) -> Bench:
 def build_interpreter(rig: Rig) -> Interpreter:
     """Decoders and a fresh perception: what understands a rig's bytes, live and in replay alike."""
     clock, description = VirtualClock(), rig.description
-    tips = {finger: _decoder(rig, finger, tip, clock) for finger, tip in force_tips(rig).items()}
+    kind, tips = description.fingertip_kind, fitted_tips(rig)
+    linked = {f: _decoder(rig, kind, f, tip, clock) for f, tip in tips.items()} if isinstance(kind, LinkedKind) else {}
+    settings = description.fingertip_settings
+    slots = {f: kind.sensor(f, tip, settings) for f, tip in tips.items()} if isinstance(kind, PalmKind) else {}
     forearm = load_forearm(rig.files["forearm"])
     perception = Perception(
-        wrench_fingertips=tips,
-        slot_fingertips=_biotacs(rig),
+        wrench_fingertips=linked,
+        slot_fingertips=slots,
         mount_T_forearm=mount_T_forearm,
         world_T_mount=forearm.world_T_mount.pose(),
         mount_covariance=forearm.covariance(),
-        tip_surfaces=_tip_surfaces(rig),
+        tip_surfaces={finger: _tip_surface(kind, tip) for finger, tip in tips.items()},
         settings=description.perception,
     )
     return Interpreter(
         perception,
         hand=HandDecoder(JointCalibration.load(rig.files["joints"]), PALMS[description.hand.palm]),
-        base=Positioner(_silent(BASE_LINK), clock, description.base),
-        wrenches=tips,
+        base=description.positioner_kind.device(_silent(BASE_LINK), clock, description.base),
+        wrenches=linked,
         camera=Camera(_silent(CAMERA_LINK), clock) if "camera" in rig.files else None,
         clock=clock,
     )
 
 
-def _hand(rig: Rig, link: Link, clock: Clock) -> ShadowHand:
-    tactile = "biotac" if rig.description.fingertips == "biotac" else "none"
-    settings = rig.description.hand.model_copy(update={"cycle_s": rig.description.cycle_s, "tactile": tactile})
+def _hand(rig: Rig, transport: Transport, clock: Clock) -> ShadowHand:
+    description = rig.description
+    settings = description.hand.model_copy(update={"cycle_s": description.cycle_s, "tactile": tactile_of(rig)})
     joints, motors = JointCalibration.load(rig.files["joints"]), MotorMap.load(rig.files["motors"])
-    return ShadowHand(link, clock, joints, settings, motors)
+    return ShadowHand(transport, clock, joints, settings, motors)
 
 
-def force_tips(rig: Rig) -> dict[str, FingertipCalibration]:
-    """Calibrations of the force fingertips that a rig has, by finger; of those with a wire where it has wires.
+def fitted_tips(rig: Rig) -> dict[str, Any]:
+    """What is known of each fingertip that a rig has, by finger; of those with a wire where linked ones have wires.
 
     Raises:
-        ConfigurationError: a finger with a wire but without a calibration.
+        ConfigurationError: a finger with a wire but without a calibration, or a file that does not fit.
     """
-    if rig.description.fingertips != "nano17":
-        return {}
-    calibrations = load_fingertips(rig.files["fingertips"])
-    fitted = calibrations if rig.description.wires is None else rig.description.wires.fingertips
-    if missing := sorted(set(fitted) - set(calibrations)):
+    kind, wires = rig.description.fingertip_kind, rig.description.wires
+    known = kind.load(rig.files)
+    fitted = wires.fingertips if wires is not None and isinstance(kind, LinkedKind) else known
+    if missing := sorted(set(fitted) - set(known)):
         what = f"the fingertip calibration does not name {', '.join(missing)}"
         raise ConfigurationError(
             what, where=rig.source, hint="Calibrate the finger, or take it out of wires.fingertips"
         )
-    return {finger: calibrations[finger] for finger in FINGERS if finger in fitted}
+    return {finger: known[finger] for finger in FINGERS if finger in fitted}
+
+
+def force_tips(rig: Rig) -> dict[str, FingertipCalibration]:
+    """As :func:`fitted_tips`, those with a force sensor."""
+    return {f: tip for f, tip in fitted_tips(rig).items() if isinstance(tip, FingertipCalibration)}
 
 
 def force_ranges_N(rig: Rig) -> dict[str, float]:
     """Calibrated range of the force fingertips, smallest axis; sensors that tell a smaller one do not connect."""
-    return dict.fromkeys(force_tips(rig), min(rig.description.nano17.force_range_N))
+    range_N = rig.description.fingertip_kind.force_range_N(rig.description.fingertip_settings)
+    return {} if range_N is None else dict.fromkeys(fitted_tips(rig), range_N)
 
 
-def _decoder(rig: Rig, finger: str, calibration: FingertipCalibration, clock: Clock) -> Nano17:
+def _decoder(rig: Rig, kind: LinkedKind[Any], finger: str, calibration: Any, clock: Clock) -> LinkedFingertip:
     """What understands a finger's bytes."""
     wire = None if rig.description.wires is None else force_wire(rig, finger)
-    return Nano17(finger, _silent(fingertip_link(finger)), clock, calibration, rig.description.nano17, wire)
+    transport = _silent(fingertip_link(finger))
+    return kind.device(finger, calibration, rig.description.fingertip_settings, transport, clock, wire)
 
 
-def _biotacs(rig: Rig) -> dict[str, BioTac]:
-    if rig.description.fingertips != "biotac":
-        return {}
-    calibrations = load_biotacs(rig.files["fingertips"])
-    normals = load_normals(rig.files["normals"]) if "normals" in rig.files else {}
-    fitted = [finger for finger in FINGERS if finger in calibrations]
-    return {finger: BioTac(finger, calibrations[finger], normals=normals.get(finger)) for finger in fitted}
-
-
-def _tip_surfaces(rig: Rig) -> dict[str, TipSurface]:
-    """What each finger touches with; the usual tip where a BioTac's calibration names no ellipsoid."""
-    if rig.description.fingertips == "nano17":
-        tips = force_tips(rig)
-        return {finger: TipSurface.upright(tip.semi_axes_m, tip.centre_distal_m) for finger, tip in tips.items()}
-    return {finger: _skin(tip) for finger, tip in load_biotacs(rig.files["fingertips"]).items()}
-
-
-def _skin(biotac: BioTacCalibration) -> TipSurface:
-    if not isinstance(biotac.skin, EllipsoidSkinSettings):
+def _tip_surface(kind: FingertipKind[Any], calibration: Any) -> TipSurface:
+    """What a finger touches with; the usual tip where its calibration names no ellipsoid."""
+    if (surface := kind.surface(calibration)) is None:
         usual = TipEllipsoid()
         return TipSurface.upright(usual.semi_axes_m, usual.centre_distal_m)
-    centre = TipSurface.upright(biotac.skin.semi_axes_m, biotac.skin.centre_m)
-    return TipSurface(centre.semi_axes_m, biotac.distal_T_sensor.pose() * centre.distal_T_tip)
+    semi_axes_m, distal_T_tip = surface
+    return TipSurface(np.array(semi_axes_m), distal_T_tip)
 
 
-def _silent(name: str) -> Link:
-    """A link for devices that only decode."""
-    return ReplayLink(name, ())
+def _silent(name: str) -> Transport:
+    """A transport for devices that only decode."""
+    return ReplayTransport(name, ())

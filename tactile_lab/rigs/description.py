@@ -2,30 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, SerializeAsAny, create_model, model_validator
 
-from calibration.admission import Installation
-from drivers.ati.nano17 import Nano17Settings
-from drivers.ati.wiring import VoltsWiring
-from drivers.positioner import PositionerSettings
-from drivers.shadow.hand_settings import HandSettings
+from calibration.store.admission import Installation
+from drivers.core.configuration import StrictModel, load, recorded_keys, validate
+from drivers.core.errors import ConfigurationError
+from drivers.core.extensions import load_extension
+from drivers.core.registry import Registry
+from drivers.fingertips.kind import FingertipKind, LinkedKind
+from drivers.fingertips.kinds import FINGERTIPS, WIRES
+from drivers.positioner.kinds import POSITIONERS, PositionerKind
+from drivers.shadow.device.hand_settings import HandSettings
 from drivers.simulation.settings import SimulationSettings
-from sessions.conductor_settings import ConductorSettings
-from sessions.perception import PerceptionSettings
-from sessions.session import Session
-from tactile_lab.errors import ConfigurationError
+from sessions.perception.perception import PerceptionSettings
+from sessions.recording.session import Session
+from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.rigs.wires import Wires
-from tactile_lab.strict_yaml import StrictModel, load, validate
-from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 
 OTHER_VERSION = "Use the version of tactile-lab that recorded it; tactile-lab session show names it"
 """Advice for a recorded description that does not fit this version."""
+
+
+_KINDS: Mapping[str, Registry[Any]] = {"fingertips": FINGERTIPS, "positioner": POSITIONERS}
+"""Keys that decide what other keys mean."""
 
 
 class CalibrationFiles(StrictModel):
@@ -68,41 +74,63 @@ class CalibrationFiles(StrictModel):
 
 
 class RigDescription(StrictModel):
-    """A rig.
+    """A rig; made by :func:`describe`.
 
     Attributes:
         name, summary: for people.
         kind: where the bytes come from: a simulated world in this program, or devices on wires.
         cycle_s: period of the common cycle, seconds.
-        fingertips: the kind of fingertip on all fingers.
+        fingertips: the kind of fingertip on all fingers, registered in :mod:`drivers.fingertips.kinds`. Its settings
+            stand under its name, in a model that :func:`describe` makes for the file.
+        positioner: what carries the hand, registered in :mod:`drivers.positioner.kinds`; its settings are ``base``.
+        extensions: Python files, relative to the rig file, that register what the rig names and the program lacks.
         calibration: files to use.
-        station: the installation that the calibrations belong to, so that several rig files of one can share them;
+        installation: the installation that the calibrations belong to, so that several rig files of one can share them;
             the rig's own name unless given.
         devices: serial numbers by device name (hand, base, camera, ft/FF ...); a calibration of another is refused.
         wires: where the devices are, for kind ``wired``.
-        stand_ins: devices on wires are emulated by this program, in real time, over a simulated plant.
-        hand, nano17, base, perception, conductor: settings of the parts.
+        emulated: devices on wires are emulated by this program, in real time, over a simulated plant.
+        hand, base, perception, conductor: settings of the parts.
         motion: how far a re-oriented object strays from the hand's motion on this rig, one standard deviation.
-        simulation: the simulated world (its fingertips follow ``fingertips``), of kind ``simulated`` or stand-ins.
+        simulation: the simulated world (its fingertips follow ``fingertips``), of kind ``simulated`` or emulated.
     """
+
+    renamed: ClassVar = {"station": "installation", "stand_ins": "emulated"}
 
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
     summary: str
     kind: Literal["simulated", "wired"]
     cycle_s: float = Field(ge=0.001, le=0.02)
-    fingertips: Literal["nano17", "biotac"]
+    fingertips: Annotated[str, AfterValidator(FINGERTIPS.known)]
+    positioner: Annotated[str, AfterValidator(POSITIONERS.known)] = "six-axis"
+    extensions: tuple[str, ...] = ()
     calibration: CalibrationFiles
-    station: str = ""
+    installation: str = ""
     devices: dict[str, str] = Field(default_factory=dict)
     wires: Wires | None = None
-    stand_ins: bool = False
+    emulated: bool = False
     hand: HandSettings = HandSettings()
-    nano17: Nano17Settings = Nano17Settings()
-    base: PositionerSettings = PositionerSettings()
+    base: SerializeAsAny[StrictModel] = StrictModel()
     perception: PerceptionSettings = PerceptionSettings()
-    conductor: ConductorSettings = ConductorSettings()
+    conductor: SessionSettings = SessionSettings()
     motion: MotionNoise = MotionNoise()
     simulation: SimulationSettings = SimulationSettings()
+
+    @property
+    def fingertip_kind(self) -> FingertipKind[Any]:
+        """What the program knows of the rig's kind of fingertip."""
+        return FINGERTIPS[self.fingertips]
+
+    @property
+    def fingertip_settings(self) -> StrictModel:
+        """What the rig file says under the kind's name; the kind's usual settings where it says nothing."""
+        own: StrictModel = getattr(self, self.fingertips, None) or self.fingertip_kind.settings()
+        return own
+
+    @property
+    def positioner_kind(self) -> PositionerKind:
+        """What the program knows of the rig's positioner."""
+        return POSITIONERS[self.positioner]
 
     @model_validator(mode="after")
     def _wires_fit(self) -> RigDescription:
@@ -110,10 +138,11 @@ class RigDescription(StrictModel):
             raise ValueError("wires belong to kind wired, and kind wired needs them")
         if self.wires is None and any((self.calibration.boards, self.calibration.rates, self.calibration.gains)):
             raise ValueError("calibration.boards, rates and gains belong to a hand on wires")
-        if self.stand_ins and self.kind != "wired":
-            raise ValueError("stand_ins belong to kind wired: a simulated rig needs none")
-        if self.wires is not None and bool(self.wires.fingertips) != (self.fingertips == "nano17"):
-            raise ValueError("wires.fingertips belong to nano17 fingertips; BioTacs send through the palm")
+        if self.emulated and self.kind != "wired":
+            raise ValueError("emulated belongs to kind wired: a simulated rig needs none")
+        if self.wires is not None and bool(self.wires.fingertips) != isinstance(self.fingertip_kind, LinkedKind):
+            linked = ", ".join(name for name in FINGERTIPS if isinstance(FINGERTIPS[name], LinkedKind))
+            raise ValueError(f"wires.fingertips belong to fingertips with wires ({linked}): others use the palm's")
         if self.wires is not None and self.wires.camera is not None and self.calibration.camera is None:
             raise ValueError("wires.camera needs calibration.camera and calibration.markers")
         return self
@@ -130,12 +159,12 @@ class Rig:
     @property
     def installation(self) -> Installation:
         """What a calibration has to belong to."""
-        return Installation(self.description.station or self.description.name, self.description.devices)
+        return Installation(self.description.installation or self.description.name, self.description.devices)
 
     @property
     def own_calibrations(self) -> dict[str, Path]:
-        """The files that are ours to judge: all but the maker's ``.cal`` files."""
-        return {role: file for role, file in self.files.items() if file.suffix != ".cal"}
+        """The files that are ours to judge: all but the maker's ``.cal`` files, and extensions."""
+        return {role: file for role, file in self.files.items() if file.suffix not in {".cal", ".py"}}
 
     def plain(self) -> dict[str, Any]:
         """The description as plain data, the form kept in ``session.yaml``."""
@@ -159,21 +188,64 @@ def load_rig(name_or_path: str) -> Rig:
         raise ConfigurationError(
             "has fingertips alone, and no hand to run a session with", where=str(path), hint="Use it with rig check"
         )
-    description = validate(content, RigDescription, where=str(path))
+    extensions = _extensions(content, path)
+    for extension in extensions.values():
+        load_extension(extension)
+    description = describe(content, where=str(path))
     named = description.calibration.model_dump(exclude_none=True)
-    files = {role: path.parent / file for role, file in (named | gauge_files(description)).items()}
-    return Rig(description, _present(files, str(path)), str(path))
+    files = {role: path.parent / file for role, file in (named | wire_files(description)).items()}
+    return Rig(description, _present(files | extensions, str(path)), str(path))
 
 
-def gauge_files(description: RigDescription) -> dict[str, str]:
-    """The ``.cal`` files that the wires of force fingertips name, by role."""
+def describe(content: Any, *, where: str, hint: str = "Correct the file and try again") -> RigDescription:
+    """A rig's description from plain data.
+
+    The model is made for the data: the settings of the fingertips stand under their kind's name, and are, like those of
+    the positioner and its wire, what the registered kind says they are.
+
+    Raises:
+        ConfigurationError: it does not fit; names each key.
+    """
+    given = content if isinstance(content, dict) else {}
+    for key, registry in _KINDS.items():
+        if isinstance(name := given.get(key), str) and name not in registry:  # other complaints would follow from it
+            raise ConfigurationError(f"{key}: {registry.unknown(name)}. {registry.listed()}", where=where, hint=hint)
+    fields: dict[str, Any] = {
+        name: (FINGERTIPS[name].settings, FINGERTIPS[name].settings())
+        for name in FINGERTIPS
+        if name in (given.get("fingertips"), *given)
+    }
+    if clash := sorted(set(fields) & set(RigDescription.model_fields)):
+        what, hint = f"the fingertip kind {clash[0]!r} has the name of another key of rig files", "Choose another name"
+        raise ConfigurationError(what, where=FINGERTIPS.file(clash[0]), hint=hint)
+    if (named := given.get("positioner", RigDescription.model_fields["positioner"].default)) in POSITIONERS:
+        kind = POSITIONERS[named]
+        fields["base"] = (kind.settings, kind.settings())
+        fields["wires"] = (create_model("Wires", __base__=Wires, base=(kind.wiring, ...)) | None, None)
+    return validate(content, create_model("RigDescription", __base__=RigDescription, **fields), where=where, hint=hint)
+
+
+def _extensions(content: Any, path: Path) -> dict[str, Path]:
+    """The extensions that a rig file names, by the role of the session's copies. Raises ConfigurationError."""
+    named = content.get("extensions") or () if isinstance(content, dict) else ()
+    if not isinstance(named, list | tuple) or not all(isinstance(file, str) for file in named):
+        raise ConfigurationError("extensions: must be a list of files", where=str(path))
+    return {f"extension-{Path(file).stem}": path.parent / file for file in named}
+
+
+def wire_files(description: RigDescription) -> dict[str, str]:
+    """The files that the fingertips' wires name, such as ``.cal`` files, by role."""
     wires = description.wires.fingertips if description.wires else {}
-    return {gauge_role(finger): wire.calibration for finger, wire in wires.items() if isinstance(wire, VoltsWiring)}
+    return {
+        wire_role(finger, setting): file
+        for finger, wire in wires.items()
+        for setting, file in WIRES[wire.wire].files(wire).items()
+    }
 
 
-def gauge_role(finger: str) -> str:
-    """Under which role a finger's ``.cal`` file is kept."""
-    return f"gauges-{finger}"
+def wire_role(finger: str, setting: str) -> str:
+    """Under which role the file is kept that a setting of a finger's wire names."""
+    return f"gauges-{finger}" if setting == "calibration" else f"{setting}-{finger}"
 
 
 def rig_of_session(session: Session) -> Rig:
@@ -184,17 +256,21 @@ def rig_of_session(session: Session) -> Rig:
         SessionError: a calibration copy is missing or was changed.
     """
     where = f"{session.folder}/session.yaml"
-    description = validate(session.manifest.rig_description, RigDescription, where=where, hint=OTHER_VERSION)
+    kept = [session.calibration_file(role) for role in session.manifest.calibration if role.startswith("extension-")]
+    named = " ".join(f"--extension {file}" for file in kept)
+    hint = f"It ran with code of its own. Look at it, then use tactile-lab {named}" if kept else OTHER_VERSION
+    with recorded_keys():
+        description = describe(session.manifest.rig_description, where=where, hint=hint)
     files = {role: session.calibration_file(role) for role in session.manifest.calibration}
     return Rig(description, files, where)
 
 
 def shipped_rigs() -> dict[str, Path]:
     """Rig files that come with the program, by name."""
-    return {path.stem: path for path in sorted(_shipped(), key=lambda path: path.stem)}
+    return {path.stem: path for path in sorted(_shipped_files(), key=lambda path: path.stem)}
 
 
-def _shipped() -> Iterator[Path]:
+def _shipped_files() -> Iterator[Path]:
     folder = Path(str(resources.files("tactile_lab.rigs")))
     yield from folder.glob("*.yaml")
 

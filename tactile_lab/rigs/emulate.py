@@ -4,35 +4,38 @@ from __future__ import annotations
 
 import ipaddress
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import can
 import numpy as np
 
-from drivers.ati import cal_file
-from drivers.ati.gauge_volts import encode_volts
-from drivers.ati.wiring import CanWiring, ControllerWiring, DigitalWiring, NetBoxWiring, VoltsWiring, Wiring, open_bus
-from drivers.emulators.ati_sensor import EmulatedSensor, emulated_calibration
+from drivers.ati.protocols import cal_file
+from drivers.ati.wires.gauge_volts import encode_volts
+from drivers.ati.wiring import CanWiring, ControllerWiring, DigitalWiring, NetBoxWiring, VoltsWiring, open_bus
+from drivers.core.errors import ConfigurationError
+from drivers.core.registry import Registry
+from drivers.emulators.ati.can_server import CanServer
+from drivers.emulators.ati.can_unit import CanUnit
+from drivers.emulators.ati.controller_unit import ControllerUnit
+from drivers.emulators.ati.digital_unit import DigitalUnit
+from drivers.emulators.ati.net_box_server import NetBoxServer
+from drivers.emulators.ati.net_box_unit import NetBoxUnit
+from drivers.emulators.ati.sensor import EmulatedSensor, emulated_calibration
 from drivers.emulators.background import Background, Pace
-from drivers.emulators.can_server import CanServer
-from drivers.emulators.can_unit import CanUnit
-from drivers.emulators.controller_unit import ControllerUnit
-from drivers.emulators.digital_unit import DigitalUnit
-from drivers.emulators.ethercat_server import EmulatedHandProcess
-from drivers.emulators.net_box_server import NetBoxServer
-from drivers.emulators.net_box_unit import NetBoxUnit
+from drivers.emulators.ethercat.server import EmulatedHandProcess
+from drivers.emulators.ethercat.shadow_chain import ChainSettings
 from drivers.emulators.pty_port import PtyPort
-from drivers.emulators.shadow_chain import ChainSettings
-from drivers.shadow.palm_images import USUAL_PALM
-from tactile_lab.errors import ConfigurationError
+from drivers.fingertips.wiring import place_of
+from drivers.shadow.protocol.palm_images import USUAL_PALM
 from tactile_lab.rigs.description import shipped_rigs
-from tactile_lab.rigs.fingertip_rig import FingertipRig, is_fingertip_rig, load_fingertip_rig, place_of
+from tactile_lab.rigs.fingertip_rig import FingertipRig, is_fingertip_rig, load_fingertip_rig
 from tactile_lab.rigs.hand_rig import HandRig, is_hand_rig, load_hand_rig
 
 _EMULATED_SERIAL = 634
-_NO_NEED = "Name a file of kind fingertips or hand; simulated rigs and those with stand_ins start what they need"
+_NO_NEED = "Name a file of kind fingertips or hand; simulated and emulated rigs start what they need"
 _VOLTS_RATE_Hz = 1000.0
 
 
@@ -52,23 +55,23 @@ def emulated_rig(name: str) -> AbstractContextManager[dict[str, str]]:
     if is_hand_rig(path):
         return emulated_hand(load_hand_rig(path))
     if is_fingertip_rig(path):
-        return emulated(load_fingertip_rig(path))
+        return emulate_sensors(load_fingertip_rig(path))
     raise ConfigurationError("is no rig of kind fingertips or hand", where=name, hint=_NO_NEED)
 
 
 @contextmanager
-def emulated(rig: FingertipRig) -> Iterator[dict[str, str]]:
+def emulate_sensors(rig: FingertipRig) -> Iterator[dict[str, str]]:
     """Sensors of all fingers while the context lasts; gives finger to where it can be found, in words.
 
     Raises:
-        ConfigurationError: a place that can not be emulated here, or is taken.
+        ConfigurationError: a place that cannot be emulated here, or is taken.
     """
     with ExitStack() as running:
         for seed, (finger, wiring) in enumerate(rig.description.wires.items()):
             serial = getattr(wiring, "serial", "") or f"FT{seed + 1:05d}"
             sensor = EmulatedSensor(emulated_calibration(serial), seed=seed)
             try:
-                _start(running, wiring, sensor, rig.folder)
+                EMULATORS[wiring.wire](running, wiring, sensor, rig.folder)
             except (OSError, can.CanError, ValueError) as error:
                 words = getattr(error, "strerror", None) or str(error)
                 raise _refusal(rig, finger, f"{place_of(wiring)} cannot be emulated ({words})") from error
@@ -81,7 +84,7 @@ def emulated_hand(rig: HandRig) -> Iterator[dict[str, str]]:
 
     Raises:
         ConfigurationError: the rig names no far end.
-        DeviceError: the far end can not be served.
+        DeviceError: the far end cannot be served.
     """
     description = rig.description
     if description.far_end is None:
@@ -94,28 +97,50 @@ def emulated_hand(rig: HandRig) -> Iterator[dict[str, str]]:
         yield {"hand": f"hand {serial} at {description.far_end}"}
 
 
-def _start(running: ExitStack, wiring: Wiring, sensor: EmulatedSensor, folder: Path) -> None:
-    """Raises OSError, CanError or ValueError when the place can not be had."""
-    match wiring:
-        case NetBoxWiring():
-            if not ipaddress.ip_address(wiring.host).is_loopback:
-                raise ValueError("only loopback addresses such as 127.0.0.2 are")
-            running.enter_context(NetBoxServer(NetBoxUnit(sensor), wiring.host, wiring.port, wiring.http_port))
-        case DigitalWiring():
-            port = running.enter_context(PtyPort(DigitalUnit(sensor, rate_hz=1000.0), wiring.baud))
-            running.callback(_linked(port.path, Path(wiring.port)).unlink)
-        case ControllerWiring():
-            port = running.enter_context(PtyPort(ControllerUnit(sensor), wiring.baud))
-            running.callback(_linked(port.path, Path(wiring.port)).unlink)
-        case CanWiring():
-            if wiring.interface == "virtual":
-                raise ValueError("a virtual bus does not leave this program")
-            running.enter_context(CanServer(CanUnit(sensor, wiring.base), open_bus(wiring)))
-        case VoltsWiring():
-            running.enter_context(_volts(wiring, sensor, folder))
+Emulate: TypeAlias = Callable[[ExitStack, Any, EmulatedSensor, Path], None]
+"""Serves a sensor at the place that a wire's settings name, until the stack ends; given the rig file's folder.
+
+Raises OSError, CanError or ValueError when the place cannot be had.
+"""
+
+EMULATORS: Registry[Emulate] = Registry("emulator of a wire", "emulated wires")
+"""How ``rig emulate`` serves a wire, by its name; one without is told so."""
 
 
-def _linked(path: str, port: Path) -> Path:
+def _net_box(running: ExitStack, wiring: NetBoxWiring, sensor: EmulatedSensor, folder: Path) -> None:
+    if not ipaddress.ip_address(wiring.host).is_loopback:
+        raise ValueError("only loopback addresses such as 127.0.0.2 are")
+    running.enter_context(NetBoxServer(NetBoxUnit(sensor), wiring.host, wiring.port, wiring.http_port))
+
+
+def _digital(running: ExitStack, wiring: DigitalWiring, sensor: EmulatedSensor, folder: Path) -> None:
+    port = running.enter_context(PtyPort(DigitalUnit(sensor, rate_hz=1000.0), wiring.baud))
+    running.callback(_link(port.path, Path(wiring.port)).unlink)
+
+
+def _controller(running: ExitStack, wiring: ControllerWiring, sensor: EmulatedSensor, folder: Path) -> None:
+    port = running.enter_context(PtyPort(ControllerUnit(sensor), wiring.baud))
+    running.callback(_link(port.path, Path(wiring.port)).unlink)
+
+
+def _can_board(running: ExitStack, wiring: CanWiring, sensor: EmulatedSensor, folder: Path) -> None:
+    if wiring.interface == "virtual":
+        raise ValueError("a virtual bus does not leave this program")
+    running.enter_context(CanServer(CanUnit(sensor, wiring.base), open_bus(wiring)))
+
+
+def _gauge_volts(running: ExitStack, wiring: VoltsWiring, sensor: EmulatedSensor, folder: Path) -> None:
+    running.enter_context(_volts(wiring, sensor, folder))
+
+
+EMULATORS.register("net-ft", _net_box)
+EMULATORS.register("digital", _digital)
+EMULATORS.register("controller", _controller)
+EMULATORS.register("can-oem", _can_board)
+EMULATORS.register("gauge-volts", _gauge_volts)
+
+
+def _link(path: str, port: Path) -> Path:
     """A link at the port's path to a pseudo terminal; a real port is never replaced. Raises OSError."""
     port.symlink_to(path)
     return port

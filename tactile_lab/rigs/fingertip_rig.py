@@ -9,33 +9,19 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from drivers.ati.nano17 import Nano17, Nano17Settings
-from drivers.ati.wiring import CanWiring, ControllerWiring, DigitalWiring, NetBoxWiring, VoltsWiring, Wiring
-from drivers.ati.wiring import make_link as link_of
-from drivers.ati.wiring import make_wire as wire_of
-from drivers.fingertip import FingertipCalibration, load_fingertips
-from sessions.interpreter import fingertip_link
-from tactile_lab.clock import Clock
-from tactile_lab.errors import CodecError, ConfigurationError
-from tactile_lab.geometry.contacts import FINGERS
-from tactile_lab.strict_yaml import StrictModel, load, validate
+from drivers.core.clock import Clock
+from drivers.core.configuration import StrictModel, load, validate
+from drivers.core.contacts import FINGERS
+from drivers.core.errors import CodecError, ConfigurationError
+from drivers.core.fingertip import FingertipCalibration, load_fingertips
+from drivers.fingertips.wiring import Wiring, make_transport, make_wire, place_of
+from drivers.force.wire_settings import WireSettings
+from sessions.perception.interpreter import fingertip_link
 
 KIND = "fingertips"
 
 
-def place_of(wiring: Wiring) -> str:
-    """Where a wire ends, in words; two sensors never share it."""
-    match wiring:
-        case NetBoxWiring():
-            return f"the box at {wiring.host}:{wiring.port}"
-        case DigitalWiring() | ControllerWiring():
-            return f"port {wiring.port}"
-        case CanWiring():
-            return f"{wiring.interface} {wiring.channel}, base 0x{wiring.base:x}"
-        case VoltsWiring():
-            return f"local port {wiring.local_port}"
-
-
-def one_place_each(wires: dict[str, Wiring]) -> dict[str, Wiring]:
+def one_place_each(wires: dict[str, WireSettings]) -> dict[str, WireSettings]:
     """Wires of known fingers that all end in places of their own. Raises ValueError."""
     if unknown := sorted(set(wires) - set(FINGERS)):
         raise ValueError(f"unknown finger {', '.join(unknown)}; the fingers are {', '.join(FINGERS)}")
@@ -74,18 +60,18 @@ class FingertipRig:
     folder: Path
     source: str
 
-    def device(self, finger: str, clock: Clock, wiring: Wiring | None = None) -> Nano17:
+    def device(self, finger: str, clock: Clock, wiring: WireSettings | None = None) -> Nano17:
         """The sensor of a finger on its wire, or on another that is tried; not connected.
 
         Raises:
-            ConfigurationError: a calibration file that the wire names can not be used.
+            ConfigurationError: a calibration file that the wire names cannot be used.
         """
         used, calibration = wiring or self.description.wires[finger], self.calibrations[finger]
         try:
-            wire = wire_of(used, self.folder)
+            wire = make_wire(used, self.folder)
         except CodecError as error:
             raise ConfigurationError(error.what, where=f"{self.source}: wires.{finger}", hint=error.hint) from error
-        link = link_of(used, fingertip_link(finger), clock)
+        link = make_transport(used, fingertip_link(finger), clock)
         return Nano17(finger, link, clock, calibration, self.description.nano17, wire)
 
 

@@ -8,10 +8,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from drivers.shadow.ethercat_link import EthercatSettings
-from drivers.shadow.hand_settings import HandSettings
-from drivers.shadow.hand_setup import HandSetup, Master
-from tactile_lab.strict_yaml import StrictModel, load, validate
+from drivers.core.configuration import StrictModel, load, validate
+from drivers.shadow.device.hand_settings import HandSettings
+from drivers.shadow.device.hand_setup import HandSetup, Master
+from drivers.shadow.ethercat.hand_transport import EthercatSettings
 
 KIND = "hand"
 

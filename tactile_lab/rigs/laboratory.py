@@ -1,4 +1,4 @@
-"""Where a session happens: a simulated world in this program, devices on wires, or stand-ins for those."""
+"""Where a session happens: a simulated world in this program, devices on wires, or emulators for those."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from drivers.camera.markers import MarkerSettings
-from drivers.emulators.wired.stand_ins import StandIns
-from drivers.shadow.real_time import preferred
+from drivers.core.clock import Clock, MonotonicClock
+from drivers.core.configuration import load_model
+from drivers.emulators.laboratory.emulated_laboratory import EmulatedLaboratory
+from drivers.shadow.device.real_time import prefer
 from drivers.simulation.mesh_object import MESH_PREFIX
 from drivers.simulation.objects import CATALOGUE, ObjectModel, object_model
 from drivers.simulation.world import SimulatedWorld, marker_settings
-from sessions.bench import Bench
-from sessions.recorder import Recorder, TrafficSink
-from tactile_lab.clock import Clock, MonotonicClock
-from tactile_lab.rigs.build import build_bench, simulated_world
+from sessions.recording.recorder import Recorder, TrafficSink
+from sessions.rig_runtime.rig_runtime import RigRuntime
+from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import Rig
-from tactile_lab.rigs.wired import stand_in_plan, with_palm
-from tactile_lab.rigs.wired_bench import build_wired_bench
-from tactile_lab.strict_yaml import load_model
+from tactile_lab.rigs.wired import emulation_plan, with_palm
+from tactile_lab.rigs.wired_runtime import build_wired_bench
 
 
 class Laboratory(Protocol):
@@ -39,7 +39,7 @@ class Laboratory(Protocol):
     @property
     def target(self) -> ObjectModel | None: ...
 
-    def bench(self, recorder: Recorder, *, first_move: bool | None = None) -> Bench:
+    def runtime(self, recorder: Recorder, *, first_move: bool | None = None) -> RigRuntime:
         """Its devices, not yet connected.
 
         Args:
@@ -66,9 +66,9 @@ class SimulatedLaboratory:
     def target(self) -> ObjectModel:
         return self.world.object_model
 
-    def bench(self, recorder: Recorder, *, first_move: bool | None = None) -> Bench:
+    def runtime(self, recorder: Recorder, *, first_move: bool | None = None) -> RigRuntime:
         """See :class:`Laboratory`."""
-        return build_bench(self.rig, self.world, recorder)
+        return build_runtime(self.rig, self.world, recorder)
 
     def remarks(self) -> tuple[str, ...]:
         return ()
@@ -76,72 +76,72 @@ class SimulatedLaboratory:
 
 @dataclass(frozen=True)
 class WiredLaboratory:
-    """Devices on wires, or their stand-ins, in real time."""
+    """Devices on wires, or their emulators, in real time."""
 
     rig: Rig
     clock: Clock
     markers: MarkerSettings
     target: ObjectModel | None = None
-    stand_ins: StandIns | None = None
+    emulators: EmulatedLaboratory | None = None
 
-    def bench(self, recorder: Recorder, *, first_move: bool | None = None) -> Bench:
+    def runtime(self, recorder: Recorder, *, first_move: bool | None = None) -> RigRuntime:
         """See :class:`Laboratory`."""
-        truth = None if self.stand_ins is None else self.stand_ins.truth
+        truth = None if self.emulators is None else self.emulators.truth
         return build_wired_bench(self.rig, recorder, self.clock, truth=truth, first_move=first_move)
 
     def remarks(self) -> tuple[str, ...]:
         """Physics that could not keep up with the clock; see :class:`Laboratory`."""
-        lost_s = 0.0 if self.stand_ins is None else self.stand_ins.lost_s
+        lost_s = 0.0 if self.emulators is None else self.emulators.lost_s
         return (f"the emulated laboratory stood still for {lost_s:.1f} s: this computer is too slow",) if lost_s else ()
 
 
 @contextmanager
 def open_laboratory(rig: Rig, seed: int, object_name: str) -> Iterator[SimulatedLaboratory | WiredLaboratory]:
-    """The laboratory of a rig with an object on its table; stand-ins run while the context lasts.
+    """The laboratory of a rig with an object on its table; emulators run while the context lasts.
 
     A real laboratory takes any name for its object. That of the catalogue, or of a mesh, tells its true shape.
 
     Raises:
-        ConfigurationError: no such object in a simulation, or stand-ins that this program does not have.
-        ShapeError: the object's mesh can not be used.
-        DeviceError: a stand-in can not be started, or the rig leaves it to the hand's cable which palm there is, and
+        ConfigurationError: no such object in a simulation, or emulators that this program does not have.
+        ShapeError: the object's mesh cannot be used.
+        DeviceError: a emulator cannot be started, or the rig leaves it to the hand's cable which palm there is, and
             none that can be driven is found.
     """
     if rig.description.kind == "simulated":
         yield SimulatedLaboratory(rig, simulated_world(rig, seed, object_name))
-    elif rig.description.stand_ins:
+    elif rig.description.emulated:
         target, clock = object_model(object_name), MonotonicClock()
-        with StandIns(stand_in_plan(rig, seed, object_name), clock) as stand_ins, preferred():
+        with EmulatedLaboratory(emulation_plan(rig, seed, object_name), clock) as emulators, prefer():
             found, markers = with_palm(rig, clock), marker_settings(target, _markers(rig))
-            yield WiredLaboratory(found, clock, markers, target, stand_ins)
+            yield WiredLaboratory(found, clock, markers, target, emulators)
     else:
         known = object_name in CATALOGUE or object_name.startswith(MESH_PREFIX)
         target_or_none, clock = object_model(object_name) if known else None, MonotonicClock()
-        with preferred():
+        with prefer():
             yield WiredLaboratory(with_palm(rig, clock), clock, _markers(rig), target_or_none)
 
 
 @contextmanager
-def connected_bench(
+def connected_runtime(
     rig: Rig, seed: int, object_name: str, onlooker: TrafficSink, *, first_move: bool | None = None
-) -> Iterator[Bench]:
+) -> Iterator[RigRuntime]:
     """The connected devices of a rig, for a wizard; they are closed in the end.
 
     Args:
         rig, seed, object_name: see :func:`open_laboratory`.
         onlooker: is shown what the devices say.
-        first_move: see :meth:`Laboratory.bench`.
+        first_move: see :meth:`Laboratory.runtime`.
 
     Raises:
         TactileLabError: as :func:`open_laboratory`; or a device does not connect.
     """
     with open_laboratory(rig, seed, object_name) as laboratory:
-        bench = laboratory.bench(Recorder(onlooker), first_move=first_move)
-        bench.connect()
+        runtime = laboratory.runtime(Recorder(onlooker), first_move=first_move)
+        runtime.connect()
         try:
-            yield bench
+            yield runtime
         finally:
-            bench.close()
+            runtime.close()
 
 
 def _markers(rig: Rig) -> MarkerSettings:

@@ -8,7 +8,7 @@ from pathlib import Path
 import can
 from serial.tools import list_ports
 
-from tactile_lab.clock import NANOSECONDS, Clock
+from drivers.core.clock import NANOSECONDS, Clock
 
 _STABLE_NAMES = Path("/dev/serial/by-id")
 _NETWORK, _ETHERNET = Path("/sys/class/net"), "1"
@@ -32,7 +32,7 @@ class PortFound:
 
 def list_all_ports() -> list[PortFound]:
     """Serial ports, then CAN interfaces of the kernel, then its Ethernet interfaces."""
-    stable = {str(link.resolve()): str(link) for link in _STABLE_NAMES.glob("*")}
+    stable = {str(transport.resolve()): str(transport) for transport in _STABLE_NAMES.glob("*")}
     serial_ports = [
         PortFound("serial", stable.get(port.device, port.device), (port.description or "").replace("n/a", ""))
         for port in sorted(list_ports.comports())
@@ -43,15 +43,15 @@ def list_all_ports() -> list[PortFound]:
 
 
 def _is_ethernet(interface: Path) -> bool:
-    return _told(interface / "type") == _ETHERNET
+    return _kernel_report(interface / "type") == _ETHERNET
 
 
 def _network(interface: Path) -> PortFound:
-    connected = _told(interface / "operstate") == "up"
+    connected = _kernel_report(interface / "operstate") == "up"
     return PortFound("network", interface.name, "connected" if connected else "no cable, or not set up")
 
 
-def _told(file: Path) -> str:
+def _kernel_report(file: Path) -> str:
     """What the kernel says; nothing of an interface that has gone meanwhile."""
     try:
         return file.read_text().strip()

@@ -4,26 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from drivers.ati.wiring import NetBoxWiring
 from drivers.camera.calibration import load_camera
-from sessions.device_stamps import camera_stamp, positioner_stamp, rdt_stamp
-from sessions.interpreter import BASE_LINK, CAMERA_LINK, fingertip_link
-from sessions.raw_frames import Stamper
-from sessions.recorder import Recorder
-from sessions.traffic_settings import TrafficSettings
-from tactile_lab.geometry.contacts import FINGERS
+from drivers.core.contacts import FINGERS
+from sessions.perception.interpreter import BASE_LINK, CAMERA_LINK, fingertip_link
+from sessions.recording.device_stamps import STAMPERS, camera_stamp
+from sessions.recording.recorder import Recorder
+from sessions.recording.traffic.raw_frames import Stamper
+from sessions.recording.traffic.settings import TrafficSettings
 from tactile_lab.rigs.description import Rig
 
 
 def stampers(rig: Rig) -> Mapping[str, Stamper]:
-    """By link, what reads a device's own counter and clock out of its messages; the palm has none."""
+    """By transport, what reads a device's own counter and clock out of its messages; the palm has none."""
     description = rig.description
-    always: dict[str, Stamper] = {BASE_LINK: positioner_stamp, CAMERA_LINK: camera_stamp}
-    if description.fingertips != "nano17":
-        return always
-    wires = description.wires.fingertips if description.wires else {}
-    boxes = [finger for finger in FINGERS if isinstance(wires.get(finger), NetBoxWiring) or not description.wires]
-    return {**always, **{fingertip_link(finger): rdt_stamp for finger in boxes}}
+    found: dict[str, Stamper] = {CAMERA_LINK: camera_stamp}
+    if description.positioner in STAMPERS:
+        found[BASE_LINK] = STAMPERS[description.positioner]
+    wires = dict.fromkeys(FINGERS, description.fingertips)  # simulated ones, whose stamper has the name of their kind
+    if description.wires is not None:
+        wires = {finger: wiring.wire for finger, wiring in description.wires.fingertips.items()}
+    for finger, wire in wires.items():
+        if wire in STAMPERS:
+            found[fingertip_link(finger)] = STAMPERS[wire]
+    return found
 
 
 def traffic_settings(rig: Rig) -> TrafficSettings:

@@ -5,20 +5,24 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from drivers.ati.wire import ForceWire
-from drivers.ati.wiring import NetBoxWiring, VoltsWiring, Wiring, make_wire
+from drivers.ati.wires.wire import ForceWire
 from drivers.camera.calibration import load_camera
 from drivers.camera.markers import MarkerSettings
 from drivers.camera.source_settings import CameraSourceSettings, source_beside
-from drivers.emulators.wired.stand_ins import SERIAL, HandPlace, Place, StandInPlan
-from drivers.shadow.hand_setup import HandSetup
-from drivers.shadow.palm_images import USUAL_PALM
-from sessions.interpreter import HAND_LINK
-from tactile_lab.clock import Clock
-from tactile_lab.errors import CodecError, ConfigurationError
-from tactile_lab.rigs.description import Rig, gauge_role
+from drivers.core.clock import Clock
+from drivers.core.configuration import load_model
+from drivers.core.errors import CodecError, ConfigurationError
+from drivers.emulators.laboratory.emulated_laboratory import SERIAL, EmulationPlan, HandPlace, Place
+from drivers.fingertips.kind import PalmKind
+from drivers.fingertips.kinds import WIRES
+from drivers.fingertips.wiring import make_wire
+from drivers.force.wire_settings import WireSettings
+from drivers.shadow.device.hand_setup import HandSetup
+from drivers.shadow.protocol.palm_images import USUAL_PALM
+from drivers.simulation.settings import SimulationSettings
+from sessions.perception.interpreter import HAND_LINK
+from tactile_lab.rigs.description import Rig, wire_role
 from tactile_lab.rigs.wires import LocalCamera, RemoteCamera, Wires
-from tactile_lab.strict_yaml import load_model
 
 
 def wires_of(rig: Rig) -> Wires:
@@ -30,12 +34,11 @@ def wires_of(rig: Rig) -> Wires:
 def hand_setup(rig: Rig) -> HandSetup:
     """The hand of a rig on wires."""
     description, files, wiring = rig.description, rig.files, wires_of(rig).hand
-    tactile = "biotac" if description.fingertips == "biotac" else "none"
     return HandSetup(
         name=HAND_LINK,
         ethercat=wiring.ethercat,
         master=wiring.master,
-        hand=description.hand.on_wire.model_copy(update={"tactile": tactile}),
+        hand=description.hand.on_wire.model_copy(update={"tactile": tactile_of(rig)}),
         joints=files["joints"].resolve(),
         motors=files["motors"].resolve(),
         boards=_whole(files.get("boards")),
@@ -44,13 +47,26 @@ def hand_setup(rig: Rig) -> HandSetup:
     )
 
 
+def tactile_of(rig: Rig) -> str:
+    """What the rig's palm is told to ask its fingertips for."""
+    kind = rig.description.fingertip_kind
+    return kind.tactile if isinstance(kind, PalmKind) else "none"
+
+
+def simulation_settings(rig: Rig, object_name: str) -> SimulationSettings:
+    """The simulated world of a rig, with what the rig says of itself."""
+    description = rig.description
+    changes = {"object": object_name, "fingertips": description.fingertips, "positioner": description.positioner}
+    return description.simulation.model_copy(update=changes)
+
+
 def with_palm(rig: Rig, clock: Clock) -> Rig:
     """A rig on wires with its palm and its cycle named, so that a session keeps how its hand was read and driven.
 
     Raises:
         DeviceError: the rig file leaves it to the ring, which does not tell.
     """
-    found = hand_setup(rig).known(clock).hand
+    found = hand_setup(rig).with_known_palm(clock).hand
     hand = rig.description.hand.model_copy(update={"palm": found.palm, "cycle_s": found.cycle_s})
     return replace(rig, description=rig.description.model_copy(update={"hand": hand}))
 
@@ -59,11 +75,12 @@ def force_wire(rig: Rig, finger: str) -> ForceWire:
     """How a finger's readings are decoded, live and in a replay.
 
     Raises:
-        ConfigurationError: a calibration file that the wire names can not be used.
+        ConfigurationError: a calibration file that the wire names cannot be used.
     """
-    wiring: Wiring = wires_of(rig).fingertips[finger]
-    if isinstance(wiring, VoltsWiring):
-        wiring = wiring.model_copy(update={"calibration": str(rig.files[gauge_role(finger)].resolve())})
+    wiring = wires_of(rig).fingertips[finger]
+    named = WIRES[wiring.wire].files(wiring)
+    here = {setting: str(rig.files[wire_role(finger, setting)].resolve()) for setting in named}
+    wiring = wiring.model_copy(update=here)
     try:
         return make_wire(wiring, Path())
     except CodecError as error:
@@ -94,20 +111,20 @@ def camera_source(rig: Rig, wiring: LocalCamera) -> CameraSourceSettings:
     return known
 
 
-def stand_in_plan(rig: Rig, seed: int, object_name: str) -> StandInPlan:
-    """What has to be emulated for a rig with stand-ins.
+def emulation_plan(rig: Rig, seed: int, object_name: str) -> EmulationPlan:
+    """What has to be emulated for a rig with emulators.
 
     Raises:
         ConfigurationError: a wire on which the simulated plant has no emulator.
     """
-    wires, description = wires_of(rig), rig.description
-    changes = {"object": object_name, "fingertips": description.fingertips}
-    return StandInPlan(
-        simulation=description.simulation.model_copy(update=changes),
+    wires = wires_of(rig)
+    return EmulationPlan(
+        simulation=simulation_settings(rig, object_name),
         seed=seed,
         hand=_hand_place(rig),
-        base=(wires.base.host, wires.base.port),
-        boxes={finger: _box(rig, finger, wiring) for finger, wiring in wires.fingertips.items()},
+        base=_base_place(rig),
+        tips=rig.files["fingertips"].resolve(),
+        wires={finger: _with_emulator(rig, finger, wiring) for finger, wiring in wires.fingertips.items()},
         camera=_camera_place(rig),
     )
 
@@ -124,7 +141,6 @@ def _hand_place(rig: Rig) -> HandPlace:
         motors=rig.files["motors"].resolve(),
         palm=hand_setup(rig).stated_palm or USUAL_PALM,
         serial=SERIAL if wiring.ethercat.serial is None else wiring.ethercat.serial,
-        biotacs=rig.files["fingertips"].resolve() if rig.description.fingertips == "biotac" else None,
     )
 
 
@@ -137,10 +153,20 @@ def _camera_place(rig: Rig) -> Place | None:
     return (camera.host, camera.port) if isinstance(camera, RemoteCamera) else None
 
 
-def _box(rig: Rig, finger: str, wiring: Wiring) -> NetBoxWiring:
-    if not isinstance(wiring, NetBoxWiring):
+def _base_place(rig: Rig) -> Place:
+    wiring, kind = wires_of(rig).base, rig.description.positioner_kind
+    if not kind.emulator_host:
+        what, hint = f"no emulator of the positioner {rig.description.positioner}", "Run it on a simulated rig"
+        raise ConfigurationError(what, where=f"{rig.source}: wires.base", hint=hint)
+    place = wiring.model_dump()
+    return place["host"], place["port"]
+
+
+def _with_emulator(rig: Rig, finger: str, wiring: WireSettings) -> WireSettings:
+    if not WIRES[wiring.wire].emulator_host:
+        fed = ", ".join(name for name in WIRES if WIRES[name].emulator_host)
         where = f"{rig.source}: wires.fingertips.{finger}"
-        raise ConfigurationError("the simulated plant feeds net-ft wires alone", where=where, hint="Use wire: net-ft")
+        raise ConfigurationError(f"the simulated plant feeds {fed} wires alone", where=where, hint=f"Use wire: {fed}")
     return wiring
 
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, SerializeAsAny
 
-from drivers.ati.wiring import Port, Wiring
 from drivers.camera.source_settings import CameraSourceSettings
-from drivers.shadow.ethercat_link import EthercatSettings
-from drivers.shadow.hand_setup import Master
+from drivers.core.configuration import StrictModel
+from drivers.fingertips.wiring import Wiring
+from drivers.force.wire_settings import Port
+from drivers.shadow.device.hand_setup import Master
+from drivers.shadow.ethercat.hand_transport import EthercatSettings
 from tactile_lab.rigs.fingertip_rig import one_place_each
-from tactile_lab.strict_yaml import StrictModel
 
 FingertipWires = Annotated[dict[str, Wiring], AfterValidator(one_place_each)]
 
@@ -22,7 +23,7 @@ class HandWiring(StrictModel):
     Attributes:
         ethercat: how it is reached.
         master: our own EtherCAT master, or ``pysoem`` (the ``[ethercat]`` extra).
-        far_end: for stand-ins: the network interface at the other end of a virtual cable.
+        far_end: for emulators: the network interface at the other end of a virtual cable.
         first_move: before a session nudge each motor, to see that it moves the joint its map says.
         patience_s: without a sign of life from the session for so long the hand's process takes the demands away.
     """
@@ -32,14 +33,6 @@ class HandWiring(StrictModel):
     far_end: str | None = None
     first_move: bool = True
     patience_s: float = Field(default=2.0, gt=0.0, le=60.0)
-
-
-class BaseWiring(StrictModel):
-    """The program that moves the positioner, spoken to in datagrams of 52 bytes (docs/real-laboratory.md)."""
-
-    wire: Literal["udp"]
-    host: str = Field(min_length=1)
-    port: Port
 
 
 class RemoteCamera(StrictModel):
@@ -64,12 +57,12 @@ class Wires(StrictModel):
     """All wires of a laboratory.
 
     Attributes:
-        hand, base: always there.
+        hand, base: always there; the latter as the rig's kind of positioner has it.
         fingertips: of force fingertips, finger to wire; none where the palm carries the fingertips' data.
         camera: left out for a rig without one.
     """
 
     hand: HandWiring
-    base: BaseWiring
+    base: SerializeAsAny[StrictModel]
     fingertips: FingertipWires = Field(default_factory=dict)
     camera: CameraWiring | None = None

@@ -11,9 +11,9 @@ import numpy as np
 import viser
 from viser import Icon, IconName
 
+from drivers.core.contacts import FINGERS
 from sessions.guided.operator import Ask
-from tactile_lab.geometry.contacts import FINGERS
-from tactile_lab.report.colours import hex_colour, viridis
+from tactile_lab.colours import hex_colour, viridis
 from tactile_lab.view.scene import Scene, SIGMA_FULL_m
 
 Press = Callable[[Ask, str], None]

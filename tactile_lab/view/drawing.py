@@ -9,10 +9,10 @@ import numpy as np
 import viser
 from gtsam import Pose3
 
-from drivers.shadow.closing import CLOSINGS, closing
-from sessions import foxglove
-from tactile_lab.geometry.contacts import FINGERS, Array
-from tactile_lab.report.colours import viridis
+from drivers.core.contacts import FINGERS, Array
+from drivers.shadow.closing.closing import CLOSINGS, closing
+from sessions.recording.traffic import foxglove
+from tactile_lab.colours import viridis
 from tactile_lab.view.scene import Scene, ShownSurface, SIGMA_FULL_m, ellipse
 from tactile_lab.view.skeleton import TIP_CENTRE_m, bones
 

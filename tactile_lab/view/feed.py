@@ -7,18 +7,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sessions.guided.operator import Ask, Panel, Request, request_of
-from tactile_lab.view.link import PageLink
+from tactile_lab.view.page_transport import PageTransport
 
 PAGE_ASKS = frozenset(Ask) - {Ask.ATTACH, Ask.MOVE, Ask.FINGERS}
 """What a page may ask for: nothing that moves the hand by itself, and no files of this computer."""
 _PENDING = 50
 
 
-class ViewFeed(PageLink):
+class ViewFeed(PageTransport):
     """A page that shows a running session; an operator of it.
 
     Args:
-        address, port, token, title: see :class:`~tactile_lab.view.link.PageLink`.
+        address, port, token, title: see :class:`~tactile_lab.view.page_transport.PageTransport`.
     """
 
     attended = False
@@ -27,7 +27,7 @@ class ViewFeed(PageLink):
         super().__init__("session", address, port, token, title)
         self._asked: deque[Request] = deque(maxlen=_PENDING)
 
-    def pressed(self, content: Mapping[str, Any]) -> None:
+    def on_press(self, content: Mapping[str, Any]) -> None:
         """Keep what may be asked for. Raises ValueError for what is no request."""
         if (request := request_of(content)).ask in PAGE_ASKS:
             self._asked.append(request)

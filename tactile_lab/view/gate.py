@@ -32,7 +32,7 @@ def is_loopback(address: str) -> bool:
 
 
 def new_token() -> str:
-    """A token that can not be guessed."""
+    """A token that cannot be guessed."""
     return secrets.token_urlsafe(24)
 
 
@@ -106,7 +106,7 @@ def _cookie(header: str) -> str:
 
 
 async def serve(gate: Gate, address: str, port: int, inner: tuple[str, int]) -> asyncio.Server:
-    """Listen, and carry what may pass to ``inner``. Raises OSError when the address can not be taken."""
+    """Listen, and carry what may pass to ``inner``. Raises OSError when the address cannot be taken."""
 
     async def visit(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with contextlib.suppress(OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, TimeoutError):

@@ -13,8 +13,8 @@ from typing import Literal, Self
 import viser
 from viser import _messages
 
+from drivers.core.errors import DeviceError
 from sessions.guided.operator import Ask
-from tactile_lab.errors import DeviceError
 from tactile_lab.view.controls import Controls
 from tactile_lab.view.drawing import Drawing
 from tactile_lab.view.gate import Gate, inner_address, is_loopback, serve
@@ -70,7 +70,7 @@ class Page:
         """Where the page is, token and all."""
 
     def __enter__(self) -> Self:
-        """Open the door. Raises DeviceError when the address can not be taken."""
+        """Open the door. Raises DeviceError when the address cannot be taken."""
         self._thread.start()
         address, port = self._door
         inner = (self._inner.get_host(), self._inner.get_port())
@@ -80,7 +80,7 @@ class Page:
             server = opened.result(10)
         except (OSError, TimeoutError) as error:
             self.close()
-            raise DeviceError(f"can not listen on port {port} ({error})", where=address) from error
+            raise DeviceError(f"cannot listen on port {port} ({error})", where=address) from error
         self._server = server
         bound = server.sockets[0].getsockname()[1]
         shown = f"[{address}]" if ":" in address else address

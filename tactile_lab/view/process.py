@@ -12,7 +12,7 @@ import sys
 import threading
 from typing import Any, BinaryIO
 
-from tactile_lab.errors import TactileLabError
+from drivers.core.errors import TactileLabError
 
 DRAW_PERIOD_s = 0.1
 
@@ -34,7 +34,7 @@ class Mouth:
 
 
 def main() -> int:
-    """Show what comes in until it ends; 1 when the page can not be opened."""
+    """Show what comes in until it ends; 1 when the page cannot be opened."""
     mouth = Mouth()
     settings = json.loads(sys.stdin.buffer.readline())
     from tactile_lab.view.page import Page

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from sessions.session import Session
-from sessions.traffic_reader import TrafficMessage
-from tactile_lab.clock import NANOSECONDS, Clock
+from drivers.core.clock import NANOSECONDS, Clock
+from sessions.recording.session import Session
+from sessions.recording.traffic.reader import TrafficMessage
 from tactile_lab.view.scene import SHOWN_TOPICS, Scene
 
 _POLL_s, _POLL_SHARE = 1.0, 5.0

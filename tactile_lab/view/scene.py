@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from gtsam import Pose3, Rot3
 
-from sessions import schemas
-from tactile_lab.geometry.contacts import Array
+from drivers.core.contacts import Array
+from sessions.recording.traffic import schemas
 
 PALM = "palm"
 WIZARD_TOPIC = "/wizard"
@@ -71,7 +71,7 @@ class Scene:
         grasps: the contacts so far.
         world_T_object, covariance: the pose, and that of its x, y (m) and yaw (rad).
         surface: as estimated.
-        plan: the next grasp, as :func:`sessions.view_messages.plan_message` gives it.
+        plan: the next grasp, as :meth:`sessions.motion.grasp_plan.GraspPlan.as_plain` gives it.
         steps: what the estimation said of each grasp.
         guide: what the person of a guided session is shown.
         wizard: what the person of a calibration wizard is shown: question, lines, tables.
@@ -154,12 +154,12 @@ def _slam_state(scene: Scene, content: dict[str, Any]) -> None:
     covariance = content.get("covariance")
     scene.covariance = None if covariance is None else np.array(covariance, dtype=float)
     scene.steps = {number: step for number, step in scene.steps.items() if number < index} | {index: content}
-    placed = [_placed(grasp, scene) if grasp.index == index else grasp for grasp in scene.grasps]
+    placed = [_place(grasp, scene) if grasp.index == index else grasp for grasp in scene.grasps]
     scene.grasps = [grasp for grasp in placed if grasp.index <= index]
     scene.changed |= {"object", "grasps"}
 
 
-def _placed(grasp: ShownGrasp, scene: Scene) -> ShownGrasp:
+def _place(grasp: ShownGrasp, scene: Scene) -> ShownGrasp:
     return ShownGrasp(
         grasp.index, grasp.fingers, grasp.points_world_m, grasp.normals_world, grasp.forces_N, scene.world_T_object
     )
@@ -206,7 +206,7 @@ _READERS = {
     schemas.SLAM_SURFACE_TOPIC: _surface,
     schemas.PLAN_TOPIC: _plan,
     schemas.GUIDE_TOPIC: _guide,
-    schemas.EVENTS_TOPIC: _event,
+    schemas.LOG_TOPIC: _event,
     WIZARD_TOPIC: _wizard,
 }
 SHOWN_TOPICS = frozenset(_READERS)

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from gtsam import Pose3
 
-from tactile_lab.geometry.contacts import FINGERS, Array
+from drivers.core.contacts import FINGERS, Array
 
 TIP_CENTRE_m = np.array([0.0, 0.0, 0.019])
 """Middle of a fingertip in its distal frame."""

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from tactile_lab.view.link import PageLink
+from tactile_lab.view.page_transport import PageTransport
 from tactile_lab.view.scene import WIZARD_TOPIC
 
 QUIT = "q"
@@ -17,13 +17,13 @@ QUIT = "q"
 _LINES, _TABLES = 8, 8
 
 
-class WizardFeed(PageLink):
+class WizardFeed(PageTransport):
     """A page that shows a wizard: its question with a button for each answer, its figures, and the hand.
 
     Every message holds all that the page shows, so that one that is lost is made good by the next.
 
     Args:
-        address, port, token, title: see :class:`~tactile_lab.view.link.PageLink`.
+        address, port, token, title: see :class:`~tactile_lab.view.page_transport.PageTransport`.
     """
 
     def __init__(self, address: str, port: int, token: str, title: str) -> None:
@@ -57,7 +57,7 @@ class WizardFeed(PageLink):
         self._text, self._usual, self._answers = text, usual, dict(answers)
         self.renew()
 
-    def settled(self) -> None:
+    def on_answered(self) -> None:
         """The question is answered, and its buttons go."""
         self._answers = {}
         self.renew()
@@ -71,7 +71,7 @@ class WizardFeed(PageLink):
 
     # --- in ----------------------------------------------------------------------------------------------------
 
-    def pressed(self, content: Mapping[str, Any]) -> None:
+    def on_press(self, content: Mapping[str, Any]) -> None:
         """Keep an answer to the question that is shown; to quit is like Ctrl+C while there is none.
 
         Raises:

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from sessions.autonomous_crew import autonomous_crew
-from sessions.bench import Bench
-from sessions.conductor_settings import ConductorSettings
-from sessions.decisions import Crew
+from drivers.core.clock import MonotonicClock, VirtualClock
+from sessions.conductor.decisions import SessionRoles
+from sessions.conductor.policy_decisions import Approve, approve_everything, record_choices
 from sessions.guided.attended import AttendedDecisions
-from sessions.guided.crew import guided_crew
 from sessions.guided.operator import Operator
 from sessions.guided.pace import Pace
-from sessions.policy_decisions import Approve, everything_approved, recorded_by
-from sessions.recorder import TrafficSink
-from tactile_lab.clock import MonotonicClock, VirtualClock
-from tactile_lab.slam import TactileSlam
+from sessions.recording.recorder import TrafficSink
+from sessions.rig_runtime.rig_runtime import RigRuntime
+from tactile_lab.autonomy.autonomous_roles import autonomous_roles
+from tactile_lab.autonomy.guided_roles import guided_roles
+from tactile_lab.autonomy.settings import SessionSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,10 @@ class Attendance:
     automatic: bool | None = None
     pace: float = 1.0
     onlooker: TrafficSink | None = None
-    approve: Approve = everything_approved
+    approve: Approve = approve_everything
 
 
-def settings_for(settings: ConductorSettings, attendance: Attendance) -> ConductorSettings:
+def settings_for(settings: SessionSettings, attendance: Attendance) -> SessionSettings:
     """The session's settings, with what was asked for on the command line."""
     asked = {"led_by": attendance.led_by, "automatic": attendance.automatic}
     changes = {name: value for name, value in asked.items() if value is not None}
@@ -55,32 +55,35 @@ def settings_for(settings: ConductorSettings, attendance: Attendance) -> Conduct
     return settings.model_copy(update={"guided": guided, "safety": safety})
 
 
-def crew_for(
+def roles_for(
     attendance: Attendance,
-    bench: Bench,
+    runtime: RigRuntime,
     slam: TactileSlam,
-    settings: ConductorSettings,
+    settings: SessionSettings,
     session_folder: Path,
     *,
     seed: int,
     dimension: int,
-) -> Crew:
-    """The crew that fits who is there."""
+) -> SessionRoles:
+    """The roles that fits who is there."""
     operator = attendance.operator
     if operator is not None and attendance.guides:
-        pace = _pace(bench, attendance)
-        return guided_crew(bench, slam, settings, operator, session_folder, seed=seed, dimension=dimension, pace=pace)
-    crew = autonomous_crew(bench, slam, settings, seed=seed, dimension=dimension, approve=attendance.approve)
+        pace = _pace(runtime, attendance)
+        return guided_roles(
+            runtime, slam, settings, operator, session_folder, seed=seed, dimension=dimension, pace=pace
+        )
+    roles = autonomous_roles(runtime, slam, settings, seed=seed, dimension=dimension, approve=attendance.approve)
     if operator is None:
-        return crew
-    pace = _pace(bench, attendance)
+        return roles
+    pace = _pace(runtime, attendance)
+    tell, approve = record_choices(runtime), attendance.approve
     decisions = AttendedDecisions(
-        crew.thinking, recorded_by(bench), attendance.approve, operator, crew.guard, lambda: pace(bench.clock.now_ns())
+        roles.estimator, tell, approve, operator, roles.guard, lambda: pace(runtime.clock.now_ns())
     )
-    return replace(crew, decisions=decisions)
+    return replace(roles, decisions=decisions)
 
 
-def _pace(bench: Bench, attendance: Attendance) -> Callable[[int], None]:
-    if attendance.pace > 0.0 and isinstance(bench.clock, VirtualClock):
+def _pace(runtime: RigRuntime, attendance: Attendance) -> Callable[[int], None]:
+    if attendance.pace > 0.0 and isinstance(runtime.clock, VirtualClock):
         return Pace(MonotonicClock(), attendance.pace)
     return lambda stamp_ns: None

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from calibration.camera_intrinsics import PARAMETERS, LensLimits, LensResult
-from calibration.camera_views import BoardView, Coverage, adds_something, coverage, view_of
-from calibration.store import CalibrationRecord, Covariance, new_record
+from calibration.camera.intrinsics import PARAMETERS, LensLimits, LensResult
+from calibration.camera.views import BoardView, Coverage, adds_something, coverage, view_of
+from calibration.store.store import CalibrationRecord, Covariance, new_record
 from drivers.camera.boards import AnyBoard
 from drivers.camera.frames import Image
 from drivers.camera.markers import other_dictionary
+from drivers.camera.pictures import Picture
 from drivers.camera.source_settings import CameraSourceSettings
-from drivers.camera.sources import Picture, open_source
-from tactile_lab.clock import Clock
-from tactile_lab.errors import ConfigurationError
+from drivers.camera.sources import open_source
+from drivers.core.clock import Clock
+from drivers.core.errors import ConfigurationError
 
 LENS_COMMENT = "Lens of the camera under the table. Made by tactile-lab calibrate camera."
 _LENS_VALID_DAYS = 365.0
@@ -62,7 +63,7 @@ def gather_views(
 
     Raises:
         ConfigurationError: no such source, or no picture shows the board; the dictionary it does show is named.
-        DeviceError: the camera can not be used, or changes its resolution.
+        DeviceError: the camera cannot be used, or changes its resolution.
     """
     source, found = open_source(settings, clock), Gathering()
     is_camera = settings.place().kind in ("device", "gstreamer")
@@ -107,7 +108,7 @@ def _nothing_found(source: str, board: AnyBoard, last: Image | None, found: Gath
 
 
 def lens_record(
-    result: LensResult, station: str, board: AnyBoard, limits: LensLimits, serial: str, notes: str = ""
+    result: LensResult, measurer: str, board: AnyBoard, limits: LensLimits, serial: str, notes: str = ""
 ) -> CalibrationRecord:
     """The result as the store keeps it."""
     names = [name for name in PARAMETERS if name in result.sigmas]
@@ -121,7 +122,7 @@ def lens_record(
     seen = result.coverage
     return new_record(
         "camera",
-        rig=station,
+        rig=measurer,
         method=f"views of a {board.kind} board, calibrateCameraExtended",
         parameters=result.lens,
         verdict="PASS" if result.passed else "FAIL",

@@ -5,23 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import ClassVar
 
-from calibration.fingertip_data import FingertipData
-from calibration.fingertip_model import FingertipNoise
-from calibration.fingertip_plan import plan_wrenches
-from calibration.fingertip_record import FingertipLimits
-from calibration.fingertip_wizard import FingertipWizard
-from calibration.forearm import load_forearm
-from drivers.fingertip import FingertipCalibration, load_fingertips
-from drivers.shadow.posture import LONG_FINGERS
-from sessions.fingertip_station import FingertipStation, FingertipStationSettings
-from sessions.recorder import TrafficSink
-from tactile_lab.errors import ConfigurationError
+from calibration.fingertip.data import FingertipData
+from calibration.fingertip.model import FingertipNoise
+from calibration.fingertip.plan import plan_wrenches
+from calibration.fingertip.record import FingertipLimits
+from calibration.fingertip.wizard import FingertipWizard
+from calibration.forearm.placement import load_forearm
+from drivers.core.configuration import StrictModel
+from drivers.core.errors import ConfigurationError
+from drivers.core.fingertip import FingertipCalibration
+from drivers.shadow.closing.posture import LONG_FINGERS
+from sessions.measuring.fingertip_measurer import FingertipMeasurer, FingertipMeasurerSettings
+from sessions.recording.recorder import TrafficSink
 from tactile_lab.rigs.build import check_calibration
-from tactile_lab.rigs.calibrating import cleared, tip_shapes
 from tactile_lab.rigs.description import Rig, load_rig
-from tactile_lab.rigs.laboratory import connected_bench
-from tactile_lab.strict_yaml import StrictModel
+from tactile_lab.rigs.laboratory import connected_runtime
+from tactile_lab.workflow.calibrating_forearm import clear_table, tip_shapes
 
 
 class FingertipSettings(StrictModel):
@@ -30,12 +31,14 @@ class FingertipSettings(StrictModel):
     Attributes:
         limits: what a result must keep to.
         noise: errors of the wrenches.
-        station: how the hand moves.
+        measurer: how the hand moves.
     """
+
+    renamed: ClassVar = {"station": "measurer"}
 
     limits: FingertipLimits = FingertipLimits()
     noise: FingertipNoise = FingertipNoise()
-    station: FingertipStationSettings = FingertipStationSettings()
+    measurer: FingertipMeasurerSettings = FingertipMeasurerSettings()
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class FingertipRequest:
 @contextmanager
 def fingertip_wizard(
     request: FingertipRequest, onlooker: TrafficSink
-) -> Iterator[tuple[FingertipWizard, FingertipStation]]:
+) -> Iterator[tuple[FingertipWizard, FingertipMeasurer]]:
     """A wizard with a connected station; the hand is lifted off and everything closed in the end.
 
     Args:
@@ -68,7 +71,7 @@ def fingertip_wizard(
         onlooker: is shown the hand while it moves.
 
     Raises:
-        ConfigurationError: the rig lacks what is needed, or the finger can not be stretched alone.
+        ConfigurationError: the rig lacks what is needed, or the finger cannot be stretched alone.
         DeviceError: the rig is not ready.
     """
     rig = load_rig(request.rig)
@@ -76,26 +79,26 @@ def fingertip_wizard(
     before = force_fingertips(rig, request.finger)[request.finger]
     if request.finger not in LONG_FINGERS:
         hint = "Record its wrenches by hand, and give them with --from"
-        raise ConfigurationError(f"{request.finger} can not be stretched alone", where="--finger", hint=hint)
+        raise ConfigurationError(f"{request.finger} cannot be stretched alone", where="--finger", hint=hint)
     world_T_mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
     plan, data = plan_wrenches(request.finger, request.presses), _data(rig, request.finger)
     wizard = FingertipWizard(plan, data, before, request.settings.noise)
-    with connected_bench(cleared(rig), request.seed, "box-10x6x4", onlooker) as bench:
-        station = FingertipStation(bench, world_T_mount, tip_shapes(rig), request.settings.station)
-        yield wizard, station
-        station.close()
+    with connected_runtime(clear_table(rig), request.seed, "box-10x6x4", onlooker) as runtime:
+        measurer = FingertipMeasurer(runtime, world_T_mount, tip_shapes(rig), request.settings.measurer)
+        yield wizard, measurer
+        measurer.close()
 
 
 def force_fingertips(rig: Rig, finger: str) -> dict[str, FingertipCalibration]:
     """The rig's force fingertips. Raises ConfigurationError when it has none, or not this one."""
-    if rig.description.fingertips != "nano17":
+    tips = rig.description.fingertip_kind.load(rig.files)
+    if not all(isinstance(tip, FingertipCalibration) for tip in tips.values()):
         hint = "See calibrate biotac for BioTacs"
         raise ConfigurationError("has no force fingertips", where=rig.source, hint=hint)
-    tips = load_fingertips(rig.files["fingertips"])
     if finger not in tips:
         hint = "Add its nominal values to the file first"
         raise ConfigurationError(f"does not name {finger}", where=str(rig.files["fingertips"]), hint=hint)
-    return tips
+    return dict(tips)
 
 
 def _data(rig: Rig, finger: str) -> FingertipData:

@@ -6,33 +6,34 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
-from calibration.block_plan import FINGERS, load_block, plan_block
-from calibration.block_problem import BlockSettings, BlockWizard, is_of_block, solve_block
-from calibration.forearm import load_forearm
-from calibration.forearm_record import check_origin
-from calibration.forearm_wizard import solve_forearm
-from calibration.geometry import Block
-from calibration.joints import JointCorrection, JointLimits, JointPose, from_contacts, from_poses, load_poses
-from calibration.pose_steps import PlannedPose, PoseSteps
-from calibration.quality import Judgement
-from calibration.recordings import FORMAT, ForearmData, load_data
-from calibration.refinement import JointOffset
-from calibration.store import Covariance
-from drivers.shadow.posture import LONG_FINGERS
+from calibration.forearm.placement import load_forearm
+from calibration.forearm.record import check_origin
+from calibration.forearm.recordings import FORMAT, ForearmData, load_data
+from calibration.forearm.wizard import solve_forearm
+from calibration.hand.block_plan import FINGERS, load_block, plan_block
+from calibration.hand.block_problem import BlockSettings, BlockWizard, is_of_block, solve_block
+from calibration.hand.joints import JointCorrection, JointLimits, JointPose, from_contacts, from_poses, load_poses
+from calibration.hand.pose_steps import PlannedPose, PoseSteps
+from calibration.steps.geometry import Block
+from calibration.steps.quality import Judgement
+from calibration.steps.refinement import JointOffset
+from calibration.store.store import Covariance
+from drivers.core.configuration import StrictModel, load, load_model
+from drivers.core.errors import ConfigurationError
+from drivers.shadow.closing.posture import LONG_FINGERS
 from drivers.simulation.objects import object_model
 from drivers.simulation.settings import ObjectStart
-from sessions.calibration_station import CalibrationStation, StationSettings
-from sessions.held_hand import HeldHand
-from sessions.recorder import TrafficSink
-from tactile_lab.errors import ConfigurationError
+from sessions.measuring.calibration_measurer import CalibrationMeasurer, MeasurerSettings
+from sessions.measuring.held_hand import HeldHand
+from sessions.recording.recorder import TrafficSink
 from tactile_lab.rigs.build import check_calibration
-from tactile_lab.rigs.calibrating import cleared, tip_shapes
 from tactile_lab.rigs.description import Rig, load_rig
-from tactile_lab.rigs.laboratory import connected_bench
-from tactile_lab.strict_yaml import StrictModel, load, load_model
+from tactile_lab.rigs.laboratory import connected_runtime
+from tactile_lab.workflow.calibrating_forearm import clear_table, tip_shapes
 
 BLOCK = "box-12x6x6"
 """The object that a simulated rig has for a block."""
@@ -46,12 +47,14 @@ class JointSettings(StrictModel):
     Attributes:
         block: errors and limits of the touches, and the least of them.
         limits: what the corrections must keep to.
-        station: how the hand moves.
+        measurer: how the hand moves.
     """
+
+    renamed: ClassVar = {"station": "measurer"}
 
     block: BlockSettings = BlockSettings()
     limits: JointLimits = JointLimits()
-    station: StationSettings = StationSettings()
+    measurer: MeasurerSettings = MeasurerSettings()
 
 
 @dataclass(frozen=True)
@@ -130,7 +133,7 @@ def known_poses(source: Path, rig: Rig) -> tuple[JointPose, ...]:
     """Known poses of a file some of which are still to be read from the hand; none when all were measured.
 
     Raises:
-        ConfigurationError: the file can not be used.
+        ConfigurationError: the file cannot be used.
     """
     poses = () if _holds_touches(source) else load_poses(source, rig.installation).poses
     return poses if any(pose.unread for pose in poses) else ()
@@ -143,13 +146,13 @@ def pose_wizard(
     """The poses that are still to be read, with a connected hand that a person holds in them.
 
     Raises:
-        ConfigurationError: the rig can not be used.
+        ConfigurationError: the rig cannot be used.
         DeviceError: it is not ready.
     """
     check_calibration(rig)
     plan = [PlannedPose(pose) for pose in poses if pose.unread]
-    with connected_bench(rig, seed, BLOCK, onlooker, first_move=False) as bench:
-        yield PoseSteps(plan, limits), HeldHand(bench)
+    with connected_runtime(rig, seed, BLOCK, onlooker, first_move=False) as runtime:
+        yield PoseSteps(plan, limits), HeldHand(runtime)
 
 
 def from_touches(data: ForearmData, rig: Rig, settings: JointSettings) -> FoundJoints:
@@ -168,7 +171,7 @@ def from_touches(data: ForearmData, rig: Rig, settings: JointSettings) -> FoundJ
 
 
 @contextmanager
-def joint_wizard(request: JointRequest, onlooker: TrafficSink) -> Iterator[tuple[BlockWizard, CalibrationStation]]:
+def joint_wizard(request: JointRequest, onlooker: TrafficSink) -> Iterator[tuple[BlockWizard, CalibrationMeasurer]]:
     """A wizard with a connected station; the hand is lifted off and everything closed in the end.
 
     Args:
@@ -176,7 +179,7 @@ def joint_wizard(request: JointRequest, onlooker: TrafficSink) -> Iterator[tuple
         onlooker: is shown the hand while it moves.
 
     Raises:
-        ConfigurationError: the rig lacks what is needed, or a finger can not press alone.
+        ConfigurationError: the rig lacks what is needed, or a finger cannot press alone.
         DeviceError: the rig is not ready.
     """
     rig = load_rig(request.rig)
@@ -184,13 +187,13 @@ def joint_wizard(request: JointRequest, onlooker: TrafficSink) -> Iterator[tuple
     block, tips = _block(rig, request), tip_shapes(rig)
     if unknown := sorted(set(request.fingers) - (set(LONG_FINGERS) & set(tips))):
         hint = f"Press with some of {', '.join(LONG_FINGERS)} that have a calibrated fingertip"
-        raise ConfigurationError(f"{', '.join(unknown)} can not press alone", where="--fingers", hint=hint)
+        raise ConfigurationError(f"{', '.join(unknown)} cannot press alone", where="--fingers", hint=hint)
     world_T_mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
     wizard = BlockWizard(plan_block(block, request.fingers, request.rounds), request.settings.block)
-    with connected_bench(_with_block(rig, block), request.seed, BLOCK, onlooker) as bench:
-        station = CalibrationStation(bench, world_T_mount, tips, request.settings.station)
-        yield wizard, station
-        station.close()
+    with connected_runtime(_with_block(rig, block), request.seed, BLOCK, onlooker) as runtime:
+        measurer = CalibrationMeasurer(runtime, world_T_mount, tips, request.settings.measurer)
+        yield wizard, measurer
+        measurer.close()
 
 
 def _block(rig: Rig, request: JointRequest) -> Block:
@@ -214,4 +217,4 @@ def _with_block(rig: Rig, block: Block) -> Rig:
         raise ConfigurationError(what, where=rig.source, hint="State that size")
     place, yaw = block.world_T_block.translation_m, block.world_T_block.pose().rotation().yaw()
     start = ObjectStart(x_m=place[0], y_m=place[1], yaw_rad=float(yaw))
-    return cleared(rig, {"start": start, "object_mass_kg": _STEEL_kg})
+    return clear_table(rig, {"start": start, "object_mass_kg": _STEEL_kg})

@@ -11,20 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from sessions.marks import Mark, MarkKind
-from sessions.schemas import MARKS_TOPIC, TRANSFORMS_TOPIC
-from sessions.session import TRAJECTORY, Session
-from tactile_lab.clock import NANOSECONDS
-from tactile_lab.errors import SessionError
+from drivers.core.atomic_files import write_whole
+from drivers.core.clock import NANOSECONDS
+from drivers.core.contacts import Array
+from drivers.core.errors import SessionError
+from sessions.recording.session import TRAJECTORY, Session
+from sessions.recording.session_events import EventKind, SessionEvent
+from sessions.recording.traffic.schemas import SESSION_EVENTS_TOPIC, TRANSFORMS_TOPIC
 from tactile_lab.evaluation.comparison import Judged, MethodSummary, compare, markdown, rows_csv
-from tactile_lab.evaluation.marker_truth import MarkerTruth, TruthReport, report_json
-from tactile_lab.evaluation.plain import json_text, plain
-from tactile_lab.evaluation.session_truth import camera_datagrams
-from tactile_lab.evaluation.time_alignment import ClockOffset, Track, clock_offset
-from tactile_lab.geometry.contacts import Array
+from tactile_lab.evaluation.files.plain import json_text, plain
+from tactile_lab.evaluation.truth.marker_truth import MarkerTruth, TruthReport, report_json
+from tactile_lab.evaluation.truth.session_truth import camera_datagrams
+from tactile_lab.evaluation.truth.time_alignment import ClockOffset, Track, clock_offset
 from tactile_lab.report.comparison_plot import comparison_svg
 from tactile_lab.rigs.description import rig_of_session
-from tactile_lab.whole_files import write_whole
 from tactile_lab.workflow.judging import TruthChoice, judge_results, marker_detector
 
 
@@ -64,8 +64,8 @@ def compare_sessions(sessions: Sequence[Session], folders: Sequence[str], choice
     """Judge folders of results of sessions; all that hold results when none is named.
 
     Raises:
-        SessionError: a session has no such results, can not be read, or is named twice.
-        ConfigurationError: the chosen calibration can not be used.
+        SessionError: a session has no such results, cannot be read, or is named twice.
+        ConfigurationError: the chosen calibration cannot be used.
     """
     _check_different(sessions)
     judged: list[Judged] = []
@@ -146,12 +146,12 @@ def _hand_track(session: Session) -> tuple[Track | None, list[tuple[float, float
     holds: list[tuple[float, float]] = []
     begun: float | None = None
     for message in session.traffic().messages():
-        if message.topic == MARKS_TOPIC:
-            mark = Mark.from_bytes(message.data)
-            if mark.kind is MarkKind.HOLD_BEGIN:
-                begun = mark.stamp_ns / NANOSECONDS
-            elif mark.kind is MarkKind.HOLD_END and begun is not None:
-                holds.append((begun, mark.stamp_ns / NANOSECONDS))
+        if message.topic == SESSION_EVENTS_TOPIC:
+            event = SessionEvent.from_bytes(message.data)
+            if event.kind is EventKind.HOLD_BEGIN:
+                begun = event.stamp_ns / NANOSECONDS
+            elif event.kind is EventKind.HOLD_END and begun is not None:
+                holds.append((begun, event.stamp_ns / NANOSECONDS))
                 begun = None
         elif message.topic == TRANSFORMS_TOPIC and (found := _palm(json.loads(message.data)["transforms"])):
             stamps.append(message.stamp_ns / NANOSECONDS)

@@ -8,17 +8,17 @@ from typing import Literal
 
 import numpy as np
 
-from sessions.archives import export_archive
-from sessions.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
-from sessions.replay import Replay, kept_grasps
-from sessions.sample_tables import SampleTables, read_tables
-from sessions.session import Session
-from tactile_lab.errors import SessionError
-from tactile_lab.geometry.contacts import Contact
+from drivers.core.atomic_files import write_whole
+from drivers.core.contacts import Contact
+from drivers.core.errors import SessionError
+from sessions.exchange.archives import export_archive
+from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
+from sessions.exchange.sample_tables import SampleTables, read_tables
+from sessions.perception.replay import Replay, kept_grasps
+from sessions.recording.session import Session
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import rig_of_session
-from tactile_lab.tracking.motion import MotionNoise
-from tactile_lab.whole_files import write_whole
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.workflow.replaying import recorded_slam, true_poses
 
 
@@ -33,9 +33,9 @@ def export_contacts(session: Session, path: Path, dimension: int | None = None) 
         dimension: 2 keeps the horizontal part; None for the session's own.
 
     Raises:
-        SessionError: the recording can not be read, or holds no grasp.
+        SessionError: the recording cannot be read, or holds no grasp.
         ConfigurationError: no grasp of the session has a contact.
-        WriteError: the log can not be written.
+        WriteError: the log cannot be written.
     """
     settings = recorded_slam(session)
     replay = Replay(session, build_interpreter(rig_of_session(session)))
@@ -82,26 +82,26 @@ def _bytes(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise SessionError(f"can not be read ({error.strerror})", where=str(path), hint="Check the file") from error
+        raise SessionError(f"cannot be read ({error.strerror})", where=str(path), hint="Check the file") from error
 
 
 def export_csv(session: Session, folder: Path) -> int:
     """All samples as CSV tables; gives their rows. Raises SessionError."""
-    from sessions.table_files import write_csv
+    from sessions.exchange.table_files import write_csv
 
     return write_csv(_tables(session), folder)
 
 
 def export_hdf5(session: Session, path: Path) -> int:
     """All samples as one HDF5 file; gives their rows. Raises SessionError."""
-    from sessions.table_files import write_hdf5
+    from sessions.exchange.table_files import write_hdf5
 
     return write_hdf5(_tables(session), path)
 
 
 def export_rosbag(session: Session, folder: Path) -> int:
     """All samples as a ROS 2 bag; gives their number. Raises SessionError, or ConfigurationError without rosbags."""
-    from sessions.ros_bag import write_ros_bag
+    from sessions.exchange.ros_bag import write_ros_bag
 
     return write_ros_bag(_tables(session), folder)
 

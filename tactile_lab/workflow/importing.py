@@ -6,13 +6,13 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from sessions.archives import import_archive
-from sessions.contact_log import ContactLog, read_contact_log, write_contact_log
-from sessions.session import Session
-from sessions.timed_contacts import ImportSettings, read_timed_contacts
-from tactile_lab.errors import ConfigurationError, SessionError, TactileLabError
-from tactile_lab.shape.mesh_io import read_mesh
-from tactile_lab.whole_files import write_whole
+from drivers.core.atomic_files import write_whole
+from drivers.core.errors import ConfigurationError, SessionError, TactileLabError
+from sessions.exchange.archives import import_archive
+from sessions.exchange.contact_log import ContactLog, read_contact_log, write_contact_log
+from sessions.exchange.timed_contacts import ImportSettings, read_timed_contacts
+from sessions.recording.session import Session
+from tactile_lab.evaluation.files.mesh_io import read_mesh
 
 
 def import_session(archive: Path, root: Path, name: str | None = None) -> Session:
@@ -24,10 +24,10 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
     """Timed contacts as a contact log, with the true mesh, where there is one, copied beside it.
 
     Raises:
-        SessionError: a file can not be read, or the log exists already.
-        WriteError: a file can not be written.
+        SessionError: a file cannot be read, or the log exists already.
+        WriteError: a file cannot be written.
         ConfigurationError: the contacts do not fit the form or do not make sense; nothing is left then.
-        ShapeError: the mesh can not be used.
+        ShapeError: the mesh cannot be used.
     """
     if log.exists():
         raise SessionError("exists already", where=str(log), hint="Choose another name with --out")
@@ -37,7 +37,7 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
     try:
         if mesh is not None:
             read_mesh(mesh)
-            made += _copied(mesh, log.with_suffix(mesh.suffix))
+            made += _copy(mesh, log.with_suffix(mesh.suffix))
         write_contact_log(log, contacts)
         read_contact_log(log)  # refuses normals that point inward
     except TactileLabError as error:
@@ -50,7 +50,7 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
     return contacts
 
 
-def _copied(mesh: Path, copy: Path) -> list[Path]:
+def _copy(mesh: Path, copy: Path) -> list[Path]:
     """The file that was made: none where the mesh is in its place already. Raises SessionError, WriteError."""
     if copy.exists() and copy.resolve() != mesh.resolve():
         raise SessionError("exists already", where=str(copy), hint="Choose another name with --out")
@@ -59,5 +59,5 @@ def _copied(mesh: Path, copy: Path) -> list[Path]:
     try:
         write_whole(copy, mesh.read_bytes())
     except OSError as error:
-        raise SessionError(f"can not be read ({error.strerror})", where=str(mesh), hint="Check the path") from error
+        raise SessionError(f"cannot be read ({error.strerror})", where=str(mesh), hint="Check the path") from error
     return [copy]

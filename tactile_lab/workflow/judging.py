@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from calibration.admission import refuse_foreign
+from calibration.store.admission import refuse_foreign
 from drivers.camera.calibration import is_opencv, load_camera
 from drivers.camera.markers import MarkerSettings
-from sessions.progress import NullProgress, Progress
-from sessions.session import RESULTS, Session
-from sessions.session_outcome import SessionOutcome
-from sessions.traffic_reader import Loss
+from drivers.core.atomic_files import write_whole
+from drivers.core.calibration_file import load_parameters
+from drivers.core.configuration import validate
+from drivers.core.contacts import Grasp
+from drivers.core.errors import SessionError, TactileLabError
+from sessions.conductor.progress import NullProgress, Progress
+from sessions.conductor.session_outcome import SessionOutcome
+from sessions.recording.session import RESULTS, Session
+from sessions.recording.traffic.reader import Loss
 from tactile_lab import report
-from tactile_lab.calibration_file import load_parameters
-from tactile_lab.errors import SessionError, TactileLabError
-from tactile_lab.evaluation.evaluation import Evaluation, Truth, evaluate
-from tactile_lab.evaluation.marker_truth import Basis, MarkerTruth, TruthReport
-from tactile_lab.evaluation.result_files import write_results
-from tactile_lab.evaluation.results import read_results
-from tactile_lab.evaluation.session_truth import TRUTH_TRAJECTORY, camera_datagrams, session_truth
+from tactile_lab.evaluation.evaluation import Evaluation, evaluate
+from tactile_lab.evaluation.files.result_files import write_results
+from tactile_lab.evaluation.files.results import read_results
+from tactile_lab.evaluation.judged import Truth
 from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
-from tactile_lab.geometry.contacts import Grasp
+from tactile_lab.evaluation.truth.marker_truth import Basis, MarkerTruth, TruthReport
+from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY, camera_datagrams, session_truth
 from tactile_lab.rigs.description import OTHER_VERSION, Rig, rig_of_session
-from tactile_lab.slam import TactileSlam
-from tactile_lab.strict_yaml import validate
-from tactile_lab.whole_files import write_whole
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 EVALUATION = "evaluation.json"
 _KNOWN = ("known.csv", "known.ply")
@@ -89,8 +91,8 @@ def judge_results(session: Session, results: Path, choice: TruthChoice) -> tuple
         The evaluation, what the truth was worth (None without a camera), and what of the recording could not be read.
 
     Raises:
-        ConfigurationError: a calibration can not be used.
-        SessionError: there are no results, or the recording can not be read.
+        ConfigurationError: a calibration cannot be used.
+        SessionError: there are no results, or the recording cannot be read.
     """
     traffic, count = session.traffic(), len(read_results(results).trajectory.stamps_s)
     detector = marker_detector(session, rig_of_session(session), choice)
@@ -103,7 +105,7 @@ def evaluate_session(session: Session) -> FinishedSession:
     """Judge a session's results again, against the markers in its recorded pictures and its true mesh.
 
     Raises:
-        SessionError: there are no results, or the recording can not be read.
+        SessionError: there are no results, or the recording cannot be read.
     """
     evaluation, loss = _write_evaluation(session, rig_of_session(session), session.results)
     return FinishedSession(session.folder, session.results, evaluation=evaluation, unread=loss.describe())
@@ -115,12 +117,22 @@ def has_results(session: Session) -> bool:
 
 
 def differing_files(one: Path, other: Path) -> list[str]:
-    """Names of replayable result files that are not the same, byte for byte, in two folders."""
+    """Names of replayable result files that are not the same, byte for byte, in two folders.
 
-    def content(folder: Path, name: str) -> bytes | None:
-        return (folder / name).read_bytes() if (folder / name).is_file() else None
+    Settings in ``slam.json`` do not count: each version writes them by its own names.
+    """
+    return [name for name in REPLAYABLE if _replayed_content(one / name) != _replayed_content(other / name)]
 
-    return [name for name in REPLAYABLE if content(one, name) != content(other, name)]
+
+def _replayed_content(file: Path) -> object:
+    if not file.is_file():
+        return None
+    if file.name != "slam.json":
+        return file.read_bytes()
+    try:
+        return {key: value for key, value in json.loads(file.read_bytes()).items() if key != "settings"}
+    except (ValueError, AttributeError):  # damaged: compared as it is
+        return file.read_bytes()
 
 
 def estimate_rest(slam: TactileSlam, grasps: Sequence[Grasp], progress: Progress | None = None) -> None:
@@ -128,7 +140,7 @@ def estimate_rest(slam: TactileSlam, grasps: Sequence[Grasp], progress: Progress
     progress = progress or NullProgress()
     for number, grasp in enumerate(grasps[slam.step_count :], slam.step_count + 1):
         progress.phase(number, "estimate")
-        slam.take(grasp)
+        slam.add_grasp(grasp)
 
 
 def judge(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp], out: Path) -> FinishedSession:
@@ -153,7 +165,7 @@ def remove_results(out: Path) -> None:
             (out / name).unlink(missing_ok=True)
     except OSError as error:
         hint = "Choose another folder for the results (--into or --out)"
-        raise SessionError(f"can not be replaced ({error.strerror})", where=str(out / name), hint=hint) from error
+        raise SessionError(f"cannot be replaced ({error.strerror})", where=str(out / name), hint=hint) from error
 
 
 def _write_evaluation(session: Session, rig: Rig, out: Path) -> tuple[Evaluation, Loss]:
@@ -167,7 +179,7 @@ def write_evaluation(out: Path, truth: Truth, object_name: str) -> Evaluation:
 
     Raises:
         SessionError, ShapeError: as :func:`tactile_lab.evaluation.evaluation.evaluate`.
-        WriteError: the folder can not be written.
+        WriteError: the folder cannot be written.
     """
     stamps_s = read_results(out).trajectory.stamps_s
     write_whole(out / TRUTH_TRAJECTORY, trajectory_text(Trajectory(stamps_s, truth.world_T_object)))
@@ -180,8 +192,8 @@ def marker_detector(session: Session, rig: Rig, choice: TruthChoice | None = Non
     """Finds the object in what the session's camera sent; None for a rig without a camera.
 
     Raises:
-        ConfigurationError: the chosen or recorded calibration can not be used, or is of another rig.
-        SessionError: the recording can not be read.
+        ConfigurationError: the chosen or recorded calibration cannot be used, or is of another rig.
+        SessionError: the recording cannot be read.
     """
     choice = choice or TruthChoice()
     for chosen in (choice.lens, choice.markers):

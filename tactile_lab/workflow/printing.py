@@ -10,11 +10,11 @@ import yaml
 
 from drivers.camera.boards import AnyBoard, CHECK_BAR_mm, SingleMarker, load_board
 from drivers.camera.markers import MarkerSettings
-from drivers.camera.print_files import pdf_bytes, svg_text
-from drivers.camera.print_layout import Sheet, sheet_of
-from tactile_lab.calibration_file import load_parameters
-from tactile_lab.strict_yaml import StrictModel, validate
-from tactile_lab.whole_files import write_whole
+from drivers.camera.printing.print_files import pdf_bytes, svg_text
+from drivers.camera.printing.print_layout import Sheet, sheet_of
+from drivers.core.atomic_files import write_whole
+from drivers.core.calibration_file import load_parameters
+from drivers.core.configuration import StrictModel, validate
 
 _HEAD = "# Made by tactile-lab markers; measured_bar_mm is the length of the print's check bar, 100 mm if it is true.\n"
 _RIG_HEAD = "# The markers of a rig as they were printed: name this file as calibration.markers in the rig file.\n"
@@ -36,7 +36,7 @@ def print_sheet(boards: Mapping[str, AnyBoard], out: Path, name: str, paper: str
 
     Raises:
         ConfigurationError: the boards do not fit on the paper.
-        WriteError: the files can not be written.
+        WriteError: the files cannot be written.
     """
     pdf, svg = _write_vectors(sheet_of(list(boards.values()), paper), out, name)
     descriptions = [_write(out / f"{each}.yaml", _text(board, _HEAD)) for each, board in boards.items()]
@@ -49,7 +49,7 @@ def print_rig_markers(markers_file: Path, out: Path, paper: str, measured_mm: fl
     """A sheet with the world marker and the object's marker of a rig, and the rig's marker file with the true scale.
 
     Raises:
-        ConfigurationError: the file can not be used, or the bar is half a per cent off.
+        ConfigurationError: the file cannot be used, or the bar is half a per cent off.
     """
     settings = load_parameters(markers_file, MarkerSettings)
     sides = {settings.world_id: settings.world_side_m, settings.object_id: settings.object_side_m}

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from sessions.contact_log import ContactLog, read_contact_log
-from sessions.listing import find_session
-from sessions.progress import NullProgress, Progress
-from tactile_lab.errors import ConfigurationError, TactileLabError
-from tactile_lab.evaluation.evaluation import Truth
+from drivers.core.configuration import load, validate
+from drivers.core.contacts import Array
+from drivers.core.errors import ConfigurationError, TactileLabError
+from sessions.conductor.progress import NullProgress, Progress
+from sessions.exchange.contact_log import ContactLog, read_contact_log
+from sessions.recording.listing import find_session
+from tactile_lab.evaluation.files.mesh_io import read_mesh
+from tactile_lab.evaluation.files.result_files import write_results
+from tactile_lab.evaluation.judged import Truth
 from tactile_lab.evaluation.prism import open_ring
-from tactile_lab.evaluation.result_files import write_results
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.mesh_io import read_mesh
-from tactile_lab.slam import SlamSettings, TactileSlam
-from tactile_lab.strict_yaml import load, validate
+from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.workflow.judging import FinishedSession, estimate_rest, remove_results, write_evaluation
 from tactile_lab.workflow.replaying import check_replaceable, recorded_seed, recorded_slam, replay_session
 
@@ -32,11 +32,11 @@ class Wishes:
     """What a person asks of an estimation; None where the data or the defaults decide.
 
     Attributes:
-        method: by name, see :class:`tactile_lab.tracking.trackers.TrackingSettings`.
+        method: by name, see :class:`tactile_lab.slam.tracking.trackers.TrackingSettings`.
         dimension: 2 or 3.
         seed: of all that is left to chance.
-        settings: a YAML file with any part of :class:`tactile_lab.slam.SlamSettings`.
-        shape: model of the final shape by name, see :data:`tactile_lab.shape.models.ShapeName`.
+        settings: a YAML file with any part of :class:`tactile_lab.slam.tactile_slam.SlamSettings`.
+        shape: model of the final shape by name, see :data:`tactile_lab.slam.shape.selection.models.SHAPE_MODELS`.
         largest_sigma_m: write the parts of the shape that are known so well once more, apart.
     """
 
@@ -47,7 +47,7 @@ class Wishes:
     shape: str | None = None
     largest_sigma_m: float | None = None
 
-    def applied(self, given: dict[str, Any]) -> SlamSettings:
+    def apply(self, given: dict[str, Any]) -> SlamSettings:
         """The settings: the data's, changed by the file's, changed by the options'.
 
         Raises:
@@ -83,7 +83,7 @@ def reconstruct(
 
     Raises:
         ConfigurationError: log, settings or folder do not fit, or the method needs a truth that is not there.
-        SessionError, ShapeError: the data, or the true mesh, can not be read.
+        SessionError, ShapeError: the data, or the true mesh, cannot be read.
     """
     path = Path(source)
     if path.suffix.lower() == ".csv":
@@ -93,7 +93,7 @@ def reconstruct(
         return reconstruct_log(path, wishes, out, progress)
     session = find_session(root, source)
     own = recorded_slam(session)
-    settings = wishes.applied({"method": own.method, "dimension": own.dimension, "motion": own.motion.model_dump()})
+    settings = wishes.apply({"method": own.method, "dimension": own.dimension, "motion": own.motion.model_dump()})
     seed = recorded_seed(session) if wishes.seed is None else wishes.seed
     return replay_session(session, settings, seed, out or session.folder / f"reconstruct-{_label(settings)}", progress)
 
@@ -103,7 +103,7 @@ def reconstruct_log(
 ) -> FinishedSession:
     """As :func:`reconstruct`, for a log's file."""
     log = read_contact_log(path)
-    settings, progress = wishes.applied(log_settings(log)), progress or NullProgress()
+    settings, progress = wishes.apply(log_settings(log)), progress or NullProgress()
     if settings.dimension > log.dimension:
         raise ConfigurationError("a log of dimension 2 has no heights", where=str(path), hint="Ask for dimension 2")
     out = out or path.with_name(f"{path.stem}-{_label(settings)}")
@@ -140,7 +140,7 @@ def log_truth(log: ContactLog, folder: Path) -> Truth:
     """The truth in a log, for evaluation. A mesh is a file beside the log.
 
     Raises:
-        ShapeError: the mesh can not be used, or the polygon has no area.
+        ShapeError: the mesh cannot be used, or the polygon has no area.
     """
     mesh: trimesh.Trimesh | None = None
     outline_m: Array | None = None

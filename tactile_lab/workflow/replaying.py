@@ -7,17 +7,17 @@ from pathlib import Path
 
 from gtsam import Pose3
 
-from sessions.pacing import AS_FAST_AS_POSSIBLE
-from sessions.progress import NullProgress, Progress
-from sessions.replay import Replay, kept_grasps
-from sessions.session import Session
-from sessions.traffic_reader import Loss
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.evaluation.session_truth import session_truth
+from drivers.core.configuration import recorded_keys, validate
+from drivers.core.errors import ConfigurationError
+from sessions.conductor.progress import NullProgress, Progress
+from sessions.perception.replay import Replay, kept_grasps
+from sessions.recording.pacing import AS_FAST_AS_POSSIBLE
+from sessions.recording.session import Session
+from sessions.recording.traffic.reader import Loss
+from tactile_lab.evaluation.truth.session_truth import session_truth
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import OTHER_VERSION, rig_of_session
-from tactile_lab.slam import SlamSettings, TactileSlam
-from tactile_lab.strict_yaml import validate
+from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.workflow.judging import (
     RESULT_FILES,
     FinishedSession,
@@ -47,7 +47,7 @@ def replay_session(
 
     Raises:
         ConfigurationError: ``out`` holds other files.
-        SessionError: the recording can not be used at all. One that was cut off is used up to the cut.
+        SessionError: the recording cannot be used at all. One that was cut off is used up to the cut.
     """
     if has_results(session) and out.resolve() == session.results.resolve():
         hint = "Choose another folder for the results (--into or --out)"
@@ -79,7 +79,7 @@ def true_poses(session: Session, grasp_count: int) -> tuple[Pose3 | None, ...]:
     """The object's pose at each grasp by the marker camera; None where it was not seen.
 
     Raises:
-        SessionError, ConfigurationError: the recording, or the calibration in it, can not be used.
+        SessionError, ConfigurationError: the recording, or the calibration in it, cannot be used.
     """
     return session_truth(session, grasp_count, marker_detector(session, rig_of_session(session))).world_T_object
 
@@ -92,7 +92,7 @@ def check_replaceable(out: Path) -> None:
     except FileNotFoundError:
         return
     except OSError as error:
-        raise ConfigurationError(f"can not be used ({error.strerror})", where=str(out), hint=hint) from error
+        raise ConfigurationError(f"cannot be used ({error.strerror})", where=str(out), hint=hint) from error
     if strange:
         raise ConfigurationError(f"holds files that are no results, such as {strange[0]}", where=str(out), hint=hint)
 
@@ -100,7 +100,8 @@ def check_replaceable(out: Path) -> None:
 def recorded_slam(session: Session) -> SlamSettings:
     """The estimation's settings of a session. Raises ConfigurationError."""
     where = f"{session.folder}/session.yaml"
-    return validate(session.manifest.settings.get("slam", {}), SlamSettings, where=where, hint=OTHER_VERSION)
+    with recorded_keys():
+        return validate(session.manifest.settings.get("slam", {}), SlamSettings, where=where, hint=OTHER_VERSION)
 
 
 def recorded_seed(session: Session) -> int:

@@ -8,25 +8,25 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from calibration.admission import UNCALIBRATED, admit
+from calibration.store.admission import UNCALIBRATED, admit
+from drivers.core.configuration import validate
+from drivers.core.errors import ConfigurationError, EstimationError, InterruptionError
 from drivers.simulation.objects import ObjectModel
-from sessions.conductor import Conductor
-from sessions.conductor_settings import ConductorSettings
-from sessions.manifest import Status
-from sessions.progress import Progress
-from sessions.recorder import Level
-from sessions.session import RunningSession, create_session
-from sessions.session_outcome import Ending, SessionOutcome
-from tactile_lab.errors import ConfigurationError, EstimationError, InterruptionError
-from tactile_lab.exploration.policies import make_policy
+from sessions.conductor.conductor import Conductor
+from sessions.conductor.progress import Progress
+from sessions.conductor.session_outcome import Ending, SessionOutcome
+from sessions.recording.manifest import Status
+from sessions.recording.recorder import Level
+from sessions.recording.session import RunningSession, create_session
+from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.laboratory import Laboratory, open_laboratory
 from tactile_lab.rigs.recording import record_camera, stampers, traffic_settings
-from tactile_lab.slam import SlamSettings, TactileSlam
-from tactile_lab.strict_yaml import validate
-from tactile_lab.tracking.motion import MotionNoise
-from tactile_lab.workflow.attending import Attendance, crew_for, settings_for
+from tactile_lab.slam.exploration.policies import make_policy
+from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.workflow.attending import Attendance, roles_for, settings_for
 from tactile_lab.workflow.judging import FinishedSession, estimate_rest, judge
 
 ALONE = Attendance()
@@ -84,7 +84,7 @@ def run_session(request: SessionRequest, progress: Progress, attendance: Attenda
         attendance: who guides it, or watches.
 
     Raises:
-        ConfigurationError, ShapeError: the request can not be met; nothing was recorded.
+        ConfigurationError, ShapeError: the request cannot be met; nothing was recorded.
         DeviceError: the rig is not ready; the session folder says so, where there is one yet.
         SessionError: the session could not be recorded.
         InterruptionError: a person ended it at once; the session folder is kept and readable.
@@ -104,11 +104,11 @@ def run_session(request: SessionRequest, progress: Progress, attendance: Attenda
             outcome = _record(session, rig, laboratory, slam, request, progress, attendance)
     with _kept_when_interrupted(session):
         progress.phase(len(outcome.grasps), "model and evaluation")
-        finished = _judged(session, rig, slam, outcome)
+        finished = _evaluate(session, rig, slam, outcome)
     return replace(finished, outcome=outcome, data_loss=session.manifest.data_loss, overlooked=overlooked)
 
 
-def _judged(session: RunningSession, rig: Rig, slam: TactileSlam, outcome: SessionOutcome) -> FinishedSession:
+def _evaluate(session: RunningSession, rig: Rig, slam: TactileSlam, outcome: SessionOutcome) -> FinishedSession:
     """The results, of all grasps; none where the estimation has failed, as it would fail on them again."""
     if isinstance(outcome.error, EstimationError):
         return FinishedSession(session.folder, session.results, problem=str(outcome.error))
@@ -138,23 +138,23 @@ def _record(
     """Connect, grasp until done, disconnect; the session is closed in any case."""
     with session:
         if attendance.onlooker is not None:
-            session.recorder.watched_by(attendance.onlooker)
-        bench = laboratory.bench(session.recorder)
-        bench.tell_problems_to(progress.told)
+            session.recorder.add_onlooker(attendance.onlooker)
+        runtime = laboratory.runtime(session.recorder)
+        runtime.tell_problems_to(progress.on_message)
         settings = settings_for(_conductor_settings(rig, request), attendance)
         seed, dimension = request.seed, request.dimension
-        crew = crew_for(attendance, bench, slam, settings, session.folder, seed=seed, dimension=dimension)
-        with crew.thinking:
-            bench.connect()
-            record_camera(rig, session.recorder, bench.clock.now_ns())
+        roles = roles_for(attendance, runtime, slam, settings, session.folder, seed=seed, dimension=dimension)
+        with roles.estimator:
+            runtime.connect()
+            record_camera(rig, session.recorder, runtime.clock.now_ns())
             try:
-                outcome = Conductor(bench, settings, crew, progress).run()
+                outcome = Conductor(runtime, settings, roles, progress).run()
             finally:
-                bench.close()
+                runtime.close()
         for remark in laboratory.remarks():
-            bench.event(Level.WARNING, "laboratory", remark)
-            progress.told(remark)
-        _close(session, outcome, bench.counts.overruns, bench.losses)
+            runtime.log(Level.WARNING, "laboratory", remark)
+            progress.on_message(remark)
+        _close(session, outcome, runtime.counts.overruns, runtime.losses)
     return outcome
 
 
@@ -194,7 +194,7 @@ def _ply(target: ObjectModel) -> bytes:
     return text
 
 
-def _conductor_settings(rig: Rig, request: SessionRequest) -> ConductorSettings:
+def _conductor_settings(rig: Rig, request: SessionRequest) -> SessionSettings:
     settings = rig.description.conductor
     changes: dict[str, Any] = {} if request.grasps is None else {"grasps": request.grasps}
     if request.policy is not None:

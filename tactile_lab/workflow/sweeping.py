@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from drivers.core.errors import SessionError
 from drivers.simulation.objects import CATALOGUE
-from sessions.progress import NullProgress
-from sessions.session import Session
-from sessions.session_outcome import Ending, SessionOutcome
-from tactile_lab.errors import SessionError
+from sessions.conductor.progress import NullProgress
+from sessions.conductor.session_outcome import Ending, SessionOutcome
+from sessions.recording.session import Session
 from tactile_lab.evaluation.sweep import SweepRun
 from tactile_lab.rigs.build import check_calibration, simulated_world
 from tactile_lab.rigs.description import load_rig
@@ -24,8 +24,8 @@ def check_sweep(rig: str, objects: Sequence[str] | None, root: Path, method: str
 
     Raises:
         ConfigurationError: no such rig, object or calibration, or a method that needs the truth.
-        ShapeError: an object's mesh can not be used.
-        SessionError: the folder of the sessions can not be made.
+        ShapeError: an object's mesh cannot be used.
+        SessionError: the folder of the sessions cannot be made.
     """
     refuse_known_pose(method)
     loaded = load_rig(rig)
@@ -36,7 +36,7 @@ def check_sweep(rig: str, objects: Sequence[str] | None, root: Path, method: str
         root.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         hint = "Choose another folder with --out"
-        raise SessionError(f"can not be made ({error.strerror})", where=str(root), hint=hint) from error
+        raise SessionError(f"cannot be made ({error.strerror})", where=str(root), hint=hint) from error
     return tuple(objects or CATALOGUE)
 
 

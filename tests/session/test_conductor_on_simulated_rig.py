@@ -10,25 +10,25 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from drivers.shadow.palm_codec import decode_command
+from drivers.core.contacts import Array, Contact, Grasp
+from drivers.core.poses import transform_points
+from drivers.shadow.protocol.palm_codec import decode_command
 from drivers.simulation.settings import ObjectStart
 from drivers.simulation.world import SimulatedWorld
-from sessions.autonomous_crew import autonomous_crew
-from sessions.bench import Bench
-from sessions.conductor import Conductor
-from sessions.conductor_settings import ConductorSettings
-from sessions.explorer import ExplorationSettings
-from sessions.marks import Mark, MarkKind
-from sessions.progress import GraspReport, NullProgress
-from sessions.recorder import Recorder
-from sessions.safety import SafetySettings
-from sessions.schemas import MARKS_TOPIC, transmitted_topic
-from sessions.session_outcome import Ending, SessionOutcome
-from tactile_lab.geometry.contacts import Array, Contact, Grasp
-from tactile_lab.geometry.poses import transform_points
-from tactile_lab.rigs.build import build_bench
+from sessions.conductor.conductor import Conductor
+from sessions.conductor.progress import GraspReport, NullProgress
+from sessions.conductor.session_outcome import Ending, SessionOutcome
+from sessions.motion.safety import SafetySettings
+from sessions.recording.recorder import Recorder
+from sessions.recording.session_events import EventKind, SessionEvent
+from sessions.recording.traffic.schemas import SESSION_EVENTS_TOPIC, transmitted_topic
+from sessions.rig_runtime.rig_runtime import RigRuntime
+from tactile_lab.autonomy.autonomous_roles import autonomous_roles
+from tactile_lab.autonomy.settings import SessionSettings
+from tactile_lab.autonomy.variance_planner import ExplorationSettings
+from tactile_lab.rigs.build import build_runtime
 from tactile_lab.rigs.description import load_rig
-from tactile_lab.slam import SlamSettings, TactileSlam
+from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 
 SEED = 0
 
@@ -37,12 +37,12 @@ SEED = 0
 class MemorySink:
     """Keeps marks and what was sent to the hand; forgets the rest."""
 
-    marks: list[Mark] = field(default_factory=list)
+    marks: list[SessionEvent] = field(default_factory=list)
     commands: list[bytes] = field(default_factory=list)
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        if topic == MARKS_TOPIC:
-            self.marks.append(Mark.from_bytes(data))
+        if topic == SESSION_EVENTS_TOPIC:
+            self.marks.append(SessionEvent.from_bytes(data))
         elif topic == transmitted_topic("hand"):
             self.commands.append(data)
 
@@ -88,31 +88,31 @@ def run(
     rig = load_rig("sim")
     simulation = rig.description.simulation.model_copy(update={"object": "box-10x6x4", "start": start})
     world, sink = SimulatedWorld(simulation, SEED), MemorySink()
-    bench = build_bench(rig, world, Recorder(sink))
-    watcher, truth = Watcher(lambda number, name: act(world, number, name)), watch_truth(bench, world)
+    runtime = build_runtime(rig, world, Recorder(sink))
+    watcher, truth = Watcher(lambda number, name: act(world, number, name)), watch_truth(runtime, world)
     carrying = ExplorationSettings(policy=None)
-    settings = ConductorSettings(grasps=grasps, safety=safety or SafetySettings(), exploration=carrying)
-    bench.connect()
+    settings = SessionSettings(grasps=grasps, safety=safety or SafetySettings(), exploration=carrying)
+    runtime.connect()
     try:
         slam = TactileSlam(SlamSettings(), SEED)
-        conductor = Conductor(bench, settings, autonomous_crew(bench, slam, settings, seed=SEED), watcher)
+        conductor = Conductor(runtime, settings, autonomous_roles(runtime, slam, settings, seed=SEED), watcher)
         outcome = conductor.run()
     finally:
-        bench.close()
+        runtime.close()
     return Session(outcome, sink, watcher.reports, truth)
 
 
-def watch_truth(bench: Bench, world: SimulatedWorld) -> list[TrueGrasp]:
-    """Keep what is true at the end of every capture, without the bench knowing."""
+def watch_truth(runtime: RigRuntime, world: SimulatedWorld) -> list[TrueGrasp]:
+    """Keep what is true at the end of every capture, without the rig runtime knowing."""
     seen: list[TrueGrasp] = []
-    measured = bench.end_capture
+    measured = runtime.end_capture
 
     def end_capture() -> Grasp:
         grasp, truth = measured(), world.truth()
         seen.append(TrueGrasp(truth.contacts, np.asarray(truth.world_T_object.translation())))
         return grasp
 
-    bench.end_capture = end_capture  # type: ignore[method-assign]
+    runtime.end_capture = end_capture  # type: ignore[method-assign]
     return seen
 
 
@@ -178,11 +178,11 @@ def test_hand_motion_predicts_the_object_up_to_slip(session: Session) -> None:
 
 
 def test_marks_tell_the_cycle(session: Session) -> None:
-    kinds = [mark.kind for mark in session.sink.marks if mark.kind is not MarkKind.TARE]
-    measured = [MarkKind.CLOSE_BEGIN, MarkKind.CAPTURE_BEGIN, MarkKind.CAPTURE_END, MarkKind.TRUTH_FRAME]
-    carried = [MarkKind.HOLD_BEGIN, MarkKind.HOLD_END]
+    kinds = [mark.kind for mark in session.sink.marks if mark.kind is not EventKind.TARE]
+    measured = [EventKind.CLOSE_BEGIN, EventKind.CAPTURE_BEGIN, EventKind.CAPTURE_END, EventKind.TRUTH_FRAME]
+    carried = [EventKind.HOLD_BEGIN, EventKind.HOLD_END]
     assert kinds == [*measured, *carried, *measured, *carried, *measured]
-    assert sum(mark.kind is MarkKind.TARE for mark in session.sink.marks) >= 3
+    assert sum(mark.kind is EventKind.TARE for mark in session.sink.marks) >= 3
 
 
 def test_reports_tell_what_happened(session: Session) -> None:
@@ -224,4 +224,4 @@ def test_ctrl_c_finishes_the_capture() -> None:
     session = run(9, interrupt)
     assert session.outcome.ending is Ending.INTERRUPTED
     assert len(session.outcome.grasps) == 1
-    assert session.sink.marks[-1].kind is MarkKind.TRUTH_FRAME
+    assert session.sink.marks[-1].kind is EventKind.TRUTH_FRAME

@@ -9,16 +9,16 @@ from tests.support.session_sweep import run_with
 
 
 @pytest.mark.parametrize(
-    ("link", "fault", "words"),
+    ("transport", "fault", "words"),
     [
         ("hand", "unplug", "hand: the wire is unplugged"),
         ("base", "delay", "cycles in a row without a status"),
         ("ft/MF", "unplug", "ft/MF: the wire is unplugged"),
     ],
 )
-def test_a_link_that_fails_ends_the_session_in_order_and_its_recording_is_whole(tmp_path, link, fault, words):
-    swept = run_with("sim", {link: fault}, tmp_path, at_s=0.5)
-    swept.check(link, fault)
+def test_a_link_that_fails_ends_the_session_in_order_and_its_recording_is_whole(tmp_path, transport, fault, words):
+    swept = run_with("sim", {transport: fault}, tmp_path, at_s=0.5)
+    swept.check(transport, fault)
     assert words in swept.ended
     assert swept.replay.startswith("read")
 

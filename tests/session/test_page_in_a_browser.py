@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from sessions import schemas
 from sessions.guided.operator import Ask, Request
-from sessions.recorder import Level
-from sessions.session import create_session
+from sessions.recording.recorder import Level
+from sessions.recording.session import create_session
+from sessions.recording.traffic import schemas
 from tactile_lab.view.feed import ViewFeed
 from tests.support.browser import Browser, chromium, until
 
@@ -42,7 +42,7 @@ def test_every_button_that_a_person_presses_reaches_the_session_and_the_recordin
 ) -> None:
     session = create_session(tmp_path / "runs", rig="sim", rig_description={}, object_name="box")
     with session, Browser(program, feed.url, tmp_path / "profile") as browser:
-        session.recorder.watched_by(feed)
+        session.recorder.add_onlooker(feed)
         session.recorder.guide(1, {"grasp": 1, "stage": "hold", "prompt": "Hold the object", "paused": "as asked"})
         until(lambda: browser.shows("Hold the object"), "the prompt")
         assert browser.shows("Paused: as asked")
@@ -66,8 +66,8 @@ def test_every_button_that_a_person_presses_reaches_the_session_and_the_recordin
         assert feed.pid is not None
         os.kill(feed.pid, signal.SIGKILL)  # the page dies while a browser shows it
         for stamp in range(50):
-            session.recorder.event(10 + stamp, Level.INFO, "test", "goes on")
+            session.recorder.log(10 + stamp, Level.INFO, "test", "goes on")
     assert session.manifest.status == "closed"
     traffic = session.traffic()
-    assert sum(message.topic == schemas.EVENTS_TOPIC for message in traffic.messages()) == 50
+    assert sum(message.topic == schemas.LOG_TOPIC for message in traffic.messages()) == 50
     assert not traffic.loss

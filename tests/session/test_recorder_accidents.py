@@ -9,11 +9,11 @@ from dataclasses import asdict
 
 import pytest
 
-from sessions.full_load import STREAMS, LoadSettings, number_of, payload, read_status
-from sessions.session import Session
-from tactile_lab.errors import SessionError
-from tactile_lab.experiments import crash_runs
+from drivers.core.errors import SessionError
+from sessions.recording.session import Session
 from tactile_lab.experiments.cells import Cell
+from tactile_lab.experiments.data.recorder_load import STREAMS, LoadSettings, number_of, payload, read_status
+from tactile_lab.experiments.runs import crash_runs
 
 
 def figures(fault, seed):
@@ -53,7 +53,7 @@ def test_a_clock_that_jumps_back_loses_nothing_and_the_late_messages_are_counted
 
 def test_a_queue_that_overflows_drops_whole_parts_and_counts_every_message(tmp_path):
     settings = LoadSettings(seconds=3.0, stall_tick=500, stall_s=1.5, queue_bytes=400_000)
-    words = [sys.executable, "-m", "sessions.full_load", tmp_path / "runs", tmp_path / "status"]
+    words = [sys.executable, "-m", "tactile_lab.experiments.data.recorder_load", tmp_path / "runs", tmp_path / "status"]
     (tmp_path / "runs").mkdir()
     subprocess.run([*words, json.dumps(asdict(settings))], check=True, timeout=60)
     (folder,) = (tmp_path / "runs").iterdir()

@@ -8,25 +8,25 @@ import pytest
 from drivers.ati.nano17 import Nano17, Nano17Settings
 from drivers.biotac.biotac import BioTac
 from drivers.camera.camera import Camera
-from drivers.links import ReplayLink, TappedLink
-from drivers.positioner import Positioner, mount_joints, mount_T_forearm
-from drivers.shadow.closing import closing
-from drivers.shadow.hand import ShadowHand
-from drivers.shadow.hand_samples import HandDecoder
-from drivers.shadow.hand_settings import HandSettings
-from drivers.shadow.kinematics import JOINTS, forearm_T_palm
+from drivers.core.clock import VirtualClock
+from drivers.core.contacts import FINGERS, Grasp
+from drivers.core.transports import ReplayTransport, TappedTransport
+from drivers.positioner.positioner import Positioner, mount_joints, mount_T_forearm
+from drivers.shadow.closing.closing import closing
+from drivers.shadow.device.hand import ShadowHand
+from drivers.shadow.device.hand_samples import HandDecoder
+from drivers.shadow.device.hand_settings import HandSettings
+from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm
 from drivers.simulation.settings import ObjectStart, SimulationSettings
 from drivers.simulation.world import SimulatedWorld
-from sessions.bench import Bench
-from sessions.closing_lines import TipSurface
-from sessions.interpreter import Interpreter, Observer, fingertip_link
-from sessions.mark_outcomes import TruthFrame
-from sessions.perception import Perception
-from sessions.replay import Replay
-from sessions.sensor_stream import SensorStream
-from sessions.session import create_session
-from tactile_lab.clock import VirtualClock
-from tactile_lab.geometry.contacts import FINGERS, Grasp
+from sessions.perception.approach_paths import TipSurface
+from sessions.perception.event_outcomes import TruthFrame
+from sessions.perception.interpreter import Interpreter, Observer, fingertip_link
+from sessions.perception.perception import Perception
+from sessions.perception.replay import Replay
+from sessions.recording.session import create_session
+from sessions.rig_runtime.rig_runtime import RigRuntime
+from sessions.rig_runtime.sensor_stream import SensorStream
 
 CYCLE_ns = 10_000_000
 SETTINGS = Nano17Settings()
@@ -37,11 +37,11 @@ def make_interpreter(world):
     slots, tips = {}, {}
     if world.settings.fingertips == "nano17":
         tips = {
-            finger: Nano17(finger, ReplayLink(fingertip_link(finger), []), clock, tip, SETTINGS)
-            for finger, tip in known.fingertips.items()
+            finger: Nano17(finger, ReplayTransport(fingertip_link(finger), []), clock, tip, SETTINGS)
+            for finger, tip in known.tips["nano17"].items()
         }
     else:
-        slots = {finger: BioTac(finger, tip) for finger, tip in known.biotacs.items()}
+        slots = {finger: BioTac(finger, tip.calibration) for finger, tip in known.tips["biotac"].items()}
     surface = TipSurface.upright((0.0085, 0.0085, 0.013), (0.0, 0.0, 0.019))
     perception = Perception(
         tip_surfaces=dict.fromkeys(FINGERS, surface),
@@ -53,69 +53,74 @@ def make_interpreter(world):
     return Interpreter(
         perception,
         hand=HandDecoder(known.joints),
-        base=Positioner(ReplayLink("base", []), clock),
+        base=Positioner(ReplayTransport("base", []), clock),
         wrenches=tips,
-        camera=Camera(ReplayLink("camera", []), clock),
+        camera=Camera(ReplayTransport("camera", []), clock),
         clock=clock,
     )
 
 
 def make_bench(world, recorder):
     observer, known = Observer(recorder, make_interpreter(world)), world.calibration
-    links = {name: TappedLink(link, observer, world.clock) for name, link in world.links().items()}
+    transports = {
+        name: TappedTransport(transport, observer, world.clock) for name, transport in world.transports().items()
+    }
     hand_settings = HandSettings(tactile="biotac" if world.settings.fingertips == "biotac" else "none")
-    wrenches = {finger: links[fingertip_link(finger)] for finger in FINGERS if fingertip_link(finger) in links}
-    return Bench(
+    wrenches = {
+        finger: transports[fingertip_link(finger)] for finger in FINGERS if fingertip_link(finger) in transports
+    }
+    return RigRuntime(
         clock=world.clock,
         cycle_ns=CYCLE_ns,
-        hand=ShadowHand(links["hand"], world.clock, known.joints, hand_settings, known.motors),
-        base=Positioner(links["base"], world.clock),
+        hand=ShadowHand(transports["hand"], world.clock, known.joints, hand_settings, known.motors),
+        base=Positioner(transports["base"], world.clock),
         observer=observer,
         wrench_devices={
-            finger: SensorStream(Nano17(finger, link, world.clock, known.fingertips[finger], SETTINGS), link)
+            finger: SensorStream(Nano17(finger, link, world.clock, known.tips["nano17"][finger], SETTINGS), link)
             for finger, link in wrenches.items()
         },
-        camera=Camera(links["camera"], world.clock),
+        camera=Camera(transports["camera"], world.clock),
         truth=world.truth,
     )
 
 
-def close_on_object(bench, table, stop_N):
+def close_on_object(runtime, table, stop_N):
     """Every finger goes on along its line until it feels the object."""
     progress = {finger: table.path(finger).valid[0] for finger in FINGERS}
     for _ in range(250):
-        loads_N = bench.perception.loads_N()
+        loads_N = runtime.perception.loads_N()
         for finger in FINGERS:
             if loads_N[finger] < stop_N:
                 progress[finger] += 4e-4 / table.path(finger).length_m
-        bench.hand.set_targets({n: a for f in FINGERS for n, a in table.joints(f, progress[f]).items()})
-        bench.cycle()
+        runtime.hand.set_targets({n: a for f in FINGERS for n, a in table.joints(f, progress[f]).items()})
+        runtime.cycle()
 
 
-def grasp_twice(bench, stop_N):
+def grasp_twice(runtime, stop_N):
     table = closing("pinch", 0.022)
-    mount_T_palm = bench.world_T_mount.inverse() * table.grasp_T_palm
+    mount_T_palm = runtime.world_T_mount.inverse() * table.grasp_T_palm
     q = mount_joints(mount_T_palm * forearm_T_palm(np.zeros(len(JOINTS))).inverse(), 0.0)
-    bench.connect()
-    bench.hand.set_targets({**table.open_targets(), "WRJ1": 0.0, "WRJ2": 0.0})
-    bench.base.set_target(q + np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]))
-    bench.run(1_500_000_000)
-    bench.tare()
-    bench.base.set_target(q)
-    bench.run(600_000_000)
-    bench.begin_closing()
-    close_on_object(bench, table, stop_N)
+    runtime.connect()
+    opened = {name: a for f in FINGERS for name, a in table.joints(f, table.paths[f].valid[0]).items()}
+    runtime.hand.set_targets({**opened, "WRJ1": 0.0, "WRJ2": 0.0})
+    runtime.base.set_target(q + np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]))
+    runtime.run(1_500_000_000)
+    runtime.tare()
+    runtime.base.set_target(q)
+    runtime.run(600_000_000)
+    runtime.begin_closing()
+    close_on_object(runtime, table, stop_N)
     grasps = []
     for _ in range(2):
-        bench.begin_capture()
-        bench.run(200_000_000)
-        grasps.append(bench.end_capture())
-        bench.truth_frame()
-        bench.begin_hold()
-        bench.base.set_target(q + np.array([0.01, 0.0, 0.0, 0.0, 0.0, 0.0]))
-        bench.run(200_000_000)
-        bench.end_hold()
-    bench.close()
+        runtime.begin_capture()
+        runtime.run(200_000_000)
+        grasps.append(runtime.end_capture())
+        runtime.truth_frame()
+        runtime.begin_hold()
+        runtime.base.set_target(q + np.array([0.01, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        runtime.run(200_000_000)
+        runtime.end_hold()
+    runtime.close()
     return grasps
 
 
@@ -133,7 +138,8 @@ def bits(grasp):
         for contact in grasp.contacts
     ]
     ways = [
-        (way.finger, way.start_world_m.tobytes(), way.end_world_m.tobytes(), way.touched) for way in grasp.closing_lines
+        (way.finger, way.start_world_m.tobytes(), way.end_world_m.tobytes(), way.touched)
+        for way in grasp.approach_paths
     ]
     poses = (grasp.world_T_palm.matrix().tobytes(), grasp.hand_motion_world.matrix().tobytes())
     return grasp.index, grasp.stamp_ns, contacts, ways, poses
@@ -151,9 +157,9 @@ def test_a_simulated_session_is_understood_the_same_from_its_bytes(tmp_path, fin
     replayed = [outcome for outcome in outcomes if isinstance(outcome, Grasp)]
     assert [bits(grasp) for grasp in replayed] == [bits(grasp) for grasp in live]
     assert len(live[0].contacts) >= 3
-    assert {way.finger for way in live[0].closing_lines if way.touched} <= {one.finger for one in live[0].contacts}
-    assert len(live[0].closing_lines) == 5
-    assert live[1].closing_lines == ()  # a second capture after one closing
+    assert {way.finger for way in live[0].approach_paths if way.touched} <= {one.finger for one in live[0].contacts}
+    assert len(live[0].approach_paths) == 5
+    assert live[1].approach_paths == ()  # a second capture after one closing
     assert live[1].hand_motion_world.x() == pytest.approx(0.01, abs=0.002)
     frames = [outcome for outcome in outcomes if isinstance(outcome, TruthFrame)]
     assert [frame.grasp_index for frame in frames] == [0, 1]

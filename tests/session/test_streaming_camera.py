@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from sessions.progress import NullProgress
-from sessions.session import Session
+from sessions.conductor.progress import NullProgress
+from sessions.recording.session import Session
 from tactile_lab import rigs
 from tactile_lab.workflow import running
 from tactile_lab.workflow.comparing import session_clock_offset
@@ -22,7 +22,7 @@ def streaming_rig(folder: Path) -> Path:
     content = yaml.safe_load((shipped / "sim.yaml").read_text())
     content["calibration"] = {role: str(shipped / file) for role, file in content["calibration"].items()}
     content["conductor"] = {"exploration": {"policy": None}}  # the object is carried: what never moves is never late
-    content.setdefault("simulation", {})["camera"] = {"stream_hz": 25.0, "late_ms": LATE_ms}
+    content.setdefault("simulation", {})["camera"] = {"stream_hz": 15.0, "late_ms": LATE_ms}
     path = folder / "streaming.yaml"
     path.write_text(yaml.safe_dump(content))
     return path

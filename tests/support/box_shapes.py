@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sessions.explorer import ExplorationSettings, KnownShape, known_shape
-from tactile_lab.shape.gpis import Gpis
+from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, known_shape
+from tactile_lab.slam.shape.fields.gpis import Gpis
 
 HEIGHT_m = 0.022
 

@@ -12,16 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from gtsam import Pose3
 
-from drivers.fingertip import TipContact
-from drivers.positioner import mount_T_forearm
-from drivers.shadow.kinematics import JOINT_INDEX, JOINTS
-from sessions.black_box import Situation
-from sessions.mark_outcomes import TareReport, Undone
-from sessions.marks import Mark, MarkKind
-from sessions.perception import Perception
-from sessions.recorder import Level, NullRecorder
-from tactile_lab.clock import VirtualClock
-from tactile_lab.geometry.contacts import FINGERS, Array, Grasp
+from drivers.core.clock import VirtualClock
+from drivers.core.contacts import FINGERS, Array, Grasp
+from drivers.core.fingertip import TipContact
+from drivers.positioner.positioner import mount_T_forearm
+from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS
+from sessions.perception.event_outcomes import TareReport, Undone
+from sessions.perception.perception import Perception
+from sessions.recording.recorder import Level, NullRecorder
+from sessions.recording.session_events import EventKind, SessionEvent
+from sessions.rig_runtime.flight_recorder import CycleSnapshot
 
 CYCLE_ns = 10_000_000
 TIP_RADIUS_m, TIP_CENTRE_m = 0.0085, np.array([0.0, 0.0, 0.019])
@@ -110,7 +110,7 @@ class Mover:
 
 
 class DiscWorld:
-    """Looks like a bench to the conductor.
+    """Looks like a rig runtime to the conductor.
 
     Args:
         disc: the object; None for an empty table.
@@ -124,8 +124,8 @@ class DiscWorld:
         self.hand, self.base = Mover(self._move_fingers), Mover(self._move_base)
         self.camera, self.fingertip_calibrations = None, {}
         self.recorder = NullRecorder()
-        self.marks: list[MarkKind] = []
-        self.events: list[tuple[Level, str]] = []
+        self.session_events: list[EventKind] = []
+        self.log_lines: list[tuple[Level, str]] = []
         self.world_T_mount = Pose3()
         self.joints_rad, self.base_q = np.zeros(len(JOINTS)), HIGH_ABOVE.copy()
         self.silent, self.cycles = False, 0
@@ -199,42 +199,42 @@ class DiscWorld:
 
     # --- marks -------------------------------------------------------------------------------------------------
 
-    def _mark(self, kind: MarkKind, fingers: tuple[str, ...] = FINGERS) -> object:
-        self.marks.append(kind)
-        return self.perception.mark(Mark(kind, self.clock.now_ns(), fingers))
+    def _mark(self, kind: EventKind, fingers: tuple[str, ...] = FINGERS) -> object:
+        self.session_events.append(kind)
+        return self.perception.event(SessionEvent(kind, self.clock.now_ns(), fingers))
 
     def tare(self, fingers: Iterable[str] = FINGERS) -> TareReport:
-        report = self._mark(MarkKind.TARE, tuple(fingers))
+        report = self._mark(EventKind.TARE, tuple(fingers))
         assert isinstance(report, TareReport)
         return report
 
     def begin_closing(self) -> None:
-        self._mark(MarkKind.CLOSE_BEGIN)
+        self._mark(EventKind.CLOSE_BEGIN)
 
     def begin_capture(self) -> None:
-        self._mark(MarkKind.CAPTURE_BEGIN)
+        self._mark(EventKind.CAPTURE_BEGIN)
 
     def end_capture(self) -> Grasp:
-        grasp = self._mark(MarkKind.CAPTURE_END)
+        grasp = self._mark(EventKind.CAPTURE_END)
         assert isinstance(grasp, Grasp)
         return grasp
 
     def end_touch(self) -> None:
-        self._mark(MarkKind.TOUCH_END)
+        self._mark(EventKind.TOUCH_END)
 
     def begin_hold(self) -> None:
-        self._mark(MarkKind.HOLD_BEGIN)
+        self._mark(EventKind.HOLD_BEGIN)
         self._held_from = self.perception.world_T_palm
 
     def end_hold(self) -> None:
-        self._mark(MarkKind.HOLD_END)
+        self._mark(EventKind.HOLD_END)
         self._held_from = None
 
     def truth_frame(self, cycle: Callable[[], None] | None = None) -> None:
-        self._mark(MarkKind.TRUTH_FRAME)
+        self._mark(EventKind.TRUTH_FRAME)
 
     def undo(self) -> Undone:
-        undone = self._mark(MarkKind.UNDO)
+        undone = self._mark(EventKind.UNDO)
         assert isinstance(undone, Undone)
         return undone
 
@@ -246,17 +246,17 @@ class DiscWorld:
         self.hand.stop()
         self.base.stop()
 
-    def situation(self) -> Situation:
+    def snapshot(self) -> CycleSnapshot:
         seen = self.perception
-        return Situation(self.clock.now_ns(), seen.hand_stamp_ns, seen.loads_N(), seen.palm_world_m)
+        return CycleSnapshot(self.clock.now_ns(), seen.hand_stamp_ns, seen.loads_N(), seen.palm_world_m)
 
     def report_stop(self, cause: str, cycles: list[dict[str, object]]) -> None:
         self.stop_reports.append((cause, len(cycles)))
 
-    def event(self, level: Level, source: str, message: str) -> None:
-        self.events.append((level, message))
+    def log(self, level: Level, source: str, message: str) -> None:
+        self.log_lines.append((level, message))
 
     @property
-    def mark_counts(self) -> Counter[MarkKind]:
+    def event_counts(self) -> Counter[EventKind]:
         """How often each kind of mark was set."""
-        return Counter(self.marks)
+        return Counter(self.session_events)

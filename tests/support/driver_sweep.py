@@ -2,12 +2,12 @@
 
     class TestTheBoxDriver(DriverSweep):
         layout = MessageLayout(...)
-        def bench(self) -> SweptBench: ...
+        def rig runtime(self) -> SweptBench: ...
 
 Each fault is injected into an otherwise healthy stream. The driver must count it (its health gains words), or stop in
-order (an error of ours that names the link and says what to do), and it must be connectable again afterwards. Faults
-that a protocol cannot show are named in ``blind`` with the reason, those that must do no harm at all in ``harmless``,
-and those by which the driver may end in ``stops``.
+order (an error of ours that names the transport and says what to do), and it must be connectable again afterwards.
+Faults that a protocol cannot show are named in ``blind`` with the reason, those that must do no harm at all in
+``harmless``, and those by which the driver may end in ``stops``.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from typing import Any, ClassVar, Protocol
 
 import pytest
 
-from drivers.faults import FarEnd, Fault, FaultyLink, Injectable, MessageLayout, When, standard_faults
-from drivers.links import Link
-from tactile_lab.clock import VirtualClock
-from tactile_lab.errors import CodecError, DeviceError, TactileLabError
+from drivers.core.clock import VirtualClock
+from drivers.core.errors import CodecError, DeviceError, TactileLabError
+from drivers.core.transports import Transport
+from tests.support.faults import FarEnd, Fault, FaultyTransport, Injectable, MessageLayout, When, standard_faults
 
 STEPS = 160
 STEP_ns = 10_000_000
@@ -44,17 +44,17 @@ class SweptBench:
     """One driver on one in-memory device.
 
     Attributes:
-        link: to the device, without faults.
+        transport: to the device, without faults.
         clock: of both.
-        build: makes the driver on a link.
+        build: makes the driver on a transport.
         step: lets the device send its next message, or do whatever it does in one cycle.
         use: lets the driver take what has arrived and gives what it made of it.
         repair: makes the device whole again after a fault of its own.
     """
 
-    link: Link
+    transport: Transport
     clock: VirtualClock
-    build: Callable[[Link], SweptDriver]
+    build: Callable[[Transport], SweptDriver]
     step: Callable[[], None]
     use: Callable[[Any], Any]
     repair: Callable[[], None] = _nothing
@@ -73,15 +73,15 @@ def _without_figures(text: str) -> str:
     return "".join(letter for letter in text if not letter.isdigit())
 
 
-def run(bench: SweptBench, driver: SweptDriver) -> Outcome:
+def run(runtime: SweptBench, driver: SweptDriver) -> Outcome:
     """Run a connected driver for the sweep's number of cycles, or until it stops."""
     words: dict[str, str] = {}
     samples = 0
     for _ in range(STEPS):
-        bench.clock.sleep_until_ns(bench.clock.now_ns() + STEP_ns)
-        bench.step()
+        runtime.clock.sleep_until_ns(runtime.clock.now_ns() + STEP_ns)
+        runtime.step()
         try:
-            samples += len(bench.use(driver))
+            samples += len(runtime.use(driver))
         except (DeviceError, CodecError) as error:
             return Outcome(words, error, samples)
         words.update({_without_figures(text): text for text in driver.health()})
@@ -96,7 +96,7 @@ class DriverSweep:
     harmless: ClassVar[frozenset[str]] = frozenset({"counter wrap"})
     stops: ClassVar[frozenset[str]] = frozenset({"unplug"})
     far_end: ClassVar[tuple[str, ...]] = ()
-    """Faults of the device itself, that the bench's link can inject (:class:`drivers.faults.Injectable`)."""
+    """Faults of the device itself that the transport can inject (:class:`tests.support.faults.Injectable`)."""
 
     def __init_subclass__(cls) -> None:
         names = cls.fault_names()
@@ -118,60 +118,60 @@ class DriverSweep:
         """All faults of the sweep."""
         return sorted([*standard_faults(cls.layout), *cls.far_end])
 
-    def bench(self) -> SweptBench:
-        """A fresh driver's bench."""
+    def runtime(self) -> SweptBench:
+        """A fresh driver's rig runtime."""
         raise NotImplementedError
 
-    def fault(self, name: str, link: Link) -> tuple[Fault, When]:
+    def fault(self, name: str, transport: Transport) -> tuple[Fault, When]:
         """A fresh fault and when it strikes."""
         if name not in self.far_end:
             return standard_faults(self.layout)[name]
-        assert isinstance(link, Injectable)
-        return FarEnd(name, link), When()
+        assert isinstance(transport, Injectable)
+        return FarEnd(name, transport), When()
 
     def sweep(self, fault_name: str, record_property: Callable[[str, object], None]) -> None:
         """Inject one fault and judge what the driver made of it."""
-        bench = self.bench()
-        healthy = bench.build(bench.link)
+        runtime = self.runtime()
+        healthy = runtime.build(runtime.transport)
         healthy.connect()
-        clean = run(bench, healthy)
+        clean = run(runtime, healthy)
         healthy.close()
         assert clean.stopped is None
 
-        bench = self.bench()
-        link = FaultyLink(bench.link, *self.fault(fault_name, bench.link))
-        driver = bench.build(link)
-        link.armed = False
+        runtime = self.runtime()
+        transport = FaultyTransport(runtime.transport, *self.fault(fault_name, runtime.transport))
+        driver = runtime.build(transport)
+        transport.armed = False
         driver.connect()
-        link.armed = True
-        outcome = run(bench, driver)
+        transport.armed = True
+        outcome = run(runtime, driver)
         new = outcome.words.keys() - clean.words.keys()
-        record_property("injected", link.injected)
+        record_property("injected", transport.injected)
         counted = "; ".join(outcome.words[each] for each in sorted(new))
         record_property("counted", counted or str(outcome.stopped or "nothing"))
-        assert link.injected > 0, "the fault never struck"
+        assert transport.injected > 0, "the fault never struck"
         self._judge(fault_name, outcome, new, clean)
         driver.close()
         driver.close()
-        link.armed = False
-        bench.repair()
-        self._works_again(bench, driver)
+        transport.armed = False
+        runtime.repair()
+        self._works_again(runtime, driver)
 
     def connect_under(self, fault_name: str) -> None:
         """Inject one fault from the first message on: the driver connects all the same, or says why not."""
-        bench = self.bench()
-        fault, when = self.fault(fault_name, bench.link)
-        link = FaultyLink(bench.link, fault, replace(when, first=0))
-        driver = bench.build(link)
+        runtime = self.runtime()
+        fault, when = self.fault(fault_name, runtime.transport)
+        transport = FaultyTransport(runtime.transport, fault, replace(when, first=0))
+        driver = runtime.build(transport)
         try:
             driver.connect()
         except (DeviceError, CodecError) as error:
             if not (error.where and error.hint):
                 pytest.fail(f"an error that does not say where and what to do: {error}")
         driver.close()
-        link.armed = False
-        bench.repair()
-        self._works_again(bench, driver)
+        transport.armed = False
+        runtime.repair()
+        self._works_again(runtime, driver)
 
     def _judge(self, fault_name: str, outcome: Outcome, new: set[str], clean: Outcome) -> None:
         if outcome.stopped is not None:
@@ -187,13 +187,13 @@ class DriverSweep:
             assert new, "the fault went by in silence"
 
     @staticmethod
-    def _works_again(bench: SweptBench, driver: SweptDriver) -> None:
+    def _works_again(runtime: SweptBench, driver: SweptDriver) -> None:
         """After closing, and with the wire plugged in again, the same driver connects and takes samples."""
         driver.connect()
-        bench.clock.sleep_until_ns(bench.clock.now_ns() + STEP_ns)
+        runtime.clock.sleep_until_ns(runtime.clock.now_ns() + STEP_ns)
         for _ in range(20):
-            bench.step()
-            if bench.use(driver):
+            runtime.step()
+            if runtime.use(driver):
                 break
         else:
             pytest.fail("no sample after connecting again")

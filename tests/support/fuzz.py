@@ -1,6 +1,6 @@
 """Random and damaged bytes against every codec: each input decodes or raises our error, and nothing else.
 
-    python -m tests.support.fuzz --count 1000000 --seed 1 --into docs/results.md
+    python -m tests.support.fuzz --count 1000000 --seed 1 --store
 
 Half of the inputs are random, every other one of these as long as a valid message; half are valid messages with bytes
 changed, cut, added or repeated. A codec is added by a line in :data:`CODECS`.
@@ -8,38 +8,37 @@ changed, cut, added or repeated. A codec is added by a line in :data:`CODECS`.
 
 from __future__ import annotations
 
-import argparse
 import random
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
-from drivers import positioner_codec
-from drivers.ati import can_codec, controller_codec, digital_calibration, gauge_stream, gauge_volts, modbus, rdt_codec
-from drivers.ati.controller_codec import AsciiLines, BinaryAnswers, Record
-from drivers.ati.gauge_stream import GaugeStream
-from drivers.ati.net_box import parse_page
+from drivers.ati.protocols import can_codec, controller_codec, digital_calibration, gauge_stream, modbus, rdt_codec
+from drivers.ati.protocols.controller_codec import AsciiLines, BinaryAnswers, Record
+from drivers.ati.protocols.gauge_stream import GaugeStream
+from drivers.ati.wires import gauge_volts
+from drivers.ati.wires.net_box import parse_page
 from drivers.biotac import cheetah_log, slot_codec
 from drivers.biotac.slot_codec import Slot
 from drivers.camera.frames import Detection, Frame, SeenMarker
 from drivers.camera.packet import MAGIC, decode_packet, encode_packet
-from drivers.emulators import slcan_unit
-from drivers.emulators.ati_sensor import emulated_calibration
-from drivers.emulators.net_box_unit import NetBoxUnit
+from drivers.core.errors import CodecError
+from drivers.core.records import RecordKind, RecordReader, encode_record
+from drivers.core.transports import Datagram
+from drivers.emulators.ati.net_box_unit import NetBoxUnit
+from drivers.emulators.ati.sensor import emulated_calibration
 from drivers.ethercat import frames as ethercat
 from drivers.ethercat.registers import AlStatus
 from drivers.hardware.can_bus import CanFrame, decode_frame, encode_frame
-from drivers.hardware.tcp import MessageReader, framed
-from drivers.links import Datagram
-from drivers.positioner_codec import PositionerCommand, PositionerStatus
-from drivers.records import RecordKind, RecordReader, encode_record
-from drivers.shadow.motor_can import MotorAnswer, MotorIdentifier
-from drivers.shadow.palm_codec import PalmCommand
-from drivers.shadow.palm_images import PALMS
-from tactile_lab.errors import CodecError
-from tests.support.results_section import write_section
+from drivers.hardware.tcp import MessageReader, frame
+from drivers.positioner import codec as positioner_codec
+from drivers.positioner.codec import PositionerCommand, PositionerStatus
+from drivers.shadow.protocol.motor_can import MotorIdentifier
+from drivers.shadow.protocol.palm_codec import PalmCommand
+from drivers.shadow.protocol.palm_images import PALMS
+from tests.support import slcan_unit
+from tests.support.stored_table import GrowingTable, Outline, parser
 
 Codec = tuple[Callable[[bytes], object], bytes]
 
@@ -95,13 +94,12 @@ CODECS: dict[str, Codec] = {
     "slcan line": (slcan_unit.decode_line, slcan_unit.encode_line(CanFrame(0x200, b"\x01"))[:-1]),
     "gauge volts": (gauge_volts.decode_volts, gauge_volts.encode_volts(1, (0.1, 0.2, 0.3, 0.4, 0.5, 0.6))),
     "motor identifier": (lambda payload: str(MotorIdentifier.of(int.from_bytes(payload, "big"))), b"\x04\xa3"),
-    "motor answer": (MotorAnswer.decode, MotorAnswer(-3, 0x1900).encode()),
     "AL status": (lambda payload: str(AlStatus.decode(payload)), AlStatus(4, True, 0x1B).encode()),
     "hand records": (
         lambda payload: RecordReader().feed(payload),
         b"".join(encode_record(kind, 7, b"\x01\x02") for kind in RecordKind),
     ),
-    "tcp messages": (lambda payload: MessageReader().feed(payload), framed(b"TRIGGER") + framed(b"")),
+    "tcp messages": (lambda payload: MessageReader().feed(payload), frame(b"TRIGGER") + frame(b"")),
     "camera packet": (
         lambda payload: decode_packet(Datagram(MAGIC + payload, 0)),  # anything else, and the picture, is OpenCV's
         encode_packet(Frame(0, None, 5, 0, _SEEN)).removeprefix(MAGIC),
@@ -156,36 +154,30 @@ def fuzz(codec: Codec, count: int, seed: int) -> tuple[int, int]:
     return decoded, count - decoded
 
 
-HEAD = """## Codecs against random and damaged bytes
-
-`python -m tests.support.fuzz --count {count} --seed {seed} --into docs/results.md`: half of the inputs are random,
-every other one of these as long as a valid message; half are valid messages with bytes changed, cut, added or
-repeated. Each decoded or raised our error; nothing else came.
-
-| Codec | Inputs | Seed | Decoded | Refused | Time, s |
-|---|---:|---:|---:|---:|---:|
-"""
+OUTLINE = Outline(
+    "fuzz",
+    "Codecs against random and damaged bytes.",
+    ("python -m tests.support.fuzz --count 1000000 --seed 1 --store",),
+    "Half of the inputs are random, every other one of these as long as a valid message; half are valid messages with "
+    "bytes changed, cut, added or repeated. Each decoded or raised our error; nothing else came.",
+    ("Codec", "Inputs", "Seed", "Decoded", "Refused", "Time, s"),
+)
 
 
 def main() -> None:
-    """Fuzz the chosen codecs, print one line for each, and write the table where it is wanted."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=1_000_000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", default="")
-    parser.add_argument("--into", type=Path)
-    chosen = parser.parse_args()
-    rows = []
+    """Fuzz the chosen codecs, print one line for each, and store the table where that is asked for."""
+    options = parser(__doc__)
+    options.add_argument("--count", type=int, default=1_000_000)
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--only", default="")
+    chosen = options.parse_args()
+    table = GrowingTable(chosen.docs, OUTLINE, [(name,) for name in CODECS])
     for name, codec in CODECS.items():
         if chosen.only in name:
             began = time.monotonic()
-            decoded, refused = fuzz(codec, chosen.count, chosen.seed)
-            took = time.monotonic() - began
-            rows.append(f"| {name} | {chosen.count} | {chosen.seed} | {decoded} | {refused} | {took:.0f} |\n")
-            print(f"{name:20} seed {chosen.seed}  {decoded:9} decoded  {refused:9} refused  {took:6.1f} s", flush=True)
-    if chosen.into:
-        head = HEAD.format(count=chosen.count, seed=chosen.seed)
-        write_section(chosen.into, "fuzz", head + "".join(rows))
+            figures = (chosen.count, chosen.seed, *fuzz(codec, chosen.count, chosen.seed))
+            table.put((name,), (*map(str, figures), f"{time.monotonic() - began:.0f}"))
+    table.publish()
 
 
 if __name__ == "__main__":

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 from gtsam import Pose2
 
-from tactile_lab.experiments.explored import ExploredMap
-from tactile_lab.experiments.outlines import OUTLINES_m, edge_normals
-from tactile_lab.experiments.planar_hand import planned_rays
-from tactile_lab.exploration.candidates import Candidate
-from tactile_lab.exploration.policy import Belief
-from tactile_lab.exploration.ten_candidates import TEN_PALMS, candidates_at
-from tactile_lab.geometry.contacts import Array
-from tactile_lab.shape.sampling import sample_polygon
+from drivers.core.contacts import Array
+from tactile_lab.experiments.coverage_criteria import ExploredMap
+from tactile_lab.experiments.data.outlines import OUTLINES_m, edge_normals
+from tactile_lab.experiments.data.planar_hand import planned_rays
+from tactile_lab.slam.exploration.candidates import Candidate, ModelledObject
+from tactile_lab.slam.exploration.policy import Belief
+from tactile_lab.slam.exploration.ten_candidates import TEN_PALMS, candidates_at
+from tactile_lab.slam.shape.surfaces.sampling import sample_polygon
 
 OUTLINE_m = OUTLINES_m["rectangle"]
 
@@ -54,3 +54,8 @@ def uncertain(belief: Belief, sigmas: Array, count: int = 400) -> Belief:
 def ten(world_T_object: Pose2 | None = None) -> tuple[Candidate, ...]:
     """The ten candidates around the object."""
     return candidates_at(TEN_PALMS, world_T_object or Pose2(), planned_rays())
+
+
+def modelled(belief: Belief) -> ModelledObject:
+    """The object of a belief, as a single candidate's contacts are predicted on it."""
+    return ModelledObject(belief.field, belief.dimension, belief.world_T_object, belief.origin_height_m)

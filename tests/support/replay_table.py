@@ -1,12 +1,11 @@
 """Sessions of all rigs and objects of the catalogue, replayed: the same samples, the same results, and how fast.
 
-python -m tests.support.replay_table --into docs/results.md
-python -m tests.support.replay_table --into docs/results.md --rigs sim-wire --objects cylinder,sphere --grasps 1
+python -m tests.support.replay_table --store
+python -m tests.support.replay_table --store --rigs sim-wire --objects cylinder,sphere --grasps 1
 """
 
 from __future__ import annotations
 
-import argparse
 import gc
 import struct
 import tempfile
@@ -20,34 +19,38 @@ from unittest.mock import patch
 
 import numpy as np
 
+from drivers.core.errors import SessionError, TactileLabError
 from drivers.simulation.objects import CATALOGUE
-from sessions.interpreter import Interpreter
-from sessions.progress import NullProgress
-from sessions.session import Session
-from sessions.session_outcome import Ending
-from tactile_lab.errors import SessionError, TactileLabError
-from tactile_lab.rigs import build, wired_bench
+from sessions.conductor.progress import NullProgress
+from sessions.conductor.session_outcome import Ending
+from sessions.perception.interpreter import Interpreter
+from sessions.recording.session import Session
+from tactile_lab.rigs import build
+from tactile_lab.rigs import wired_runtime as wired_runtime
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.workflow import replaying
 from tactile_lab.workflow.judging import differing_files
 from tactile_lab.workflow.running import SessionRequest, run_session
-from tests.support.results_section import GrowingTable
+from tests.support.stored_table import GrowingTable, Outline, parser
 
 Listener = Callable[[str, Any], None]
 
 _UNTRACKED = 1000
 """Samples after which the garbage collector is told to leave alone what there is."""
 RIGS = "sim,sim-biotac,sim-wire,sim-wire-biotac"
-HEAD = """## Replay of all rigs and objects
-
-`python -m tests.support.replay_table --into docs/results.md`: a session of two grasps, seed 1, for every rig and
-object (on wires of one, the first box of two, in real time: `--rigs sim-wire,sim-wire-biotac --grasps 1`), and its
-replay as fast as possible. Samples: all that the decoders gave, in order, compared bit by bit. Results: trajectory,
-contacts, contour or surface, and the estimation's own record, compared byte by byte.
-
-| Rig | Object | Samples | Are the same | Results | Bytes read, times the original pace |
-|---|---|---:|---|---|---:|
-"""
+OUTLINE = Outline(
+    "replays",
+    "Sessions of every rig and object replayed from their bytes, and compared.",
+    (
+        "python -m tests.support.replay_table --store",
+        "python -m tests.support.replay_table --store --rigs sim-wire,sim-wire-biotac --grasps 1",
+    ),
+    "Sessions of two grasps (one on wires, in real time), seed 1, and their replay as fast as possible. Samples: all "
+    "that the decoders gave, in order, compared bit by bit. Results: trajectory, contacts, contour or surface, and the "
+    "estimation's own record, compared byte by byte.",
+    ("Rig", "Object", "Samples", "Are the same", "Results", "Bytes read, times the original pace"),
+    keys=2,
+)
 
 
 def bits(value: Any) -> bytes:
@@ -67,10 +70,10 @@ class Digest:
     def __init__(self) -> None:
         self.count, self._digest = 0, sha256()
 
-    def take(self, link: str, sample: Any) -> None:
-        """One sample of a link."""
+    def take(self, transport: str, sample: Any) -> None:
+        """One sample of a transport."""
         self.count += 1
-        self._digest.update(link.encode() + bits(sample))
+        self._digest.update(transport.encode() + bits(sample))
 
     @property
     def value(self) -> tuple[int, str]:
@@ -87,9 +90,9 @@ class Kept:
     def __init__(self) -> None:
         self._samples: list[tuple[str, Any]] = []
 
-    def take(self, link: str, sample: Any) -> None:
-        """One sample of a link."""
-        self._samples.append((link, sample))
+    def take(self, transport: str, sample: Any) -> None:
+        """One sample of a transport."""
+        self._samples.append((transport, sample))
         if len(self._samples) % _UNTRACKED == 0:
             gc.freeze()  # or the collector would go through all of them again and again, in the middle of a cycle
 
@@ -97,8 +100,8 @@ class Kept:
         """The digest of all of them, which are let go."""
         gc.unfreeze()
         digest, samples, self._samples = Digest(), self._samples, []
-        for link, sample in samples:
-            digest.take(link, sample)
+        for transport, sample in samples:
+            digest.take(transport, sample)
         return digest
 
 
@@ -151,7 +154,7 @@ def compare(rig: str, object_name: str, grasps: int, root: Path) -> Replayed:
 
 def _builder(rig: str) -> Any:
     """The module that builds the interpreter of a running session."""
-    return wired_bench if load_rig(rig).description.wires is not None else build
+    return wired_runtime if load_rig(rig).description.wires is not None else build
 
 
 def run(table: GrowingTable, rigs: list[str], objects: list[str], grasps: int) -> None:
@@ -167,16 +170,16 @@ def run(table: GrowingTable, rigs: list[str], objects: list[str], grasps: int) -
 
 
 def main() -> None:
-    """Print the table, or write it into a document row by row."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--into", type=Path)
-    parser.add_argument("--rigs", default=RIGS)
-    parser.add_argument("--objects", default=",".join(CATALOGUE))
-    parser.add_argument("--grasps", type=int, default=2)
-    chosen = parser.parse_args()
+    """Print the table, and store it row by row where that is asked for."""
+    options = parser(__doc__)
+    options.add_argument("--rigs", default=RIGS)
+    options.add_argument("--objects", default=",".join(CATALOGUE))
+    options.add_argument("--grasps", type=int, default=2)
+    chosen = options.parse_args()
     keys = [(rig, name) for rig in RIGS.split(",") for name in CATALOGUE]
-    table = GrowingTable(chosen.into, "replays", HEAD, keys)
+    table = GrowingTable(chosen.docs, OUTLINE, keys)
     run(table, chosen.rigs.split(","), chosen.objects.split(","), chosen.grasps)
+    table.publish()
 
 
 if __name__ == "__main__":

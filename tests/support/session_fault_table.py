@@ -1,17 +1,15 @@
 """Every fault of a wire in the middle of a session, as a table.
 
-python -m tests.support.session_fault_table --into docs/results.md
-python -m tests.support.session_fault_table --into docs/results.md --missing
+python -m tests.support.session_fault_table --store
+python -m tests.support.session_fault_table --store --missing
 """
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.support.results_section import GrowingTable, Key
 from tests.support.session_sweep import (
     BLIND,
     LAYOUTS,
@@ -22,54 +20,53 @@ from tests.support.session_sweep import (
     faults,
     run_with,
 )
+from tests.support.stored_table import GrowingTable, Key, Outline, parser
 
 TIMES = ", ".join(
-    [f"{link} {most:g} s" for link, most in LONGEST_s.items()]
-    + [f"{link}, {fault} {most:g} s" for (link, fault), most in UNTIL_IT_MOVES_s.items()]
+    [f"{transport} {most:g} s" for transport, most in LONGEST_s.items()]
+    + [f"{transport}, {fault} {most:g} s" for (transport, fault), most in UNTIL_IT_MOVES_s.items()]
 )
-HEAD = f"""## Faults in the middle of a session
+OUTLINE = Outline(
+    "session-faults",
+    "Every fault of every link in the middle of a session.",
+    ("python -m tests.support.session_fault_table --store",),
+    f"A session of one grasp on the box, seed 1; faults from second {STRIKES_AT_s:g} on: the fingers are closing; the "
+    f"first picture comes later. A session ends in order within the time stated ({TIMES}), or goes on. In both cases "
+    "its recording was then read without loss and replayed: results identical byte for byte, where the session came "
+    "to any. Told: what its events and its record say, with the figures at the end.",
+    ("Rig", "Link", "Fault", "Struck", "The session", "Told and stored", "Replay"),
+    keys=3,
+)
 
-`python -m tests.support.session_fault_table --into docs/results.md`: a session of one grasp on the box, seed 1, for
-every fault of every link, from second {STRIKES_AT_s:g} on: the fingers are closing; the first picture comes later.
-A session ends in order within the time stated ({TIMES}), or goes on. In both cases
-its recording was then read without loss and replayed: results identical byte for byte, where the session came to any.
-Told: what its events and its record say, with the figures at the end.
 
-| Rig | Link | Fault | Struck | The session | Told and stored | Replay |
-|---|---|---|---:|---|---|---|
-"""
-
-
-def cells(rig: str, link: str, fault: str, swept: Swept) -> tuple[str, ...]:
-    """One line of the table, behind its link and fault."""
+def cells(rig: str, transport: str, fault: str, swept: Swept) -> tuple[str, ...]:
+    """One line of the table, behind its transport and fault."""
     went = f"ends after {swept.after_s:.2f} s: {swept.ended}" if swept.ended else "goes on"
-    unseen = "as it ended" if swept.ended else BLIND[rig][link].get(fault, "harmless")
+    unseen = "as it ended" if swept.ended else BLIND[rig][transport].get(fault, "harmless")
     told = "; ".join(swept.told) or unseen
     return str(swept.struck), went, told, swept.replay
 
 
 def run(table: GrowingTable, keys: Sequence[Key]) -> None:
-    """Run sessions. Raises AssertionError for one that hung, or that left what can not be read."""
-    for rig, link, fault in keys:
+    """Run sessions. Raises AssertionError for one that hung, or that left what cannot be read."""
+    for rig, transport, fault in keys:
         with tempfile.TemporaryDirectory() as root:
-            swept = run_with(rig, {link: fault}, Path(root))
-        swept.check(link, fault)
-        table.put((rig, link, fault), cells(rig, link, fault, swept))
+            swept = run_with(rig, {transport: fault}, Path(root))
+        swept.check(transport, fault)
+        table.put((rig, transport, fault), cells(rig, transport, fault, swept))
 
 
 def main() -> None:
-    """Print the table, or write it into a document row by row."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--into", type=Path)
-    parser.add_argument("--rigs", default=",".join(LAYOUTS))
-    parser.add_argument("--only", default="", help="Part of the link's or the fault's name.")
-    parser.add_argument("--missing", action="store_true", help="Only what the document does not have.")
-    chosen = parser.parse_args()
-    table = GrowingTable(
-        chosen.into, "session faults", HEAD, [(rig, *fault) for rig in LAYOUTS for fault in faults(rig)]
-    )
+    """Print the table, and store it row by row where that is asked for."""
+    options = parser(__doc__)
+    options.add_argument("--rigs", default=",".join(LAYOUTS))
+    options.add_argument("--only", default="", help="Part of the link's or the fault's name.")
+    options.add_argument("--missing", action="store_true", help="Only what this version has not made.")
+    chosen = options.parse_args()
+    table = GrowingTable(chosen.docs, OUTLINE, [(rig, *fault) for rig in LAYOUTS for fault in faults(rig)])
     asked = [(rig, *fault) for rig in chosen.rigs.split(",") for fault in faults(rig) if chosen.only in " ".join(fault)]
     run(table, [key for key in asked if not chosen.missing or key in table.missing])
+    table.publish()
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """Every fault of a wire in the middle of a session: does it end in order, or go on with the fault told and stored?
 
-A session of one grasp runs on a simulated rig, on virtual time. From the middle of the closing on, one of its links
-has one fault (:mod:`drivers.faults`, with the message layouts of the drivers' own sweeps). Anything but an error of
-ours is a traceback and ends the sweep; a link that is asked too often is a session that hangs.
+A session of one grasp runs on a simulated rig, on virtual time. From the middle of the closing on, one of its
+transports has one fault (:mod:`tests.support.faults`, with the message layouts of the drivers' own sweeps). Anything
+but an error of ours is a traceback and ends the sweep; a transport that is asked too often is a session that hangs.
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from unittest.mock import patch
 
-from drivers.faults import CounterWrap, Fault, FaultyLink, MessageLayout, When, standard_faults
-from drivers.links import Datagram, Link
+from drivers.core.clock import NANOSECONDS, Clock
+from drivers.core.errors import TactileLabError
+from drivers.core.transports import Datagram, Transport
 from drivers.simulation.world import SimulatedWorld
-from sessions.progress import NullProgress
-from sessions.replay import Replay
-from sessions.schemas import EVENTS_TOPIC
-from sessions.session import Session
-from sessions.session_outcome import Ending
-from tactile_lab.clock import NANOSECONDS, Clock
-from tactile_lab.errors import TactileLabError
+from sessions.conductor.progress import NullProgress
+from sessions.conductor.session_outcome import Ending
+from sessions.perception.replay import Replay
+from sessions.recording.session import Session
+from sessions.recording.traffic.schemas import LOG_TOPIC
 from tactile_lab.rigs import laboratory
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import rig_of_session
 from tactile_lab.workflow.judging import differing_files, has_results
 from tactile_lab.workflow.replaying import recorded_seed, recorded_slam, replay_session
 from tactile_lab.workflow.running import SessionRequest, run_session
-from tests.unit.test_device_sweeps import TestBioTacInThePalm, TestCamera, TestHand
-from tests.unit.test_nano17_sweep import TestNetBox
-from tests.unit.test_positioner_sweep import TestPositioner
+from tests.support.faults import CounterWrap, Fault, FaultyTransport, MessageLayout, When, standard_faults
+from tests.unit.drivers.ati.test_nano17_sweep import TestNetBox
+from tests.unit.drivers.positioner.test_positioner_sweep import TestPositioner
+from tests.unit.drivers.test_device_sweeps import TestBioTacInThePalm, TestCamera, TestHand
 
 LAYOUTS: dict[str, dict[str, MessageLayout]] = {
     "sim": {
@@ -47,7 +47,7 @@ LAYOUTS: dict[str, dict[str, MessageLayout]] = {
         "camera": TestCamera.layout,
     },
 }
-"""Rigs, their links, and what the faults must know of the messages."""
+"""Rigs, their transports, and what the faults must know of the messages."""
 
 BLIND: dict[str, dict[str, dict[str, str]]] = {
     "sim": {
@@ -62,7 +62,7 @@ BLIND: dict[str, dict[str, dict[str, str]]] = {
         "camera": TestCamera.blind,
     },
 }
-"""What the devices can not see, and why, by rig and link."""
+"""What the devices cannot see, and why, by rig and transport."""
 
 STRIKES_AT_s = 7.0
 """When the faults strike: in a session of one grasp the fingers are closing then."""
@@ -72,21 +72,21 @@ LONGEST_s = {"hand": 1.0, "base": 0.5, "ft/MF": 0.5, "camera": 1.5}
 picture, and the cycles that stop the hand. A finger whose angle seems to stand still is stopped by force."""
 
 UNTIL_IT_MOVES_s = {("base", "stuck value"): 5.0}
-"""The same for what can not be seen before the device is to move."""
+"""The same for what cannot be seen before the device is to move."""
 
 HANGS_AFTER = 60_000
-"""Readings of one link; a session of one grasp needs some thousand."""
+"""Readings of one transport; a session of one grasp needs some thousand."""
 
 
-class TimedFault(FaultyLink):
+class TimedFault(FaultyTransport):
     """A fault that strikes at a time, not at a number of messages.
 
     Attributes:
         struck_ns: when it first did.
     """
 
-    def __init__(self, link: Link, clock: Clock, fault: Fault, when: When, at_s: float) -> None:
-        super().__init__(link, fault, replace(when, first=0))
+    def __init__(self, transport: Transport, clock: Clock, fault: Fault, when: When, at_s: float) -> None:
+        super().__init__(transport, fault, replace(when, first=0))
         self._clock, self._readings, self._at_ns = clock, 0, at_s * NANOSECONDS
         self.struck_ns: int | None = None
         self.armed = isinstance(fault, CounterWrap)  # its counters run wrong from the first message on
@@ -122,28 +122,28 @@ class Swept:
     replay: str = ""
     lost: dict[str, int] = field(default_factory=dict)
 
-    def check(self, link: str, fault: str) -> None:
+    def check(self, transport: str, fault: str) -> None:
         """Raises AssertionError for a session that took longer to end than its time-outs say."""
         assert self.struck > 0, "the fault never struck"
-        longest_s = UNTIL_IT_MOVES_s.get((link, fault), LONGEST_s[link])
+        longest_s = UNTIL_IT_MOVES_s.get((transport, fault), LONGEST_s[transport])
         assert not self.ended or (self.after_s is not None and self.after_s <= longest_s), self
 
 
 def faults(rig: str) -> Iterator[tuple[str, str]]:
-    """Links and names of faults of a rig."""
-    for link, layout in LAYOUTS[rig].items():
+    """Transports and names of faults of a rig."""
+    for transport, layout in LAYOUTS[rig].items():
         for name in sorted(standard_faults(layout)):
-            yield link, name
+            yield transport, name
 
 
 def run_with(rig: str, faulty: dict[str, str], root: Path, at_s: float = STRIKES_AT_s) -> Swept:
-    """Run a session in which links have faults, by name, from a time on, and look at all it left.
+    """Run a session in which transports have faults, by name, from a time on, and look at all it left.
 
     Raises:
-        AssertionError: it hung, or what it left can not be read or replayed.
+        AssertionError: it hung, or what it left cannot be read or replayed.
     """
-    links: dict[str, TimedFault] = {}
-    with _faulty_world(rig, faulty, links, at_s):
+    transports: dict[str, TimedFault] = {}
+    with _faulty_world(rig, faulty, transports, at_s):
         try:
             finished = run_session(SessionRequest(rig, "box-10x6x4", root, seed=1, grasps=1), NullProgress())
             folder, outcome, error = finished.folder, finished.outcome, None
@@ -154,9 +154,11 @@ def run_with(rig: str, faulty: dict[str, str], root: Path, at_s: float = STRIKES
     ended = str(error or "")
     if outcome is not None and outcome.ending is not Ending.COMPLETE:
         ended = outcome.reason
-    struck_ns = min((link.struck_ns for link in links.values() if link.struck_ns is not None), default=None)
+    struck_ns = min(
+        (transport.struck_ns for transport in transports.values() if transport.struck_ns is not None), default=None
+    )
     return Swept(
-        struck=sum(link.injected for link in links.values()),
+        struck=sum(transport.injected for transport in transports.values()),
         ended=ended,
         after_s=None if struck_ns is None else _stopped_after_s(session, struck_ns),
         told=tuple(_told(session)),
@@ -166,17 +168,17 @@ def run_with(rig: str, faulty: dict[str, str], root: Path, at_s: float = STRIKES
 
 
 @contextmanager
-def _faulty_world(rig: str, faulty: dict[str, str], links: dict[str, TimedFault], at_s: float) -> Iterator[None]:
-    """The simulated rigs of this program have faulty links meanwhile."""
+def _faulty_world(rig: str, faulty: dict[str, str], transports: dict[str, TimedFault], at_s: float) -> Iterator[None]:
+    """The simulated rigs of this program have faulty transports meanwhile."""
     build = laboratory.simulated_world
 
     def world_with_faults(*arguments: object) -> SimulatedWorld:
         world = build(*arguments)  # type: ignore[arg-type]
-        given = world.links()
+        given = world.transports()
         for name, fault_name in faulty.items():
             fault, when = standard_faults(LAYOUTS[rig][name])[fault_name]
-            links[name] = TimedFault(given[name], world.clock, fault, when, at_s)
-        world.links = lambda: {**given, **links}  # type: ignore[method-assign]
+            transports[name] = TimedFault(given[name], world.clock, fault, when, at_s)
+        world.transports = lambda: {**given, **transports}  # type: ignore[method-assign]
         return world
 
     with patch.object(laboratory, "simulated_world", world_with_faults):
@@ -186,7 +188,7 @@ def _faulty_world(rig: str, faulty: dict[str, str], links: dict[str, TimedFault]
 def _events(session: Session) -> Iterator[tuple[int, int, str]]:
     """Stamp, level and words of a session's events."""
     for message in session.traffic().messages():
-        if message.topic == EVENTS_TOPIC:
+        if message.topic == LOG_TOPIC:
             content = json.loads(message.data)
             yield message.stamp_ns, content["level"], f"{content['name']}: {content['message']}"
 

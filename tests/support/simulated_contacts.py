@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from tactile_lab.evaluation.registration import registration_rms_mm
-from tactile_lab.experiments import planar_data, spatial_data
-from tactile_lab.experiments.sensing import SimulatedGrasps
-from tactile_lab.shape.settings import GpisSettings
-from tactile_lab.slam_result import SlamResult
-from tactile_lab.tracking.contact_map import ContactMap, PlacedGrasp
-from tactile_lab.tracking.contact_set import ContactSet
-from tactile_lab.tracking.motion import planar_motion
+from tactile_lab.experiments.data import planar_data, spatial_data
+from tactile_lab.experiments.data.sensing import SimulatedGrasps
+from tactile_lab.slam.result import SlamResult
+from tactile_lab.slam.shape.fields.settings import GpisSettings
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
+from tactile_lab.slam.tracking.contacts.motion import planar_motion
 
 
 def true_map(

@@ -21,9 +21,9 @@ def load() -> None:
     import rich.progress  # noqa: F401
 
     import tactile_lab.cli.app
-    import tactile_lab.rigs.calibrating
     import tactile_lab.workflow.calibrating_camera
     import tactile_lab.workflow.calibrating_fingertip
+    import tactile_lab.workflow.calibrating_forearm
     import tactile_lab.workflow.calibrating_joints
     import tactile_lab.workflow.running  # noqa: F401
 

@@ -73,7 +73,7 @@ def call_inside(*arguments: object) -> Answer:
 
 @pytest.fixture(scope="session")
 def recorded_root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with one finished session of three grasps, the same for all workers of a run; only to be read."""
+    """A folder with one finished session of two grasps, the same for all workers of a run; only to be read."""
     shared = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         shared = shared.parent
@@ -88,7 +88,7 @@ def recorded_root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def record(folder: Path) -> None:
     """Run the session; what it said on standard error and, last of all, on standard output, is kept beside it."""
     folder.mkdir(exist_ok=True)
-    answer = call("run", "--grasps", 3, "--seed", 1, "--notes", "for the tests", "--out", folder / "runs", "--json")
+    answer = call("run", "--grasps", 2, "--seed", 1, "--notes", "for the tests", "--out", folder / "runs", "--json")
     assert answer.code == 0, answer.err
     (folder / "run.err").write_text(answer.err)
     (folder / "run.json").write_text(answer.out)

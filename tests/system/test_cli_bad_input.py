@@ -11,8 +11,8 @@ import pytest
 import trimesh
 import yaml
 
-from tactile_lab.calibration_file import is_stored
-from tactile_lab.strict_yaml import load
+from drivers.core.calibration_file import is_stored
+from drivers.core.configuration import load
 
 RIGS = Path(str(resources.files("tactile_lab.rigs")))
 CALIBRATION = "calibrations/simulated-hand"
@@ -165,4 +165,4 @@ def test_a_folder_for_sessions_that_is_a_file(inside, tmp_path):
 
 def test_a_list_of_sessions_in_a_file(inside, tmp_path):
     (tmp_path / "file").write_text("")
-    one_line(inside("session", "list", "--root", tmp_path / "file"), 1, "can not be read")
+    one_line(inside("session", "list", "--root", tmp_path / "file"), 1, "cannot be read")

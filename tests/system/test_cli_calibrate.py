@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 import yaml
 
-from calibration.forearm import load_forearm
-from calibration.recordings import ForearmData, save_data
-from calibration.store import read_record, write_record
-from calibration.touch_plan import plan_touches
-from tactile_lab.experiments.calibration_data import TrueRig, touches_of
-from tactile_lab.experiments.calibration_runs import GEOMETRY
-from tactile_lab.strict_yaml import load
+from calibration.forearm.placement import load_forearm
+from calibration.forearm.recordings import ForearmData, save_data
+from calibration.forearm.touch_plan import plan_touches
+from calibration.store.store import read_record, write_record
+from drivers.core.configuration import load
+from tactile_lab.experiments.data.calibration_data import TrueRig, touches_of
+from tactile_lab.experiments.runs.calibration_runs import GEOMETRY
 
 RIGS = Path(str(resources.files("tactile_lab.rigs")))
 
@@ -26,7 +26,7 @@ SETTINGS = {
         "needs": {"lever_m": 0.01},
         "limits": {"held_out_mm": 20, "repeat_mm": 20, "repeat_deg": 10, "region_mm": 20, "region_deg": 10},
     },
-    "station": {
+    "measurer": {
         "travel_m_s": 0.5,
         "turn_rad_s": 2.5,
         "fingers_rad_s": 2.5,
@@ -41,7 +41,7 @@ SETTINGS = {
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Recorded touches of the simulated rig, by kinematics."""
     rng = np.random.default_rng(3)
-    rig = TrueRig.drawn(rng)
+    rig = TrueRig.draw(rng)
     touches = tuple(touches_of(plan_touches(GEOMETRY, per_patch=4), rig, rng))
     path = tmp_path_factory.mktemp("data") / "touches.json"
     save_data(path, ForearmData(rig="simulated-hand", touches=touches))

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import yaml
 
-from calibration.store import read_record
-from drivers.shadow.joint_calibration import JointCalibration
-from drivers.shadow.kinematics import JOINT_INDEX, joint_vector
+from calibration.store.store import read_record
+from drivers.shadow.model.joint_calibration import JointCalibration
+from drivers.shadow.model.kinematics import JOINT_INDEX, joint_vector
 from tactile_lab.rigs.description import load_rig
 
 RIG = load_rig("sim")
@@ -141,7 +141,7 @@ def test_tables_of_counts_that_can_not_be_used_are_named(inside, tmp_path, text,
 
 @pytest.mark.parametrize(
     ("words", "told"),
-    [(("--finger", "TH"), "TH can not be stretched alone"), (("--rig", "sim-biotac"), "has no force fingertips")],
+    [(("--finger", "TH"), "TH cannot be stretched alone"), (("--rig", "sim-biotac"), "has no force fingertips")],
 )
 def test_fingertips_that_can_not_be_measured_are_refused(inside, tmp_path, words, told):
     answer = inside("calibrate", "fingertip", *words, "--out", tmp_path / "tips.yaml", "--no-input")

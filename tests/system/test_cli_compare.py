@@ -14,7 +14,7 @@ import pytest
 import yaml
 from scipy.stats import t as student
 
-from calibration.store import read_record, write_record
+from calibration.store.store import read_record, write_record
 from tactile_lab.evaluation.trajectory import COLUMNS
 from tactile_lab.rigs.description import load_rig
 from tests.system.conftest import call_inside

@@ -12,7 +12,7 @@ import yaml
 
 from drivers.camera.boards import load_board
 from drivers.camera.markers import MarkerSettings
-from tactile_lab.calibration_file import load_parameters
+from drivers.core.calibration_file import load_parameters
 from tests.support.warm_terminal import WarmProgram
 
 MM = 72 / 25.4  # points of a PDF

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from tactile_lab.evaluation.slips import Slips
-from tactile_lab.tracking.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 
 
 def test_slips_of_recorded_sessions_are_told_and_too_few_say_so(inside, recorded_root, recorded):
@@ -24,7 +24,7 @@ def test_slips_of_recorded_sessions_are_told_and_too_few_say_so(inside, recorded
     assert document["sessions"] == [recorded.name]
     assert document["motion"] is None
     steps = document["carried"] + document["left"]
-    assert len(steps) == 2
+    assert len(steps) == 1
     assert all(abs(x_m) < 0.03 and abs(y_m) < 0.03 for x_m, y_m, _ in steps)
 
 
@@ -36,7 +36,7 @@ def test_the_motion_is_printed_as_the_rig_file_wants_it(inside, recorded_root, r
     assert "pushed by the closing hand where it was to be left: 0 of 40" in said
     motion = MotionNoise.model_validate(yaml.safe_load(said.split("in the rig file:")[1])["motion"])
     assert motion.translation_m == pytest.approx(0.006, rel=0.2)
-    assert motion.left_lying == pytest.approx(0.1, rel=0.3)
+    assert motion.unheld == pytest.approx(0.1, rel=0.3)
 
 
 def test_sessions_of_several_rigs_are_not_mixed(inside, recorded, tmp_path):

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 import yaml
 
-from calibration.fingertip_data import load_fingertip_data
-from calibration.recordings import ForearmData, save_data
-from calibration.store import read_record
-from calibration.touch_plan import plan_touches
+from calibration.fingertip.data import load_fingertip_data
+from calibration.forearm.recordings import ForearmData, save_data
+from calibration.forearm.touch_plan import plan_touches
+from calibration.store.store import read_record
 from drivers.camera.calibration import load_camera
-from drivers.fingertip import load_fingertips
-from drivers.shadow.joint_calibration import JointCalibration
-from drivers.simulation.board_camera import simulated_lens
-from tactile_lab.experiments.calibration_data import TrueRig, touches_of
-from tactile_lab.experiments.calibration_runs import GEOMETRY
+from drivers.camera.rendering.board_camera import simulated_lens
+from drivers.core.fingertip import load_fingertips
+from drivers.shadow.model.joint_calibration import JointCalibration
+from tactile_lab.experiments.data.calibration_data import TrueRig, touches_of
+from tactile_lab.experiments.runs.calibration_runs import GEOMETRY
 from tactile_lab.rigs.description import load_rig
 from tests.support.warm_terminal import INTERRUPT, Terminal, WarmProgram
 
@@ -91,12 +91,12 @@ def measured(program: WarmProgram, tmp_path_factory: pytest.TempPathFactory) -> 
 
 def prepared(folder: Path) -> Path:
     """Settings and recorded data beside which a wizard is called."""
-    (folder / "fast.yaml").write_text(yaml.safe_dump({"station": FAST}))
+    (folder / "fast.yaml").write_text(yaml.safe_dump({"measurer": FAST}))
     poses = [{"known_deg": {"FFJ3": a}, "measured_deg": {"FFJ3": b}} for a, b in MEASURED_deg.items()]
     table = {"format": "tactile-joint-poses/1", "rig": "simulated-hand", "poses": poses}
     (folder / "poses.yaml").write_text(yaml.safe_dump(table))
     rng = np.random.default_rng(3)
-    touches = touches_of(plan_touches(GEOMETRY, per_patch=4), TrueRig.drawn(rng), rng)
+    touches = touches_of(plan_touches(GEOMETRY, per_patch=4), TrueRig.draw(rng), rng)
     save_data(folder / "touches.json", ForearmData(rig="simulated-hand", touches=tuple(touches)))
     return folder
 

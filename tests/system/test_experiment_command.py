@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import shutil
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from drivers.core.errors import ConfigurationError, SessionError
 from tactile_lab.cli.app import app
-from tactile_lab.errors import ConfigurationError
 
+DOCS = Path(__file__).parents[2] / "docs"
 TINY = ["--seeds", "0-1", "--jobs", "1", "--only", "solver=Cauchy;ours"]
 
 
@@ -41,13 +44,32 @@ def test_an_experiment_writes_its_results_and_goes_on_where_it_stopped(tmp_path)
     assert again["runs"] == outcome["runs"]
 
 
-def test_the_section_of_a_document_is_replaced(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("<!-- experiment graph-stress -->\n<!-- end graph-stress -->\n")
-    answer = invoke("graph-stress", "--out", tmp_path / "x", *TINY, "--into", page)
+def test_one_command_stores_an_outcome_and_writes_its_page(tmp_path):
+    docs = tmp_path / "docs"
+    shutil.copytree(DOCS / "results", docs / "results")
+    answer = invoke("graph-stress", "--out", tmp_path / "x", *TINY, "--store", "--docs", docs)
     assert answer.exit_code == 0
-    assert "| ours |" in page.read_text()
-    assert "(pictures/graph-stress.svg)" in page.read_text()
+    page = (docs / "results" / "graph-stress.md").read_text()
+    fresh, older = page.split("## Made earlier")
+    assert "Made by this version of the code" in fresh
+    assert "| ours | 2 |" in fresh
+    assert "tactile-lab experiment graph-stress --seeds 0-1 --only 'solver=Cauchy;ours' --jobs 1" in fresh
+    assert "Made by an older version of the code" in older
+    assert "| ours |" not in older
+    assert "| GNC |" in older
+    assert (docs / "pictures" / "graph-stress.svg").is_file()
+    assert "experiment graph-stress --seeds 0-1" in invoke("commands", "--docs", docs).stdout
+    forgetful = invoke("graph-stress", "--out", tmp_path / "x", *TINY, "--store", "--forget", "--docs", docs)
+    assert "solver GNC" in str(forgetful.exception)  # which the claims show
+
+
+def test_nothing_is_stored_that_several_versions_made_or_beside_no_repository(tmp_path):
+    answer = invoke("graph-stress", "--out", tmp_path, *TINY, "--store", "--keep")
+    assert answer.exit_code == 2
+    assert "--keep" in answer.output
+    lost = invoke("graph-stress", "--out", tmp_path / "x", *TINY, "--store", "--docs", tmp_path)
+    assert isinstance(lost.exception, SessionError)
+    assert "no stored results" in str(lost.exception)
 
 
 @pytest.mark.parametrize(

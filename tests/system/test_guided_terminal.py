@@ -11,9 +11,9 @@ from typing import Any
 import pexpect
 import pytest
 
-from sessions import schemas
-from sessions.listing import list_sessions
-from sessions.session import Session
+from sessions.recording.listing import list_sessions
+from sessions.recording.session import Session
+from sessions.recording.traffic import schemas
 from tactile_lab.cli.main import main
 from tactile_lab.workflow.judging import differing_files
 
@@ -64,7 +64,7 @@ class Terminal:
 
 def events(session: Session) -> str:
     messages = session.traffic().messages()
-    return "\n".join(message.data.decode() for message in messages if message.topic == schemas.EVENTS_TOPIC)
+    return "\n".join(message.data.decode() for message in messages if message.topic == schemas.LOG_TOPIC)
 
 
 def grasp(terminal: Terminal) -> None:
@@ -81,7 +81,7 @@ def test_person_guides_a_session_with_undo_pause_an_unplugged_sensor_and_a_resum
     terminal.until("note: box on its side")
     grasp(terminal)
     terminal.until("Hold still", "p")
-    terminal.until("e ends the session", "p")
+    terminal.until("e: end session", "p")
     terminal.until("resumed", " ")
     terminal.until("Turn the object", "g")
     terminal.until("Ready for the next grasp", "u")

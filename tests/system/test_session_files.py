@@ -11,11 +11,11 @@ import pytest
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
-from sessions.archives import import_archive
-from sessions.extracting import Piece, extract
-from sessions.session import Session
-from sessions.traffic_reader import TrafficReader
-from tactile_lab.errors import ConfigurationError, SessionError
+from drivers.core.errors import ConfigurationError, SessionError
+from sessions.exchange.archives import import_archive
+from sessions.exchange.extracting import Piece, extract
+from sessions.recording.session import Session
+from sessions.recording.traffic.reader import TrafficReader
 from tactile_lab.workflow import exporting
 from tactile_lab.workflow.replaying import recorded_seed, recorded_slam
 
@@ -82,7 +82,7 @@ def test_tables_say_the_same_in_every_form(first_grasp, tmp_path):
         (exporting.export_hdf5, "s.h5"),
         (exporting.export_rosbag, "bag"),
     ):
-        with pytest.raises(SessionError, match=r"exists already|can not be written"):
+        with pytest.raises(SessionError, match=r"exists already|cannot be written"):
             export(first_grasp, tmp_path / place)
 
 
@@ -106,12 +106,12 @@ def test_a_piece_of_a_session_is_a_session(session, tmp_path):
     assert piece.calibration_file("joints").is_file()
     assert sum(1 for _ in piece.traffic().messages()) == sum(counts.values())
     with pytest.raises(ConfigurationError, match=r"no link called elbow.*Its links are base, camera, ft/FF"):
-        extract(session, tmp_path / "piece-2", Piece(links={"elbow"}))
+        extract(session, tmp_path / "piece-2", Piece(transports={"elbow"}))
     with pytest.raises(SessionError, match="nothing was recorded in that piece"):
         extract(session, tmp_path / "piece-2", Piece(from_s=1e6))
     with pytest.raises(SessionError, match="exists already"):
         extract(session, tmp_path / "piece-1", Piece())
-    with pytest.raises(SessionError, match="can not be the name"):
+    with pytest.raises(SessionError, match="cannot be the name"):
         extract(session, tmp_path / "Piece", Piece())
     assert not (tmp_path / "piece-2").exists()
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from calibration.store import read_record
+from calibration.store.store import read_record
 from tests.support.browser import Browser, chromium, until
 from tests.support.warm_terminal import Terminal, WarmProgram
 
@@ -28,7 +28,7 @@ def test_a_wizard_is_led_from_its_page(program: WarmProgram, tmp_path: Path) -> 
     browser_program = chromium()
     if browser_program is None:
         pytest.skip("no Chromium on this computer")
-    (tmp_path / "fast.yaml").write_text(yaml.safe_dump({"station": FAST}))
+    (tmp_path / "fast.yaml").write_text(yaml.safe_dump({"measurer": FAST}))
     (tmp_path / "poses.yaml").write_text(
         yaml.safe_dump({"format": "tactile-joint-poses/1", "rig": "simulated-hand", "poses": POSES})
     )

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import can
 import pytest
-from ethercat_wire import JOINTS, cable
 
-from drivers.emulators.ethercat_server import EmulatedHandProcess
-from drivers.shadow.bootloader import bootloader_versions
+from drivers.emulators.ethercat.server import EmulatedHandProcess
+from drivers.shadow.ethercat.bootloader import bootloader_versions
+from tests.support.ethercat_wire import JOINTS, cable
 from tests.support.interruptible import interruptible
 
 

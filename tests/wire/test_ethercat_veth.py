@@ -8,19 +8,19 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from ethercat_wire import JOINTS, cable, check_it_moves
 
-from drivers.emulators.ethercat_server import EmulatedHandProcess
-from drivers.emulators.shadow_chain import ChainSettings
+from drivers.core.clock import MonotonicClock
+from drivers.core.errors import DeviceError
+from drivers.emulators.ethercat.server import EmulatedHandProcess
+from drivers.emulators.ethercat.shadow_chain import ChainSettings
 from drivers.ethercat.master import MasterSettings
-from drivers.shadow.ethercat_link import EthercatLink, EthercatSettings
-from drivers.shadow.hand import ShadowHand
-from drivers.shadow.hand_settings import HandSettings
-from drivers.shadow.joint_calibration import JointCalibration
-from drivers.shadow.palm_codec import PalmCommand, PalmStatus
-from drivers.shadow.palm_images import PALMS
-from tactile_lab.clock import MonotonicClock
-from tactile_lab.errors import DeviceError
+from drivers.shadow.device.hand import ShadowHand
+from drivers.shadow.device.hand_settings import HandSettings
+from drivers.shadow.ethercat.hand_transport import EthercatSettings, EthercatTransport
+from drivers.shadow.model.joint_calibration import JointCalibration
+from drivers.shadow.protocol.palm_codec import PalmCommand, PalmStatus
+from drivers.shadow.protocol.palm_images import PALMS
+from tests.support.ethercat_wire import JOINTS, cable, check_it_moves
 
 PATIENT = MasterSettings(answer_s=0.05, setup_answer_s=0.1)
 """A shared machine may take its time; these tests judge content, not speed."""
@@ -32,21 +32,23 @@ def ends() -> Iterator[tuple[str, str]]:
         yield names
 
 
-class Bench:
+class RigRuntime:
     def __init__(self, interface: str, **settings: Any) -> None:
         self.clock = MonotonicClock()
         settings = {"master": PATIENT, "poll_every": 20} | settings
-        self.link = EthercatLink("hand", EthercatSettings(interface=interface, **settings), self.clock)
+        self.transport = EthercatTransport("hand", EthercatSettings(interface=interface, **settings), self.clock)
 
     def hand(self, **settings: Any) -> ShadowHand:
-        return ShadowHand(self.link, self.clock, JointCalibration.load(JOINTS), HandSettings(cycle_s=0.002, **settings))
+        return ShadowHand(
+            self.transport, self.clock, JointCalibration.load(JOINTS), HandSettings(cycle_s=0.002, **settings)
+        )
 
     def ask(self, count: int, palm: str = "0220") -> list[PalmStatus | None]:
         image = PALMS[palm]  # type: ignore[index]
         statuses = []
         for cycle in range(count):
-            self.link.send(image.encode_command(PalmCommand(1, 3, cycle & 1, 2)))
-            datagrams = self.link.receive()
+            self.transport.send(image.encode_command(PalmCommand(1, 3, cycle & 1, 2)))
+            datagrams = self.transport.receive()
             statuses.append(image.decode_status(datagrams[0].payload) if datagrams else None)
             time.sleep(0.002)
         return statuses
@@ -64,42 +66,42 @@ def fresh(hand: ShadowHand) -> bool:
 
 @pytest.mark.parametrize("palm", ["0220", "0230", "0240"])
 def test_a_bare_hand_reaches_op_and_exchanges_its_image(ends: tuple[str, str], palm: Any) -> None:
-    bench = Bench(ends[0])
+    runtime = RigRuntime(ends[0])
     with EmulatedHandProcess(ends[1], JOINTS, ChainSettings(palm=palm)) as emulator:
-        bench.link.open()
-        assert (bench.link.hand.serial, bench.link.hand.image.name) == (634, palm)
-        answered = [status for status in bench.ask(50, palm) if status is not None and status.written]
+        runtime.transport.open()
+        assert (runtime.transport.hand.serial, runtime.transport.hand.image.name) == (634, palm)
+        answered = [status for status in runtime.ask(50, palm) if status is not None and status.written]
         assert len(answered) >= 40
         assert {status.which_motors for status in answered} == {0, 1}
         assert emulator.order()["state"] == "OP"
-        bench.link.close()
+        runtime.transport.close()
         assert emulator.order()["state"] == "INIT"
 
 
 def test_the_hand_driver_moves_a_joint(ends: tuple[str, str]) -> None:
-    bench = Bench(ends[0])
+    runtime = RigRuntime(ends[0])
     with EmulatedHandProcess(ends[1], JOINTS):
-        check_it_moves(bench.hand(soft_start_s=0.0))
+        check_it_moves(runtime.hand(soft_start_s=0.0))
 
 
 def test_losses_are_counted_as_the_slaves_count_them(ends: tuple[str, str]) -> None:
-    bench = Bench(ends[0])
+    runtime = RigRuntime(ends[0])
     with EmulatedHandProcess(ends[1], JOINTS) as emulator:
-        bench.link.open()
+        runtime.transport.open()
         emulator.order(cable={"drop_share": 0.02})
-        bench.ask(300)
+        runtime.ask(300)
         counts = emulator.order(cable={"drop_share": 0.0})
-        assert bench.ask(3)[-1] is not None
-        ours = bench.link.counts
+        assert runtime.ask(3)[-1] is not None
+        ours = runtime.transport.counts
         assert ours.lost - ours.stale == counts["lost"] > 0  # what a busy machine delivered late was not lost
-        bench.link.close()
+        runtime.transport.close()
 
 
 def test_a_killed_and_restarted_hand_is_reconnected(ends: tuple[str, str]) -> None:
-    bench = Bench(ends[0], master=MasterSettings(answer_s=0.02, setup_answer_s=0.1))
+    runtime = RigRuntime(ends[0], master=MasterSettings(answer_s=0.02, setup_answer_s=0.1))
     emulator = EmulatedHandProcess(ends[1], JOINTS)
     emulator.start()
-    hand = bench.hand(lost_limit=5)
+    hand = runtime.hand(lost_limit=5)
     hand.connect()
     emulator.kill()
     with pytest.raises(DeviceError, match="5 cycles in a row without a valid status"):
@@ -113,27 +115,27 @@ def test_a_killed_and_restarted_hand_is_reconnected(ends: tuple[str, str]) -> No
 
 
 def test_a_watchdog_trip_is_told_and_mended(ends: tuple[str, str]) -> None:
-    bench = Bench(ends[0], watchdog_s=0.4, poll_every=1)
+    runtime = RigRuntime(ends[0], watchdog_s=0.4, poll_every=1)
     with EmulatedHandProcess(ends[1], JOINTS) as emulator:
-        bench.link.open()
-        assert bench.link.hand.watchdog_s == pytest.approx(0.4)
+        runtime.transport.open()
+        assert runtime.transport.hand.watchdog_s == pytest.approx(0.4)
         time.sleep(0.8)
         with pytest.raises(DeviceError, match="SAFEOP with error 0x001B, watchdog"):
-            bench.ask(3)
+            runtime.ask(3)
         assert emulator.order()["watchdog_trips"] == 1
-        bench.link.open()
-        assert bench.ask(5)[-1] is not None
-        bench.link.close()
+        runtime.transport.open()
+        assert runtime.ask(5)[-1] is not None
+        runtime.transport.close()
 
 
 def test_a_pulled_interface_is_told(ends: tuple[str, str]) -> None:
     with cable("p") as (near, far), EmulatedHandProcess(far, JOINTS):
-        bench = Bench(near)
-        bench.link.open()
+        runtime = RigRuntime(near)
+        runtime.transport.open()
         _set_down(near)
         with pytest.raises(DeviceError, match=f"{near}: the network interface is down or gone"):
-            bench.ask(3)
-        bench.link.close()
+            runtime.ask(3)
+        runtime.transport.close()
 
 
 def _set_down(interface: str) -> None:

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from drivers.fingertip import load_fingertips
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.rigs.check import check_rig
+from drivers.core.errors import ConfigurationError
+from drivers.core.fingertip import load_fingertips
+from tactile_lab.rigs.checks.check import check_rig
+from tactile_lab.rigs.checks.findings import Finding
 from tactile_lab.rigs.description import load_rig
-from tactile_lab.rigs.emulate import emulated, emulated_rig
-from tactile_lab.rigs.findings import Finding
+from tactile_lab.rigs.emulate import emulate_sensors, emulated_rig
 from tactile_lab.rigs.fingertip_rig import load_fingertip_rig
 
 TIPS = Path(str(resources.files("tactile_lab.rigs"))) / "calibrations" / "simulated-hand" / "fingertips.yaml"
@@ -77,7 +77,7 @@ def found(rig: Path) -> dict[str, Finding]:
 
 
 def test_every_sensor_is_found_and_described(rig: Path) -> None:
-    with emulated(load_fingertip_rig(rig)) as places:
+    with emulate_sensors(load_fingertip_rig(rig)) as places:
         findings = found(rig)
     assert findings.pop("calibration fingertips").figures["verdict"] == "PASS"
     assert set(places) == set(findings) == {"FF", "MF", "TH"}
@@ -99,14 +99,14 @@ def test_sensors_that_are_not_there_are_told_each_in_its_words(rig: Path) -> Non
 
 
 def test_a_wrong_baud_rate_is_found_out(rig: Path) -> None:
-    with emulated(load_fingertip_rig(rig)):
+    with emulate_sensors(load_fingertip_rig(rig)):
         digital, controller = (found(changed(rig, finger, baud=baud)) for finger, baud in (("MF", 19200), ("TH", 9600)))
     assert "It answers at 115200 baud: correct wires.MF.baud" in digital["MF"].detail
     assert "It answers at 19200 baud: correct wires.TH.baud" in controller["TH"].detail
 
 
 def test_another_sensor_than_the_rig_names_is_found_out(rig: Path) -> None:
-    with emulated(load_fingertip_rig(rig)):
+    with emulate_sensors(load_fingertip_rig(rig)):
         box, digital = (found(changed(rig, finger, serial="FT77777"))[finger] for finger in ("FF", "MF"))
     assert "the box uses the calibration of FT20001, the rig file names FT77777" in box.detail
     assert "the sensor is FT00002, the rig file names FT77777" in digital.detail
@@ -117,7 +117,7 @@ def test_a_device_that_is_no_controller_is_told(rig: Path, tmp_path: Path) -> No
     content = yaml.safe_load(swapped.read_text())
     del content["wires"]["MF"]
     write(swapped, content)
-    with emulated(load_fingertip_rig(rig)):
+    with emulate_sensors(load_fingertip_rig(rig)):
         assert "does not answer" in found(swapped)["TH"].detail
 
 
@@ -167,7 +167,7 @@ def test_emulated_volts_go_through_the_rigs_own_calibration(rig: Path, lab_data:
     port = free_port(socket.SOCK_DGRAM)
     content["wires"] = {"FF": {"wire": "gauge-volts", "calibration": "FT14048.cal", "local_port": port}}
     write(rig, content)
-    with emulated(load_fingertip_rig(rig)):
+    with emulate_sensors(load_fingertip_rig(rig)):
         assert found(rig)["FF"].ok
 
 
@@ -181,19 +181,19 @@ def test_emulated_volts_go_through_the_rigs_own_calibration(rig: Path, lab_data:
 def test_what_cannot_be_emulated_is_told(rig: Path, changes: dict[str, object], words: str) -> None:
     content = yaml.safe_load(rig.read_text())
     content["wires"] = {"FF": changes if "wire" in changes else content["wires"]["FF"] | changes}
-    with pytest.raises(ConfigurationError, match=words), emulated(load_fingertip_rig(write(rig, content))):
+    with pytest.raises(ConfigurationError, match=words), emulate_sensors(load_fingertip_rig(write(rig, content))):
         pytest.fail("it was emulated")
 
 
 @pytest.mark.parametrize("name", ["sim", str(TIPS.parents[2] / "sim-wire.yaml")])
 def test_rigs_that_start_what_they_need_are_not_emulated(name: str) -> None:
-    with pytest.raises(ConfigurationError, match="simulated rigs and those with stand_ins start what they need"):
+    with pytest.raises(ConfigurationError, match="simulated and emulated rigs start what they need"):
         emulated_rig(name)
 
 
 def test_a_real_port_is_never_replaced(rig: Path) -> None:
     (rig.parent / "tty-MF").write_text("a device")
-    with pytest.raises(ConfigurationError, match="tty-MF cannot be emulated"), emulated(load_fingertip_rig(rig)):
+    with pytest.raises(ConfigurationError, match="tty-MF cannot be emulated"), emulate_sensors(load_fingertip_rig(rig)):
         pytest.fail("it was emulated")
     assert (rig.parent / "tty-MF").read_text() == "a device"
 
@@ -213,7 +213,7 @@ def test_the_command_tells_what_is_wrong_and_ends_with_its_code(rig: Path, capsy
     assert not told["ready"]
     names = ["calibration fingertips", "fingertip FF", "fingertip MF", "fingertip TH"]
     assert [device["device"] for device in told["devices"]] == names
-    with emulated(load_fingertip_rig(rig)), pytest.raises(SystemExit) as ended:
+    with emulate_sensors(load_fingertip_rig(rig)), pytest.raises(SystemExit) as ended:
         main(["rig", "check", str(rig)])
     assert ended.value.code == 0
     with pytest.raises(SystemExit) as ended:

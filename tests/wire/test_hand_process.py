@@ -11,20 +11,20 @@ from typing import Any
 
 import pytest
 import yaml
-from ethercat_wire import JOINTS, cable
 
-from drivers.emulators.ethercat_server import EmulatedHandProcess
+from drivers.core.errors import DeviceError
+from drivers.core.transports import Datagram
+from drivers.emulators.ethercat.server import EmulatedHandProcess
 from drivers.ethercat.master import MasterSettings
-from drivers.links import Datagram
-from drivers.shadow.ethercat_link import EthercatSettings
-from drivers.shadow.hand_process import HandProcess
-from drivers.shadow.hand_samples import HandDecoder
-from drivers.shadow.hand_settings import HandSettings
-from drivers.shadow.hand_setup import HandSetup
-from drivers.shadow.joint_calibration import JointCalibration
-from drivers.shadow.motors import MotorMap
-from drivers.shadow.palm_images import PALMS
-from tactile_lab.errors import DeviceError
+from drivers.shadow.device.hand_process import HandProcess
+from drivers.shadow.device.hand_samples import HandDecoder
+from drivers.shadow.device.hand_settings import HandSettings
+from drivers.shadow.device.hand_setup import HandSetup
+from drivers.shadow.ethercat.hand_transport import EthercatSettings
+from drivers.shadow.model.joint_calibration import JointCalibration
+from drivers.shadow.model.motors import MotorMap
+from drivers.shadow.protocol.palm_images import PALMS
+from tests.support.ethercat_wire import JOINTS, cable
 
 MOTORS = JOINTS.with_name("motors.yaml")
 
@@ -36,10 +36,10 @@ class Tap:
         self.sent: list[Datagram] = []
         self.arrived: list[Datagram] = []
 
-    def transmitted(self, link: str, payload: bytes, stamp_ns: int) -> None:
+    def on_transmitted(self, transport: str, payload: bytes, stamp_ns: int) -> None:
         self.sent.append(Datagram(payload, stamp_ns))
 
-    def received(self, link: str, payload: bytes, stamp_ns: int) -> None:
+    def on_received(self, transport: str, payload: bytes, stamp_ns: int) -> None:
         self.arrived.append(Datagram(payload, stamp_ns))
 
     def angles(self, joint: int = 2) -> list[float]:
@@ -61,11 +61,11 @@ def ends() -> Iterator[tuple[str, str]]:
 def hand(
     interface: str, tap: Tap | None = None, lost_limit: int = 200, patience_s: float = 60.0, **changes: Any
 ) -> HandProcess:
-    link = EthercatSettings(
+    transport = EthercatSettings(
         interface=interface, watchdog_s=1.0, master=MasterSettings(answer_s=0.02, setup_answer_s=0.1)
     )
     settings = HandSettings(cycle_s=0.002, soft_start_s=0.0, lost_limit=lost_limit)
-    setup = HandSetup(ethercat=link, hand=settings, joints=JOINTS, motors=MOTORS)
+    setup = HandSetup(ethercat=transport, hand=settings, joints=JOINTS, motors=MOTORS)
     return HandProcess(setup.model_copy(update=changes), tap, patience_s=patience_s)
 
 

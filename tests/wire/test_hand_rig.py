@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 import yaml
-from ethercat_wire import JOINTS, cable
 
-from drivers.emulators.ethercat_server import EmulatedHandProcess
-from drivers.emulators.shadow_chain import ChainSettings
-from tactile_lab.errors import ConfigurationError
-from tactile_lab.geometry.contacts import FINGERS
-from tactile_lab.rigs.check import check_rig
+from drivers.core.contacts import FINGERS
+from drivers.core.errors import ConfigurationError
+from drivers.emulators.ethercat.server import EmulatedHandProcess
+from drivers.emulators.ethercat.shadow_chain import ChainSettings
+from tactile_lab.rigs.checks.check import check_rig
 from tactile_lab.rigs.emulate import emulated_hand
 from tactile_lab.rigs.hand_rig import load_hand_rig
+from tests.support.ethercat_wire import JOINTS, cable
 
 CALIBRATIONS = ("calibration joints", "calibration motors")
 

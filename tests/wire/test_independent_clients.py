@@ -8,13 +8,13 @@ import can
 import numpy as np
 import pytest
 
-from drivers.ati.digital_calibration import BLOCK, FIRST_REGISTER, decode_block
-from drivers.emulators.ati_sensor import EmulatedSensor
-from drivers.emulators.can_server import CanServer
-from drivers.emulators.can_unit import CanUnit
-from drivers.emulators.digital_unit import DigitalUnit
-from drivers.emulators.net_box_server import NetBoxServer
-from drivers.emulators.net_box_unit import NetBoxUnit
+from drivers.ati.protocols.digital_calibration import BLOCK, FIRST_REGISTER, decode_block
+from drivers.emulators.ati.can_server import CanServer
+from drivers.emulators.ati.can_unit import CanUnit
+from drivers.emulators.ati.digital_unit import DigitalUnit
+from drivers.emulators.ati.net_box_server import NetBoxServer
+from drivers.emulators.ati.net_box_unit import NetBoxUnit
+from drivers.emulators.ati.sensor import EmulatedSensor
 from drivers.emulators.pty_port import PtyPort
 
 PRESSED = np.array([1.0, -0.5, 2.0, 0.010, -0.004, 0.002])

@@ -11,44 +11,48 @@ import can
 import numpy as np
 import pytest
 
-from drivers.ati import net_box
-from drivers.ati.force_tip import WrenchSample
-from drivers.ati.gauge_volts import encode_volts
 from drivers.ati.nano17 import Nano17, Nano17Settings
+from drivers.ati.wires import net_box
+from drivers.ati.wires.gauge_volts import encode_volts
 from drivers.ati.wiring import (
     CanWiring,
     ControllerWiring,
     DigitalWiring,
     NetBoxWiring,
     VoltsWiring,
-    Wiring,
-    make_link,
-    make_wire,
 )
-from drivers.emulators.ati_sensor import EmulatedSensor
-from drivers.emulators.can_server import CanServer
-from drivers.emulators.can_unit import CanUnit
-from drivers.emulators.controller_unit import COUNTS_PER_N, ControllerUnit, COUNTS_PER_Nm
-from drivers.emulators.digital_unit import DigitalUnit
-from drivers.emulators.net_box_server import NetBoxServer
-from drivers.emulators.net_box_unit import NetBoxUnit
+from drivers.core.clock import MonotonicClock
+from drivers.core.errors import DeviceError
+from drivers.core.fingertip import load_fingertips
+from drivers.core.transports import Transport
+from drivers.emulators.ati.can_server import CanServer
+from drivers.emulators.ati.can_unit import CanUnit
+from drivers.emulators.ati.controller_unit import COUNTS_PER_N, ControllerUnit, COUNTS_PER_Nm
+from drivers.emulators.ati.digital_unit import DigitalUnit
+from drivers.emulators.ati.net_box_server import NetBoxServer
+from drivers.emulators.ati.net_box_unit import NetBoxUnit
+from drivers.emulators.ati.sensor import EmulatedSensor
 from drivers.emulators.pty_port import PtyPort
-from drivers.emulators.slcan_unit import SlcanUnit
-from drivers.faults import Drop, FaultyLink, Reorder, When
-from drivers.fingertip import load_fingertips
-from drivers.links import Link
-from tactile_lab.clock import MonotonicClock
-from tactile_lab.errors import DeviceError
+from drivers.fingertips.wiring import make_transport, make_wire
+from drivers.force.force_fingertip import WrenchSample
+from drivers.force.wire_settings import WireSettings
+from tests.support.faults import Drop, FaultyTransport, Reorder, When
+from tests.support.repository import SIMULATED_HAND
+from tests.support.slcan_unit import SlcanUnit
 
-TIPS = Path(__file__).parents[2] / "tactile_lab" / "rigs" / "calibrations" / "simulated-hand" / "fingertips.yaml"
+TIPS = SIMULATED_HAND / "fingertips.yaml"
 CLOCK = MonotonicClock()
 PRESSED = np.array([1.0, -0.5, 2.0, 0.010, -0.004, 0.002])
 COUNT = np.repeat([5e-3, 5e-5], 3)
 
 
-def device(wiring: Wiring, folder: Path = TIPS.parent, wrap: Callable[[Link], Link] = lambda link: link) -> Nano17:
-    link = wrap(make_link(wiring, "ft/FF", CLOCK))
-    return Nano17("FF", link, CLOCK, load_fingertips(TIPS)["FF"], Nano17Settings(), make_wire(wiring, folder))
+def device(
+    wiring: WireSettings,
+    folder: Path = TIPS.parent,
+    wrap: Callable[[Transport], Transport] = lambda transport: transport,
+) -> Nano17:
+    transport = wrap(make_transport(wiring, "ft/FF", CLOCK))
+    return Nano17("FF", transport, CLOCK, load_fingertips(TIPS)["FF"], Nano17Settings(), make_wire(wiring, folder))
 
 
 def listen(tip: Nano17, count: int, seconds: float = 10.0) -> list[WrenchSample]:
@@ -119,7 +123,7 @@ def test_lost_records_are_counted_exactly(box: NetBoxServer) -> None:
     listen(tip, 300)
     box.lose = lambda number: False
     last = box.unit.sent + 1
-    while listen(tip, 1)[-1].rdt_sequence < last:
+    while listen(tip, 1)[-1].sent < last:
         pass  # what was lost last is known by what came after it
     assert tip.sequences.lost == box.lost > 0
     assert any("records lost" in problem for problem in tip.health())
@@ -128,10 +132,10 @@ def test_lost_records_are_counted_exactly(box: NetBoxServer) -> None:
 
 @pytest.mark.parametrize(("fault", "words"), [(Drop(), "records lost"), (Reorder(), "out of order")])
 def test_a_fault_on_the_real_wire_is_counted(box: NetBoxServer, fault: Drop | Reorder, words: str) -> None:
-    wrapped: list[FaultyLink] = []
+    wrapped: list[FaultyTransport] = []
 
-    def wrap(link: Link) -> Link:
-        wrapped.append(FaultyLink(link, fault, When(first=20, every=7, count=20)))
+    def wrap(transport: Transport) -> Transport:
+        wrapped.append(FaultyTransport(transport, fault, When(first=20, every=7, count=20)))
         return wrapped[0]
 
     tip = device(box_wiring(box), wrap=wrap)
@@ -149,15 +153,15 @@ def test_a_forged_record_from_a_foreign_address_never_becomes_a_sample(box: NetB
     tip = device(box_wiring(box))
     tip.connect()
     listen(tip, 10)
-    link = tip._link
-    port = link._socket.getsockname()[1]  # type: ignore[attr-defined]
+    transport = tip._transport
+    port = transport._socket.getsockname()[1]  # type: ignore[attr-defined]
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         stranger.bind(("127.0.0.9", 0))
         for _ in range(5):
             stranger.sendto(bytes(36), ("127.0.0.1", port))
     samples = listen(tip, 50)
-    assert all(sample.rdt_sequence for sample in samples)
-    assert link.foreign == 5  # type: ignore[attr-defined]
+    assert all(sample.sent for sample in samples)
+    assert transport.foreign == 5  # type: ignore[attr-defined]
     assert any("5 datagrams from other addresses" in problem for problem in tip.health())
     tip.close()
 
@@ -303,14 +307,14 @@ def test_volts_arrive_from_an_acquisition_program(lab_data: Path) -> None:
     tip = device(wiring, lab_data / "ati_cal")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as program:
         program.bind(("127.0.0.1", 0))
-        tip._link.open()
+        tip._transport.open()
         for number in range(40):
             program.sendto(encode_volts(number, (0.1, 0.2, -0.1, 0.0, 0.05, 0.01 * (number % 2))), ("127.0.0.1", port))
         tip.connect()
         for number in range(40, 60):
             program.sendto(encode_volts(number, (0.1, 0.2, -0.1, 0.0, 0.05, 0.01 * (number % 2))), ("127.0.0.1", port))
         samples = listen(tip, 20)
-    assert [sample.rdt_sequence for sample in samples][-1] == 59
+    assert [sample.sent for sample in samples][-1] == 59
     assert tip.sequences.lost == 0
     tip.close()
 

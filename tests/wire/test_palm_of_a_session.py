@@ -7,18 +7,18 @@ from pathlib import Path
 
 import pytest
 import yaml
-from ethercat_wire import JOINTS, cable
 
-from drivers.emulators.ethercat_server import EmulatedHandProcess
-from drivers.emulators.shadow_chain import ChainSettings
-from drivers.shadow.hand_process import HandProcess
-from sessions.interpreter import Interpreter, Observer
-from sessions.replay import Replay
-from sessions.session import Session, create_session
+from drivers.emulators.ethercat.server import EmulatedHandProcess
+from drivers.emulators.ethercat.shadow_chain import ChainSettings
+from drivers.shadow.device.hand_process import HandProcess
+from sessions.perception.interpreter import Interpreter, Observer
+from sessions.perception.replay import Replay
+from sessions.recording.session import Session, create_session
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import Rig, load_rig, rig_of_session
 from tactile_lab.rigs.laboratory import open_laboratory
 from tactile_lab.rigs.wired import hand_setup
+from tests.support.ethercat_wire import JOINTS, cable
 from tests.support.wire_rig import wire_rig
 
 pytestmark = pytest.mark.usefixtures("real_time_alone")
@@ -67,8 +67,8 @@ def record(rig: Rig, root: Path) -> list[tuple[int, bytes]]:
 
 
 def real_rig(folder: Path, interface: str) -> Rig:
-    """A laboratory without stand-ins, whose hand is on a cable."""
-    path = wire_rig(folder, stand_ins=False)
+    """A laboratory without emulators, whose hand is on a cable."""
+    path = wire_rig(folder, emulated=False)
     content = yaml.safe_load(path.read_text())
     content["wires"]["hand"]["ethercat"]["interface"] = interface
     path.write_text(yaml.safe_dump(content))

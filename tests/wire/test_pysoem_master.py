@@ -7,20 +7,20 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from ethercat_wire import JOINTS, cable, check_it_moves
 
-from drivers.emulators.ethercat_server import EmulatedHandProcess
-from drivers.emulators.shadow_chain import ChainSettings
+from drivers.core.clock import MonotonicClock
+from drivers.core.errors import ConfigurationError, DeviceError
+from drivers.emulators.ethercat.server import EmulatedHandProcess
+from drivers.emulators.ethercat.shadow_chain import ChainSettings
 from drivers.ethercat.master import MasterSettings
-from drivers.shadow.ethercat_link import EthercatSettings
-from drivers.shadow.hand import ShadowHand
-from drivers.shadow.hand_settings import HandSettings
-from drivers.shadow.joint_calibration import JointCalibration
-from drivers.shadow.palm_codec import PalmCommand
-from drivers.shadow.palm_images import PALMS
-from drivers.shadow.pysoem_link import PysoemLink
-from tactile_lab.clock import MonotonicClock
-from tactile_lab.errors import ConfigurationError, DeviceError
+from drivers.shadow.device.hand import ShadowHand
+from drivers.shadow.device.hand_settings import HandSettings
+from drivers.shadow.ethercat.hand_transport import EthercatSettings
+from drivers.shadow.ethercat.pysoem_transport import PysoemTransport
+from drivers.shadow.model.joint_calibration import JointCalibration
+from drivers.shadow.protocol.palm_codec import PalmCommand
+from drivers.shadow.protocol.palm_images import PALMS
+from tests.support.ethercat_wire import JOINTS, cable, check_it_moves
 
 pysoem = pytest.importorskip("pysoem", reason="the [ethercat] extra is not installed")
 
@@ -31,12 +31,12 @@ def ends() -> Iterator[tuple[str, str]]:
         yield names
 
 
-def link(interface: str, **settings: Any) -> PysoemLink:
+def transport(interface: str, **settings: Any) -> PysoemTransport:
     settings = {"master": MasterSettings(answer_s=0.05)} | settings
-    return PysoemLink("hand", EthercatSettings(interface=interface, **settings), MonotonicClock())
+    return PysoemTransport("hand", EthercatSettings(interface=interface, **settings), MonotonicClock())
 
 
-def cycle(hand: PysoemLink, count: int) -> None:
+def cycle(hand: PysoemTransport, count: int) -> None:
     for _ in range(count):
         hand.send(bytes(70))
         hand.receive()
@@ -57,7 +57,7 @@ def test_soem_finds_both_boards_by_their_eeproms(ends: tuple[str, str]) -> None:
 
 @pytest.mark.parametrize("palm", ["0220", "0230", "0240"])
 def test_soem_reaches_op_and_exchanges_the_image(ends: tuple[str, str], palm: Any) -> None:
-    image, hand = PALMS[palm], link(ends[0])  # type: ignore[index]
+    image, hand = PALMS[palm], transport(ends[0])  # type: ignore[index]
     with EmulatedHandProcess(ends[1], JOINTS, ChainSettings(palm=palm, eeprom="mapped")) as emulator:
         hand.open()
         written = 0
@@ -75,16 +75,16 @@ def test_the_hand_driver_works_through_soem(ends: tuple[str, str]) -> None:
     clock = MonotonicClock()
     with EmulatedHandProcess(ends[1], JOINTS, ChainSettings(eeprom="mapped")):
         settings = HandSettings(cycle_s=0.002, soft_start_s=0.0)
-        check_it_moves(ShadowHand(link(ends[0]), clock, JointCalibration.load(JOINTS), settings))
+        check_it_moves(ShadowHand(transport(ends[0]), clock, JointCalibration.load(JOINTS), settings))
 
 
 def test_a_bare_eeprom_is_refused_with_the_way_out(ends: tuple[str, str]) -> None:
     with EmulatedHandProcess(ends[1], JOINTS), pytest.raises(DeviceError, match=r"0 \+ 0 bytes.*our own master"):
-        link(ends[0]).open()
+        transport(ends[0]).open()
 
 
 def test_a_palm_that_falls_back_is_told(ends: tuple[str, str]) -> None:
-    hand = link(ends[0], poll_every=2)
+    hand = transport(ends[0], poll_every=2)
     with EmulatedHandProcess(ends[1], JOINTS, ChainSettings(eeprom="mapped")) as emulator:
         hand.open()
         emulator.order(fall=[4, 0x1A])
@@ -94,7 +94,7 @@ def test_a_palm_that_falls_back_is_told(ends: tuple[str, str]) -> None:
 
 
 def test_a_palm_that_is_cut_off_while_running_is_told(ends: tuple[str, str]) -> None:
-    hand = link(ends[0], poll_every=2)
+    hand = transport(ends[0], poll_every=2)
     with EmulatedHandProcess(ends[1], JOINTS, ChainSettings(eeprom="mapped")) as emulator:
         hand.open()
         emulator.order(cable={"connected": 1})
@@ -108,16 +108,16 @@ def test_another_hand_is_named(ends: tuple[str, str]) -> None:
         EmulatedHandProcess(ends[1], JOINTS, ChainSettings(serial=3)),
         pytest.raises(DeviceError, match="hand 3, not hand 4"),
     ):
-        link(ends[0], serial=4).open()
+        transport(ends[0], serial=4).open()
 
 
 def test_wrong_interface_and_missing_slaves_are_named(ends: tuple[str, str]) -> None:
     with pytest.raises(DeviceError, match="no network interface nosuch0"):
-        link("nosuch0").open()
+        transport("nosuch0").open()
     with pytest.raises(DeviceError, match="0 EtherCAT slaves instead of 2"):
-        link(ends[0]).open()
+        transport(ends[0]).open()
 
 
 def test_the_watchdog_is_not_promised(ends: tuple[str, str]) -> None:
     with pytest.raises(ConfigurationError, match="does not set the palm's watchdog"):
-        link(ends[0], watchdog_s=0.1)
+        transport(ends[0], watchdog_s=0.1)

@@ -13,26 +13,26 @@ from typing import Any
 
 import pytest
 
-from drivers.emulators.wired.stand_ins import StandIns
-from drivers.shadow.palm_images import PALMS
-from sessions import schemas
-from sessions.bench import Bench
-from sessions.decisions import Crew
-from sessions.mark_outcomes import TareReport
-from sessions.progress import NullProgress
-from sessions.recorder import Recorder
-from sessions.replay import Replay
-from sessions.session import Session
-from sessions.session_outcome import Ending, SessionOutcome
-from sessions.thinker_process import ThinkerProcess
-from tactile_lab.errors import DeviceError
-from tactile_lab.geometry.contacts import Grasp
+from drivers.core.contacts import Grasp
+from drivers.core.errors import DeviceError
+from drivers.emulators.laboratory.emulated_laboratory import EmulatedLaboratory
+from drivers.shadow.protocol.palm_images import PALMS
+from sessions.conductor.decisions import SessionRoles
+from sessions.conductor.progress import NullProgress
+from sessions.conductor.session_outcome import Ending, SessionOutcome
+from sessions.perception.event_outcomes import TareReport
+from sessions.perception.replay import Replay
+from sessions.recording.recorder import Recorder
+from sessions.recording.session import Session
+from sessions.recording.traffic import schemas
+from sessions.rig_runtime.rig_runtime import RigRuntime
+from tactile_lab.autonomy.estimator_process import EstimatorProcess
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import Rig, load_rig, rig_of_session
 from tactile_lab.rigs.laboratory import WiredLaboratory, open_laboratory
-from tactile_lab.slam import TactileSlam
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow import running
-from tactile_lab.workflow.attending import crew_for
+from tactile_lab.workflow.attending import roles_for
 from tests.support.wire_rig import wire_rig
 
 pytestmark = pytest.mark.usefixtures("real_time_alone")
@@ -72,9 +72,9 @@ def laboratory(rig: Rig) -> Iterator[WiredLaboratory]:
         raise
 
 
-def stations(laboratory: WiredLaboratory) -> StandIns:
-    assert laboratory.stand_ins is not None
-    return laboratory.stand_ins
+def emulated_laboratory(laboratory: WiredLaboratory) -> EmulatedLaboratory:
+    assert laboratory.emulators is not None
+    return laboratory.emulators
 
 
 def run(
@@ -88,13 +88,13 @@ def run(
 
 
 def run_killing(rig: Rig, laboratory: WiredLaboratory, root: Path, device: str) -> tuple[SessionOutcome, Path]:
-    """The same, with a device's stand-in killed while the hand comes down, and started again for the next session."""
-    station = stations(laboratory).stations[device]
+    """The same, with a device's emulator killed while the hand comes down, and started again for the next session."""
+    host = emulated_laboratory(laboratory).hosts[device]
     try:
-        return run(rig, laboratory, root, At("descend", station.kill))
+        return run(rig, laboratory, root, At("descend", host.kill))
     finally:
-        station.start()
-        station.await_ready()
+        host.start()
+        host.await_ready()
 
 
 def test_a_session_is_completed_and_replays_to_the_same_grasp(
@@ -112,9 +112,9 @@ def test_a_session_is_completed_and_replays_to_the_same_grasp(
     assert [each.finger for each in grasp.contacts] == [each.finger for each in live.contacts]
     for ours, theirs in zip(live.contacts, grasp.contacts, strict=True):
         assert ours.point_world_m.tobytes() == theirs.point_world_m.tobytes()
-    links = {"hand", "base", "camera", "ft/FF", "ft/MF", "ft/RF", "ft/LF", "ft/TH"}
-    recorded = {schemas.received_link(message.topic) for message in session.traffic().messages()}
-    assert links <= recorded
+    transports = {"hand", "base", "camera", "ft/FF", "ft/MF", "ft/RF", "ft/LF", "ft/TH"}
+    recorded = {schemas.received_transport(message.topic) for message in session.traffic().messages()}
+    assert transports <= recorded
 
 
 @pytest.mark.parametrize(
@@ -147,17 +147,17 @@ def test_a_world_that_stands_still_ends_the_session_in_order(
 def test_a_hand_process_that_dies_ends_the_session_in_order(
     rig: Rig, laboratory: WiredLaboratory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    benches: list[Bench] = []
+    runtimes: list[RigRuntime] = []
 
-    def kept(place: WiredLaboratory, recorder: Recorder) -> Bench:
-        benches.append(made(place, recorder))
-        return benches[-1]
+    def kept(place: WiredLaboratory, recorder: Recorder) -> RigRuntime:
+        runtimes.append(made(place, recorder))
+        return runtimes[-1]
 
     def kill() -> None:
-        os.kill(benches[0].hand._child.process_id, signal.SIGKILL)  # type: ignore[attr-defined]
+        os.kill(runtimes[0].hand._child.process_id, signal.SIGKILL)  # type: ignore[attr-defined]
 
-    made = WiredLaboratory.bench
-    monkeypatch.setattr(WiredLaboratory, "bench", kept)
+    made = WiredLaboratory.runtime
+    monkeypatch.setattr(WiredLaboratory, "runtime", kept)
     outcome, folder = run(rig, laboratory, tmp_path, At("descend", kill))
     assert outcome.ending is Ending.STOPPED
     assert "its process has ended" in outcome.reason
@@ -167,18 +167,18 @@ def test_a_hand_process_that_dies_ends_the_session_in_order(
 def test_an_estimation_whose_process_dies_ends_the_session_in_order(
     rig: Rig, laboratory: WiredLaboratory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    crews: list[Crew] = []
+    crews: list[SessionRoles] = []
 
-    def kept(*args: Any, **kwargs: Any) -> Crew:
-        crews.append(crew_for(*args, **kwargs))
+    def kept(*args: Any, **kwargs: Any) -> SessionRoles:
+        crews.append(roles_for(*args, **kwargs))
         return crews[-1]
 
     def kill() -> None:
-        thinking = crews[0].thinking
-        assert isinstance(thinking, ThinkerProcess)
-        os.kill(thinking.process_id, signal.SIGKILL)
+        estimator = crews[0].estimator
+        assert isinstance(estimator, EstimatorProcess)
+        os.kill(estimator.process_id, signal.SIGKILL)
 
-    monkeypatch.setattr(running, "crew_for", kept)
+    monkeypatch.setattr(running, "roles_for", kept)
     outcome, folder = run(rig, laboratory, tmp_path, At("descend", kill))
     assert outcome.ending is Ending.STOPPED
     check_ended_in_order(folder, "estimation: its process has ended")

@@ -13,17 +13,17 @@ from gtsam import Pose3, Rot3
 
 from drivers.camera.calibration import load_camera
 from drivers.camera.markers import MarkerSettings
-from drivers.simulation.camera_renderer import PrintedMarker, TableCamera
+from drivers.camera.rendering.settings import CameraSettings
+from drivers.camera.rendering.table_camera import PrintedMarker, TableCamera
+from drivers.core.configuration import load_model
+from drivers.core.errors import DeviceError
 from drivers.simulation.objects import object_model
-from drivers.simulation.settings import CameraSettings
 from drivers.simulation.world import marker_settings
-from sessions.progress import NullProgress
-from sessions.session import Session
-from tactile_lab.errors import DeviceError
-from tactile_lab.evaluation.session_truth import TRUTH_TRAJECTORY
+from sessions.conductor.progress import NullProgress
+from sessions.recording.session import Session
 from tactile_lab.evaluation.trajectory import read_trajectory
+from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY
 from tactile_lab.rigs.description import Rig, load_rig
-from tactile_lab.strict_yaml import load_model
 from tactile_lab.workflow import running
 from tactile_lab.workflow.comparing import compare_sessions
 from tactile_lab.workflow.judging import TruthChoice
@@ -31,7 +31,7 @@ from tests.support.wire_rig import wire_rig
 
 pytestmark = pytest.mark.usefixtures("real_time_alone")
 
-OBJECT = "box-10x6x4"
+OBJECT, RATE_Hz = "box-10x6x4", 5
 TRUTH = Pose3(Rot3.Yaw(0.4), np.array([0.02, -0.015, 0.02]))  # the box stands on the table
 
 
@@ -42,13 +42,13 @@ def with_video(folder: Path) -> Rig:
     markers = marker_settings(object_model(OBJECT), load_model(rig.files["markers"], MarkerSettings))
     lens = load_camera(rig.files["camera"])
     assert lens.size_px is not None
-    video = cv2.VideoWriter(str(folder / "table.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 20, lens.size_px, False)
+    video = cv2.VideoWriter(str(folder / "table.avi"), cv2.VideoWriter.fourcc(*"MJPG"), RATE_Hz, lens.size_px, False)
     view = TableCamera(lens, CameraSettings(), np.random.default_rng(4))
     for _ in range(5):
         video.write(view.render(placed(markers), np.zeros((3, 3))))
     video.release()
     content = yaml.safe_load(path.read_text())
-    source = {"source": "table.avi", "rate_hz": 20, "repeat": True}
+    source = {"source": "table.avi", "rate_hz": RATE_Hz, "repeat": True}
     content["wires"]["camera"] = {"wire": "source", "settings": source}
     path.write_text(yaml.safe_dump(content))
     return load_rig(str(path))

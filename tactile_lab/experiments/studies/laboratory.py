@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from calibration.fingertip_model import PARTS
-from tactile_lab.experiments import (
+from calibration.fingertip.model import PARTS
+from tactile_lab.experiments.cells import grid
+from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.runs import (
     calibration_runs,
     camera_runs,
     crash_runs,
@@ -11,10 +13,8 @@ from tactile_lab.experiments import (
     forearm_on_rig,
     graph_runs,
 )
-from tactile_lab.experiments.cells import grid
-from tactile_lab.experiments.experiment import Experiment
-from tactile_lab.experiments.graph_stress import stock_solvers
-from tactile_lab.experiments.study_plots import ranges
+from tactile_lab.experiments.runs.graph_stress import stock_solvers
+from tactile_lab.experiments.studies.plots import ranges
 from tactile_lab.experiments.summary import Column
 
 CAMERA_TRUTH = Experiment(

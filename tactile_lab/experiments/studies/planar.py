@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from tactile_lab.experiments import contact_limit, contour_limit, shape_runs, tracking_runs
 from tactile_lab.experiments.cells import Setting, grid
 from tactile_lab.experiments.experiment import Experiment
-from tactile_lab.experiments.study_columns import (
+from tactile_lab.experiments.runs import contact_limit, contour_limit, shape_runs, tracking_runs
+from tactile_lab.experiments.studies.columns import (
     AGAINST_KNOWN,
     MEAN_DISTANCE,
     REGISTRATION,
     SHAPE_COLUMNS,
     TRACKING_COLUMNS,
 )
-from tactile_lab.experiments.study_plots import HAUSDORFF_LABEL, condition, curves, ranges
+from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, condition, curves, ranges
 
 METHODS = ("known-pose", "joint", "particle", "icp", "thesis-pf", "thesis-pf-graph", "odometry")
 PLANAR_SHAPES = ("rectangle", "triangle", "ellipse", "L", "hexagon", "trapezoid", "pentagon", "stadium")

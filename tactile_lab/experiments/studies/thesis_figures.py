@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from tactile_lab.experiments import shape_runs, tracking_runs
 from tactile_lab.experiments.cells import Setting, grid
 from tactile_lab.experiments.experiment import Experiment
-from tactile_lab.experiments.studies.planar import PLANAR_GRASPS
-from tactile_lab.experiments.study_columns import (
+from tactile_lab.experiments.runs import shape_runs, tracking_runs
+from tactile_lab.experiments.studies.columns import (
     HAUSDORFF,
     MEAN_DISTANCE,
     REGISTRATION,
@@ -14,7 +13,8 @@ from tactile_lab.experiments.study_columns import (
     STEP,
     TRACKING_COLUMNS,
 )
-from tactile_lab.experiments.study_plots import HAUSDORFF_LABEL, condition, curves, ranges
+from tactile_lab.experiments.studies.planar import PLANAR_GRASPS
+from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, condition, curves, ranges
 from tactile_lab.experiments.summary import Column
 
 THREE_SHAPES = ("rectangle", "ellipse", "hexagon")

@@ -1,0 +1,1 @@
+"""Where the forearm's mount stands in the world."""

@@ -1,0 +1,271 @@
+"""Recorded observations of a forearm-to-world calibration in a file, so that it can be solved again.
+
+Ours (``tactile-forearm-data/1``) is one JSON document with touches or views and all that solving them needs. Pose pairs
+as other programs write them, ``[[mount_T_hand, camera_T_target], ...]`` with 4 x 4 matrices, are read too.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeAlias
+
+import numpy as np
+from gtsam import Pose3, Rot3
+from pydantic import Field, RootModel
+
+from calibration.forearm.hand_eye import nearest_rotation
+from calibration.steps.observations import HandPose, Plane, PosePair, Spot, Target, Touch, View
+from drivers.camera.calibration import CameraCalibration
+from drivers.camera.markers import MarkerSettings
+from drivers.core.atomic_files import write_whole
+from drivers.core.configuration import StrictModel, validate
+from drivers.core.contacts import FINGERS, Array
+from drivers.core.errors import ConfigurationError
+from drivers.core.fingertip import RigidTransform, Vector3
+from drivers.shadow.model.kinematics import JOINTS
+
+FORMAT = "tactile-forearm-data/1"
+
+Six = tuple[float, float, float, float, float, float]
+Joints = Annotated[tuple[float, ...], Field(min_length=len(JOINTS), max_length=len(JOINTS))]
+Square3 = tuple[Vector3, Vector3, Vector3]
+Pixel = tuple[float, float]
+
+_SKEWED = 1e-3
+
+
+class PlaneEntry(StrictModel):
+    """A face."""
+
+    kind: Literal["plane"] = "plane"
+    name: str
+    point_world_m: Vector3
+    normal_world: Vector3
+    sigma_m: float = Field(ge=0.0)
+
+
+class SpotEntry(StrictModel):
+    """A known point."""
+
+    kind: Literal["spot"] = "spot"
+    name: str
+    point_world_m: Vector3
+    sigma_m: float = Field(ge=0.0)
+
+
+class TouchEntry(StrictModel):
+    """One touch."""
+
+    finger: Literal["FF", "MF", "RF", "LF", "TH"]
+    base_q: Six
+    joints_rad: Joints
+    point_distal_m: Vector3
+    normal_distal: Vector3
+    point_covariance_m2: Square3
+    force_N: float = 0.0
+    target: Annotated[PlaneEntry | SpotEntry, Field(discriminator="kind")]
+
+
+class ViewEntry(StrictModel):
+    """One picture."""
+
+    base_q: Six
+    joints_rad: Joints
+    board_m: tuple[Vector3, ...]
+    board_px: tuple[Pixel, ...]
+    world_px: tuple[Pixel, Pixel, Pixel, Pixel] | None = None
+
+
+class DataFile(StrictModel):
+    """A file of recorded observations."""
+
+    format: Literal["tactile-forearm-data/1"] = "tactile-forearm-data/1"
+    rig: str = Field(min_length=1)
+    devices: dict[str, str] = Field(default_factory=dict)
+    guess: RigidTransform = RigidTransform(translation_m=(0.0, 0.0, 0.0))
+    touches: tuple[TouchEntry, ...] = ()
+    views: tuple[ViewEntry, ...] = ()
+    link: Literal["palm", "FF", "MF", "RF", "LF", "TH"] = "palm"
+    camera: CameraCalibration | None = None
+    markers: MarkerSettings | None = None
+
+
+Matrix: TypeAlias = tuple[
+    tuple[float, float, float, float],
+    tuple[float, float, float, float],
+    tuple[float, float, float, float],
+    tuple[float, float, float, float],
+]
+
+
+class _Pairs(RootModel[tuple[tuple[Matrix, Matrix], ...]]):
+    """Pose pairs as other programs write them."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForearmData:
+    """Recorded observations: touches, views or pairs, and what solving them needs.
+
+    Attributes:
+        rig, devices: what they were recorded on; empty where the file does not say.
+        guess: roughly where the mount stands.
+        touches, views, pairs: one of them.
+        link: what carries the board in the views.
+        camera, markers: lens and world marker of the views.
+    """
+
+    rig: str = ""
+    devices: dict[str, str] = field(default_factory=dict)
+    guess: Pose3 = field(default_factory=Pose3)
+    touches: tuple[Touch, ...] = ()
+    views: tuple[View, ...] = ()
+    pairs: tuple[PosePair, ...] = ()
+    link: str = "palm"
+    camera: CameraCalibration | None = None
+    markers: MarkerSettings | None = None
+
+
+def load_data(path: Path) -> ForearmData:
+    """Read recorded observations.
+
+    Raises:
+        ConfigurationError: the file cannot be read, is of no known form, or holds what is no rigid motion.
+    """
+    content = _json(path)
+    if isinstance(content, list):
+        return ForearmData(pairs=_pairs(validate(content, _Pairs, where=str(path)).root, str(path)))
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        hint = f"Give a file with format {FORMAT}, or a list of pairs of 4 x 4 matrices"
+        raise ConfigurationError("holds no observations that are known", where=str(path), hint=hint)
+    file = validate(content, DataFile, where=str(path))
+    if bool(file.touches) == bool(file.views):
+        raise ConfigurationError("needs touches, or views, and not both", where=str(path))
+    if file.views and (file.camera is None or file.markers is None):
+        raise ConfigurationError("views need camera and markers", where=str(path))
+    return ForearmData(
+        rig=file.rig,
+        devices=file.devices,
+        guess=file.guess.pose(),
+        touches=tuple(map(_touch, file.touches)),
+        views=tuple(_view(entry, index, str(path)) for index, entry in enumerate(file.views)),
+        link=file.link,
+        camera=file.camera,
+        markers=file.markers,
+    )
+
+
+def save_data(path: Path, data: ForearmData) -> None:
+    """Write observations, whole or not at all. Raises WriteError."""
+    roll, pitch, yaw = data.guess.rotation().xyz()
+    file = DataFile(
+        rig=data.rig,
+        devices=data.devices,
+        guess=RigidTransform(translation_m=_three(data.guess.translation()), rpy_rad=(roll, pitch, yaw)),
+        touches=tuple(map(_touch_entry, data.touches)),
+        views=tuple(map(_view_entry, data.views)),
+        link=data.link,  # type: ignore[arg-type]
+        camera=data.camera,
+        markers=data.markers,
+    )
+    write_whole(path, file.model_dump_json(indent=1))
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigurationError(
+            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
+        ) from error
+    except (ValueError, RecursionError) as error:
+        raise ConfigurationError("is not JSON", where=str(path), hint="Check the file") from error
+
+
+def _pairs(matrices: Sequence[tuple[Matrix, Matrix]], where: str) -> tuple[PosePair, ...]:
+    return tuple(
+        PosePair(
+            _rigid(np.array(hand), f"{where}: pair {index + 1}"), _rigid(np.array(target), f"{where}: pair {index + 1}")
+        )
+        for index, (hand, target) in enumerate(matrices)
+    )
+
+
+def _rigid(matrix: Array, where: str) -> Pose3:
+    rotation = nearest_rotation(matrix[:3, :3])
+    if np.abs(rotation - matrix[:3, :3]).max() > _SKEWED or np.abs(matrix[3] - [0, 0, 0, 1]).max() > _SKEWED:
+        hint = "Give 4 x 4 matrices of a rotation and a translation in metres"
+        raise ConfigurationError("a matrix is no rigid motion", where=where, hint=hint)
+    return Pose3(Rot3(rotation), matrix[:3, 3])
+
+
+def _touch(entry: TouchEntry) -> Touch:
+    return Touch(
+        finger=entry.finger,
+        pose=HandPose(np.array(entry.base_q), np.array(entry.joints_rad)),
+        point_distal_m=np.array(entry.point_distal_m),
+        normal_distal=np.array(entry.normal_distal),
+        point_covariance_m2=np.array(entry.point_covariance_m2),
+        target=_target(entry.target),
+        force_N=entry.force_N,
+    )
+
+
+def _target(entry: PlaneEntry | SpotEntry) -> Target:
+    if isinstance(entry, SpotEntry):
+        return Spot(entry.name, np.array(entry.point_world_m), entry.sigma_m)
+    normal = np.array(entry.normal_world)
+    return Plane(entry.name, np.array(entry.point_world_m), normal / np.linalg.norm(normal), entry.sigma_m)
+
+
+def _view(entry: ViewEntry, index: int, where: str) -> View:
+    if len(entry.board_m) != len(entry.board_px) or len(entry.board_m) < 4:
+        what = f"view {index + 1} needs as many pixels as corners, and at least four"
+        raise ConfigurationError(what, where=where, hint="Check board_m and board_px")
+    return View(
+        pose=HandPose(np.array(entry.base_q), np.array(entry.joints_rad)),
+        board_m=np.array(entry.board_m),
+        board_px=np.array(entry.board_px),
+        world_px=None if entry.world_px is None else np.array(entry.world_px),
+    )
+
+
+def _touch_entry(touch: Touch) -> TouchEntry:
+    target, place = touch.target, _three(touch.target.point_world_m)
+    entry: PlaneEntry | SpotEntry = SpotEntry(name=target.name, point_world_m=place, sigma_m=target.sigma_m)
+    if isinstance(target, Plane):
+        normal = _three(target.normal_world)
+        entry = PlaneEntry(name=target.name, point_world_m=place, normal_world=normal, sigma_m=target.sigma_m)
+    if touch.finger not in FINGERS:
+        raise ConfigurationError(f"no finger called {touch.finger}")
+    return TouchEntry.model_validate(
+        {
+            "finger": touch.finger,
+            "base_q": tuple(touch.pose.base_q.tolist()),
+            "joints_rad": tuple(touch.pose.joints_rad.tolist()),
+            "point_distal_m": _three(touch.point_distal_m),
+            "normal_distal": _three(touch.normal_distal),
+            "point_covariance_m2": tuple(map(_three, touch.point_covariance_m2)),
+            "force_N": touch.force_N,
+            "target": entry,
+        }
+    )
+
+
+def _view_entry(view: View) -> ViewEntry:
+    return ViewEntry.model_validate(
+        {
+            "base_q": tuple(view.pose.base_q.tolist()),
+            "joints_rad": tuple(view.pose.joints_rad.tolist()),
+            "board_m": tuple(map(_three, view.board_m)),
+            "board_px": tuple(tuple(pixel) for pixel in view.board_px.tolist()),
+            "world_px": None if view.world_px is None else tuple(tuple(pixel) for pixel in view.world_px.tolist()),
+        }
+    )
+
+
+def _three(values: Any) -> Vector3:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -1,0 +1,1 @@
+"""Joint offsets and gains of the hand."""

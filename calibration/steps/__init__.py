@@ -1,0 +1,1 @@
+"""What all calibrations share: guided steps, motion checks, refinement, verdicts."""

@@ -1,0 +1,1 @@
+"""Codecs of ATI electronics: pure functions between bytes and samples."""

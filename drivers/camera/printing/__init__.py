@@ -1,0 +1,1 @@
+"""Sheets of markers and boards to print, at true size."""

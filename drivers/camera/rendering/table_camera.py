@@ -1,0 +1,191 @@
+"""Pictures of the markers as the camera under the table would take them, without any graphics library.
+
+Every pixel near a marker is followed as rays through the lens, the glass plate and into the marker's plane (nine rays a
+pixel); the rest of the picture is background and the dark underside of the object. Blur and noise come last.
+The table's glass lies between z = -thickness and z = 0; above it a ray runs on in its old direction, moved sideways by
+``thickness * (tan incidence - tan refraction)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+from gtsam import Pose3
+from numpy.typing import NDArray
+
+from drivers.camera.calibration import CameraCalibration
+from drivers.camera.rendering.settings import CameraSettings
+from drivers.core.contacts import Array
+from drivers.core.errors import ConfigurationError
+from drivers.core.poses import rotate, transform_points
+
+Image = NDArray[np.uint8]
+_Picture = NDArray[np.float32]
+
+_RAYS = 3  # rays per pixel and direction
+_MARGIN_px = 3
+_MARKER_MODULES = 6  # 4 x 4 bits and a black frame
+_BACKGROUND, _FOOT, _WHITE, _BLACK = 150.0, 70.0, 235.0, 20.0
+_VIGNETTING = 0.18
+
+
+@dataclass(frozen=True)
+class PrintedMarker:
+    """A printed ArUco marker: black square with half a module of white around it.
+
+    Its frame has x to the right and y up on the print, z out of it.
+
+    Attributes:
+        dictionary: OpenCV's name, for instance ``DICT_4X4_50``.
+        number: which marker of the dictionary.
+        side_m: side of the black square.
+    """
+
+    dictionary: str
+    number: int
+    side_m: float
+
+
+Placed: TypeAlias = tuple[PrintedMarker, Pose3]
+"""A print and its ``world_T_marker``."""
+
+
+class TableCamera:
+    """The camera under the table.
+
+    Args:
+        lens: its optics; the picture's size must be stated.
+        settings: where it stands, glass, sharpness and noise.
+        rng: where the noise comes from.
+
+    Raises:
+        ConfigurationError: the lens does not say how large its pictures are.
+    """
+
+    def __init__(self, lens: CameraCalibration, settings: CameraSettings, rng: np.random.Generator) -> None:
+        if lens.size_px is None:
+            raise ConfigurationError("the picture size is missing", where="simulated camera", hint="State size_px")
+        self._lens, self._settings, self._rng = lens, settings, rng
+        self._size_px = lens.size_px
+        self._pose = settings.world_T_camera.pose()
+
+    def render(self, markers: tuple[Placed, ...], foot_world_m: Array) -> Image:
+        """One picture, shape (height, width).
+
+        Args:
+            markers: those on the table and under the object; one that faces up is not seen.
+            foot_world_m: corners of the object's underside, shape (n, 3); drawn dark, under the markers.
+        """
+        width, height = self._size_px
+        picture = np.full((height, width), _BACKGROUND, np.float32)
+        self._draw_foot(picture, foot_world_m)
+        for marker, world_T_marker in markers:
+            self._draw_marker(picture, marker, world_T_marker)
+        picture *= self._brightness
+        sharp = cv2.GaussianBlur(picture, (0, 0), self._settings.blur_px)
+        noise = self._settings.noise_levels * self._rng.standard_normal(picture.shape, dtype=np.float32)
+        return np.clip(sharp + noise, 0, 255).astype(np.uint8)
+
+    def project(self, points_world_m: Array) -> Array:
+        """Pixel positions, shape (n, 2), of points on or above the table, shape (n, 3).
+
+        The sideways shift in the glass is that of the straight ray; the error is a few micrometres.
+        """
+        seen = points_world_m - self._pose.translation()
+        across = np.linalg.norm(seen[:, :2], axis=1)
+        direction = seen[:, :2] / np.maximum(across, 1e-9)[:, None]
+        apparent = points_world_m.copy()
+        apparent[:, :2] += direction * self._glass_shift_m(across / seen[:, 2])[:, None]
+        return self._lens.project(transform_points(self._pose.inverse(), apparent))
+
+    def _glass_shift_m(self, tangent: Array) -> Array:
+        """Sideways shift of a ray by the glass, from the tangent of its angle to the vertical."""
+        sine = tangent / np.sqrt(1 + tangent**2) / self._settings.glass_index
+        return np.asarray(self._settings.glass_thickness_m * (tangent - sine / np.sqrt(1 - sine**2)))
+
+    def _draw_foot(self, picture: _Picture, foot_world_m: Array) -> None:
+        corners = np.rint(self.project(foot_world_m) * 16).astype(np.int32)  # sixteenths of a pixel
+        cv2.fillPoly(picture, [corners], _FOOT, cv2.LINE_AA, 4)
+
+    def _draw_marker(self, picture: _Picture, marker: PrintedMarker, pose: Pose3) -> None:
+        window = self._window(marker, pose)
+        if window is None:
+            return
+        rows, columns = window
+        modules, half_modules = _half_modules(marker)
+        across, up = self._hits(pose, window)
+        scale = _MARKER_MODULES * 2 / marker.side_m
+        column = np.floor(across * scale).astype(int) + half_modules // 2
+        row = half_modules // 2 - 1 - np.floor(up * scale).astype(int)
+        inside = (np.minimum(column, row) >= 0) & (np.maximum(column, row) < half_modules)
+        shade = modules[np.clip(row, 0, half_modules - 1), np.clip(column, 0, half_modules - 1)]
+        covered, ink = _pixel_means(inside.astype(np.float32)), _pixel_means(np.where(inside, shade, 0))
+        picture[rows, columns] = picture[rows, columns] * (1 - covered) + ink
+
+    def _window(self, marker: PrintedMarker, pose: Pose3) -> tuple[slice, slice] | None:
+        """Rows and columns that hold the marker; None when it faces away or lies outside the picture."""
+        facing = (pose.translation() - self._pose.translation()) @ pose.rotation().matrix()[:, 2]
+        if facing >= 0:
+            return None
+        half = marker.side_m / 2 * (1 + 1 / _MARKER_MODULES)
+        square = half * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+        pixels = self.project(transform_points(pose, square))
+        low = np.maximum(np.floor(pixels.min(axis=0)).astype(int) - _MARGIN_px, 0)
+        high = np.minimum(np.ceil(pixels.max(axis=0)).astype(int) + _MARGIN_px + 1, self._size_px)
+        return None if np.any(high - low < 2) else (slice(low[1], high[1]), slice(low[0], high[0]))
+
+    @cached_property
+    def _brightness(self) -> _Picture:
+        width, height = self._size_px
+        columns, rows = np.meshgrid(np.arange(width), np.arange(height))
+        radius = np.hypot(columns - width / 2, rows - height / 2) / (width / 2)
+        return np.asarray(1 - _VIGNETTING * radius**2, np.float32)
+
+    @cached_property
+    def _rays(self) -> tuple[Array, Array]:
+        """Each pixel's ray above the table: where it passes z = 0, and its direction per metre of height.
+
+        Both of shape (height, width, 3), world frame.
+        """
+        width, height = self._size_px
+        pixels = np.stack(np.meshgrid(np.arange(float(width)), np.arange(float(height))), axis=-1).reshape(-1, 2)
+        rays = rotate(self._pose, self._lens.rays(pixels))
+        slope = rays[:, :2] / rays[:, 2:]
+        tangent = np.linalg.norm(slope, axis=1)
+        glass_m = self._glass_shift_m(tangent) / np.maximum(tangent, 1e-9)
+        centre_m = self._pose.translation()
+        ground_m = centre_m[:2] - slope * (centre_m[2] + glass_m[:, None])
+        up = np.ones((len(rays), 1))
+        return np.hstack([ground_m, 0 * up]).reshape(height, width, 3), np.hstack([slope, up]).reshape(height, width, 3)
+
+    def _hits(self, world_T_marker: Pose3, window: tuple[slice, slice]) -> tuple[Array, Array]:
+        """Where the rays of a window meet the marker's plane: marker x and y, metres, for every ray of every pixel.
+
+        The crossing is found for the pixels' centres and interpolated between them: it changes smoothly.
+        """
+        rotation = world_T_marker.rotation().matrix()
+        ground_m, slopes = self._rays
+        start = (ground_m[window] - world_T_marker.translation()) @ rotation
+        slope = slopes[window] @ rotation
+        crossing = start[..., :2] - slope[..., :2] * (start[..., 2:] / slope[..., 2:])
+        size = (_RAYS * crossing.shape[1], _RAYS * crossing.shape[0])
+        fine = np.asarray(cv2.resize(crossing, size, interpolation=cv2.INTER_LINEAR), float)
+        return fine[..., 0], fine[..., 1]
+
+
+def _half_modules(marker: PrintedMarker) -> tuple[_Picture, int]:
+    """Shades of the print in half modules, white border included, and how many there are across."""
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, marker.dictionary))
+    bits = cv2.aruco.generateImageMarker(dictionary, marker.number, 2 * _MARKER_MODULES)
+    print_ = np.pad(bits, 1, constant_values=255)
+    return np.where(print_ > 127, _WHITE, _BLACK).astype(np.float32), len(print_)
+
+
+def _pixel_means(values: NDArray[np.floating]) -> _Picture:
+    rows, columns = values.shape
+    blocks = values.reshape(rows // _RAYS, _RAYS, columns // _RAYS, _RAYS)
+    return np.asarray(blocks.mean(axis=(1, 3)), np.float32)

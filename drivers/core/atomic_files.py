@@ -1,0 +1,50 @@
+"""Files that are written whole or not at all: after a power cut, too, either the old or the new one is there."""
+
+from __future__ import annotations
+
+import errno
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from drivers.core.errors import WriteError
+
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+
+
+def write_whole(path: Path, content: str | bytes, hint: str = "Choose another folder, or check its rights") -> None:
+    """Write a file, and its folder where there is none, whole or not at all.
+
+    Args:
+        content: text goes out as UTF-8 with the line ends it has.
+        hint: what to do when this place cannot be written; a full disk has an advice of its own.
+
+    Raises:
+        WriteError: the disk is full, or the place cannot be written; an older file is as it was.
+    """
+    partial = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with partial.open("wb") as file:
+            file.write(content.encode() if isinstance(content, str) else content)
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(path)
+    except OSError as error:
+        advice = "Free some space on it, then try again" if disk_full(error) else hint
+        in_the_way = isinstance(error, (FileExistsError, NotADirectoryError))
+        what = f"cannot be written ({path.parent} is no folder)" if in_the_way else write_failure(error)
+        raise WriteError(what, where=str(path), hint=advice) from error
+    finally:  # after an interruption too; nothing is left of it when all went well
+        with suppress(OSError):  # where the folder is none, either
+            partial.unlink(missing_ok=True)
+
+
+def disk_full(error: OSError) -> bool:
+    """Whether the disk, or one's share of it, is full."""
+    return error.errno in _FULL
+
+
+def write_failure(error: OSError) -> str:
+    """Why something could not be written, in words."""
+    return "the disk is full" if disk_full(error) else f"cannot be written ({error.strerror or error})"

@@ -1,0 +1,186 @@
+"""A module of this package in a process of its own: start it, give it orders, hear its answers, end it.
+
+Two pipes lead to the child: orders go in as lines of JSON (see :mod:`drivers.core.orders`), the first of them says what
+it is to be. It answers with what it likes; :meth:`ChildProcess.answer` hears lines of JSON, :func:`say` is the child's
+side of that. The pipe of the orders ends with the program that started the child, however that ends, and the child
+then ends by itself: whoever writes one looks at that pipe between two pieces of work.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from drivers.core.clock import NANOSECONDS, MonotonicClock
+from drivers.core.errors import DeviceError, TactileLabError
+from drivers.core.orders import Order, OrderWriter
+
+_READ_BYTES = 1_048_576
+_ENDING_s = 1.0
+
+
+class ChildProcess:
+    """A child and its two pipes; nothing runs before :meth:`start`. Not to be shared between threads.
+
+    Args:
+        module: of this package, run as a program.
+        name: of the device or work it is for, for messages.
+    """
+
+    def __init__(self, module: str, name: str) -> None:
+        self.name, self._module = name, module
+        self._process: subprocess.Popen[bytes] | None = None
+        self._orders: OrderWriter | None = None
+        self._rest = b""
+
+    def start(self, first: Order) -> None:
+        """Start it with its first order, without waiting until it works.
+
+        It gets a process group of its own: Ctrl+C is for the program that started it, which ends it in order.
+
+        Raises:
+            DeviceError: it ended at once.
+        """
+        assert self._process is None, f"{self.name} has been started"
+        command = [sys.executable, "-m", self._module]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
+        assert self._process.stdin is not None
+        self._orders, self._rest = OrderWriter(self._process.stdin.fileno(), self.name), b""
+        try:
+            self.give(first)
+        except DeviceError:
+            self.close(0.0)
+            raise
+
+    @property
+    def started(self) -> bool:
+        """Whether it was started and not yet closed; it may have ended by itself."""
+        return self._process is not None
+
+    @property
+    def running(self) -> bool:
+        """Whether its process lives."""
+        return self._process is not None and self._process.poll() is None
+
+    @property
+    def process_id(self) -> int:
+        """Of the started process. Raises DeviceError when there is none."""
+        return self._start().pid
+
+    def give(self, order: Order) -> None:
+        """Give an order; never waits.
+
+        Raises:
+            DeviceError: it is not started, has ended, or has not taken orders for long.
+        """
+        self._start()
+        assert self._orders is not None
+        self._orders.give(order)
+
+    def read(self, patience_s: float) -> bytes | None:
+        """Bytes that arrive in this time; None when none do.
+
+        Raises:
+            DeviceError: it is not started, or has ended and all it said has been read.
+        """
+        process = self._start()
+        assert process.stdout is not None
+        if not select.select([process.stdout], [], [], max(patience_s, 0.0))[0]:
+            return None
+        if not (data := os.read(process.stdout.fileno(), _READ_BYTES)):
+            with suppress(subprocess.TimeoutExpired):  # it says nothing more a moment before it has ended
+                process.wait(_ENDING_s)
+            raise DeviceError("its process has ended", where=self.name, hint="See its last error, and connect again")
+        return data
+
+    def ready(self, patience_s: float) -> dict[str, Any]:
+        """Its first answer; without a good one it is closed.
+
+        Raises:
+            DeviceError: as :meth:`answer`.
+        """
+        try:
+            return self.answer(patience_s)
+        except BaseException:
+            self.close()
+            raise
+
+    def answer(self, patience_s: float) -> dict[str, Any]:
+        """The next line of JSON it says, waited for.
+
+        Raises:
+            DeviceError: none comes in this time; and as :meth:`hear`.
+        """
+        if (content := self.hear(patience_s)) is None:
+            raise DeviceError("its process does not answer", where=self.name, hint="Start it again")
+        return content
+
+    def hear(self, patience_s: float = 0.0) -> dict[str, Any] | None:
+        """The next line of JSON it says; None when none comes in this time.
+
+        Raises:
+            DeviceError: it has ended, or the line is an error of :func:`errors_said`: in its own words.
+        """
+        clock = MonotonicClock()
+        until_ns = clock.now_ns() + round(patience_s * NANOSECONDS)
+        while b"\n" not in self._rest:
+            if (data := self.read((until_ns - clock.now_ns()) / NANOSECONDS)) is None:
+                return None
+            self._rest += data
+        line, self._rest = self._rest.split(b"\n", 1)
+        content: dict[str, Any] = json.loads(line)
+        if "error" in content:
+            raise DeviceError(content["error"], where=self.name)
+        return content
+
+    def kill(self) -> None:
+        """End it at once, as a power cut would; idempotent."""
+        if self._process is not None:
+            self._process.kill()
+        self.close(0.0)
+
+    def close(self, patience_s: float = 5.0) -> bytes:
+        """End its orders and wait until it has ended, or kill it when it takes longer; idempotent.
+
+        Returns:
+            what it has said that was not read.
+        """
+        if self._process is None:
+            return b""
+        process, self._process = self._process, None
+        try:
+            said, _ = process.communicate(timeout=patience_s)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            said, _ = process.communicate()
+        return self._rest + (said or b"")
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        if self._process is None:
+            raise DeviceError("not connected", where=self.name, hint="Connect it first")
+        return self._process
+
+
+# --- the child's side ----------------------------------------------------------------------------------------------
+
+
+def say(content: dict[str, Any]) -> None:
+    """Say a line, for :meth:`ChildProcess.answer`."""
+    sys.stdout.write(json.dumps(content) + "\n")
+    sys.stdout.flush()
+
+
+@contextmanager
+def errors_said() -> Iterator[None]:
+    """Errors of this package are said as an answer, and end the process with their exit code."""
+    try:
+        yield
+    except TactileLabError as error:
+        say({"error": str(error)})
+        sys.exit(error.exit_code)

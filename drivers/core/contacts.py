@@ -1,0 +1,102 @@
+"""A contact is a point with a normal; a grasp is the contacts of one closing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from gtsam import Pose3
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+
+FINGERS = ("FF", "MF", "RF", "LF", "TH")
+"""Fingers of the Shadow hand in the palm's own order: first, middle, ring, little finger, thumb."""
+
+LARGEST_GRASP_m = 0.6
+"""No hand spans more; contacts farther apart are in wrong units."""
+
+LARGEST_SLOPE = 0.5
+"""Smallest horizontal part of a normal that still tells about a horizontal contour (60 degrees of slope)."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One fingertip's touch.
+
+    Attributes:
+        finger: one of :data:`FINGERS`.
+        point_world_m: contact point, shape (3,), world frame, metres.
+        normal_world: unit surface normal, shape (3,), world frame, pointing out of the object.
+        point_covariance_m2: covariance of the point, shape (3, 3), world frame, square metres; by default the thesis's
+            1 mm per axis (section 3.4).
+        normal_sigma_rad: standard deviation of the normal's direction, per axis, radians; by default the thesis's 5
+            degrees.
+        force_N: magnitude of the contact force.
+        probed: touched on its own before the hand closed (a tap on the top, a probe from the side), the object at
+            rest where the grasp then found it.
+    """
+
+    finger: str
+    point_world_m: Array
+    normal_world: Array
+    point_covariance_m2: Array = field(default_factory=lambda: 1e-6 * np.eye(3))
+    normal_sigma_rad: float = float(np.deg2rad(5.0))
+    force_N: float = 0.0
+    probed: bool = False
+
+
+@dataclass(frozen=True)
+class ApproachPath:
+    """The straight way of one fingertip's contact point while it closed: free space, as far as it got.
+
+    Attributes:
+        finger: one of :data:`FINGERS`.
+        start_world_m: where it began, shape (3,), world frame, metres.
+        end_world_m: where it touched, or where it stopped without a touch, shape (3,).
+        touched: it ended at a contact.
+    """
+
+    finger: str
+    start_world_m: Array
+    end_world_m: Array
+    touched: bool
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """The contacts of one closing, and how the hand carried the object since the last one.
+
+    Attributes:
+        index: number of the grasp in the session, from 0.
+        stamp_ns: time in the middle of the capture, session clock.
+        contacts: at most one contact a finger from the closing; behind them those that were probed before it.
+        world_T_palm: the palm's pose at capture; the object frame is born along its axes.
+        hand_motion_world: how the hand moved while it held the object since the previous grasp, so that
+            predicted ``world_T_object = hand_motion_world * previous world_T_object`` (eq. 3.8); identity
+            in the first grasp.
+        closing_lines: the fingers' ways to their contacts, and of those that met nothing; empty if not known.
+    """
+
+    index: int
+    stamp_ns: int
+    contacts: tuple[Contact, ...]
+    world_T_palm: Pose3 = field(default_factory=Pose3)
+    hand_motion_world: Pose3 = field(default_factory=Pose3)
+    approach_paths: tuple[ApproachPath, ...] = ()
+
+    @property
+    def touching(self) -> frozenset[str]:
+        """Fingers that touch the object in this grasp, those that only probed it left out."""
+        return frozenset(contact.finger for contact in self.contacts if not contact.probed)
+
+    @property
+    def points_world_m(self) -> Array:
+        """Contact points, shape (n, 3), world frame, metres."""
+        return np.array([contact.point_world_m for contact in self.contacts]).reshape(-1, 3)
+
+    @property
+    def normals_world(self) -> Array:
+        """Outward unit normals, shape (n, 3), world frame."""
+        return np.array([contact.normal_world for contact in self.contacts]).reshape(-1, 3)

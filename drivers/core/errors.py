@@ -1,0 +1,86 @@
+"""Every error a person can meet, in one tree.
+
+TactileLabError                exit 1
+ |- ConfigurationError         exit 2   a file the user wrote: rig, calibration, options
+ |- DeviceError                exit 4   a device that does not answer, or answers wrongly
+ |   `- CodecError                      bytes that are not what the protocol says
+ |- SafetyError                exit 1   a limit of the hand or the workspace was passed: the rig has stopped
+ |- SessionError               exit 1   a session folder or its traffic file
+ |   `- EstimationError                 the program itself failed while it estimated or planned
+ |- WriteError                 exit 1   a file that cannot be written: a full disk, a folder one may not write to
+ |- ShapeError                 exit 1   a mesh, contour or model that cannot be used
+ |- TrackingError              exit 1   the object cannot be followed any further
+ `- InterruptionError          exit 130 a person ended the work before it was done
+
+Each message says what happened, where (which device or file), and what to do next.
+Exit codes are those of the command line: 0 done, 1 failed, 2 usage, 3 done with data loss or
+outside a limit, 4 hardware not ready, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+
+class TactileLabError(Exception):
+    """Base of all errors shown to people.
+
+    Args:
+        what: what happened, one clause without a full stop.
+        where: the device, file or option concerned.
+        hint: what to do next.
+    """
+
+    exit_code = 1
+
+    def __init__(self, what: str, *, where: str = "", hint: str = "") -> None:
+        self.what, self.where, self.hint = what, where, hint
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        head = f"{self.where}: {self.what}" if self.where else self.what
+        return f"{head}. {self.hint}" if self.hint else head
+
+
+class ConfigurationError(TactileLabError):
+    """A rig, calibration or option file that cannot be used as written."""
+
+    exit_code = 2
+
+
+class DeviceError(TactileLabError):
+    """A device is missing, silent or faulty."""
+
+    exit_code = 4
+
+
+class CodecError(DeviceError):
+    """Bytes that do not follow the device's protocol."""
+
+
+class SafetyError(TactileLabError):
+    """A limit of the hand or the workspace was passed; the rig has to stop."""
+
+
+class SessionError(TactileLabError):
+    """A session folder or traffic file that cannot be read or written."""
+
+
+class EstimationError(SessionError):
+    """The estimation or the planning of a running session failed for a reason nobody foresaw; its notes say where."""
+
+
+class WriteError(TactileLabError):
+    """A file that cannot be written."""
+
+
+class ShapeError(TactileLabError):
+    """A mesh, contour or shape model that cannot be used."""
+
+
+class TrackingError(TactileLabError):
+    """The object cannot be followed any further."""
+
+
+class InterruptionError(TactileLabError):
+    """A person ended the work before it was done; says what is kept."""
+
+    exit_code = 130

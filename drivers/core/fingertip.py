@@ -1,0 +1,156 @@
+"""What every kind of fingertip gives the rest of the program: a load and a contact.
+
+The *distal frame* of a finger is the child frame of its last joint J1: origin on the joint's axis, z along the
+fingertip, -y to the palm side. The fingertip's surface is an ellipsoid whose axes are parallel to that frame's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Protocol
+
+import numpy as np
+from gtsam import Pose3, Rot3
+from pydantic import AfterValidator, Field
+
+from drivers.core.calibration_file import load_parameters
+from drivers.core.configuration import StrictModel
+from drivers.core.contacts import FINGERS, Array
+
+GRAVITY = 9.80665
+"""Standard gravity, m/s^2."""
+
+Vector3 = tuple[float, float, float]
+PositiveFloat = Annotated[float, Field(gt=0.0)]
+
+
+@dataclass(frozen=True)
+class TipBody:
+    """One fingertip beyond its sensor.
+
+    Attributes:
+        distal_T_sensor: the sensor's measuring frame in the distal frame.
+        distal_T_skin: centre and axes of the ellipsoid that touches.
+        semi_axes_m: its semi-axes.
+        mass_kg: mass beyond the sensor.
+        com_distal_m: its centre in the distal frame.
+    """
+
+    distal_T_sensor: Pose3
+    distal_T_skin: Pose3
+    semi_axes_m: tuple[float, float, float]
+    mass_kg: float
+    com_distal_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class TipContact:
+    """Where one fingertip touches the object, in the finger's distal frame.
+
+    Attributes:
+        point_distal_m: contact point, shape (3,).
+        normal_distal: unit normal, shape (3,), out of the *object* (into the tip: minus the tip's own outward normal).
+        point_covariance_m2: covariance of the point, shape (3, 3).
+        normal_sigma_rad: standard deviation of the normal's direction, per axis.
+        force_N: magnitude of the contact force.
+        torsion_Nm: moment about ``normal_distal`` that the object applies to the tip (0 where it is not measured).
+    """
+
+    point_distal_m: Array
+    normal_distal: Array
+    point_covariance_m2: Array
+    normal_sigma_rad: float
+    force_N: float
+    torsion_Nm: float
+
+
+class FingertipSensor(Protocol):
+    """A fingertip, whatever it measures with. Each kind has its own ``update`` for its decoded samples.
+
+    ``world_R_distal`` is the distal frame's orientation in the world (z up), shape (3, 3): it tells which way the
+    tip's own weight pulls.
+    """
+
+    finger: str
+
+    def tare(self, world_R_distal: Array, *, reason: str = "") -> None:
+        """Take the newest samples as "nothing touches". Raises DeviceError when they do not allow it."""
+
+    def load_N(self, world_R_distal: Array) -> float:
+        """Contact force from the newest sample, for the stop threshold; infinite where it tells none."""
+
+    def void(self) -> str:
+        """Why the newest sample tells no force, in words; "" while it does."""
+
+    def begin_capture(self) -> None:
+        """From here on samples are gathered for :meth:`contact`."""
+
+    def contact(self, world_R_distal: Array) -> TipContact | None:
+        """The contact from the samples since :meth:`begin_capture`; None when nothing is touched for sure."""
+
+    def health(self) -> tuple[str, ...]:
+        """What is wrong with the sensor, in words; empty when all is well."""
+
+
+class RigidTransform(StrictModel):
+    """A mounting: translation in metres, then fixed-axis roll, pitch, yaw in radians (Rz Ry Rx)."""
+
+    translation_m: Vector3
+    rpy_rad: Vector3 = (0.0, 0.0, 0.0)
+
+    def pose(self) -> Pose3:
+        """The transform as a gtsam pose."""
+        roll, pitch, yaw = self.rpy_rad
+        return Pose3(Rot3.Ypr(yaw, pitch, roll), np.array(self.translation_m))
+
+
+class FingertipCalibration(StrictModel):
+    """Shape, weight and mounting of one force-sensing fingertip.
+
+    Attributes:
+        semi_axes_m: semi-axes of the ellipsoid along the distal x, y, z.
+        centre_distal_m: its centre in the distal frame.
+        distal_T_sensor: pose of the sensor's measuring frame in the distal frame.
+        mass_kg, com_distal_m: everything the sensor carries, and its centre of mass in the distal frame.
+        shell_min_distal_m, shell_max_distal_m: the box in the distal frame outside which the tip has no shell, so that
+            no contact there is valid; the shell on the Shadow hand covers the palm side only, y up to 5.1 mm.
+        force_sigma_N, moment_sigma_Nm: noise of one sample, per axis.
+        force_drift_N, moment_drift_Nm: what may have crept in since the tare, per axis, one standard deviation.
+        point_floor_m, normal_floor_rad: error of shape and mounting that no averaging removes, per axis.
+    """
+
+    semi_axes_m: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
+    centre_distal_m: Vector3
+    distal_T_sensor: RigidTransform
+    mass_kg: float = Field(ge=0.0)
+    com_distal_m: Vector3
+    shell_min_distal_m: Vector3 = (-1.0, -1.0, -1.0)
+    shell_max_distal_m: Vector3 = (1.0, 1.0, 1.0)
+    force_sigma_N: PositiveFloat = 1 / 320
+    moment_sigma_Nm: PositiveFloat = 1e-3 / 64
+    force_drift_N: float = Field(default=0.01, ge=0.0)
+    moment_drift_Nm: float = Field(default=5e-5, ge=0.0)
+    point_floor_m: float = Field(default=0.0003, ge=0.0)
+    normal_floor_rad: float = Field(default=0.02, ge=0.0)
+
+
+def _known_fingers(fingertips: dict[str, FingertipCalibration]) -> dict[str, FingertipCalibration]:
+    if unknown := sorted(set(fingertips) - set(FINGERS)):
+        raise ValueError(f"unknown finger {', '.join(unknown)}; the fingers are {', '.join(FINGERS)}")
+    return fingertips
+
+
+class FingertipCalibrationFile(StrictModel):
+    """A calibration file: one entry for each finger that carries a force sensor."""
+
+    fingertips: Annotated[dict[str, FingertipCalibration], Field(min_length=1), AfterValidator(_known_fingers)]
+
+
+def load_fingertips(path: Path) -> dict[str, FingertipCalibration]:
+    """Read a fingertip calibration file: finger name to calibration.
+
+    Raises:
+        ConfigurationError: the file is missing, not strict YAML, or does not fit the model.
+    """
+    return load_parameters(path, FingertipCalibrationFile).fingertips

@@ -1,0 +1,70 @@
+"""Orders to a process of its own: lines of JSON through a pipe, none of whose ends ever waits for the other."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+from typing import Any
+
+from drivers.core.errors import DeviceError
+
+Order = dict[str, Any]
+END: Order = {"end": True}
+"""What the reader makes of a pipe that has ended: whoever gave the orders is gone."""
+
+_AT_ONCE = 65_536
+
+
+class OrderReader:
+    """The reading end.
+
+    Args:
+        descriptor: of the pipe.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor, self._rest = descriptor, b""
+
+    def waiting(self, patience_s: float = 0.0) -> list[Order]:
+        """The orders that have come, oldest first; :data:`END` when no more can come."""
+        if not select.select([self._descriptor], [], [], patience_s)[0]:
+            return []
+        data = os.read(self._descriptor, _AT_ONCE)
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        return [json.loads(line) for line in lines] if data else [END]
+
+    def first(self) -> Order:
+        """The first order, waited for; :data:`END` when none comes."""
+        while not (orders := self.waiting(1.0)):
+            pass
+        return orders[0]
+
+
+class OrderWriter:
+    """The writing end.
+
+    Args:
+        descriptor: of the pipe.
+        where: the device's name, for messages.
+    """
+
+    def __init__(self, descriptor: int, where: str) -> None:
+        self._descriptor, self._where = descriptor, where
+        os.set_blocking(descriptor, False)
+
+    def give(self, order: Order) -> None:
+        """Give an order.
+
+        Raises:
+            DeviceError: the process is gone, or has not taken orders for long.
+        """
+        line = json.dumps(order).encode() + b"\n"
+        try:
+            written = os.write(self._descriptor, line)
+        except BrokenPipeError:
+            raise DeviceError("its process has ended", where=self._where, hint="Connect again") from None
+        except BlockingIOError:
+            written = 0
+        if written < len(line):
+            raise DeviceError("its process takes no orders", where=self._where, hint="Connect again")

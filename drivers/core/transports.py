@@ -1,0 +1,151 @@
+"""The seam between the program and the world: a transport moves byte strings and stamps their arrival.
+
+A device never knows whether its transport is hardware, a simulated world or a recorded log.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from drivers.core.clock import Clock
+from drivers.core.errors import DeviceError
+
+
+@dataclass(frozen=True)
+class Datagram:
+    """One received byte string and the time it arrived (session clock, nanoseconds)."""
+
+    payload: bytes
+    stamp_ns: int
+
+
+class Transport(Protocol):
+    """A two-way path for whole messages. ``name`` is the device's name in the rig and in recordings."""
+
+    name: str
+
+    def open(self) -> None:
+        """Connect; repeatable, all or nothing. Raises DeviceError."""
+
+    def close(self) -> None:
+        """Disconnect; idempotent."""
+
+    def send(self, payload: bytes) -> None:
+        """Send one message. Raises DeviceError when the device is gone."""
+
+    def receive(self) -> list[Datagram]:
+        """Everything that has arrived since the last call, oldest first; never blocks for long."""
+
+
+@runtime_checkable
+class WatchedTransport(Protocol):
+    """A transport that knows what went wrong below the messages: strangers, drops, damaged frames."""
+
+    def health(self) -> tuple[str, ...]:
+        """What went wrong, in words; empty when nothing did."""
+
+
+def link_health(transport: Transport) -> tuple[str, ...]:
+    """What a transport, of any kind, knows to be wrong."""
+    return transport.health() if isinstance(transport, WatchedTransport) else ()
+
+
+class Peer(Protocol):
+    """The far end of an in-memory transport: something that takes and gives device bytes."""
+
+    def write(self, payload: bytes) -> None:
+        """Take one message from the program."""
+
+    def read(self) -> list[Datagram]:
+        """Give all messages that wait for the program, with their arrival stamps."""
+
+
+class MemoryTransport:
+    """A transport to a peer in the same process."""
+
+    def __init__(self, name: str, peer: Peer) -> None:
+        self.name, self._peer, self._open = name, peer, False
+
+    def open(self) -> None:
+        self._open = True
+
+    def close(self) -> None:
+        self._open = False
+
+    def send(self, payload: bytes) -> None:
+        self._check_open()
+        self._peer.write(payload)
+
+    def receive(self) -> list[Datagram]:
+        self._check_open()
+        return self._peer.read()
+
+    def _check_open(self) -> None:
+        if not self._open:
+            raise DeviceError("link is not open", where=self.name, hint="Connect the device first")
+
+
+class ReplayTransport:
+    """A transport that gives back recorded messages: one recorded batch for each ``receive``.
+
+    ``sent`` keeps what the program wrote, so that a test can compare it with the recording.
+    """
+
+    def __init__(self, name: str, recorded: Iterable[Datagram | list[Datagram]]) -> None:
+        self.name = name
+        self._batches = deque([item] if isinstance(item, Datagram) else list(item) for item in recorded)
+        self.sent: list[bytes] = []
+
+    def open(self) -> None:
+        """Nothing to open."""
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+    def send(self, payload: bytes) -> None:
+        self.sent.append(payload)
+
+    def receive(self) -> list[Datagram]:
+        if not self._batches:
+            raise DeviceError("the recording has ended", where=self.name, hint="Stop the session here")
+        return self._batches.popleft()
+
+
+class Tap(Protocol):
+    """Sees every byte of a transport, before anything downstream can fail."""
+
+    def on_transmitted(self, transport: str, payload: bytes, stamp_ns: int) -> None:
+        """The program sent ``payload``."""
+
+    def on_received(self, transport: str, payload: bytes, stamp_ns: int) -> None:
+        """The device sent ``payload``, which arrived at ``stamp_ns``."""
+
+
+class TappedTransport:
+    """A transport whose traffic also goes to a tap (the session recorder)."""
+
+    def __init__(self, transport: Transport, tap: Tap, clock: Clock) -> None:
+        self.name, self._transport, self._tap, self._clock = transport.name, transport, tap, clock
+
+    def open(self) -> None:
+        self._transport.open()
+
+    def close(self) -> None:
+        self._transport.close()
+
+    def send(self, payload: bytes) -> None:
+        self._tap.on_transmitted(self.name, payload, self._clock.now_ns())
+        self._transport.send(payload)
+
+    def receive(self) -> list[Datagram]:
+        datagrams = self._transport.receive()
+        for datagram in datagrams:
+            self._tap.on_received(self.name, datagram.payload, datagram.stamp_ns)
+        return datagrams
+
+    def health(self) -> tuple[str, ...]:
+        """What the tapped transport knows to be wrong."""
+        return link_health(self._transport)

@@ -1,0 +1,1 @@
+"""ATI electronics as their clients meet them."""

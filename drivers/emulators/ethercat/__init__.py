@@ -1,0 +1,1 @@
+"""The hand's EtherCAT slaves as a master meets them."""

@@ -1,0 +1,104 @@
+"""A ring of emulated slaves, and what can go wrong on its cable."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivers.core.errors import CodecError
+from drivers.emulators.ethercat.slave import SlaveController
+from drivers.ethercat.frames import Telegram, decode_frame, encode_frame, source_of
+
+_LOCAL_BIT = 0x02
+
+
+@dataclass
+class CableFaults:
+    """Faults of the cable, to be changed while it runs.
+
+    Attributes:
+        drop: so many frames get lost next, on their way to the slaves.
+        drop_answers: so many get lost next, on their way back.
+        drop_share: share of frames that get lost at random, half on either way.
+        hold: so many answers stay behind next and come in a burst with the one after them.
+        connected: slaves that are reached, from the first on; None for all.
+    """
+
+    drop: int = 0
+    drop_answers: int = 0
+    drop_share: float = 0.0
+    hold: int = 0
+    connected: int | None = None
+
+
+@dataclass
+class CableCounts:
+    """Frames at the slaves' end: arrived, lost on either way, not EtherCAT."""
+
+    frames: int = 0
+    lost: int = 0
+    foreign: int = 0
+
+
+class EmulatedRing:
+    """Slaves in a row; a frame runs through all and comes back.
+
+    Args:
+        slaves: the first one next to the master.
+        seed: of random losses.
+    """
+
+    def __init__(self, slaves: Sequence[SlaveController], seed: int = 0) -> None:
+        self.slaves = tuple(slaves)
+        self.faults, self.counts = CableFaults(), CableCounts()
+        self._rng = np.random.default_rng(seed)
+        self._held: list[bytes] = []
+
+    def process(self, frame: bytes) -> list[bytes]:
+        """What comes back when a frame is sent: usually that frame."""
+        self.counts.frames += 1
+        if self._loses_frame("drop"):
+            return []
+        try:
+            telegrams = decode_frame(frame)
+        except CodecError:
+            self.counts.foreign += 1
+            return []
+        source = bytes((source_of(frame)[0] | _LOCAL_BIT,)) + source_of(frame)[1:]
+        answer = encode_frame([self._round(telegram) for telegram in telegrams], source)
+        return [] if self._loses_frame("drop_answers") else self._in_order(answer)
+
+    @property
+    def due_ns(self) -> int | None:
+        """When the next slave will have work to do; None when all have done theirs."""
+        return min((due_ns for slave in self.slaves if (due_ns := slave.due_ns) is not None), default=None)
+
+    def work(self) -> None:
+        """Let the slaves do what is due, so that the next frame need not wait for it."""
+        for slave in self.slaves:
+            slave.work()
+
+    def _round(self, telegram: Telegram) -> Telegram:
+        passed = replace(telegram, circulated=False) if telegram.circulated else telegram
+        for slave in self.slaves[: self.faults.connected]:
+            passed = slave.process(passed)
+        return passed
+
+    def _loses_frame(self, way: str) -> bool:
+        left, share = getattr(self.faults, way), self.faults.drop_share
+        if left:
+            setattr(self.faults, way, left - 1)
+        lost = bool(left) or (share > 0 and self._rng.random() < share / 2)
+        self.counts.lost += lost
+        return lost
+
+    def _in_order(self, answer: bytes) -> list[bytes]:
+        arrived = [*self._held, answer]
+        if self.faults.hold:
+            self.faults.hold -= 1
+            self._held = arrived
+            return []
+        self._held = []
+        return arrived

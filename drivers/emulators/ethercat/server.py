@@ -1,0 +1,184 @@
+"""The emulated hand in a process of its own, on one end of a cable: ``python -m drivers.emulators.ethercat.server``.
+
+Takes its settings and later orders as lines of JSON on standard input and answers each with one line; it ends with
+its standard input, so that it never outlives the program that started it.
+
+Orders: ``{"cable": {...}}`` sets fields of :class:`~drivers.emulators.ethercat.ring.CableFaults`; ``{"hung": true}``
+stops the palm's processor; ``{"service_ns": n}`` slows it; ``{"silent": [motors]}``; ``{"fall": [state, code]}`` lets
+the palm leave its state; ``{"power_cycle": true}``; ``{"announce": [bus, identifier, hex]}`` lets a motor speak on its
+CAN bus. Every answer holds the counts.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import select
+import sys
+from pathlib import Path
+from typing import Any
+
+from drivers.core.child_process import ChildProcess, errors_said, say
+from drivers.core.clock import NANOSECONDS, Clock, MonotonicClock, VirtualClock
+from drivers.emulators.ethercat.motor_can import MotorCanBuses
+from drivers.emulators.ethercat.shadow_chain import ChainSettings, EmulatedHand, emulated_hand
+from drivers.emulators.ethercat.stamped_port import StampedPort
+from drivers.ethercat.registers import AlState
+from drivers.shadow.device.real_time import request_real_time
+from drivers.shadow.model.joint_calibration import JointCalibration
+from drivers.shadow.protocol.palm_codec import CanFrame
+
+_IDLE_s, _LOOK_ns = 0.02, 5_000_000
+_START_s, _ANSWER_s = 30.0, 5.0
+
+
+class HandServer:
+    """Serves frames and orders until its orders end.
+
+    The hand's time is that of its wire: a frame is taken at the time of its arrival, however late this program gets to
+    it, and between two frames it is the time up to which none has come. A real palm is not put aside by its computer;
+    so its motors halt, and its watchdog trips, for a master's pause and never for one of this program.
+
+    Args:
+        hand: what is served; no time passes for it but here.
+        time: the hand's.
+        port: at its end of the cable.
+        can: the motors' buses.
+        clock: that of the port's stamps.
+    """
+
+    def __init__(
+        self, hand: EmulatedHand, time: VirtualClock, port: StampedPort, can: MotorCanBuses, clock: Clock
+    ) -> None:
+        self._hand, self._time, self._port, self._can, self._clock = hand, time, port, can, clock
+        self._look_ns = clock.now_ns()
+
+    def run(self) -> None:
+        """Serve. Raises DeviceError when the interface goes."""
+        while True:
+            now_ns = self._clock.now_ns()
+            if (frame := self._port.receive(self._patience_s(now_ns))) is not None:
+                self._pass_to(self._port.arrived_ns)
+                for answer in self._hand.ring.process(frame):
+                    self._port.send(answer)
+                continue
+            self._pass_to(now_ns)
+            self._hand.ring.work()
+            if self._has_order():
+                if not (line := sys.stdin.readline()):
+                    return
+                say(self._obey(json.loads(line)))
+
+    def _pass_to(self, stamp_ns: int) -> None:
+        """Let the hand's time pass, and what is due until then be done when it is due."""
+        while (due_ns := self._hand.ring.due_ns) is not None and due_ns <= stamp_ns:
+            self._time.sleep_until_ns(due_ns)
+            self._hand.ring.work()
+        self._time.sleep_until_ns(stamp_ns)
+
+    def _patience_s(self, now_ns: int) -> float:
+        due_ns = self._hand.ring.due_ns
+        return _IDLE_s if due_ns is None else max(due_ns - now_ns, 0) / NANOSECONDS
+
+    def _has_order(self) -> bool:
+        """Whether there is an order, or no one left to give one; looked at now and then, as it costs a system call."""
+        now_ns = self._clock.now_ns()
+        if now_ns < self._look_ns:
+            return False
+        self._look_ns = now_ns + _LOOK_ns
+        return bool(select.select([sys.stdin], [], [], 0)[0])
+
+    def _obey(self, order: dict[str, Any]) -> dict[str, Any]:
+        hand = self._hand
+        for name, value in order.get("cable", {}).items():
+            setattr(hand.ring.faults, name, value)
+        hand.palm.hung = order.get("hung", hand.palm.hung)
+        hand.palm.service_ns = order.get("service_ns", hand.palm.service_ns)
+        hand.palm.palm.faults.silent = set(order.get("silent", hand.palm.palm.faults.silent))
+        if "fall" in order:
+            state, code = order["fall"]
+            hand.palm_slave.fall_to(AlState(state), code)
+        if "power_cycle" in order:
+            for slave in hand.ring.slaves:
+                slave.power_cycle()
+        if "announce" in order:
+            bus, identifier, data = order["announce"]
+            payload = bytes.fromhex(data)
+            self._can.announce(CanFrame(bus, len(payload), identifier, payload.ljust(8, b"\0")))
+        return self._counts()
+
+    def _counts(self) -> dict[str, Any]:
+        hand = self._hand
+        counts = dataclasses.asdict(hand.ring.counts) | dataclasses.asdict(hand.palm_slave.counts)
+        counts |= {"can_frames": len(set(self._can.heard))}  # one whose cycle was late comes twice
+        return counts | {"served": hand.palm.served, "state": str(hand.palm_slave.al_status)}
+
+
+def main() -> None:
+    """Read the first line, make the hand, serve it."""
+    start = json.loads(sys.stdin.readline())
+    clock = MonotonicClock()
+    with errors_said():
+        calibration = JointCalibration.load(Path(start["joints"]))
+        can = MotorCanBuses()
+        time, port = VirtualClock(clock.now_ns()), StampedPort(start["interface"], clock)
+        hand = emulated_hand(time, calibration, ChainSettings(**start["settings"]), can=can)
+        port.open()
+        say({"ready": True})
+        request_real_time()
+        HandServer(hand, time, port, can, clock).run()
+
+
+class EmulatedHandProcess:
+    """The emulated hand in another process, as a context.
+
+    Args:
+        interface: network interface it serves.
+        joints: joint calibration file, read backwards.
+        settings: what kind of hand.
+    """
+
+    def __init__(self, interface: str, joints: Path, settings: ChainSettings | None = None) -> None:
+        self._start = {
+            "interface": interface,
+            "joints": str(joints),
+            "settings": dataclasses.asdict(settings or ChainSettings()),
+        }
+        self._child = ChildProcess("drivers.emulators.ethercat.server", "emulated hand")
+
+    def __enter__(self) -> EmulatedHandProcess:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def start(self) -> None:
+        """Start it and wait until it serves.
+
+        Raises:
+            DeviceError: it does not come up, with its own words.
+        """
+        self._child.start(self._start)
+        self._child.ready(_START_s)
+
+    def order(self, **order: Any) -> dict[str, Any]:
+        """Give an order (see the module); the counts after it.
+
+        Raises:
+            DeviceError: the process is gone.
+        """
+        self._child.give(order)
+        return self._child.answer(_ANSWER_s)
+
+    def kill(self) -> None:
+        """End it at once, as a power cut would."""
+        self._child.kill()
+
+    def close(self) -> None:
+        """End it; idempotent."""
+        self._child.close()
+
+
+if __name__ == "__main__":
+    main()

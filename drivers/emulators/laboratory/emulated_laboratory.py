@@ -1,0 +1,175 @@
+"""A whole laboratory of emulators: cable, plant, hand, boxes, positioner, camera; started and ended together."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+from gtsam import Pose3
+
+from drivers.core.clock import Clock
+from drivers.core.errors import DeviceError
+from drivers.emulators.laboratory.host_process import HostProcess
+from drivers.emulators.laboratory.plant_mirror import PlantMirror
+from drivers.emulators.laboratory.virtual_cable import virtual_cable
+from drivers.fingertips.kinds import WIRES
+from drivers.force.wire_settings import WireSettings
+from drivers.positioner.kinds import POSITIONERS
+from drivers.shadow.protocol.palm_images import PalmName
+from drivers.simulation.plant import START_BASE
+from drivers.simulation.settings import SimulationSettings
+
+_GONE_ns = 2_000_000_000
+"""Without a step of the physics for so long there is none."""
+
+SERIAL = 634
+"""Of the emulated hand."""
+
+Place = tuple[str, int]
+
+
+@dataclass(frozen=True)
+class HandPlace:
+    """Where the emulated hand is, and what it is.
+
+    Attributes:
+        near, far: the cable's ends; the hand is at the far one.
+        joints, motors: its calibration files, read backwards.
+        palm, serial: its identity.
+    """
+
+    near: str
+    far: str
+    joints: Path
+    motors: Path
+    palm: PalmName = "0220"
+    serial: int = SERIAL
+
+
+@dataclass(frozen=True)
+class EmulationPlan:
+    """A laboratory to emulate.
+
+    Attributes:
+        simulation: the plant, and how imperfect the devices are.
+        seed: of everything random.
+        hand: the hand.
+        base: the positioner's place.
+        tips: calibration file of the fingertips.
+        wires: of linked fingertips, by finger; each of a kind that has an emulator.
+        camera: address and TCP port of the camera, if there is one.
+    """
+
+    simulation: SimulationSettings
+    seed: int
+    hand: HandPlace
+    base: Place
+    tips: Path
+    wires: Mapping[str, WireSettings] = field(default_factory=dict)
+    camera: Place | None = None
+
+
+@dataclass(frozen=True)
+class EmulatedTruth:
+    """What really is; the plant's process does not tell its contacts."""
+
+    world_T_object: Pose3
+    contacts: None = None
+
+
+class EmulatedLaboratory:
+    """The running laboratory, a context.
+
+    Args:
+        plan: what to emulate.
+        clock: the session's; real time.
+
+    Attributes:
+        stations: the emulators by device: ``plant``, ``hand``, ``base``, ``camera``, ``ft/FF`` to ``ft/TH``.
+    """
+
+    def __init__(self, plan: EmulationPlan, clock: Clock) -> None:
+        self._plan, self._clock = plan, clock
+        self._open = ExitStack()
+        self._mirror: PlantMirror | None = None
+        self.hosts: dict[str, HostProcess] = {}
+
+    def __enter__(self) -> Self:
+        """Start everything and wait until it serves. All or nothing.
+
+        Raises:
+            DeviceError: something cannot be served; says what and why.
+        """
+        try:
+            self._start()
+        except BaseException:
+            self._open.close()
+            raise
+        return self
+
+    def __exit__(self, *ended: object) -> None:
+        self._open.close()
+
+    def truth(self) -> EmulatedTruth:
+        """The object's true pose.
+
+        Raises:
+            DeviceError: the physics does not run any more; every emulator goes on, in a world that stands still.
+        """
+        if self._memory.age_ns > _GONE_ns:
+            hint = "Its process has ended, or this computer is far too slow; run again"
+            raise DeviceError("the emulated laboratory stands still", where="plant", hint=hint)
+        return EmulatedTruth(self._memory.world_T_object)
+
+    @property
+    def lost_s(self) -> float:
+        """Time by which the plant stayed behind the clock: a machine too slow for real time."""
+        return self._memory.lost_ns / 1e9
+
+    @property
+    def _memory(self) -> PlantMirror:
+        if self._mirror is None:
+            raise DeviceError("is not running", where="stand-ins", hint="Start them first")
+        return self._mirror
+
+    def _start(self) -> None:
+        plan = self._plan
+        self._open.enter_context(virtual_cable(plan.hand.near, plan.hand.far))
+        memory = Path(self._open.enter_context(tempfile.TemporaryDirectory(prefix="tactile-lab-"))) / "plant"
+        self._mirror = PlantMirror.create(memory, self._clock, START_BASE)
+        world = {**_world(plan), "tips": str(plan.tips)}
+        positioner = POSITIONERS[plan.simulation.positioner]
+        self._add("plant", "plant", memory, **world)
+        self._add("base", positioner.emulator_host, memory, host=plan.base[0], port=plan.base[1])
+        if plan.camera is not None:
+            self._add("camera", "camera", memory, host=plan.camera[0], port=plan.camera[1], **world)
+        for finger, wiring in plan.wires.items():
+            start = {"finger": finger, "wiring": wiring.model_dump(mode="json"), **_world(plan)}
+            self._add(f"ft/{finger}", WIRES[wiring.wire].emulator_host, memory, **start)
+        self._add("hand", "hand", memory, **world, **_hand(plan.hand))
+        for host in self.hosts.values():
+            host.await_ready()
+
+    def _add(self, device: str, role: str, memory: Path, **start: Any) -> None:
+        host = HostProcess(device, role, mirror=str(memory), **start)
+        self._open.callback(host.close)
+        host.start()
+        self.hosts[device] = host
+
+
+def _world(plan: EmulationPlan) -> dict[str, Any]:
+    return {"simulation": plan.simulation.model_dump(mode="json"), "seed": plan.seed}
+
+
+def _hand(hand: HandPlace) -> dict[str, Any]:
+    return {
+        "far_end": hand.far,
+        "joints": str(hand.joints),
+        "motors": str(hand.motors),
+        "palm": hand.palm,
+        "serial": hand.serial,
+    }

@@ -1,0 +1,48 @@
+"""An emulator's process, seen from the laboratory that started it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from drivers.core.child_process import ChildProcess
+
+_START_s = 60.0
+
+
+class HostProcess:
+    """One emulator in a process of its own.
+
+    Args:
+        name: of the device, for messages.
+        role: one of :data:`drivers.emulators.laboratory.host.ROLES`, or a module with a ``make`` like theirs.
+        start: what it needs to know.
+    """
+
+    def __init__(self, name: str, role: str, **start: Any) -> None:
+        self.name, self._start = name, {"role": role, **start}
+        self._child = ChildProcess("drivers.emulators.laboratory.host", f"emulated {name}")
+
+    def start(self) -> None:
+        """Start it, without waiting until it serves."""
+        self._child.start(self._start)
+
+    def await_ready(self) -> None:
+        """Wait until it serves.
+
+        Raises:
+            DeviceError: it does not come up, in its own words.
+        """
+        self._child.ready(_START_s)
+
+    @property
+    def running(self) -> bool:
+        """Whether its process lives."""
+        return self._child.running
+
+    def kill(self) -> None:
+        """End it at once, as a power cut would."""
+        self._child.kill()
+
+    def close(self) -> None:
+        """End it; idempotent."""
+        self._child.close()

@@ -1,0 +1,198 @@
+"""What the emulators of one laboratory share: the plant's newest state, and what drives it, in shared memory.
+
+The plant's process writes the state after every step and reads the demands before the next. Emulators, each in its own
+process, read the state whenever their device would measure and write their own demand. Nobody waits for anybody.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from gtsam import Pose3
+from numpy.typing import NDArray
+
+from drivers.core.clock import Clock
+from drivers.core.contacts import FINGERS, Array
+from drivers.core.errors import DeviceError
+from drivers.simulation.hand_plant import TrueContact
+
+_STATE = np.dtype(
+    [
+        ("joints_rad", "<f8", 24),
+        ("motor_torque_Nm", "<f8", 20),
+        ("base", "<f8", 6),
+        ("wrenches", "<f8", (5, 6)),
+        ("world_T_object", "<f8", (4, 4)),
+    ]
+)
+_MOST_CONTACTS = 64
+_TOUCHED = ("object", "table")
+_CONTACT = np.dtype(
+    [("finger", "u1"), ("touched", "u1"), ("point_m", "<f8", 3), ("normal", "<f8", 3), ("force_N", "<f8", 3)]
+)
+_TOUCHES = np.dtype(
+    [("world_T_distal", "<f8", (len(FINGERS), 4, 4)), ("count", "<i4"), ("contact", _CONTACT, _MOST_CONTACTS)]
+)
+_MEMORY = np.dtype(
+    [
+        ("beat", "<u8"),  # odd while the state or the touches are being written
+        ("stamp_ns", "<i8"),
+        ("lost_ns", "<i8"),
+        ("state", _STATE),
+        ("touches", _TOUCHES),
+        ("duty", "<f8", 20),
+        ("base_target", "<f8", 6),
+    ]
+)
+_TRIES = 1000
+
+
+class PlantMirror:
+    """A plant seen through shared memory, as an emulator needs it; times are those of the common clock.
+
+    Args:
+        path: the file that holds the memory, made by :meth:`create`.
+        clock: for :attr:`stamp_ns`; a device measures when it is asked.
+
+    Raises:
+        DeviceError: no such file, or another program's.
+    """
+
+    def __init__(self, path: Path, clock: Clock) -> None:
+        self._clock = clock
+        try:
+            with path.open("r+b") as file:
+                if os.fstat(file.fileno()).st_size != _MEMORY.itemsize:
+                    raise DeviceError("is no plant's memory", where=str(path), hint="Start the laboratory again")
+                self._memory = np.frombuffer(mmap.mmap(file.fileno(), _MEMORY.itemsize), _MEMORY)
+        except OSError as error:
+            raise DeviceError(f"no plant's memory ({error.strerror})", where=str(path)) from error
+
+    @classmethod
+    def create(cls, path: Path, clock: Clock, base: Array) -> PlantMirror:
+        """Make the memory, with the positioner's target where it stands."""
+        path.write_bytes(bytes(_MEMORY.itemsize))
+        mirror = cls(path, clock)
+        mirror._memory["base_target"][0] = base
+        return mirror
+
+    # --- for emulators -----------------------------------------------------------------------------------------
+
+    @property
+    def stamp_ns(self) -> int:
+        """Now."""
+        return self._clock.now_ns()
+
+    @property
+    def joints_rad(self) -> Array:
+        """True joint angles, shape (24,)."""
+        return np.asarray(self._state()["joints_rad"])
+
+    @property
+    def motor_torque_Nm(self) -> Array:
+        """Torque of each driven joint's motor, shape (20,)."""
+        return np.asarray(self._state()["motor_torque_Nm"])
+
+    @property
+    def base(self) -> Array:
+        """True positioner joints, shape (6,)."""
+        return np.asarray(self._state()["base"])
+
+    @property
+    def wrenches(self) -> Array:
+        """Loads on the five fingertips, shape (5, 6), sensor frames."""
+        return np.asarray(self._state()["wrenches"])
+
+    @property
+    def world_T_object(self) -> Pose3:
+        """True pose of the object."""
+        return Pose3(np.asarray(self._state()["world_T_object"]))
+
+    def contacts(self) -> tuple[TrueContact, ...]:
+        """Every touch of a fingertip; none where the plant does not show them."""
+        touches = self._read("touches")
+        return tuple(map(_contact, touches["contact"][: int(touches["count"])]))
+
+    def world_T_distal(self, finger: str) -> Pose3:
+        """True pose of a finger's distal frame, where the plant shows touches."""
+        return Pose3(np.asarray(self._read("touches")["world_T_distal"][FINGERS.index(finger)]))
+
+    def drive(self, duty: Array) -> None:
+        """Duty cycles from now on, shape (20,), -1 to 1."""
+        self._memory["duty"][0] = duty
+
+    def move_base(self, target: Array) -> None:
+        """The positioner's targets from now on, shape (6,)."""
+        self._memory["base_target"][0] = target
+
+    # --- for the plant -----------------------------------------------------------------------------------------
+
+    @property
+    def demands(self) -> tuple[Array, Array]:
+        """Duty cycles, shape (20,), and the positioner's targets, shape (6,)."""
+        return self._memory["duty"][0].copy(), self._memory["base_target"][0].copy()
+
+    def publish(
+        self, stamp_ns: int, joints_rad: Array, torque_Nm: Array, base: Array, wrenches: Array, world_T_object: Pose3
+    ) -> None:
+        """Show a new state; see the properties for shapes."""
+        memory = self._memory
+        memory["beat"] += 1
+        memory["state"][0] = (joints_rad, torque_Nm, base, wrenches, world_T_object.matrix())
+        memory["stamp_ns"] = stamp_ns
+        memory["beat"] += 1
+
+    def publish_touches(self, contacts: Sequence[TrueContact], world_T_distal: Sequence[Pose3]) -> None:
+        """Show the fingertips' touches, of many the first, and the distal frames of all fingers."""
+        rows = [_row(contact) for contact in contacts[:_MOST_CONTACTS]]
+        memory = self._memory
+        memory["beat"] += 1
+        touches = memory["touches"][0]
+        touches["world_T_distal"] = [pose.matrix() for pose in world_T_distal]
+        touches["contact"][: len(rows)] = rows
+        touches["count"] = len(rows)
+        memory["beat"] += 1
+
+    def count_lost(self, lost_ns: int) -> None:
+        """The plant was so late that this time is left out of it."""
+        self._memory["lost_ns"] += lost_ns
+
+    # --- for people --------------------------------------------------------------------------------------------
+
+    @property
+    def lost_ns(self) -> int:
+        """Time by which the plant stayed behind the clock, for good."""
+        return int(self._memory["lost_ns"][0])
+
+    @property
+    def age_ns(self) -> int:
+        """How old the state is."""
+        return self._clock.now_ns() - int(self._memory["stamp_ns"][0])
+
+    def _state(self) -> NDArray[np.void]:
+        return self._read("state")
+
+    def _read(self, part: str) -> NDArray[np.void]:
+        """A part that was not being written while it was read; the newest look after too many tries."""
+        memory = self._memory
+        for _ in range(_TRIES):
+            before = int(memory["beat"][0])
+            content: NDArray[np.void] = memory[part][0].copy()
+            if not before & 1 and int(memory["beat"][0]) == before:
+                break
+        return content
+
+
+def _row(contact: TrueContact) -> tuple[object, ...]:
+    finger, touched = FINGERS.index(contact.finger), _TOUCHED.index(contact.touched)
+    return finger, touched, contact.point_world_m, contact.normal_world, contact.force_on_tip_world_N
+
+
+def _contact(row: np.void) -> TrueContact:
+    touched: Literal["object", "table"] = "table" if row["touched"] else "object"
+    return TrueContact(FINGERS[row["finger"]], touched, row["point_m"], row["normal"], row["force_N"])

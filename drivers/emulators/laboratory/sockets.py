@@ -1,0 +1,25 @@
+"""Sockets that emulators serve on."""
+
+from __future__ import annotations
+
+import socket
+
+from drivers.core.errors import DeviceError
+
+
+def bind_socket(kind: socket.SocketKind, host: str, port: int, where: str) -> socket.socket:
+    """A socket at an address of this computer.
+
+    Raises:
+        DeviceError: the address is another computer's or taken.
+    """
+    made = socket.socket(socket.AF_INET, kind)
+    try:
+        if kind == socket.SOCK_STREAM:
+            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        made.bind((host, port))
+    except OSError as error:
+        made.close()
+        what = f"cannot be served at {host}:{port} ({error.strerror})"
+        raise DeviceError(what, where=where, hint="End the other laboratory, or name a free place here") from error
+    return made

@@ -1,0 +1,83 @@
+"""Can this wrench come from one contact on the fingertip? If it persistently cannot, the torque is not to be trusted.
+
+A gauge that drifts, a loose cable or a wrong calibration file gives wrenches that look like forces and torques but
+belong to no contact: their axis misses the tip, or they need a pull, an impossible friction or an impossible twist.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+
+import numpy as np
+from pydantic import Field
+
+from drivers.core.configuration import StrictModel
+from drivers.core.contacts import Array
+from drivers.core.fingertip import FingertipCalibration
+from drivers.force.intrinsic_contact import EllipsoidContact
+
+
+class PlausibilitySettings(StrictModel):
+    """Limits of what one frictional contact can do.
+
+    Attributes:
+        axis_distance: how far the wrench's axis may pass outside the surface (1: it just touches).
+        force_angle_rad: largest angle between force and inward normal; the atan of a generous friction coefficient.
+        torsion_m: largest twist per newton of force; about the radius of the contact patch.
+        judged_force_N: below this load drift and noise decide, and nothing is judged.
+        window: captures remembered; the sensor is faulty when at least ``faulty_count`` and more than half of the
+            loaded ones are impossible.
+    """
+
+    axis_distance: float = Field(default=1.1, gt=0.0)
+    force_angle_rad: float = Field(default=1.2, gt=0.0, lt=np.pi / 2)
+    torsion_m: float = Field(default=0.008, gt=0.0)
+    judged_force_N: float = Field(default=0.3, gt=0.0)
+    window: int = Field(default=20, ge=1)
+    faulty_count: int = Field(default=4, ge=1)
+
+
+def objection(
+    contact: EllipsoidContact, force_N: Array, calibration: FingertipCalibration, settings: PlausibilitySettings
+) -> str:
+    """Why this one contact cannot be, in words; empty when it can.
+
+    Args:
+        contact: one contact (no leading shape), axes parallel to the distal frame, origin in the ellipsoid's centre.
+        force_N: its force, shape (3,).
+    """
+    point_distal_m = contact.point_m + np.array(calibration.centre_distal_m)
+    below = point_distal_m < np.array(calibration.shell_min_distal_m)
+    above = point_distal_m > np.array(calibration.shell_max_distal_m)
+    if contact.axis_distance > settings.axis_distance:
+        return "the axis of the wrench misses the fingertip"
+    if np.any(below | above):
+        return "the contact would lie where the fingertip has no surface"
+    if contact.force_angle_rad > settings.force_angle_rad:
+        return "the force would slide along the surface"
+    if abs(float(contact.torsion_Nm)) > settings.torsion_m * float(np.linalg.norm(force_N)):
+        return "the twist about the contact is too strong for its force"
+    return ""
+
+
+class WrenchMonitor:
+    """Remembers the verdicts on loaded captures and tells when the torque persistently does not fit the force."""
+
+    def __init__(self, settings: PlausibilitySettings) -> None:
+        self._settings = settings
+        self._verdicts: deque[str] = deque(maxlen=settings.window)
+
+    def note(self, verdict: str, force_N: Array) -> None:
+        """Take the verdict on one capture; weak ones do not count."""
+        if np.linalg.norm(force_N) >= self._settings.judged_force_N:
+            self._verdicts.append(verdict)
+
+    @property
+    def fault(self) -> str:
+        """The complaint in words; empty while the sensor can be trusted."""
+        objections = [verdict for verdict in self._verdicts if verdict]
+        if len(objections) < self._settings.faulty_count or 2 * len(objections) <= len(self._verdicts):
+            return ""
+        usual = Counter(objections).most_common(1)[0][0]
+        share = f"{len(objections)} of {len(self._verdicts)} loaded captures"
+        return f"the torque does not fit the force in {share}: {usual}; check cable, mounting and calibration file"

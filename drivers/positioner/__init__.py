@@ -1,0 +1,1 @@
+"""The six-axis positioner that carries the hand."""

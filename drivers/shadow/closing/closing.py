@@ -1,0 +1,221 @@
+"""Closing paths of the hand: where each fingertip starts, where it ends, and the joint angles in between.
+
+A closing is described in the *grasp frame*: origin on the table below the middle of the grasp, z up, the four fingers
+on the +x side and the thumb on the -x side, the first finger towards +y. Every fingertip's centre runs along a
+straight line, horizontal where the hand is upright; the palm stands still above. The whole grasp is then three numbers
+(x, y, yaw of the grasp frame in the world) and one progress ``u`` in 0..1 for each finger, so that a contact is
+predicted by intersecting a line with a surface.
+
+The postures are solved once for each closing and height (:mod:`drivers.shadow.closing.posture`, a fraction of a second)
+and kept in memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from gtsam import Pose3, Rot3
+
+from drivers.core.contacts import FINGERS, Array
+from drivers.core.errors import ConfigurationError
+from drivers.shadow.closing.posture import LONG_FINGERS, NODES, TipEllipsoid, finger_joints, solve_postures
+
+Point = tuple[float, float]
+
+LOWEST_m, HIGHEST_m = 0.015, 0.12
+"""Heights of the fingertips' centres above the table at which the hand can work."""
+
+
+@dataclass(frozen=True)
+class TipPath:
+    """The straight line of one fingertip's centre, in the grasp frame.
+
+    Attributes:
+        start_m: open end, shape (3,).
+        end_m: closed end, shape (3,).
+        valid: smallest and largest progress ``u`` that the hand can take up with the tip on the line.
+    """
+
+    start_m: Array
+    end_m: Array
+    valid: tuple[float, float]
+
+    @property
+    def length_m(self) -> float:
+        """Distance from start to end."""
+        return float(np.linalg.norm(self.end_m - self.start_m))
+
+    @property
+    def direction(self) -> Array:
+        """Unit direction of closing, shape (3,)."""
+        return np.asarray((self.end_m - self.start_m) / self.length_m)
+
+    def centre_m(self, u: float) -> Array:
+        """Centre of the tip at progress ``u``, shape (3,)."""
+        return np.asarray(self.start_m + u * (self.end_m - self.start_m))
+
+
+@dataclass(frozen=True)
+class Closing:
+    """One way to close the hand at one height.
+
+    Attributes:
+        name: a key of :data:`PRESHAPES` or :data:`LEANING`.
+        height_m: height of the fingertip centres above the table; where the hand leans, of the lowest one.
+        radius_m: of the fingertips, across the finger.
+        grasp_T_palm: the palm in the grasp frame, wrist straight.
+        paths: each finger's line.
+        tables: each finger's joint angles along its line, shape (NODES, joints of the finger), radians, in the order
+            of :func:`finger_joints`.
+    """
+
+    name: str
+    height_m: float
+    radius_m: float
+    grasp_T_palm: Pose3
+    paths: Mapping[str, TipPath]
+    tables: Mapping[str, Array]
+
+    def path(self, finger: str) -> TipPath:
+        """The line of one finger's tip centre in the grasp frame, with its valid range."""
+        return self.paths[finger]
+
+    def angles_rad(self, finger: str, u: float) -> dict[str, float]:
+        """Joint angles of one finger at progress ``u``, clipped to the valid range."""
+        low, high = self.paths[finger].valid
+        position = min(max(u, low), high) * (NODES - 1)
+        index = min(int(position), NODES - 2)
+        fraction = position - index
+        table = self.tables[finger]
+        row = (1 - fraction) * table[index] + fraction * table[index + 1]
+        return dict(zip(finger_joints(finger), row.tolist(), strict=True))
+
+    def joints(self, finger: str, u: float) -> dict[str, float]:
+        """Targets of one finger's motors at progress ``u``: the coupled distal pair as J0 = J1 + J2, radians."""
+        return motor_targets(self.angles_rad(finger, u))
+
+
+@dataclass(frozen=True)
+class Preshape:
+    """Start and end of the fingertip centres in the grasp frame's x, y, metres."""
+
+    starts_m: Mapping[str, Point]
+    ends_m: Mapping[str, Point]
+
+
+PRESHAPES: Mapping[str, Preshape] = {
+    "pinch": Preshape(
+        starts_m={
+            "FF": (0.078, 0.034),
+            "MF": (0.078, 0.011),
+            "RF": (0.078, -0.011),
+            "LF": (0.078, -0.036),
+            "TH": (-0.070, 0.020),
+        },
+        ends_m={
+            "FF": (-0.010, 0.030),
+            "MF": (-0.010, 0.010),
+            "RF": (-0.010, -0.010),
+            "LF": (-0.010, -0.030),
+            "TH": (0.004, 0.010),
+        },
+    ),
+    "radial": Preshape(
+        starts_m={
+            "FF": (0.060, 0.056),
+            "MF": (0.080, 0.013),
+            "RF": (0.078, -0.015),
+            "LF": (0.050, -0.060),
+            "TH": (-0.070, 0.024),
+        },
+        ends_m={
+            "FF": (0.012, 0.014),
+            "MF": (-0.010, 0.008),
+            "RF": (-0.010, -0.012),
+            "LF": (0.010, -0.016),
+            "TH": (0.004, 0.006),
+        },
+    ),
+}
+"""The closings: four parallel fingers against the thumb, and first and little finger coming in from the sides."""
+
+
+@dataclass(frozen=True)
+class Leaning:
+    """A hand that comes from the side: an upright closing turned about the grasp frame's x axis, first finger down.
+
+    Attributes:
+        upright: a key of :data:`PRESHAPES`.
+        height_m: of that closing; its postures are those of a low grasp, however high the leaning hand stands.
+        lean_rad: how far it is turned.
+    """
+
+    upright: str
+    height_m: float
+    lean_rad: float
+
+
+LEANING: Mapping[str, Leaning] = {"aside": Leaning("pinch", 0.028, float(np.deg2rad(25.0)))}
+"""Closings with the fingers one above the other. A lean of 40 degrees brings the fingers so far above the thumb that
+they tip a box over by 6 degrees on the simulated rig, one of 25 degrees leaves it standing; a palm that stood upright
+could come no lower than 56 mm, as the forearm is 100 mm thick."""
+
+CLOSINGS = frozenset({*PRESHAPES, *LEANING})
+"""Names of all closings."""
+
+
+@lru_cache(maxsize=64)
+def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Closing:
+    """The closing path table of one preshape at one height of the fingertip centres; kept in memory.
+
+    Where the hand leans it is the height of the lowest fingertip's centre.
+
+    Raises:
+        ConfigurationError: no such closing, or a height the hand cannot work at.
+    """
+    if name not in CLOSINGS:
+        raise ConfigurationError(f"no closing called {name!r}", hint=f"Choose from {', '.join(sorted(CLOSINGS))}")
+    if not LOWEST_m <= height_m <= HIGHEST_m:
+        allowed = f"{LOWEST_m * 1e3:.0f} to {HIGHEST_m * 1e3:.0f} mm"
+        raise ConfigurationError(
+            f"contact height {height_m * 1e3:.0f} mm is outside {allowed}", hint="Choose a height in that range"
+        )
+    if name in LEANING:
+        return _leaning(name, height_m, tip)
+    starts_m, ends_m = (
+        np.array([(*points[finger], height_m) for finger in FINGERS])
+        for points in (PRESHAPES[name].starts_m, PRESHAPES[name].ends_m)
+    )
+    tip = tip or TipEllipsoid()
+    postures = solve_postures(starts_m, ends_m, tip)
+    paths = {
+        finger: TipPath(starts_m[index], ends_m[index], postures.valid[finger]) for index, finger in enumerate(FINGERS)
+    }
+    return Closing(name, height_m, tip.radius_m, postures.grasp_T_palm, paths, postures.tables_rad)
+
+
+def _leaning(name: str, height_m: float, tip: TipEllipsoid | None) -> Closing:
+    upright = closing(LEANING[name].upright, LEANING[name].height_m, tip)
+    turn, middle_m = Rot3.Rx(-LEANING[name].lean_rad), np.array([0.0, 0.0, upright.height_m])
+    lowest_m = min(float(turn.rotate(path.start_m - middle_m)[2]) for path in upright.paths.values())
+    lean = Pose3(turn, np.array([0.0, 0.0, height_m - lowest_m]) - turn.rotate(middle_m))
+    paths = {
+        finger: TipPath(lean.transformFrom(path.start_m), lean.transformFrom(path.end_m), path.valid)
+        for finger, path in upright.paths.items()
+    }
+    return Closing(name, height_m, upright.radius_m, lean * upright.grasp_T_palm, paths, upright.tables)
+
+
+_COUPLED = {f"{finger}{joint}": f"{finger}J0" for finger in LONG_FINGERS for joint in ("J1", "J2")}
+
+
+def motor_targets(angles_rad: Mapping[str, float]) -> dict[str, float]:
+    """Joint angles as motor targets: J1 and J2 of the four fingers share the tendon J0."""
+    targets: dict[str, float] = {}
+    for name, angle in angles_rad.items():
+        motor = _COUPLED.get(name, name)
+        targets[motor] = targets.get(motor, 0.0) + angle
+    return targets

@@ -1,0 +1,81 @@
+"""Settings of the hand, as they stand in a rig file."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from drivers.core.configuration import StrictModel
+from drivers.shadow.device.motor_load import LoadLimits
+from drivers.shadow.device.motor_polling import PollingRates
+from drivers.shadow.device.motor_watch import HeatLimits
+from drivers.shadow.device.tactile_requests import TactileKind
+from drivers.shadow.model.gains import GainTable
+from drivers.shadow.model.motors import DRIVEN_JOINTS
+from drivers.shadow.protocol.motor_data import MAX_PWM, MOTOR_PATIENCE_s
+from drivers.shadow.protocol.palm_images import USUAL_PALM, PalmName
+
+WIRE_CYCLE_s = 0.002
+"""Period of a hand on its cable that nobody has stated; Shadow's own host has 1 ms."""
+
+
+class HandSettings(StrictModel):
+    """How the host drives the hand.
+
+    Attributes:
+        palm: which palm the hand has; on a cable the product code tells where this is left out (:attr:`palm_stated`).
+        cycle_s: period of the exchanges, seconds; below the 20 ms after which motors halt for want of a demand. On a
+            cable it is :data:`WIRE_CYCLE_s` where it is left out (:attr:`on_wire`).
+        demand: what the motors are told: a duty cycle, or a torque that they keep by themselves at 5 kHz.
+        gains: position control, in counts of that demand.
+        polling: how often the motors are asked for what.
+        tactile: kind of fingertip asked for data through the palm.
+        tactile_names: ask the fingertips, after connecting, who they are as well; ``rig check`` does.
+        lost_limit: so many cycles in a row without a valid status stop the hand.
+        blind_after: so many lost cycles in a row already take the demands away, until a status comes again.
+        soft_start_s: after connecting, a resume or a loss the duty cycle limit rises from zero in this time.
+        demand_grace_s: after a pause in the demands motors may report for so long that they had halted.
+        heat: temperature limits of the motors.
+        load: limits of torque and duty cycle.
+        connect_tries: exchanges until the palm must have answered.
+        close_cycles: exchanges with zero demands before the transport is closed.
+        reset_motors: reset the motor boards when connecting; they then need ``reset_wait_s`` to come back.
+    """
+
+    palm: PalmName = USUAL_PALM
+    cycle_s: float = Field(default=0.01, gt=0.0, lt=MOTOR_PATIENCE_s)
+    demand: Literal["pwm", "torque"] = "pwm"
+    gains: GainTable = GainTable()
+    polling: PollingRates = PollingRates()
+    tactile: TactileKind = "none"
+    tactile_names: bool = False
+    lost_limit: int = Field(default=10, ge=1)
+    blind_after: int = Field(default=2, ge=1)
+    soft_start_s: float = Field(default=0.5, ge=0.0)
+    demand_grace_s: float = Field(default=0.3, ge=0.0)
+    heat: HeatLimits = HeatLimits()
+    load: LoadLimits = LoadLimits()
+    connect_tries: int = Field(default=20, ge=1)
+    close_cycles: int = Field(default=5, ge=1)
+    reset_motors: bool = False
+    reset_wait_s: float = Field(default=3.2, ge=0.0, le=30.0)
+
+    @property
+    def palm_stated(self) -> bool:
+        """Whether someone named the palm, so that another one is refused."""
+        return "palm" in self.model_fields_set
+
+    @property
+    def on_wire(self) -> HandSettings:
+        """The same on a cable, where the hand keeps a quicker cycle by itself unless another is stated."""
+        if "cycle_s" in self.model_fields_set:
+            return self
+        return self.model_copy(update={"cycle_s": WIRE_CYCLE_s})
+
+    @model_validator(mode="after")
+    def _duty_cycles_exist(self) -> HandSettings:
+        largest = max(self.gains.of(joint).max_pwm for joint in DRIVEN_JOINTS)
+        if self.demand == "pwm" and largest > MAX_PWM:
+            raise ValueError(f"a duty cycle of {largest:g} counts is more than the full one, {MAX_PWM}")
+        return self

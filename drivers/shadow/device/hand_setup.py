@@ -1,0 +1,113 @@
+"""Everything that is needed to reach and drive one real hand, in a form that can be handed to another process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from drivers.core.clock import Clock
+from drivers.core.configuration import StrictModel
+from drivers.core.errors import ConfigurationError
+from drivers.core.transports import Transport
+from drivers.shadow.device.hand import ShadowHand
+from drivers.shadow.device.hand_settings import HandSettings
+from drivers.shadow.device.motor_polling import load_rates
+from drivers.shadow.ethercat.hand_transport import EthercatSettings, EthercatTransport, find_palm
+from drivers.shadow.ethercat.pysoem_transport import PysoemTransport
+from drivers.shadow.model.gains import load_gains
+from drivers.shadow.model.joint_calibration import JointCalibration
+from drivers.shadow.model.motors import MotorMap
+from drivers.shadow.protocol.motor_configuration import load_configurations
+from drivers.shadow.protocol.palm_images import PalmName
+
+Master = Literal["own", "pysoem"]
+
+
+class HandSetup(StrictModel):
+    """A hand on its cable.
+
+    Attributes:
+        name: the device's name in the rig.
+        ethercat: how it is reached.
+        master: our own EtherCAT master, or ``pysoem`` (the ``[ethercat]`` extra).
+        hand: how it is driven; ``cycle_s`` is the period of its cycle.
+        joints, motors: calibration files of this very hand.
+        boards: settings to upload to the motor boards when connecting; they keep theirs when left out.
+        rates: how often motors are asked for what, in place of ``hand.polling``.
+        gains: position control as Shadow delivers it (``sr_edc_joint_position_controllers_PWM.yaml``), in place of
+            ``hand.gains``; its signs tell which motors turn backwards.
+    """
+
+    name: str = "hand"
+    ethercat: EthercatSettings
+    master: Master = "own"
+    hand: HandSettings
+    joints: Path
+    motors: Path
+    boards: Path | None = None
+    rates: Path | None = None
+    gains: Path | None = None
+
+    def with_known_palm(self, clock: Clock) -> HandSetup:
+        """The same hand with its palm named: as it is stated, else as the ring tells by the palm's product code.
+
+        Raises:
+            DeviceError: what is missing on the ring or wrong, and what to do.
+        """
+        palm = self.stated_palm or find_palm(self.ethercat, clock)
+        return self.model_copy(update={"hand": self.hand.model_copy(update={"palm": palm})})
+
+    @property
+    def stated_palm(self) -> PalmName | None:
+        """The palm that a file names, of the hand or of its cable; None where the ring is to tell."""
+        return self.hand.palm if self.hand.palm_stated else self.ethercat.palm
+
+    def settings(self) -> HandSettings:
+        """How the hand is driven, with the polling rates and gains of the files. Raises ConfigurationError."""
+        changes: dict[str, object] = {} if self.rates is None else {"polling": load_rates(self.rates)}
+        if self.gains is not None:
+            changes["gains"] = load_gains(self.gains).table
+        return self.hand.model_copy(update=changes)
+
+    def transport(self, clock: Clock) -> EthercatTransport | PysoemTransport:
+        """The hand's transport, not open; to a palm that is :meth:`known`.
+
+        Raises:
+            ConfigurationError: the master is not installed, or two places name different palms.
+        """
+        if self.ethercat.palm not in (None, self.hand.palm):
+            raise ConfigurationError(
+                "hand.palm and the cable's palm differ", where=self.name, hint="Name the palm under hand alone"
+            )
+        settings = self.ethercat.model_copy(update={"palm": self.hand.palm})
+        return (EthercatTransport if self.master == "own" else PysoemTransport)(self.name, settings, clock)
+
+    def check_files(self) -> None:
+        """Read every file that is named. Raises ConfigurationError."""
+        self.settings()
+        self.motor_map()
+        JointCalibration.load(self.joints)
+        if self.boards is not None:
+            load_configurations(self.boards)
+
+    def motor_map(self) -> MotorMap:
+        """Which motor pulls which joint. Raises ConfigurationError."""
+        motors = MotorMap.load(self.motors)
+        return motors if self.gains is None else motors.reverse(load_gains(self.gains).backwards)
+
+    def device(self, transport: Transport, clock: Clock, *, set_up_boards: bool = True) -> ShadowHand:
+        """The hand, not connected.
+
+        Args:
+            transport: from :meth:`transport`, or one around it.
+            clock: the session's.
+            set_up_boards: upload the motor boards' settings when connecting.
+
+        Raises:
+            ConfigurationError: a file that cannot be used.
+        """
+        boards = load_configurations(self.boards) if self.boards else None
+        joints = JointCalibration.load(self.joints)
+        return ShadowHand(
+            transport, clock, joints, self.settings(), self.motor_map(), boards if set_up_boards else None
+        )

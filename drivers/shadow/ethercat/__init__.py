@@ -1,0 +1,1 @@
+"""The hand on its EtherCAT cable: start-up, identity, process data, the motors' CAN buses."""

@@ -1,0 +1,140 @@
+"""Bringing the hand's two slaves into operation, in the order of Shadow's own master (protocols: Bring-up)."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+
+from drivers.core.clock import NANOSECONDS
+from drivers.core.errors import DeviceError
+from drivers.ethercat.frames import Command, Telegram
+from drivers.ethercat.master import EtherCatMaster, Slave
+from drivers.ethercat.registers import FMMU_BYTES, SYNC_MANAGER_BYTES, AlState, Register
+from drivers.shadow.ethercat.hand_identity import SERIAL_WORD, BoardIdentity, HandIdentity, checked_image
+from drivers.shadow.protocol.palm_images import IMAGE_BASE, PalmImage, PalmName
+
+_VENDOR, _PRODUCT, _REVISION = 0x08, 0x0A, 0x0C
+_ALL_REGISTERS = bytes(256)
+_FIRST_EXCHANGES = 20
+_LOOP_CONTROL_MASK = 0x3FFF
+_NANOSECONDS_PER_TICK = 40
+
+
+class HandRing:
+    """The hand's ring.
+
+    Args:
+        master: on the interface the hand is plugged into.
+        palm: the palm that must be there; any that can be driven when None.
+        serial: the hand that must be there; any when None.
+        watchdog_s: let commands feed the palm's watchdog, and set it to this time; unused when None.
+    """
+
+    BRIDGE, PALM = Slave(0, 1), Slave(1, 2)
+
+    def __init__(
+        self,
+        master: EtherCatMaster,
+        palm: PalmName | None = None,
+        serial: int | None = None,
+        watchdog_s: float | None = None,
+    ) -> None:
+        self._master, self._palm, self._serial, self._watchdog_s = master, palm, serial, watchdog_s
+
+    def bring_up(self) -> HandIdentity:
+        """From power-up, or from wherever the slaves are, to OP with an all-zero image exchanged.
+
+        Raises:
+            DeviceError: what is missing or wrong, and what to do.
+        """
+        bridge, palm, image = self.look()
+        self._master.broadcast(Register.FMMU, _ALL_REGISTERS)
+        self._master.broadcast(Register.SYNC_MANAGER, _ALL_REGISTERS)
+        self._give_addresses()
+        self._all_to(AlState.PREOP)
+        self._open_loop_port()
+        watchdog_s = self._map(image)
+        self._all_to(AlState.SAFEOP)
+        self._all_to(AlState.OP)
+        self._exchange_zeros(image)
+        return HandIdentity(bridge, palm, image, watchdog_s)
+
+    # --- who is there ------------------------------------------------------------------------------------------
+
+    def look(self) -> tuple[BoardIdentity, BoardIdentity, PalmImage]:
+        """Bridge and palm by their EEPROMs, and the process image that belongs to the palm's product code.
+
+        No slave changes its state.
+
+        Raises:
+            DeviceError: what is missing or wrong, and what to do.
+        """
+        self._check_ring()
+        bridge, palm = self._identify(0), self._identify(1)
+        return bridge, palm, checked_image(bridge, palm, self._palm, self._serial, self._master.where)
+
+    def _check_ring(self) -> None:
+        count = self._master.count_slaves()
+        if count != 2:
+            hint = "Only the hand may be on this interface: check its cable, its power, and the name of the interface"
+            raise self._wrong(f"{count} EtherCAT slaves instead of the hand's bridge and palm", hint)
+
+    def _identify(self, position: int) -> BoardIdentity:
+        slave = Slave(position)
+        words = [self._master.read_eeprom(slave, word) for word in (_PRODUCT, _REVISION, SERIAL_WORD, _VENDOR)]
+        product, revision, serial, vendor = words
+        return BoardIdentity(vendor, product, revision, serial)
+
+    # --- set-up ------------------------------------------------------------------------------------------------
+
+    def _give_addresses(self) -> None:
+        for slave in (self.BRIDGE, self.PALM):
+            unnamed = Slave(slave.position)
+            self._master.change_state(unnamed, AlState.INIT)
+            self._master.write(unnamed, Register.STATION_ADDRESS, struct.pack("<H", slave.station))
+
+    def _all_to(self, state: AlState) -> None:
+        for slave in (self.BRIDGE, self.PALM):
+            self._master.change_state(slave, state)
+
+    def _open_loop_port(self) -> None:
+        """The bridge's port that leads on to the palm follows its transport by itself, as Shadow's driver sets it."""
+        (control,) = struct.unpack("<H", self._master.read(self.BRIDGE, Register.DL_CONTROL, 2))
+        self._master.write(self.BRIDGE, Register.DL_CONTROL, struct.pack("<H", control & _LOOP_CONTROL_MASK))
+
+    def _map(self, image: PalmImage) -> float | None:
+        """Program the palm's process image; the watchdog's time as it reads back."""
+        watched = self._watchdog_s is not None
+        self._write_all(Register.FMMU, FMMU_BYTES, (each.encode() for each in image.fmmus()))
+        managers = image.sync_managers(watched=watched)
+        self._write_all(Register.SYNC_MANAGER, SYNC_MANAGER_BYTES, (each.encode() for each in managers))
+        if self._watchdog_s is None:
+            return None
+        ticks = max(round(self._watchdog_s / self._watchdog_tick_s()), 1)
+        self._master.write(self.PALM, Register.WATCHDOG_TIME, struct.pack("<H", min(ticks, 0xFFFF)))
+        (set_ticks,) = struct.unpack("<H", self._master.read(self.PALM, Register.WATCHDOG_TIME, 2))
+        return float(set_ticks * self._watchdog_tick_s())
+
+    def _watchdog_tick_s(self) -> float:
+        (divider,) = struct.unpack("<H", self._master.read(self.PALM, Register.WATCHDOG_DIVIDER, 2))
+        return (int(divider) + 2) * _NANOSECONDS_PER_TICK / NANOSECONDS
+
+    def _write_all(self, register: int, size: int, contents: Iterable[bytes]) -> None:
+        for number, content in enumerate(contents):
+            self._master.write(self.PALM, register + size * number, content)
+
+    def _exchange_zeros(self, image: PalmImage) -> None:
+        for _ in range(_FIRST_EXCHANGES):
+            if self._master.ask(image_telegram(image, bytes(image.command_bytes))).working_counter:
+                return
+            self._master.wait(0.001)
+        hint = "Switch the hand off and on, and connect again"
+        raise self._wrong(f"the palm took no process image in {_FIRST_EXCHANGES} tries", hint)
+
+    def _wrong(self, what: str, hint: str) -> DeviceError:
+        return DeviceError(what, where=self._master.where, hint=hint)
+
+
+def image_telegram(image: PalmImage, command: bytes) -> Telegram:
+    """The one telegram of a cycle: the command, and room for the status behind it."""
+    return Telegram(Command.LRW, IMAGE_BASE, command + bytes(image.status_bytes))

@@ -1,0 +1,1 @@
+"""What the hand is like: kinematics, links, motors, joint calibration, gains."""

@@ -1,0 +1,176 @@
+"""From ADC counts to joint angles and back, by the tables in a hand's ``calibration.yaml``.
+
+The file is Shadow's own format (protocols: Joint calibration files). ``sr_calibrations`` holds one table of (counts,
+degrees) a joint, read piecewise linearly and continued with the end pair. ``sr_calibrations_coupled`` holds pairs of
+joints whose two sensors both depend on both angles (the thumb's THJ1 and THJ2): points ((countsA, countsB), degreesA,
+degreesB), read by linear interpolation on the Delaunay triangulation of the counts plane. THJ5 and WRJ1 have two
+sensors each, averaged before the table is read. Every joint's own sensor is read, so J1 and J2 of a finger are both
+known although one tendon drives their sum.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.core.calibration_file import load_parameters
+from drivers.core.configuration import StrictModel
+from drivers.core.contacts import Array
+from drivers.core.errors import ConfigurationError
+from drivers.shadow.model.interpolation import Curves, Plane
+from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS
+from drivers.shadow.protocol.palm_codec import OPTIONAL_CHANNELS, SENSORS
+
+Table = Sequence[tuple[float, float]]
+"""Calibration points (ADC counts, degrees) of one joint."""
+
+CoupledTable = Sequence[tuple[tuple[float, float], float, float]]
+"""Calibration points ((counts of A, counts of B), degrees of A, degrees of B) of two joints."""
+
+_AVERAGED = {"THJ5": ("THJ5A", "THJ5B"), "WRJ1": ("WRJ1A", "WRJ1B")}
+
+
+class _CalibrationFile(StrictModel):
+    sr_calibrations: tuple[tuple[str, tuple[tuple[float, float], ...]], ...]
+    sr_calibrations_coupled: tuple[
+        tuple[tuple[str, str], tuple[tuple[tuple[float, float], float, float], ...]], ...
+    ] = ()
+
+
+class JointCalibration:
+    """The calibration of one hand.
+
+    Args:
+        tables: table of each joint that has its own.
+        coupled: tables of pairs of joints. Together every one of the 24 joints appears exactly once.
+        where: the file, for error messages.
+
+    Raises:
+        ConfigurationError: a joint is missing, unknown or given twice, or a table cannot be used.
+    """
+
+    def __init__(
+        self, tables: Mapping[str, Table], coupled: Mapping[tuple[str, str], CoupledTable], where: str = "calibration"
+    ) -> None:
+        _check_complete([*tables, *(joint for pair in coupled for joint in pair)], where)
+        self._plain = np.array([JOINT_INDEX[joint] for joint in tables], dtype=np.intp)
+        self._curves = Curves([_checked_table(joint, table, where) for joint, table in tables.items()])
+        self._pairs = [
+            (np.array([JOINT_INDEX[joint] for joint in pair]), _plane(pair, points, where))
+            for pair, points in coupled.items()
+        ]
+
+    @classmethod
+    def load(cls, path: Path) -> JointCalibration:
+        """Read a ``calibration.yaml``.
+
+        Raises:
+            ConfigurationError: the file or one of its tables cannot be used; names the joint.
+        """
+        content = load_parameters(path, _CalibrationFile)
+        _refuse_repeats([joint for joint, _ in content.sr_calibrations], str(path))
+        _refuse_repeats([joint for pair, _ in content.sr_calibrations_coupled for joint in pair], str(path))
+        return cls(dict(content.sr_calibrations), dict(content.sr_calibrations_coupled), str(path))
+
+    def angles_rad(self, sensors: NDArray[np.uint16] | Array) -> Array:
+        """Joint angles from one set of readings.
+
+        Args:
+            sensors: ADC counts, shape (37,), the palm's channels.
+
+        Returns:
+            Angles, shape (24,), order of :data:`~drivers.shadow.model.kinematics.JOINTS`, radians.
+        """
+        counts = _JOINT_FROM_SENSOR.dot(np.asarray(sensors, dtype=float))
+        angles_deg = np.empty(len(JOINTS))
+        angles_deg[self._plain] = self._curves(counts[self._plain])
+        for joints, plane in self._pairs:
+            angles_deg[joints] = plane(counts[joints])
+        return np.radians(angles_deg)
+
+    def raw_counts(self, joints_rad: Array) -> Array:
+        """The readings that would give these angles: the inverse of :meth:`angles_rad`, for emulated palms.
+
+        Args:
+            joints_rad: joint angles, shape (24,), radians.
+
+        Returns:
+            ADC counts before rounding and clipping, shape (37,). Channels without a joint read as in a palm
+            without the optional sensors: their own index, or zero.
+
+        Raises:
+            ConfigurationError: a coupled table does not determine both angles.
+        """
+        fixed = [JOINTS[joint] for joints, plane in self._pairs if not plane.invertible for joint in joints]
+        if fixed:
+            raise ConfigurationError(
+                f"the calibration of {' and '.join(fixed)} does not determine both angles",
+                hint="Use another calibration for an emulated hand",
+            )
+        angles_deg = np.degrees(joints_rad)
+        counts = np.empty(len(JOINTS))
+        counts[self._plain] = self._curves.inverse(angles_deg[self._plain])
+        for joints, plane in self._pairs:
+            counts[joints] = plane.inverse(angles_deg[joints])
+        sensors = _IDLE_SENSORS.copy()
+        sensors[_SENSOR_HAS_JOINT] = counts[_JOINT_OF_SENSOR]
+        return sensors
+
+
+def _checked_table(joint: str, table: Table, where: str) -> Array:
+    """The table by rising counts, shape (n, 2). Angles rise, fall or, for a fixed joint, stay."""
+    points = np.array(sorted(table), dtype=float).reshape(-1, 2)
+    if len(points) < 2:
+        raise ConfigurationError(f"the table of {joint} needs two or more points", where=where)
+    steps = np.diff(points, axis=0)
+    same_way = (steps[:, 1] > 0).all() or (steps[:, 1] < 0).all() or not steps[:, 1].any()
+    if not same_way or not (steps[:, 0] > 0).all() or not np.isfinite(points).all():
+        raise ConfigurationError(
+            f"the table of {joint} is not monotonic", where=where, hint="Each count needs its own angle"
+        )
+    return points
+
+
+def _plane(pair: tuple[str, str], points: CoupledTable, where: str) -> Plane:
+    counts, degrees = np.array([point[0] for point in points]), np.array([point[1:] for point in points])
+    try:
+        return Plane(counts, degrees)
+    except ValueError as error:
+        raise ConfigurationError(f"the table of {pair[0]} and {pair[1]} {error}", where=where) from error
+
+
+def _check_complete(joints: Sequence[str], where: str) -> None:
+    _refuse_repeats(joints, where)
+    missing, unknown = sorted(set(JOINTS) - set(joints)), sorted(set(joints) - set(JOINTS))
+    if missing or unknown:
+        problems = [
+            f"{word} {', '.join(names)}" for word, names in (("misses", missing), ("has unknown", unknown)) if names
+        ]
+        raise ConfigurationError(
+            " and ".join(problems), where=where, hint="A hand's calibration names each of the 24 joints once"
+        )
+
+
+def _refuse_repeats(joints: Sequence[str], where: str) -> None:
+    repeated = sorted(joint for joint, times in Counter(joints).items() if times > 1)
+    if repeated:
+        raise ConfigurationError(f"calibrates {', '.join(repeated)} more than once", where=where)
+
+
+def _joint_from_sensor() -> Array:
+    matrix = np.zeros((len(JOINTS), len(SENSORS)))
+    for row, joint in enumerate(JOINTS):
+        channels = _AVERAGED.get(joint, (joint,))
+        for channel in channels:
+            matrix[row, SENSORS.index(channel)] = 1 / len(channels)
+    return matrix
+
+
+_JOINT_FROM_SENSOR = _joint_from_sensor()
+_SENSOR_HAS_JOINT = _JOINT_FROM_SENSOR.any(axis=0)
+_JOINT_OF_SENSOR = _JOINT_FROM_SENSOR.argmax(axis=0)[_SENSOR_HAS_JOINT]
+_IDLE_SENSORS = np.array([float(channel) if channel in OPTIONAL_CHANNELS else 0.0 for channel in range(len(SENSORS))])

@@ -1,0 +1,1 @@
+"""Bytes of the palm, its motors and its fingertips."""

@@ -1,0 +1,1 @@
+"""Far ends of the simulated rig's transports: true quantities in, device bytes out."""

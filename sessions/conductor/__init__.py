@@ -1,0 +1,1 @@
+"""A session, grasp after grasp; the protocols of whoever estimates and decides."""

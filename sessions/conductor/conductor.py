@@ -1,0 +1,286 @@
+"""The conductor: a session, grasp after grasp, until there are enough or a reason to end.
+
+Who decides about the grasps and who does them is a :class:`~sessions.conductor.decisions.SessionRoles`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from gtsam import Pose3
+
+from drivers.core.contacts import Grasp
+from drivers.core.errors import TactileLabError
+from sessions.conductor.decisions import DoGrasp, End, GraspAbandonedError, Pause, SessionRoles, UndoGrasp, Veto, Wait
+from sessions.conductor.estimation import Estimation
+from sessions.conductor.estimator import Estimate, Reorientation
+from sessions.conductor.progress import GraspReport, NullProgress, Progress
+from sessions.conductor.session_outcome import Ending, SessionOutcome
+from sessions.conductor.settings import ConductorSettings
+from sessions.motion.grasp_plan import GraspPlan
+from sessions.recording.recorder import Level
+from sessions.rig_runtime.rig_runtime import RigRuntime
+
+
+class Conductor:
+    """Runs a session on a connected rig runtime.
+
+    Args:
+        rig runtime: connected; the caller closes it.
+        settings: of the session.
+        roles: who decides about the grasps and does them; the caller opens its estimator.
+        progress: is told what happens.
+    """
+
+    def __init__(
+        self,
+        runtime: RigRuntime,
+        settings: ConductorSettings,
+        roles: SessionRoles,
+        progress: Progress | None = None,
+    ) -> None:
+        self._runtime, self._settings = runtime, settings
+        self._progress = progress or NullProgress()
+        self._supervisor, self._cycle, self._decisions = roles.supervisor, roles.performer, roles.decisions
+        self._survey, self._guard = roles.survey, roles.guard
+        self._guard.heard = self._progress.on_interrupt
+        self._estimation = Estimation(runtime, roles.estimator)
+        self._prepared: int | None = None
+        self._paused = False
+        self._grasps: list[Grasp] = []
+        self._misses = 0
+        self._number = 0
+
+    # --- the session -------------------------------------------------------------------------------------------
+
+    def run(self) -> SessionOutcome:
+        """Grasp until done. However it ends, the hand is without demand and the positioner holds.
+
+        Ctrl+C once finishes the step in hand and ends the session, twice raises KeyboardInterrupt at once.
+        """
+        try:
+            with self._guard:
+                ending, reason = self._grasp_until_done()
+            return self._end(ending, reason)
+        except TactileLabError as error:
+            return self._end(Ending.STOPPED, str(error), error)
+        except BaseException as error:
+            self._supervisor.stop(error)
+            raise
+
+    def _feel_bounding_box(self) -> tuple[Ending, str] | None:
+        """The phase before the first grasp, where the session has one; why to end when there is no object."""
+        if self._survey is None:
+            return None
+        self._phase("bounding box")
+        box = self._survey(lambda: self._guard.requested)
+        self._decisions.on_bounding_box(box)
+        self._tell(Level.INFO, box.in_words())
+        if box.is_found or self._guard.requested:
+            return None
+        return Ending.OBJECT_LOST, f"nothing was felt where the object is expected; {box.in_words()}"
+
+    def _grasp_until_done(self) -> tuple[Ending, str]:
+        if ended := self._feel_bounding_box():
+            return ended
+        while True:
+            if ended := self._reason_to_end():
+                return ended
+            try:
+                if ended := self._follow_decision(len(self._grasps)):
+                    return ended
+            except TactileLabError as error:
+                self._survive(error)
+
+    def _follow_decision(self, index: int) -> tuple[Ending, str] | None:
+        """Ask what to do next, and do it."""
+        self._number = index + 1
+        self._consider(index)
+        if self._guard.requested:
+            return None
+        decision = self._decisions.decide(index)
+        self._pause(decision if isinstance(decision, Pause) else None)
+        match decision:
+            case DoGrasp(plan):
+                self._prepared = None
+                self._one_grasp(plan)
+            case UndoGrasp(reason):
+                self._undo(reason)
+            case End(reason):
+                return Ending.COMPLETE, reason
+            case Wait() | Pause():
+                self._cycle.idle()
+        return None
+
+    def _consider(self, index: int) -> None:
+        if self._prepared != index:
+            self._decisions.prepare(index)
+            self._prepared = index
+            if plan := self._decisions.suggested:
+                self._runtime.recorder.plan(self._runtime.clock.now_ns(), plan.as_plain(index))
+
+    def _pause(self, wanted: Pause | None) -> None:
+        if wanted is not None and not self._paused:
+            self._runtime.stop()
+            self._tell(Level.INFO, f"paused: {wanted.reason}")
+        elif wanted is None and self._paused:
+            self._runtime.resume()
+            self._tell(Level.INFO, "goes on")
+        self._paused = wanted is not None
+
+    def _survive(self, error: TactileLabError) -> None:
+        """Stop everything and go on, if whoever decides wants to. Raises the error otherwise."""
+        if not self._decisions.on_failure(error):
+            raise error
+        problems = self._supervisor.stop(error)
+        if self._runtime.perception.is_holding:
+            self._runtime.end_hold()
+        self._paused, self._prepared = True, None
+        self._tell(Level.ERROR, "; ".join([f"stopped: {error}", *problems]))
+
+    def _reason_to_end(self) -> tuple[Ending, str] | None:
+        if self._guard.requested:
+            return Ending.INTERRUPTED, "interrupted by the operator"
+        if len(self._grasps) >= self._settings.grasps:
+            return Ending.COMPLETE, f"{len(self._grasps)} grasps done"
+        if self._misses >= self._settings.missed_approaches:
+            return Ending.OBJECT_LOST, f"could not reach the table: {self._misses} approaches were blocked"
+        if reason := self._supervisor.time_over(self._runtime.clock.now_ns()):
+            return Ending.LIMIT, reason
+        if reason := self._supervisor.object_lost(*self._decisions.centre_m):
+            return Ending.OBJECT_LOST, reason
+        return None
+
+    def _end(self, ending: Ending, reason: str, error: TactileLabError | None = None) -> SessionOutcome:
+        problems = self._supervisor.stop(error)
+        text = "; ".join([reason, *(f"while stopping: {problem}" for problem in problems)])
+        self._runtime.log(Level.ERROR if error else Level.INFO, "conductor", f"{ending}: {text}")
+        for note in getattr(error, "__notes__", ()):
+            self._runtime.log(Level.ERROR, "conductor", note)
+        return SessionOutcome(ending, text, tuple(self._grasps), dict(self._runtime.perception.drop_counts), error)
+
+    # --- one grasp ---------------------------------------------------------------------------------------------
+
+    def _one_grasp(self, plan: GraspPlan) -> None:
+        """Descend, close, settle, capture, squeeze, re-orient, release, lift; then estimate."""
+        try:
+            grasp = self._measure(plan)
+        except GraspAbandonedError as given_up:
+            self._tell(Level.INFO, str(given_up))
+            self._let_go()
+            return
+        if grasp is None:
+            return
+        missing = dict(self._runtime.perception.dropped)
+        wanted = self._choose_reorientation(grasp)
+        if isinstance(wanted, Veto):
+            self._runtime.undo()
+            self._tell(Level.INFO, f"grasp {self._number} does not count: {wanted.reason}")
+            self._let_go()
+            return
+        self._grasps.append(grasp)
+        try:
+            if wanted is not None:
+                self._carry(grasp, wanted)
+                self._let_go()
+        except TactileLabError as error:
+            self._survive(error)
+        self._phase("estimate")
+        estimate = self._estimation.step(grasp)
+        self._decisions.on_estimate(estimate.step)
+        self._progress.grasp_done(self._report(grasp, plan, estimate, missing))
+
+    def _choose_reorientation(self, grasp: Grasp) -> Reorientation | Veto | None:
+        """What is to become of a captured grasp; None where something failed meanwhile and the session goes on."""
+        try:
+            return self._decisions.on_capture(grasp, self._cycle.plan)
+        except TactileLabError as error:
+            self._survive(error)
+            return None
+
+    def _measure(self, plan: GraspPlan) -> Grasp | None:
+        """Down to the captured grasp; None when the hand did not get there, or is not to go on."""
+        cycle = self._cycle
+        self._phase("descend")
+        if not self._arrive(plan):
+            return None
+        self._phase("close")
+        cycle.close()
+        cycle.settle()
+        if self._guard.requested:
+            self._let_go()
+            return None
+        self._phase("capture")
+        return cycle.capture()
+
+    def _undo(self, reason: str) -> None:
+        """Forget the last grasp; the next one has its number, and what the hand carried is not forgotten."""
+        if not self._grasps:
+            self._tell(Level.WARNING, "there is no grasp to take back")
+            return
+        undone = self._runtime.undo()
+        self._grasps.pop()
+        self._estimation.undo(self._runtime.perception.hand_motion_world)
+        self._decisions.on_undo()
+        self._prepared = None
+        self._tell(Level.INFO, f"grasp {undone.index + 1} is taken back: {reason}")
+
+    def _arrive(self, plan: GraspPlan) -> bool:
+        arrived = self._cycle.descend(plan)
+        self._decisions.on_arrival(self._cycle.landings_world_m)
+        self._misses = 0 if arrived else self._misses + 1
+        if not arrived:
+            landings = len(self._cycle.landings_world_m)
+            self._tell(Level.WARNING, f"the hand came down on the object {landings} times: another grasp")
+        return arrived
+
+    def _carry(self, grasp: Grasp, wanted: Reorientation) -> None:
+        """Squeeze, and re-orient the object, unless it is to stay, too few fingers hold it or no grasp will follow."""
+        cycle, touching = self._cycle, grasp.touching
+        self._supervisor.count_contacts(len(touching))
+        hand_motion = Pose3()
+        last = len(self._grasps) >= self._settings.grasps or self._guard.requested
+        if wanted.moves and holds(touching) and not last:
+            self._phase("squeeze")
+            cycle.squeeze(touching)
+            self._phase("re-orient")
+            hand_motion = cycle.reorient(wanted.turn_rad, wanted.shift_world_m, touching)
+            if cycle.jammed:
+                self._tell(Level.WARNING, f"{', '.join(cycle.jammed)} pressed hard: re-orientation stopped early")
+        self._decisions.on_carry(hand_motion)
+
+    def _let_go(self) -> None:
+        self._phase("release")
+        self._cycle.release()
+        self._phase("lift")
+        self._cycle.lift()
+
+    # --- telling -----------------------------------------------------------------------------------------------
+
+    def _report(self, grasp: Grasp, plan: GraspPlan, estimate: Estimate, missing: dict[str, str]) -> GraspReport:
+        step, covariance = estimate.step, estimate.step.covariance
+        return GraspReport(
+            number=len(self._grasps),
+            planned=self._settings.grasps,
+            closing=plan.closing,
+            reason=plan.reason,
+            forces_N={contact.finger: contact.force_N for contact in grasp.contacts if not contact.probed},
+            missing=missing,
+            landings=len(self._cycle.landings_world_m),
+            position_sigma_m=None if covariance is None else float(np.sqrt(np.trace(covariance[:2, :2]) / 2)),
+            yaw_sigma_rad=None if covariance is None else float(np.sqrt(covariance[2, 2])),
+            explored=estimate.explored,
+            verdict=f"{step.verdict}: {step.reason}",
+            stamp_ns=grasp.stamp_ns,
+        )
+
+    def _phase(self, name: str) -> None:
+        self._progress.phase(self._number, name)
+
+    def _tell(self, level: Level, message: str) -> None:
+        self._runtime.log(level, "conductor", message)
+        self._progress.on_message(message)
+
+
+def holds(touching: frozenset[str]) -> bool:
+    """Whether these fingers can carry the object: the thumb against another, or both side fingers."""
+    return ("TH" in touching and len(touching) > 1) or {"FF", "LF"} <= touching

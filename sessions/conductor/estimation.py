@@ -1,0 +1,43 @@
+"""The estimation beside a running session: a step for each grasp, recorded."""
+
+from __future__ import annotations
+
+from gtsam import Pose3
+
+from drivers.core.contacts import Grasp
+from sessions.conductor.estimator import Estimate, EstimatorService
+from sessions.conductor.estimator_client import EstimatorClient
+from sessions.rig_runtime.rig_runtime import RigRuntime
+
+
+class Estimation:
+    """Has grasps estimated one after the other, and records each step.
+
+    Args:
+        rig runtime: of the session.
+        estimator: where it is estimated.
+    """
+
+    def __init__(self, runtime: RigRuntime, estimator: EstimatorClient) -> None:
+        self._runtime, self._estimator = runtime, estimator
+        self._known = 0
+        """Estimates that are recorded and have not been taken back."""
+
+    def step(self, grasp: Grasp) -> Estimate:
+        """One step of the estimation."""
+        estimates = self._estimator.ask(EstimatorService.estimate, grasp, self._known)
+        for estimate in estimates:
+            self._record(estimate)
+        self._known += len(estimates)
+        return estimates[-1]
+
+    def undo(self, hand_motion_world: Pose3) -> None:
+        """Back to before the last step; the hand carried the object so far since the grasp before it."""
+        self._estimator.ask(EstimatorService.undo, hand_motion_world)
+        self._known -= 1
+
+    def _record(self, estimate: Estimate) -> None:
+        recorder, now_ns, step = self._runtime.recorder, self._runtime.clock.now_ns(), estimate.step
+        state = {"index": step.index, "verdict": step.verdict, "reason": step.reason, "seconds": step.seconds}
+        recorder.slam(now_ns, step.world_T_object, state, step.covariance)
+        recorder.surface(now_ns, estimate.surface)

@@ -1,0 +1,105 @@
+"""Decisions of a session that follows a policy: each is recorded with all it was about, and a person may veto it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from sessions.conductor.decisions import AutonomousDecisions, Decision, End
+from sessions.conductor.estimator import EstimatorService, PolicyChoice
+from sessions.conductor.estimator_client import EstimatorClient
+from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.safety import InterruptGuard
+from sessions.recording.recorder import Level
+from sessions.rig_runtime.rig_runtime import RigRuntime
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """The grasp that would come next.
+
+    Attributes:
+        number: from 1.
+        plan: what would be done, and why.
+        vetoed: how many plans for this grasp have been refused already.
+        withdrawn: whether the answer does not matter any more: Ctrl+C ends the session.
+    """
+
+    number: int
+    plan: GraspPlan
+    vetoed: int = 0
+    withdrawn: Callable[[], bool] = lambda: False
+
+
+Approve = Callable[[Proposal], bool]
+"""Whether a person lets a grasp be done; asked before each."""
+
+
+def approve_everything(proposal: Proposal) -> bool:
+    """Nobody is asked."""
+    return True
+
+
+class PolicyDecisions(AutonomousDecisions):
+    """The planner's policy decides.
+
+    Args:
+        estimator: where a planner with or without a policy is asked.
+        tell: told every decision of the policy once.
+        approve: asked before every grasp; what it refuses is replaced by the next best.
+        guard: hears Ctrl+C, which withdraws what was asked.
+    """
+
+    def __init__(
+        self,
+        estimator: EstimatorClient,
+        tell: Callable[[PolicyChoice], None],
+        approve: Approve = approve_everything,
+        guard: InterruptGuard | None = None,
+    ) -> None:
+        super().__init__(estimator)
+        self._tell, self._approve, self._guard = tell, approve, guard or InterruptGuard()
+        self._untold: PolicyChoice | None = None
+
+    def prepare(self, index: int) -> None:
+        super().prepare(index)
+        vetoed = 0
+        while not (self._is_over or self._is_approved(index, vetoed) or self._guard.requested):
+            self._planned, vetoed = self.estimator.ask(EstimatorService.replan, index), vetoed + 1
+        self._untold = self._choice
+
+    def _is_approved(self, index: int, vetoed: int) -> bool:
+        """Whether a person, where one is asked, lets the grasp be done that is planned."""
+        if self._planned is None or self._approve is approve_everything:
+            return True
+        proposal = Proposal(index + 1, self._planned.plan, vetoed, lambda: self._guard.requested)
+        return self.estimator.wait_for_person(lambda: self._approve(proposal))
+
+    def decide(self, index: int) -> Decision:
+        if (choice := self._untold) is not None:
+            self._untold = None
+            self._tell(choice)
+        if self._is_over and self._choice is not None:
+            return End(self._choice.reason)
+        return super().decide(index)
+
+    @property
+    def _choice(self) -> PolicyChoice | None:
+        """The policy's, about the grasp that comes next."""
+        return None if self._planned is None else self._planned.choice
+
+    @property
+    def _is_over(self) -> bool:
+        """Whether the policy has nothing more to gain."""
+        return self._choice is not None and self._choice.is_over
+
+
+def record_choices(runtime: RigRuntime) -> Callable[[PolicyChoice], None]:
+    """Puts decisions into a rig runtime's recording, whole for programs and in a sentence for people."""
+
+    def tell(choice: PolicyChoice) -> None:
+        now_ns = runtime.clock.now_ns()
+        runtime.recorder.decision(now_ns, choice.as_plain())
+        runtime.log(Level.WARNING if choice.failure else Level.INFO, "policy", choice.sentence())
+
+    return tell

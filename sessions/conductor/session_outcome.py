@@ -1,0 +1,39 @@
+"""How a session of grasps ended, and what came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from drivers.core.contacts import Grasp
+from drivers.core.errors import TactileLabError
+
+
+class Ending(StrEnum):
+    """How a session ended."""
+
+    COMPLETE = "complete"
+    OBJECT_LOST = "object lost"
+    INTERRUPTED = "interrupted"
+    LIMIT = "limit reached"
+    STOPPED = "stopped"
+    """A safety limit or a failing device; the outcome carries the error."""
+
+
+@dataclass(frozen=True)
+class SessionOutcome:
+    """What came of a session.
+
+    Attributes:
+        ending: how it ended.
+        reason: the same in words.
+        grasps: everything captured, in order.
+        dropped: how often each reason kept a finger's contact out.
+        error: what stopped it, for an ending of that kind.
+    """
+
+    ending: Ending
+    reason: str
+    grasps: tuple[Grasp, ...]
+    dropped: dict[str, int]
+    error: TactileLabError | None = None

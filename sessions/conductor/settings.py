@@ -1,0 +1,30 @@
+"""What a session of grasps is asked to do, and with what limits."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from drivers.core.configuration import StrictModel
+from sessions.conductor.guided_settings import GuidedSettings
+from sessions.motion.bounding_box import ProbingSettings
+from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.safety import SafetySettings
+
+
+class ConductorSettings(StrictModel):
+    """A session.
+
+    Attributes:
+        grasps: how many.
+        fixed_grasps: how many of them follow the fixed rule before the estimate chooses.
+        missed_approaches: this many approaches in a row that are blocked end the session.
+        cycle, probing, safety, guided: see there.
+    """
+
+    grasps: int = Field(default=16, ge=1)
+    fixed_grasps: int = Field(default=2, ge=1)
+    missed_approaches: int = Field(default=6, ge=1)
+    cycle: CycleSettings = CycleSettings()
+    probing: ProbingSettings = ProbingSettings()
+    safety: SafetySettings = SafetySettings()
+    guided: GuidedSettings = GuidedSettings()

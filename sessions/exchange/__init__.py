@@ -1,0 +1,1 @@
+"""Sessions and contacts in the forms of other programs."""

@@ -1,0 +1,168 @@
+"""A session as one ZIP file, and back. An archive from elsewhere is not trusted: not its names, links or sizes.
+
+Only plain files come out of it, only under names that a session has, only into a new folder, and never more than the
+limits say, whatever the archive claims of itself. Nothing in it is executed or unpickled.
+"""
+
+from __future__ import annotations
+
+import shutil
+import stat
+import zipfile
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import BinaryIO
+
+from drivers.core.errors import SessionError
+from sessions.recording.manifest import MANIFEST, read_manifest, write_manifest
+from sessions.recording.session import TRAFFIC, Session
+from sessions.recording.session_ids import check_id
+
+_BLOCK_BYTES = 1 << 20
+_ADVICE = "Nothing was imported"
+
+
+@dataclass(frozen=True)
+class ArchiveLimits:
+    """What an archive may hold.
+
+    Attributes:
+        files: number of files.
+        total_bytes: all files unpacked.
+        ratio: unpacked over packed size of one file of more than a megabyte.
+    """
+
+    files: int = 10_000
+    total_bytes: int = 50 << 30
+    ratio: float = 500.0
+
+
+def export_archive(session: Session, path: Path) -> int:
+    """Write a session's files into a new ZIP file; gives their number. Links are left out.
+
+    Raises:
+        SessionError: the file exists or cannot be written.
+    """
+    files = [item for item in sorted(session.folder.rglob("*")) if item.is_file() and not item.is_symlink()]
+    try:
+        with zipfile.ZipFile(path, "x", zipfile.ZIP_DEFLATED) as archive:
+            for item in files:
+                name = (PurePosixPath(session.folder.name) / item.relative_to(session.folder).as_posix()).as_posix()
+                archive.write(item, name)
+    except FileExistsError as error:
+        raise SessionError("exists already", where=str(path), hint="Choose another name") from error
+    except OSError as error:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+        raise SessionError(f"cannot be written ({error.strerror})", where=str(path), hint="Check the disk") from error
+    return len(files)
+
+
+def import_archive(path: Path, root: Path, name: str | None = None, limits: ArchiveLimits | None = None) -> Session:
+    """Unpack a session from a ZIP file into a new folder under ``root``.
+
+    Args:
+        name: of the new session; by default the name of the one folder in the archive.
+
+    Raises:
+        SessionError: no ZIP file, one with unsafe names, links or sizes, no session in it, or a session of that name
+            is there already; nothing is left behind then.
+    """
+    limits = limits or ArchiveLimits()
+    try:
+        with zipfile.ZipFile(path) as archive:
+            entries = _checked_entries(archive, path, limits)
+            folder = root / check_id(name or _common_folder(entries, path), str(path))
+            return _unpack(archive, entries, folder, path, limits)
+    except zipfile.BadZipFile as error:
+        raise SessionError(f"not a ZIP archive ({error})", where=str(path), hint=_ADVICE) from error
+    except OSError as error:
+        raise SessionError(f"cannot be read ({error.strerror or error})", where=str(path), hint=_ADVICE) from error
+
+
+def _checked_entries(archive: zipfile.ZipFile, path: Path, limits: ArchiveLimits) -> list[zipfile.ZipInfo]:
+    entries = [entry for entry in archive.infolist() if not entry.is_dir()]
+    if len(entries) > limits.files:
+        raise _refusal(path, f"holds {len(entries)} files, more than {limits.files}")
+    for entry in entries:
+        _check_entry(entry, path, limits)
+    if (total := sum(entry.file_size for entry in entries)) > limits.total_bytes:
+        raise _refusal(path, f"holds {total} bytes, more than {limits.total_bytes}")
+    names = [entry.filename for entry in entries]
+    if len(set(names)) < len(names):
+        raise _refusal(path, "holds two files of one name")
+    return entries
+
+
+def _check_entry(entry: zipfile.ZipInfo, path: Path, limits: ArchiveLimits) -> None:
+    name = entry.filename
+    parts = PurePosixPath(name).parts
+    if name.startswith("/") or "\\" in name or ":" in name or "\0" in name or ".." in parts or not 2 <= len(parts) <= 6:
+        raise _refusal(path, f"holds the unsafe name {name!r}")
+    mode = entry.external_attr >> 16
+    if mode and not stat.S_ISREG(mode) and stat.S_IFMT(mode):
+        raise _refusal(path, f"{name!r} is no plain file but a link or a device")
+    if entry.flag_bits & 1:
+        raise _refusal(path, f"{name!r} is encrypted")
+    if entry.file_size > _BLOCK_BYTES and entry.file_size > limits.ratio * max(1, entry.compress_size):
+        raise _refusal(path, f"{name!r} would unpack to {entry.file_size} bytes, out of all proportion")
+
+
+def _common_folder(entries: list[zipfile.ZipInfo], path: Path) -> str:
+    folders = {PurePosixPath(entry.filename).parts[0] for entry in entries}
+    if len(folders) != 1:
+        raise _refusal(path, f"holds {len(folders)} folders, not one session")
+    return folders.pop()
+
+
+def _unpack(
+    archive: zipfile.ZipFile, entries: list[zipfile.ZipInfo], folder: Path, path: Path, limits: ArchiveLimits
+) -> Session:
+    if len({PurePosixPath(entry.filename).parts[0] for entry in entries}) != 1:
+        raise _refusal(path, "does not hold one session")
+    try:
+        folder.mkdir(parents=True)
+    except FileExistsError as error:
+        hint = f"{_ADVICE}; choose another name with --name"
+        raise SessionError("a session of that name is there already", where=str(folder), hint=hint) from error
+    try:
+        left = limits.total_bytes
+        for entry in entries:
+            target = folder.joinpath(*PurePosixPath(entry.filename).parts[1:])
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with archive.open(entry) as source, target.open("xb") as out:
+                left -= _copy(source, out, left, path)  # type: ignore[arg-type]
+        return _as_session(folder, path)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)  # only what came out of the archive
+        raise
+
+
+def _copy(source: BinaryIO, out: BinaryIO, most: int, path: Path) -> int:
+    """Copy, whatever size the archive claims; gives the number of bytes."""
+    copied = 0
+    while block := source.read(_BLOCK_BYTES):
+        copied += len(block)
+        if copied > most:
+            raise _refusal(path, "unpacks to more than it says")
+        out.write(block)
+    return copied
+
+
+def _as_session(folder: Path, path: Path) -> Session:
+    """The unpacked folder, if it is a session whose recording and calibration are the recorded ones."""
+    if not (folder / MANIFEST).is_file() or not (folder / TRAFFIC).is_file():
+        raise _refusal(path, f"holds no session ({MANIFEST} and {TRAFFIC} side by side in one folder)")
+    manifest = read_manifest(folder)
+    session = Session(folder, manifest)
+    for role in manifest.calibration:
+        session.calibration_file(role)  # its hash
+    session.traffic()
+    changes = {"name": folder.name, "derived": manifest.derivation("import", path.name)}
+    write_manifest(folder, manifest.model_copy(update=changes))
+    return Session.open(folder)
+
+
+def _refusal(path: Path, what: str) -> SessionError:
+    return SessionError(what, where=str(path), hint=_ADVICE)

@@ -1,0 +1,176 @@
+"""The exchange form ``tactile-contacts/1`` as a document: its keys, and what makes no sense in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import AfterValidator, Field, model_validator
+
+from drivers.core.configuration import StrictModel
+from drivers.core.contacts import Array, LARGEST_GRASP_m
+
+FORMAT = "tactile-contacts/1"
+
+_LARGEST_OBJECT_m = 2.0
+"""Larger outlines, and motions of the hand between two grasps, are in millimetres."""
+
+_LARGEST_WORKSPACE_m = 20.0
+"""Contacts of one session farther apart are in millimetres."""
+
+
+def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    length = float(np.linalg.norm(vector))
+    if abs(length - 1.0) > 0.01:
+        raise ValueError(f"a normal has length 1, this one {length:.3g}")
+    return vector
+
+
+def _rigid(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    matrix = np.array(rows)
+    rotation = matrix[:3, :3]
+    bottom = np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0], atol=1e-6)
+    if not bottom or not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4) or np.linalg.det(rotation) < 0:
+        raise ValueError("not a rigid motion (rotation, translation, last row 0 0 0 1)")
+    return rows
+
+
+def _covariance(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    matrix = np.array(rows)
+    if not np.allclose(matrix, matrix.T, rtol=1e-6, atol=1e-15) or np.linalg.eigvalsh(matrix).min() < -1e-12:
+        raise ValueError("not a covariance (symmetric, no negative variance)")
+    return rows
+
+
+def _short(limit: float, unit: str) -> AfterValidator:
+    """A standard deviation beyond the limit was not written in our unit."""
+
+    def check(sigma: float) -> float:
+        if sigma > limit:
+            raise ValueError(f"{sigma:.4g} is too large; is it in {unit}?")
+        return sigma
+
+    return AfterValidator(check)
+
+
+Vector = tuple[float, float, float]
+Row = tuple[float, float, float, float]
+RigidRows = Annotated[tuple[Row, Row, Row, Row], AfterValidator(_rigid)]
+CovarianceRows = Annotated[tuple[Vector, Vector, Vector], AfterValidator(_covariance)]
+FingerName = Annotated[str, Field(min_length=1, max_length=40)]
+_Length = Annotated[float, _short(0.2, "millimetres")]
+_Angle = Annotated[float, _short(float(np.pi), "degrees")]
+
+
+class MotionSigma(StrictModel):
+    """Standard deviations of one re-orientation, per axis."""
+
+    translation_m: _Length = Field(ge=0.0)
+    rotation_rad: _Angle = Field(ge=0.0)
+
+
+class ObjectTruth(StrictModel):
+    """The true object in its own coordinates: an outline, or the name of a mesh file beside the log."""
+
+    name: str = "object"
+    polygon_m: tuple[tuple[float, float], ...] | None = Field(default=None, min_length=3)
+    mesh: str | None = None
+
+    @model_validator(mode="after")
+    def _in_metres(self) -> Self:
+        if self.polygon_m and (extent := float(np.ptp(self.polygon_m, axis=0).max())) > _LARGEST_OBJECT_m:
+            raise ValueError(f"its polygon is {extent:.4g} m wide, as if its lengths were in millimetres")
+        return self
+
+
+class ContactEntry(StrictModel):
+    """One contact. What is known of it alone goes before the log's own sigmas."""
+
+    finger: FingerName
+    point_world_m: Vector
+    normal_world: Annotated[Vector, AfterValidator(_unit)]
+    point_sigma_m: _Length | None = Field(default=None, gt=0.0)
+    point_covariance_m2: CovarianceRows | None = None
+    normal_sigma_rad: _Angle | None = Field(default=None, gt=0.0)
+    force_N: float | None = Field(default=None, ge=0.0)
+
+
+class LineEntry(StrictModel):
+    """The way of one fingertip while it closed."""
+
+    finger: FingerName
+    start_world_m: Vector
+    end_world_m: Vector
+    touched: bool
+
+
+class GraspEntry(StrictModel):
+    """One grasp."""
+
+    stamp_s: float = 0.0
+    contacts: tuple[ContactEntry, ...]
+    hand_motion_world: RigidRows
+    world_T_palm: RigidRows | None = None
+    closing_lines: tuple[LineEntry, ...] = ()
+    world_T_object: RigidRows | None = None
+
+    @property
+    def points_m(self) -> Array:
+        """Contact points, shape (n, 3), world frame."""
+        return np.array([contact.point_world_m for contact in self.contacts]).reshape(-1, 3)
+
+
+class Document(StrictModel):
+    """A whole log."""
+
+    format: Literal["tactile-contacts/1"]
+    dimension: Literal[2, 3]
+    point_sigma_m: _Length = Field(gt=0.0)
+    normal_sigma_rad: _Angle = Field(gt=0.0)
+    motion_sigma: MotionSigma | None = None
+    object: ObjectTruth | None = None
+    grasps: tuple[GraspEntry, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Self:
+        if not any(grasp.contacts for grasp in self.grasps):
+            raise ValueError("no grasp has a contact")
+        _check_sizes(self.grasps)
+        if self.dimension == 2:
+            _check_planar(self.grasps)
+        return self
+
+
+def _check_sizes(grasps: Sequence[GraspEntry]) -> None:
+    """Lengths that no hand and no workspace has are in another unit."""
+    for index, grasp in enumerate(grasps):
+        if len(grasp.contacts) and (extent := _extent_m(grasp.points_m)) > LARGEST_GRASP_m:
+            raise ValueError(f"contacts of grasp {index} lie {extent:.4g} m apart, as if lengths were in millimetres")
+    together = np.concatenate([grasp.points_m for grasp in grasps])
+    if (extent := _extent_m(together)) > _LARGEST_WORKSPACE_m:
+        raise ValueError(f"the grasps lie {extent:.4g} m apart, as if lengths were in millimetres")
+    for index, (before, grasp) in enumerate(pairwise(grasps), start=1):
+        if (carried := _carried_m(before, grasp)) > _LARGEST_OBJECT_m:
+            moved = f"the hand moved by {carried:.4g} m before grasp {index}"
+            raise ValueError(f"{moved}, as if lengths were in millimetres")
+
+
+def _extent_m(points_m: Array) -> float:
+    return float(np.ptp(points_m, axis=0).max())
+
+
+def _carried_m(before: GraspEntry, grasp: GraspEntry) -> float:
+    """How far the hand's motion carries the contacts of the grasp before."""
+    if not before.contacts:
+        return 0.0
+    motion, centre = np.array(grasp.hand_motion_world), before.points_m.mean(axis=0)
+    return float(np.linalg.norm(motion[:3, :3] @ centre + motion[:3, 3] - centre))
+
+
+def _check_planar(grasps: Sequence[GraspEntry]) -> None:
+    vectors = [v for grasp in grasps for c in grasp.contacts for v in (c.point_world_m, c.normal_world)]
+    vectors += [v for grasp in grasps for line in grasp.closing_lines for v in (line.start_world_m, line.end_world_m)]
+    if any(vector[2] != 0.0 for vector in vectors):
+        raise ValueError("dimension 2 needs z = 0 in every point and normal")

@@ -1,0 +1,98 @@
+"""Tables of samples as CSV files or as one HDF5 file. Stamps are seconds of the session clock."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from drivers.core.clock import NANOSECONDS
+from drivers.core.errors import SessionError
+from sessions.exchange.sample_tables import SampleTables, Table
+
+PICTURES = "pictures"
+
+
+def write_csv(tables: SampleTables, folder: Path) -> int:
+    """A CSV file for each table in a new folder, pictures as files in a folder of their own; gives the rows written.
+
+    Raises:
+        SessionError: the folder exists or cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True)
+        for name, table in tables.tables.items():
+            _write_table(folder / f"{name}.csv", table)
+        if tables.pictures:
+            (folder / PICTURES).mkdir()
+        for stamp_ns, content in tables.pictures:
+            (folder / PICTURES / f"{stamp_ns:019d}{picture_suffix(content)}").write_bytes(content)
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+    return rows_of(tables)
+
+
+def write_hdf5(tables: SampleTables, path: Path) -> int:
+    """A group for each table with ``stamp_ns`` and one dataset for each column; gives the rows written.
+
+    Names of columns carry their units. Pictures are encoded as they came, as arrays of bytes in ``pictures/encoded``.
+
+    Raises:
+        SessionError: the file exists or cannot be written.
+    """
+    try:
+        with h5py.File(path, "x") as file:
+            file.attrs["format"] = "tactile-samples/1"
+            for name, table in tables.tables.items():
+                _write_group(file.create_group(name), table)
+            if tables.pictures:
+                _write_pictures(file.create_group(PICTURES), tables.pictures)
+    except OSError as error:
+        raise _unwritable(path, error) from error
+    return rows_of(tables)
+
+
+def rows_of(tables: SampleTables) -> int:
+    """Rows and pictures in all tables."""
+    return sum(len(table.rows) for table in tables.tables.values()) + len(tables.pictures)
+
+
+def picture_suffix(content: bytes) -> str:
+    """Suffix of a picture's file."""
+    return ".png" if content.startswith(b"\x89PNG") else ".jpg"
+
+
+def _write_table(path: Path, table: Table) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        lines = csv.writer(file)
+        lines.writerow(["stamp_s", *table.columns])
+        for stamp_ns, row in zip(table.stamps_ns, table.rows, strict=True):
+            seconds, rest = divmod(stamp_ns, NANOSECONDS)
+            lines.writerow([f"{seconds}.{rest:09d}", *(_plain(value) for value in row)])
+
+
+def _plain(value: object) -> object:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _write_group(group: h5py.Group, table: Table) -> None:
+    group.create_dataset("stamp_ns", data=np.array(table.stamps_ns, dtype=np.int64))
+    for place, column in enumerate(table.columns):
+        values = [row[place] for row in table.rows]
+        text = bool(values) and isinstance(values[0], str)
+        data = np.array(values, dtype=h5py.string_dtype() if text else None)
+        group.create_dataset(column, data=data, compression=None if text else "gzip")
+
+
+def _write_pictures(group: h5py.Group, pictures: list[tuple[int, bytes]]) -> None:
+    group.create_dataset("stamp_ns", data=np.array([stamp_ns for stamp_ns, _ in pictures], dtype=np.int64))
+    encoded = group.create_dataset("encoded", (len(pictures),), dtype=h5py.vlen_dtype(np.uint8))
+    for place, (_, content) in enumerate(pictures):
+        encoded[place] = np.frombuffer(content, np.uint8)
+
+
+def _unwritable(path: Path, error: OSError) -> SessionError:
+    what = "exists already" if path.exists() else f"cannot be written ({error.strerror or error})"
+    return SessionError(what, where=str(path), hint="Choose another name")

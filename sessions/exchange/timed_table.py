@@ -1,0 +1,176 @@
+"""Tables of timed contacts, CSV or JSON: read and checked, line by line, before anything is made of them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from drivers.core.errors import ConfigurationError, SessionError
+
+FORMAT = "tactile-timed-contacts/1"
+
+POSE_PARTS = ("x_m", "y_m", "z_m", "yaw_rad", "qx", "qy", "qz", "qw")
+COLUMNS = (
+    *("time_s", "grasp", "finger", "held"),
+    *("x_m", "y_m", "z_m", "nx", "ny", "nz", "fx_N", "fy_N", "fz_N"),
+    *("point_sigma_m", "normal_sigma_rad"),
+    *(f"tool_{part}" for part in POSE_PARTS),
+    *(f"object_{part}" for part in POSE_PARTS),
+)
+SIGMAS = ("point_sigma_m", "normal_sigma_rad")
+_TEXTS = {"finger"}
+_WRONG_UNIT = re.compile(r"_(?:mm|cm|um|deg|degrees|ms|us|ns|mN|kg|g)$")
+_LARGEST_FORCE_N = 1000.0
+
+Row = Mapping[str, Any]
+
+
+def read_csv(path: Path) -> list[dict[str, str]]:
+    """The lines of a CSV table without their empty values. Raises SessionError or ConfigurationError."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            lines = csv.DictReader(line for line in file if not line.startswith("#"))
+            rows = [{str(name).strip(): value for name, value in row.items()} for row in lines]
+            names = [name.strip() for name in lines.fieldnames or ()]
+    except OSError as error:
+        raise SessionError(f"cannot be read ({error.strerror})", where=str(path), hint="Check the path") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise SessionError(f"is not a CSV table ({error})", where=str(path)) from error
+    if len(set(names)) < len(names):
+        raise ConfigurationError("two columns have one name", where=str(path), hint="Name every column once")
+    check_columns(set(names), path)
+    for number, row in enumerate(rows, start=1):
+        if "None" in row or None in row.values():
+            raise refusal(
+                path, number, f"does not have {len(names)} values", "Give every column a value, or leave it empty"
+            )
+    return [{name: value for name, value in row.items() if value.strip()} for row in rows]
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """A document of the form :data:`FORMAT`. Raises SessionError or ConfigurationError."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SessionError(f"cannot be read ({error.strerror})", where=str(path), hint="Check the path") from error
+    except (ValueError, RecursionError) as error:
+        raise SessionError(f"is not JSON ({error})", where=str(path)) from error
+    form = document.get("format") if isinstance(document, dict) else None
+    if form == "tactile-contacts/1":
+        hint = f"It needs no import: tactile-lab reconstruct {path}"
+        raise ConfigurationError("is a contact log already", where=str(path), hint=hint)
+    if form != FORMAT:
+        hint = "docs/sessions.md describes the form"
+        raise ConfigurationError(f"its format is {form!r}, not {FORMAT!r}", where=str(path), hint=hint)
+    rows = document.get("contacts")
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise ConfigurationError("contacts: must be a list of objects", where=str(path))
+    if unknown := set(document) - {"format", "contacts", "object", "note", *SIGMAS}:
+        raise ConfigurationError(f"unknown key {sorted(unknown)[0]!r}", where=str(path), hint="See docs/sessions.md")
+    for name in SIGMAS:
+        value = document.get(name, 1.0)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
+            raise ConfigurationError(f"{name} is {value!r}", where=str(path), hint="Give a number above 0")
+    return dict(document)
+
+
+def check_columns(names: Iterable[str], path: Path) -> None:
+    """Raises ConfigurationError for a column that is not known, in another unit, or missing."""
+    for name in sorted(names):
+        if name in COLUMNS:
+            continue
+        stem = _WRONG_UNIT.sub("", name)
+        proper = [column for column in COLUMNS if stem != name and column.startswith(stem + "_")]
+        hint = f"Convert it and call it {proper[0]}" if proper else f"Columns are {', '.join(COLUMNS)}"
+        if ";" in name or "\t" in name:
+            hint = "Separate the columns by commas, and write decimals with a point"
+        what = f"column {name!r} is in another unit" if proper else f"unknown column {name!r}"
+        raise ConfigurationError(what, where=str(path), hint=hint)
+    for needed in ("time_s", "x_m", "y_m"):
+        if needed not in names:
+            raise ConfigurationError(
+                f"no column {needed!r}", where=str(path), hint="docs/sessions.md describes the form"
+            )
+
+
+def as_numbers(row: Row, number: int, path: Path) -> dict[str, Any]:
+    """A line with its numbers as numbers. Raises ConfigurationError."""
+    found: dict[str, Any] = {}
+    for name, value in row.items():
+        if name in _TEXTS:
+            found[name] = str(value)
+            continue
+        try:
+            found[name] = float(value)
+        except (TypeError, ValueError):
+            raise refusal(path, number, f"{name} is {value!r}, no number", "Correct the line") from None
+        if not math.isfinite(found[name]):
+            raise refusal(path, number, f"{name} is {value!r}, no finite number", "Leave the line out")
+    return found
+
+
+def refusal(path: Path, number: int, what: str, hint: str) -> ConfigurationError:
+    """What is wrong with a contact, by its number in the table."""
+    return ConfigurationError(f"contact {number}: {what}", where=str(path), hint=hint)
+
+
+@dataclass(frozen=True)
+class TimedTable:
+    """The lines of a table, as numbers."""
+
+    path: Path
+    rows: list[dict[str, Any]]
+
+    @property
+    def dimension(self) -> Literal[2, 3]:
+        """3 where a column says how high."""
+        return 3 if any("z_m" in row for row in self.rows) else 2
+
+    @property
+    def by_force(self) -> bool:
+        """The directions are those of forces."""
+        return not any("nx" in row for row in self.rows)
+
+    def check(self) -> None:
+        """Raises ConfigurationError for lines that are incomplete or out of order."""
+        if not self.rows:
+            raise ConfigurationError("holds no contact", where=str(self.path))
+        for number, row in enumerate(self.rows, start=1):
+            self._check_row(number, row)
+        for number, (before, row) in enumerate(pairwise(self.rows), start=2):
+            if row["time_s"] < before["time_s"]:
+                what = f"its time {row['time_s']:g} s is before that of the contact before, {before['time_s']:g} s"
+                raise refusal(self.path, number, what, "Sort the lines by time_s")
+            if row.get("grasp", 0) < before.get("grasp", 0):
+                raise refusal(self.path, number, "its grasp comes before that of the contact before", "Sort the lines")
+
+    def _check_row(self, number: int, row: Row) -> None:
+        needed = ["time_s", "x_m", "y_m", *(["z_m"] if self.dimension == 3 else [])]
+        if missing := [name for name in needed if name not in row]:
+            raise refusal(self.path, number, f"has no {missing[0]}", "Give every contact a time and a place")
+        for name in SIGMAS:
+            if row.get(name, 1.0) <= 0.0:
+                raise refusal(self.path, number, f"{name} is {row[name]:g}", "Give a number above 0, or nothing")
+        direction = self.direction(row)
+        length = float(np.linalg.norm(direction))
+        if self.by_force and not 0.0 < length < _LARGEST_FORCE_N:
+            raise refusal(self.path, number, f"its force is {length:g} N", "Give a normal, or the force in newtons")
+        if not self.by_force and abs(length - 1.0) > 0.01:
+            raise refusal(self.path, number, f"a normal has length 1, this one {length:.3g}", "Give unit normals")
+        if row.get("held") and not any(name.startswith("tool_") for name in row):
+            raise refusal(self.path, number, "the object was held, but nothing says by what", "Give the tool's pose")
+
+    def direction(self, row: Row) -> Array:
+        """The normal as given, or the force, shape (3,)."""
+        names = ("fx_N", "fy_N", "fz_N") if self.by_force else ("nx", "ny", "nz")
+        return np.array([row.get(name, 0.0) for name in names])

@@ -1,0 +1,280 @@
+"""The operator's console: reads what is asked for, keeps notes, watches the sensors, and shows it all."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+from drivers.core.clock import NANOSECONDS
+from drivers.core.errors import TactileLabError
+from sessions.conductor.decisions import GraspAbandonedError
+from sessions.conductor.guided_settings import GuidedSettings
+from sessions.guided.operator import Ask, Operator, Panel, Request, Stage
+from sessions.guided.operator_view import OperatorView, Watcher
+from sessions.motion.safety import InterruptGuard
+from sessions.recording.attachments import Attachments
+from sessions.recording.recorder import Level
+from sessions.rig_runtime.rig_runtime import RigRuntime
+
+BEFORE_CAPTURE = frozenset({Stage.GUIDE, Stage.CLOSE, Stage.HOLD, Stage.CAPTURE})
+
+
+class OperatorConsole:
+    """Between the person and the session.
+
+    Args:
+        rig runtime: connected.
+        operator: the person.
+        settings: of the guided session.
+        attachments: where notes, pictures and files go.
+        touch_force_N: force from which a finger touches.
+        guard: hears Ctrl+C, which ends the session as the person may, even where he is waited for.
+        pace: called with the session clock after every cycle; makes a simulated rig wait for the person.
+    """
+
+    def __init__(
+        self,
+        runtime: RigRuntime,
+        operator: Operator,
+        settings: GuidedSettings,
+        attachments: Attachments,
+        touch_force_N: float,
+        guard: InterruptGuard,
+        pace: Callable[[int], None] = lambda stamp_ns: None,
+    ) -> None:
+        self._runtime, self._operator, self.settings = runtime, operator, settings
+        self._attachments, self._guard, self._pace = attachments, guard, pace
+        self._watcher = Watcher(runtime.perception, settings, touch_force_N)
+        self.view = OperatorView({})
+        self.automatic = settings.automatic
+        self.grasp = 1
+        self.suggestion, self.unknown = "", "the whole object is unknown"
+        self.paused = ""
+        """Why the session pauses; "" when it does not."""
+        self.end_wanted = self.undo_wanted = False
+        self._given_up = ""
+        self._end_asked = False
+        self._stage, self._prompt = Stage.PLACE, ""
+        self._asks: tuple[Ask, ...] = ()
+        self._message = ""
+        self._waiting: deque[Request] = deque()
+        self._next_panel_ns = 0
+        self._heard_ns: int | None = None
+        self._markers = self._photos = 0
+        self._known_silent: frozenset[str] = frozenset()
+        self._common: dict[Ask, Callable[[Request], None]] = {
+            Ask.PAUSE: self._toggle_pause,
+            Ask.END: self._ask_end,
+            Ask.AUTOMATIC: self._toggle_automatic,
+            Ask.NOTE: self._note,
+            Ask.MARKER: self._mark_instant,
+            Ask.PHOTO: self._photo,
+            Ask.ATTACH: self._attach,
+        }
+
+    # --- for whoever leads through a grasp ---------------------------------------------------------------------
+
+    def enter(self, stage: Stage, prompt: str, *asks: Ask) -> None:
+        """A new step: what was asked for before it is void."""
+        self._stage, self._prompt, self._asks = stage, prompt, asks
+        self._waiting.clear()
+        self._given_up = self._given_up if stage in BEFORE_CAPTURE else ""
+        self._show(self._runtime.clock.now_ns())
+
+    def take(self) -> list[Request]:
+        """What was asked for in this step since the last call."""
+        requests = list(self._waiting)
+        self._waiting.clear()
+        return requests
+
+    def wants_capture(self) -> bool:
+        """The person asks for the capture, or it is automatic and the grasp is steady."""
+        asked = any(request.ask in (Ask.NEXT, Ask.CAPTURE) for request in self.take())
+        return asked or (self.automatic and self.view.is_steady)
+
+    @property
+    def moves_on(self) -> bool:
+        """The person wants to be done with this step whatever it is."""
+        return self.end_wanted or self.undo_wanted
+
+    def tell(self, message: str, level: Level = Level.INFO) -> None:
+        """Something the person should know; recorded too."""
+        self._message = message
+        self._runtime.log(level, "guide", message)
+
+    @property
+    def holds(self) -> bool:
+        """The session pauses in the middle of a grasp: the hand stays as it is."""
+        return bool(self.paused) and self._stage not in (Stage.PLACE, Stage.ESTIMATE)
+
+    def check_given_up(self) -> None:
+        """Raises GraspAbandonedError when the person has given up the grasp in hand."""
+        if self._given_up and self._stage in BEFORE_CAPTURE:
+            reason, self._given_up = self._given_up, ""
+            self._stage = Stage.RELEASE
+            raise GraspAbandonedError(reason)
+
+    # --- every cycle -------------------------------------------------------------------------------------------
+
+    def cycle(self) -> None:
+        """Look, listen, show."""
+        now_ns = self._runtime.clock.now_ns()
+        self._watcher.take(now_ns)
+        for request in self._operator.requests():
+            self._heard_ns = now_ns
+            self._sort(request)
+        if self._guard.requested:
+            self._leave("interrupted by the operator")
+        self._heard_ns = now_ns if self._heard_ns is None else self._heard_ns
+        if now_ns - self._heard_ns > self.settings.attention_s * NANOSECONDS:
+            self._leave(f"nobody there for {self.settings.attention_s:g} s")
+        if now_ns >= self._next_panel_ns:
+            self._show(now_ns)
+        self._pace(now_ns)
+
+    def rest(self) -> None:
+        """One cycle of a pause; what fails is shown."""
+        try:
+            self._runtime.cycle()
+        except TactileLabError as error:
+            self._message = str(error)
+            self._runtime.clock.sleep_until_ns(self._runtime.clock.now_ns() + self._runtime.cycle_ns)
+        self.cycle()
+
+    def fail(self, reason: str) -> bool:
+        """Everything has stopped; whether someone is there to mend it and go on."""
+        self._waiting.clear()
+        self._stage, self._asks = Stage.PLACE, ()
+        self.paused = reason
+        return self._operator.attended
+
+    def _show(self, now_ns: int) -> None:
+        self._next_panel_ns = now_ns + round(self.settings.panel_s * NANOSECONDS)
+        self.view = self._watcher.view(now_ns)
+        self._watch_sensors()
+        panel = self.panel(now_ns)
+        self._operator.show(panel)
+        self._runtime.recorder.guide(now_ns, panel.content())
+
+    def panel(self, now_ns: int) -> Panel:
+        """What is shown now."""
+        return Panel(
+            stamp_ns=now_ns,
+            grasp=self.grasp,
+            stage=self._stage,
+            prompt="Paused. p: resume, e: end session" if self.paused else self._prompt,
+            view=self.view,
+            capture=self._until_capture() if self._stage is Stage.HOLD else "",
+            suggestion=self.suggestion,
+            unknown=self.unknown,
+            message=self._message,
+            paused=self.paused,
+            automatic=self.automatic,
+            asks=self._asks,
+        )
+
+    def _until_capture(self) -> str:
+        missing = self.settings.least_contacts - len(self.view.touching)
+        if missing > 0:
+            return "1 more finger has to touch" if missing == 1 else f"{missing} more fingers have to touch"
+        if not self.view.is_steady:
+            return f"hold still: steady for {self.view.steady_s:.1f} of {self.settings.steady_s:g} s"
+        return "steady"
+
+    def _watch_sensors(self) -> None:
+        """A sensor that falls silent is told, and with a person there the session pauses."""
+        silent = frozenset(self.view.silent)
+        fallen, back = silent - self._known_silent, self._known_silent - silent
+        self._known_silent = silent
+        if fallen:
+            self.tell(f"no usable reading from {', '.join(sorted(fallen))}: check cable and power", Level.WARNING)
+            if self._operator.attended:
+                self._pause(self._message)
+        if back:
+            self.tell(f"{', '.join(sorted(back))} can be read again")
+
+    # --- what can always be asked for --------------------------------------------------------------------------
+
+    def _sort(self, request: Request) -> None:
+        self._end_asked = self._end_asked and request.ask is Ask.END
+        if act := self._common.get(request.ask):
+            act(request)
+        elif self.paused:
+            self._message = "paused: p goes on"
+        elif request.ask is Ask.GIVE_UP or (request.ask is Ask.UNDO and self._stage in BEFORE_CAPTURE):
+            self._give_up("given up by the operator")
+        elif request.ask is Ask.UNDO and self._stage is not Stage.PLACE:
+            self.undo_wanted = True
+            self.tell("this grasp will be taken back")
+        else:
+            self._waiting.append(request)
+
+    def _give_up(self, reason: str) -> None:
+        if self._stage in BEFORE_CAPTURE:
+            self._given_up = reason
+        else:
+            self._message = "there is no closing to give up; u takes back the last grasp"
+
+    def _toggle_pause(self, request: Request) -> None:
+        if self.paused:
+            self._go_on()
+        else:
+            self._pause(request.text or "by the operator")
+
+    def _pause(self, reason: str) -> None:
+        self.paused = reason
+        self.tell(f"paused: {reason}")
+        self._next_panel_ns = 0
+
+    def _go_on(self) -> None:
+        """Start silent sensors again; one that cannot be started keeps the session paused."""
+        for finger in self._known_silent:
+            try:
+                self._runtime.restart_fingertip(finger)
+            except TactileLabError as error:
+                self.tell(f"still paused: {error}", Level.WARNING)
+                return
+        self.paused = ""
+        self.tell("resumed")
+        self._next_panel_ns = 0
+
+    def _ask_end(self, request: Request) -> None:
+        if self._end_asked or request.text:
+            self._leave("ended by the operator")
+        else:
+            self._end_asked, self._message = True, "once more to end the session"
+
+    def _leave(self, reason: str) -> None:
+        if not self.end_wanted:
+            self.end_wanted, self._given_up, self.paused = True, reason, ""
+            self.tell(reason)
+
+    def _toggle_automatic(self, request: Request) -> None:
+        self.automatic = not self.automatic
+        self.tell(f"automatic capture {'on' if self.automatic else 'off'}")
+
+    def _note(self, request: Request) -> None:
+        self._attachments.note(request.text)
+        self.tell(f"note: {request.text}")
+
+    def _mark_instant(self, request: Request) -> None:
+        self._markers += 1
+        self.tell(f"marker {self._markers} {request.text}".rstrip())
+
+    def _photo(self, request: Request) -> None:
+        if self._runtime.camera is None:
+            self._message = "this rig has no camera"
+            return
+        self._photos += 1
+        try:
+            name = self._attachments.picture(f"photo-{self._photos:03d}.png", self._runtime.picture().image)
+        except TactileLabError as error:
+            self.tell(str(error), Level.WARNING)
+        else:
+            self.tell(f"photo kept as {name} {request.text}".rstrip())
+
+    def _attach(self, request: Request) -> None:
+        try:
+            self.tell(f"attached {self._attachments.file(request.text)}")
+        except TactileLabError as error:
+            self.tell(str(error), Level.WARNING)

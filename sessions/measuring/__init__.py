@@ -1,0 +1,1 @@
+"""A rig as the place where calibrations are measured."""

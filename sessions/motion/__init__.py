@@ -1,0 +1,1 @@
+"""How hand and positioner move, and what stops them."""

@@ -1,0 +1,103 @@
+"""Speeds, forces and times of the grasp cycle, as they stand in a rig file."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from drivers.core.configuration import StrictModel
+
+
+class TouchSettings(StrictModel):
+    """How the hand touches without grasping.
+
+    Attributes:
+        tap_m_s: speed of the hand coming down on the top.
+        met_N: force on a fingertip that ends the approach.
+        force_N: force that every fingertip is then brought to.
+        most_N: force on any fingertip at which the hand itself moves on no more.
+        reach_m: how far a fingertip moves on for that; what is farther away is not met.
+        gain: speed of that per force error, m/s per N.
+        sink_m: how far the hand itself moves on.
+        press_s: time for both.
+        capture_s: length of the capture.
+        rake_height_m: height of the fingertips' centres in a rake.
+        rake_m_s: speed of a rake.
+        rake_N: force that fingertips are brought to on a side: all together less than moves the object.
+        row_m: x of the fingertips in the row's own grasp frame.
+        beyond_m: how far beyond the middle a rake goes.
+        lowest_m: height of the fingertips over the table where a tap has missed the object.
+    """
+
+    tap_m_s: float = Field(default=0.06, gt=0.0)
+    met_N: float = Field(default=0.20, gt=0.0)
+    force_N: float = Field(default=0.35, gt=0.0)
+    most_N: float = Field(default=0.8, gt=0.0)
+    reach_m: float = Field(default=0.008, ge=0.0)
+    gain: float = Field(default=0.04, gt=0.0)
+    sink_m: float = Field(default=0.004, ge=0.0)
+    press_s: float = Field(default=0.6, ge=0.0)
+    capture_s: float = Field(default=0.2, gt=0.0)
+    rake_height_m: float = Field(default=0.028, gt=0.0)
+    rake_m_s: float = Field(default=0.05, gt=0.0)
+    rake_N: float = Field(default=0.15, gt=0.0)
+    row_m: float = Field(default=0.012, ge=0.0)
+    beyond_m: float = Field(default=0.030, ge=0.0)
+    lowest_m: float = Field(default=0.012, ge=0.0)
+
+
+class CycleSettings(StrictModel):
+    """Speeds, forces and times of the grasp cycle.
+
+    Attributes:
+        lift_m: how far above a grasp the hand travels.
+        travel_m_s, turn_rad_s: speeds above the object.
+        descent_m_s: speed of the guarded descent.
+        landing_force_N: a fingertip force during the descent that means the object is under it.
+        landing_shift_m: how far the grasp moves toward the finger that landed.
+        landing_tries: descents before the grasp is given up.
+        closing_m_s: speed of the fingertips; it sets how far the object is pushed.
+        touch_force_N: contact force at which a finger stops.
+        touch_cycles: cycles in a row with that force: a lone jerk of the finger's own mass is no touch.
+        held_up_rad: angle by which a joint falls behind where something holds the finger.
+        closing_most_N: force on a fingertip at which all fingers stop: links that feel nothing push the object.
+        contact_force_N: force that each touching finger settles to for the capture; the thumb takes the others' sum.
+        settle_s: time for that.
+        rest_s: rest after every motion that something is measured after.
+        capture_s: length of the capture (20 samples at 100 Hz).
+        squeeze_force_N: force of each finger while the object is carried; the thumb holds against their sum.
+        squeeze_s: time to build the squeeze up.
+        squeeze_gain: fingertip speed per force error, m/s per N.
+        pressed_N: force on a fingertip that no other finger adds to.
+        pressed_cycles: cycles in a row with that force after which the object is carried no farther.
+        carry_turn_rad_s, carry_m_s: speeds while the object is held.
+        finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind leave the path.
+        touch: taps on the top and probes from the side.
+        finger_gap_m: the thumb stops this far from another tip's centre: they would touch each other.
+    """
+
+    lift_m: float = Field(default=0.10, gt=0.0)
+    travel_m_s: float = Field(default=0.25, gt=0.0)
+    turn_rad_s: float = Field(default=1.5, gt=0.0)
+    descent_m_s: float = Field(default=0.08, gt=0.0)
+    landing_force_N: float = Field(default=0.25, gt=0.0)
+    landing_shift_m: float = Field(default=0.018, gt=0.0)
+    landing_tries: int = Field(default=4, ge=1)
+    closing_m_s: float = Field(default=0.030, gt=0.0)
+    touch_force_N: float = Field(default=0.15, gt=0.0)
+    touch_cycles: int = Field(default=2, ge=1)
+    held_up_rad: float = Field(default=0.12, gt=0.0)
+    closing_most_N: float = Field(default=2.0, gt=0.0)
+    contact_force_N: float = Field(default=0.4, gt=0.0)
+    settle_s: float = Field(default=0.3, ge=0.0)
+    rest_s: float = Field(default=0.2, gt=0.0)
+    capture_s: float = Field(default=0.2, gt=0.0)
+    squeeze_force_N: float = Field(default=0.8, gt=0.0)
+    squeeze_s: float = Field(default=0.5, gt=0.0)
+    squeeze_gain: float = Field(default=0.02, gt=0.0)
+    pressed_N: float = Field(default=3.5, gt=0.0)
+    pressed_cycles: int = Field(default=5, ge=1)
+    carry_turn_rad_s: float = Field(default=0.6, gt=0.0)
+    carry_m_s: float = Field(default=0.06, gt=0.0)
+    finger_rad_s: float = Field(default=1.8, gt=0.0)
+    touch: TouchSettings = TouchSettings()
+    finger_gap_m: float = Field(default=0.021, ge=0.0)

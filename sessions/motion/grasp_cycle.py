@@ -1,0 +1,274 @@
+"""The grasp cycle: descend, close, settle, capture, squeeze, re-orient, release, lift."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from gtsam import Pose3
+
+from drivers.core.contacts import FINGERS, Array, Grasp
+from drivers.shadow.closing.closing import Closing, closing
+from drivers.shadow.closing.posture import TipEllipsoid
+from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.grasp_plan import GraspPlan, evade
+from sessions.motion.motion import GraspFrame, Motion
+from sessions.motion.touching import Toucher
+
+_HASTE_N, _FLIGHT_N = 1.0, 3.0
+"""Largest force errors that count in force control: toward the object, and away from it."""
+
+
+class GraspCycle:
+    """The verbs of one grasp, in the order in which they are meant to be called.
+
+    Args:
+        motion: supervised motion.
+        settings: speeds, forces, times.
+        tip: shape of the fingertips.
+        yaw_window_rad: yaws the arm can take up.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        settings: CycleSettings,
+        tip: TipEllipsoid | None = None,
+        yaw_window_rad: tuple[float, float] = (-np.pi, np.pi),
+    ) -> None:
+        self._motion, self.settings = motion, settings
+        self._toucher = Toucher(motion, settings, tip or TipEllipsoid())
+        self._tip, self._yaw_window_rad = tip or TipEllipsoid(), yaw_window_rad
+        self._plan: GraspPlan | None = None
+        self._progress = dict.fromkeys(FINGERS, 0.0)
+        self._touching: frozenset[str] = frozenset()
+        self.landings_world_m: list[Array] = []
+        """Where the tips' centres stood, (3,) each, at each landing on the object in the last approach."""
+
+        self.jammed: tuple[str, ...] = ()
+        """The fingertips that were pressed so hard in the last re-orientation that it was broken off."""
+
+    @property
+    def plan(self) -> GraspPlan:
+        """The grasp in hand, where it really is (a landing or a re-orientation shifts it)."""
+        assert self._plan is not None
+        return self._plan
+
+    # --- down --------------------------------------------------------------------------------------------------
+
+    def descend(self, plan: GraspPlan) -> bool:
+        """Move above, tap on the top if the plan says so, tare, and come down with care.
+
+        A fingertip that meets something on the way down stands on the object: lift, shift the grasp toward that
+        finger and try again. When thumb and fingers have both landed, the object is too long that way: turn.
+
+        Returns:
+            Whether the hand is down around the object, fingers open.
+        """
+        self._plan, self.landings_world_m = plan, []
+        landed: set[str] = set()
+        if plan.tap:
+            self._toucher.tap(plan.frame)
+        for _ in range(self.settings.landing_tries):
+            self._move_above()
+            hit = self._come_down()
+            if not hit:
+                self._motion.supervisor.on_approach()
+                return True
+            landed.update(hit)
+            self.lift()
+            shift_m, window = self.settings.landing_shift_m, self._yaw_window_rad
+            self._plan = evade(plan, self.plan, hit, landed, self._table(), shift_m, window)
+        return False
+
+    def _move_above(self) -> None:
+        table, s = self._table(), self.settings
+        self._progress = self._open_progress()
+        self._motion.blend_fingers(table, self._progress, s.finger_rad_s)
+        above = self._motion.base_joints(self.plan.frame, table, s.lift_m)
+        self._motion.move_base(above, s.travel_m_s, s.turn_rad_s)
+        self._motion.tare(s.rest_s)
+
+    def _come_down(self) -> list[str]:
+        """Guarded descent; the fingers that landed on something, by their tips or, which bends them, by other links."""
+        s = self.settings
+        down = self._motion.base_joints(self.plan.frame, self._table())
+        hit: list[str] = []
+
+        def met() -> bool:
+            felt = {*self._pressed_fingers(s.landing_force_N), *self._motion.bent(s.held_up_rad)}
+            hit.extend(finger for finger in FINGERS if finger in felt - set(hit))
+            if hit:
+                self.landings_world_m.append(self._motion.tip_centre_world_m(hit[0], self._tip))
+            return bool(hit)
+
+        if self._motion.probe_base(down, s.descent_m_s, met):
+            self._motion.wait(s.rest_s)
+            met()
+        return hit
+
+    # --- close and measure -------------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Close every finger along its line until it touches, meets the thumb, or comes to the line's end.
+
+        Links above the fingertips feel nothing. A finger that is held up by one stops, and all do where the object is
+        pushed hard against a fingertip.
+        """
+        s, table = self.settings, self._table()
+        step_m = s.closing_m_s * self._motion.supervisor.speed_scale * self._motion.cycle_s
+        moving, touched = set(FINGERS), dict.fromkeys(FINGERS, 0)
+        self._motion.runtime.begin_closing()
+        while moving and not self._pressed_fingers(s.closing_most_N):
+            loads_N = self._motion.loads_N()
+            for finger in moving:
+                touched[finger] = touched[finger] + 1 if loads_N.get(finger, 0.0) > s.touch_force_N else 0
+            held_up = self._motion.bent(s.held_up_rad)
+            moving = {f for f in moving if touched[f] < s.touch_cycles and f not in held_up and self._may_close(f)}
+            for finger in sorted(moving):
+                self._progress[finger] += step_m / table.path(finger).length_m
+            self._motion.set_fingers(table, self._progress)
+            self._motion.tick()
+        self._touching = frozenset(finger for finger in FINGERS if touched[finger] >= s.touch_cycles)
+
+    def _may_close(self, finger: str) -> bool:
+        return self._progress[finger] < self._table().path(finger).valid[1] and not self._meets_thumb(finger)
+
+    def _meets_thumb(self, finger: str) -> bool:
+        """Whether this tip and the thumb's (any other's, for the thumb) are about to touch each other."""
+        centres = {f: self._table().path(f).centre_m(self._progress[f]) for f in FINGERS}
+        others = [f for f in FINGERS if f != "TH"] if finger == "TH" else ["TH"]
+        gap_m = min(float(np.linalg.norm(centres[finger] - centres[other])) for other in others)
+        return gap_m < self.settings.finger_gap_m
+
+    def settle(self) -> None:
+        """Bring the fingers that touch to the contact force, then let hand and object come to rest."""
+        self._build_up(self._balanced_forces_N(self._touching, self.settings.contact_force_N), self.settings.settle_s)
+        self._motion.wait(self.settings.rest_s)
+
+    def capture(self) -> Grasp:
+        """Gather samples, make a grasp of them, and take a picture of the object as it is held."""
+        return self._motion.capture(self.settings.capture_s)
+
+    # --- carry -------------------------------------------------------------------------------------------------
+
+    def squeeze(self, touching: frozenset[str]) -> None:
+        """Build up the holding force of the fingers that touch; the thumb holds against their sum."""
+        self._build_up(self._balanced_forces_N(touching, self.settings.squeeze_force_N), self.settings.squeeze_s)
+
+    def reorient(self, turn_rad: float, shift_world_m: Array, touching: frozenset[str]) -> Pose3:
+        """Turn about the grasp's vertical axis and shift, holding the object, unless it is jammed (:attr:`jammed`).
+
+        Args:
+            turn_rad: about world z.
+            shift_world_m: shape (2,), along the world's axes.
+            touching: fingers that hold.
+
+        Returns:
+            The palm's motion in the world as measured: what carries the object along (eq. 3.8).
+        """
+        motion, table, start = self._motion, self._table(), self.plan.frame
+        targets_N = self._balanced_forces_N(touching, self.settings.squeeze_force_N)
+        duration_s = max(
+            abs(turn_rad) / self.settings.carry_turn_rad_s,
+            float(np.linalg.norm(shift_world_m)) / self.settings.carry_m_s,
+        )
+
+        def frame_at(share: float) -> GraspFrame:
+            dx, dy = share * shift_world_m
+            return start.move(float(dx), float(dy), share * turn_rad)
+
+        self.jammed, pressed_cycles = (), 0
+
+        def hold() -> bool:
+            nonlocal pressed_cycles
+            self._servo_forces(targets_N)
+            pressed = self._pressed_fingers(self.settings.pressed_N)
+            pressed_cycles = pressed_cycles + 1 if pressed else 0
+            if pressed_cycles > self.settings.pressed_cycles:
+                self.jammed = pressed
+            return not self.jammed
+
+        world_T_before = motion.runtime.perception.world_T_palm
+        motion.runtime.begin_hold()
+        share = motion.follow(lambda share: motion.base_joints(frame_at(share), table), duration_s, hold)
+        if self.jammed:
+            self._build_up(targets_N, self.settings.squeeze_s)
+        motion.wait(self.settings.rest_s)
+        motion.runtime.end_hold()
+        self._plan = replace(self.plan, frame=frame_at(share))
+        return motion.runtime.perception.world_T_palm * world_T_before.inverse()
+
+    def _balanced_forces_N(self, touching: frozenset[str], force_N: float) -> dict[str, float]:
+        """Force of each finger; the thumb takes the sum of what the others push along the grasp's x axis."""
+        table = self._table()
+        forces_N = dict.fromkeys(sorted(touching - {"TH"}), force_N)
+        if "TH" in touching:
+            pushed_N = sum(-force_N * float(table.path(finger).direction[0]) for finger in forces_N)
+            forces_N["TH"] = max(force_N, pushed_N)
+        return forces_N
+
+    def _build_up(self, targets_N: dict[str, float], duration_s: float) -> None:
+        for _ in range(self._motion.cycles(duration_s)):
+            self._servo_forces(targets_N)
+            self._motion.tick()
+
+    def _servo_forces(self, targets_N: dict[str, float]) -> None:
+        """One cycle of force control: a fingertip moves along its line in proportion to its force error.
+
+        It gives way faster than it presses. One that is held up presses no farther, and none does while another is
+        pressed hard. Strained fingers without a force to keep give way.
+        """
+        s, table, loads_N = self.settings, self._table(), self._motion.loads_N()
+        pressed, held_up = self._pressed_fingers(s.pressed_N), self._motion.bent(s.held_up_rad)
+        errors_N = dict.fromkeys((*pressed, *held_up), -_HASTE_N)
+        for finger, target_N in targets_N.items():
+            most_N = 0.0 if pressed or finger in held_up else _HASTE_N
+            errors_N[finger] = float(np.clip(target_N - loads_N.get(finger, 0.0), -_FLIGHT_N, most_N))
+        for finger, error_N in errors_N.items():
+            path = table.path(finger)
+            step = s.squeeze_gain * error_N * self._motion.cycle_s / path.length_m
+            self._progress[finger] = float(np.clip(self._progress[finger] + step, *path.valid))
+        self._motion.set_fingers(table, self._progress)
+
+    def _pressed_fingers(self, force_N: float) -> tuple[str, ...]:
+        """The fingertips that feel more than a force."""
+        return tuple(finger for finger, load_N in self._motion.loads_N().items() if load_N > force_N)
+
+    def _overloaded_fingers(self) -> set[str]:
+        """The fingers whose tips are pressed hard, or that are held up."""
+        return {*self._pressed_fingers(self.settings.pressed_N), *self._motion.bent(self.settings.held_up_rad)}
+
+    # --- and away ----------------------------------------------------------------------------------------------
+
+    def release(self) -> None:
+        """Open the hand, every tip back along its line: a short cut through the joints would dip into the table.
+
+        Strained fingers are freed first, the others wait for them.
+        """
+        table, closed, opened = self._table(), self._progress, self._open_progress()
+        step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))
+        shares = dict.fromkeys(FINGERS, 0.0)
+        while closed_still := {finger for finger in FINGERS if shares[finger] < 1.0}:
+            for finger in closed_still & self._overloaded_fingers() or closed_still:
+                shares[finger] = min(1.0, shares[finger] + step)
+            self._progress = {finger: u + shares[finger] * (opened[finger] - u) for finger, u in closed.items()}
+            self._motion.set_fingers(table, self._progress)
+            self._motion.tick()
+
+    def lift(self) -> None:
+        """Straight up."""
+        s = self.settings
+        above = self._motion.base_joints(self.plan.frame, self._table(), s.lift_m)
+        self._motion.move_base(above, s.travel_m_s, s.turn_rad_s)
+
+    def idle(self) -> None:
+        """One cycle without motion."""
+        self._motion.tick()
+
+    def _open_progress(self) -> dict[str, float]:
+        """Progress of the open hand."""
+        return {finger: self._table().path(finger).valid[0] for finger in FINGERS}
+
+    def _table(self) -> Closing:
+        return closing(self.plan.closing, self.plan.height_m, self._tip)

@@ -1,0 +1,81 @@
+"""What a grasp is to be, and what becomes of it where the hand lands on the object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, TypeAlias
+
+import numpy as np
+from pydantic import Field
+
+from drivers.shadow.closing.closing import Closing, HIGHEST_m, LOWEST_m
+from sessions.motion.motion import GraspFrame
+
+ContactHeight: TypeAlias = Annotated[float, Field(ge=LOWEST_m, le=HIGHEST_m)]
+"""A setting: height of the fingertips' centres above the table, metres."""
+
+
+@dataclass(frozen=True)
+class GraspPlan:
+    """One grasp to do.
+
+    Attributes:
+        frame: the grasp frame in the world.
+        closing: one of :data:`drivers.shadow.closing.closing.CLOSINGS`.
+        height_m: height of the fingertip centres above the table.
+        tap: lay the fingertips on the top first.
+        reason: why this one, for people.
+    """
+
+    frame: GraspFrame
+    closing: str
+    height_m: float
+    reason: str = ""
+    tap: bool = False
+
+    def as_plain(self, index: int) -> dict[str, Any]:
+        """The plan of grasp number ``index``, from 0, as viewers are told of it; metres and radians on the table."""
+        return {
+            "index": index,
+            "closing": self.closing,
+            "x_m": self.frame.x_m,
+            "y_m": self.frame.y_m,
+            "yaw_rad": self.frame.yaw_rad,
+            "height_m": self.height_m,
+            "reason": self.reason,
+        }
+
+
+def evade(
+    wanted: GraspPlan,
+    now: GraspPlan,
+    hit: Sequence[str],
+    landed: set[str],
+    table: Closing,
+    shift_m: float,
+    yaw_window_rad: tuple[float, float],
+) -> GraspPlan:
+    """The plan after a landing: shifted toward the fingers that landed, or turned when both sides did.
+
+    Args:
+        wanted, now: the plan as it was chosen, and what has become of it so far.
+        hit: fingers that landed just now.
+        landed: those that landed since the hand was turned, ``hit`` among them; emptied when it turns.
+        table: the plan's closing.
+        shift_m: how far to shift.
+        yaw_window_rad: yaws the arm can take up.
+    """
+    if "TH" in landed and landed - {"TH"}:
+        landed.clear()
+        return replace(wanted, frame=_turn_away(wanted.frame, yaw_window_rad))
+    directions = np.array([table.path(finger).start_m[:2] for finger in hit])
+    aside_m = shift_m * np.mean(directions / np.linalg.norm(directions, axis=1)[:, None], 0)
+    return replace(now, frame=now.frame.shifted_inside(aside_m))
+
+
+def _turn_away(frame: GraspFrame, yaw_window_rad: tuple[float, float]) -> GraspFrame:
+    """A quarter turn, as far as the arm's yaw window allows, toward its middle."""
+    low, high = yaw_window_rad
+    turn = -np.pi / 2 if frame.yaw_rad > (low + high) / 2 else np.pi / 2
+    return replace(frame, yaw_rad=float(np.clip(frame.yaw_rad + turn, low, high)))

@@ -1,0 +1,284 @@
+"""Motion: moves the hand and the positioner along paths, one supervised cycle of the rig runtime at a time.
+
+Nothing else in a session moves anything. Every cycle goes through :meth:`Motion.tick`, where the safety supervisor
+looks at it; so no verb of the grasp cycle can forget to be supervised.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from gtsam import Pose3, Rot3
+
+from drivers.core.clock import NANOSECONDS
+from drivers.core.contacts import FINGERS, Array, Grasp
+from drivers.positioner.positioner import mount_joints
+from drivers.shadow.closing.closing import Closing
+from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm
+from sessions.motion.safety import SafetySupervisor
+from sessions.rig_runtime.rig_runtime import RigRuntime
+
+_STRAIGHT_WRIST = forearm_T_palm(np.zeros(len(JOINTS)))
+_TARES = 5  # a fingertip that still swings is given so many rests
+_WITHDRAW_s = 0.15  # a positioner follows its targets late: back by more than it is behind
+_HOLD_WRIST = {"WRJ1": 0.0, "WRJ2": 0.0}
+
+
+@dataclass(frozen=True)
+class GraspFrame:
+    """A grasp frame on the table: world x, y of its origin and its yaw. Height is the closing's affair."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+    @property
+    def pose(self) -> Pose3:
+        """``world_T_grasp``."""
+        return Pose3(Rot3.Yaw(self.yaw_rad), np.array([self.x_m, self.y_m, 0.0]))
+
+    def move(self, dx_m: float = 0.0, dy_m: float = 0.0, turn_rad: float = 0.0) -> GraspFrame:
+        """Shifted along the world's axes and turned about its own origin."""
+        return GraspFrame(self.x_m + dx_m, self.y_m + dy_m, self.yaw_rad + turn_rad)
+
+    def shifted_inside(self, shift_grasp_m: Array) -> GraspFrame:
+        """Shifted by a vector (2,) given in the grasp frame itself."""
+        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        x, y = shift_grasp_m
+        return self.move(float(c * x - s * y), float(s * x + c * y))
+
+
+class Motion:
+    """The hand and the positioner as one thing that moves.
+
+    Args:
+        rig runtime: connected before anything moves.
+        supervisor: looks at every cycle.
+    """
+
+    def __init__(self, runtime: RigRuntime, supervisor: SafetySupervisor) -> None:
+        self.runtime, self.supervisor = runtime, supervisor
+        self._targets_rad: dict[str, float] = {}
+        self._loads_N: dict[str, float] = {}
+        self._resting_N: dict[str, float] = {}
+
+    @cached_property
+    def _base_q(self) -> Array:
+        """The positioner's last target, shape (6,); before the first one, where it is."""
+        return self.runtime.perception.base_q.copy()
+
+    # --- time --------------------------------------------------------------------------------------------------
+
+    @property
+    def cycle_s(self) -> float:
+        """Length of a cycle."""
+        return self.runtime.cycle_ns / NANOSECONDS
+
+    def tick(self) -> None:
+        """One cycle, looked at by the supervisor.
+
+        Raises:
+            SafetyError: a limit is passed.
+            DeviceError: a device failed.
+        """
+        self.runtime.cycle()
+        snapshot = self.runtime.snapshot()
+        self._loads_N = dict(snapshot.loads_N)
+        self.supervisor.check(snapshot)
+
+    def wait(self, duration_s: float) -> None:
+        """Cycles for a time."""
+        for _ in range(self.cycles(duration_s)):
+            self.tick()
+
+    def tare(self, rest_s: float, fingers: Sequence[str] = FINGERS, tries: int = _TARES) -> Mapping[str, str]:
+        """Rest, and take fingertips as untouched; again where one refuses because the hand still moves.
+
+        What a fingertip shows that refuses to the end counts as nothing from here on: see :meth:`loads_N`.
+
+        Returns:
+            The reasons of those that refused to the end, by finger.
+        """
+        self._resting_N, refused = {}, dict[str, str]()
+        for _ in range(tries):
+            self.wait(rest_s)
+            if not (refused := dict(self.runtime.tare(fingers).refused)):
+                break
+        self._resting_N = {finger: self._loads_N[finger] for finger in refused}
+        return refused
+
+    def capture(self, seconds: float) -> Grasp:
+        """Gather samples for so long, make a grasp of them, and take a picture of the object as it is held."""
+        self.runtime.begin_capture()
+        self.wait(seconds)
+        grasp = self.runtime.end_capture()
+        self.runtime.truth_frame(self.tick)
+        return grasp
+
+    def cycles(self, duration_s: float) -> int:
+        """Whole cycles in a duration, at least one."""
+        return max(1, round(duration_s / self.cycle_s))
+
+    def shares(self, duration_s: float) -> Iterator[float]:
+        """One growing share of a motion for each of its cycles, the last one 1; slower while moves have to be slow."""
+        count = self.cycles(duration_s / self.supervisor.speed_scale)
+        for step in range(1, count + 1):
+            yield step / count
+
+    # --- the positioner ----------------------------------------------------------------------------------------
+
+    def base_joints(self, grasp: GraspFrame, closing: Closing, above_m: float = 0.0) -> Array:
+        """Positioner joints that put the palm over a grasp frame, wrist straight, near the present yaw."""
+        raised = Pose3(Rot3(), np.array([0.0, 0.0, above_m]))
+        world_T_palm = raised * grasp.pose * closing.grasp_T_palm
+        mount_T_forearm = self.runtime.world_T_mount.inverse() * world_T_palm * _STRAIGHT_WRIST.inverse()
+        return np.asarray(mount_joints(mount_T_forearm, float(self._base_q[3])))
+
+    def set_base(self, q: Array) -> None:
+        """New positioner target, shape (6,), metres and radians."""
+        self._base_q = np.asarray(q, dtype=float)
+        self.runtime.base.set_target(self._base_q)
+
+    def move_base(self, q: Array, speed_m_s: float, turn_rad_s: float) -> None:
+        """Straight, smooth move of the positioner's joints to ``q``, shape (6,); the slower of both speeds paces it."""
+        start = self._base_q
+        for share in self.shares(self._base_time_s(q, speed_m_s, turn_rad_s)):
+            self.set_base(start + smooth(share) * (q - start))
+            self.tick()
+
+    def rise(self, height_m: float, speed_m_s: float) -> None:
+        """Straight up from where the positioner was sent last."""
+        q = self._base_q.copy()
+        q[:3] += self.runtime.world_T_mount.rotation().unrotate(np.array([0.0, 0.0, height_m]))
+        self.move_base(q, speed_m_s, np.inf)
+
+    def probe_base(self, q: Array, speed_m_s: float, met: Callable[[], bool]) -> bool:
+        """Even move toward ``q`` that turns back where something is met.
+
+        Args:
+            q: where to, shape (6,).
+            speed_m_s: even speed.
+            met: asked after every cycle.
+
+        Returns:
+            Whether ``q`` was reached. If not, the positioner is on its way back to where it was a moment before.
+        """
+        start = self._base_q
+        steps = [start + share * (q - start) for share in self.shares(self._base_time_s(q, speed_m_s, np.inf))]
+        for count, step in enumerate(steps):
+            self.set_base(step)
+            self.tick()
+            if met():
+                self.set_base(steps[max(0, count - self.cycles(_WITHDRAW_s))])
+                self.tick()
+                return False
+        return True
+
+    def line(self, q: Array, speed_m_s: float) -> Iterator[Array]:
+        """Targets on the even way from where the positioner was sent last to ``q``, one a cycle."""
+        start = self._base_q
+        for share in self.shares(self._base_time_s(q, speed_m_s, np.inf)):
+            yield start + share * (q - start)
+
+    def _base_time_s(self, q: Array, speed_m_s: float, turn_rad_s: float) -> float:
+        travel_s = float(np.linalg.norm(q[:3] - self._base_q[:3])) / speed_m_s
+        return max(travel_s, float(np.max(np.abs(q[3:] - self._base_q[3:]))) / turn_rad_s)
+
+    def follow(self, pose_at: Callable[[float], Array], duration_s: float, each: Callable[[], bool]) -> float:
+        """Positioner joints as a function of smooth progress 0..1.
+
+        Args:
+            pose_at: the joints, shape (6,).
+            duration_s: of the whole way.
+            each: acts before every cycle, and says whether to go on.
+
+        Returns:
+            The progress made.
+        """
+        made = 0.0
+        for share in self.shares(duration_s):
+            if not each():
+                break
+            made = smooth(share)
+            self.set_base(pose_at(made))
+            self.tick()
+        return made
+
+    # --- the fingers -------------------------------------------------------------------------------------------
+
+    def set_fingers(
+        self, closing: Closing, progress: Mapping[str, float], aside_rad: Mapping[str, float] | None = None
+    ) -> None:
+        """Targets of the fingers at their progress on the closing's lines; the wrist stays straight.
+
+        Args:
+            closing: whose lines.
+            progress: of each finger.
+            aside_rad: what single motors turn beyond that.
+        """
+        targets = dict(_HOLD_WRIST)
+        for finger in FINGERS:
+            targets.update(closing.joints(finger, progress[finger]))
+        for motor, angle in (aside_rad or {}).items():
+            targets[motor] += angle
+        self._targets_rad = targets
+        self.runtime.hand.set_targets(targets)
+
+    def blend_fingers(
+        self,
+        closing: Closing,
+        progress: Mapping[str, float],
+        speed_rad_s: float,
+        aside_rad: Mapping[str, float] | None = None,
+    ) -> None:
+        """From the present targets to those at ``progress``, straight in joint space."""
+        start = self._present_targets(closing, progress)
+        self.set_fingers(closing, progress, aside_rad)
+        end = self._targets_rad
+        duration_s = max(abs(angle - start[name]) for name, angle in end.items()) / speed_rad_s
+        for share in self.shares(duration_s):
+            self.runtime.hand.set_targets({name: (1 - share) * start[name] + share * end[name] for name in end})
+            self.tick()
+
+    def finger_time_s(self, closing: Closing, progress: Mapping[str, float], speed_rad_s: float) -> float:
+        """How long the joint with the longest way takes to the targets at ``progress``."""
+        start = self._present_targets(closing, progress)
+        end = {name: angle for finger in FINGERS for name, angle in closing.joints(finger, progress[finger]).items()}
+        return max(abs(angle - start[name]) for name, angle in end.items()) / speed_rad_s
+
+    def _present_targets(self, closing: Closing, progress: Mapping[str, float]) -> dict[str, float]:
+        return self._targets_rad or self._measured_targets(closing, progress)
+
+    def _measured_targets(self, closing: Closing, progress: Mapping[str, float]) -> dict[str, float]:
+        """Where the motors stand now, for the names that ``progress`` will command."""
+        measured = self._measured_rad()
+        names = [*_HOLD_WRIST, *(name for finger in FINGERS for name in closing.joints(finger, progress[finger]))]
+        return {name: measured[name] for name in names}
+
+    def _measured_rad(self) -> dict[str, float]:
+        """Where joints stand now, and what the coupled ones are together."""
+        joints = dict(zip(JOINTS, self.runtime.perception.joints_rad.tolist(), strict=True))
+        return joints | {f"{finger}J0": joints[f"{finger}J1"] + joints[f"{finger}J2"] for finger in FINGERS[:4]}
+
+    def bent(self, least_rad: float) -> tuple[str, ...]:
+        """Fingers with a joint that is farther off its target: something holds it, felt by the fingertip or not."""
+        measured = self._measured_rad()
+        off = [name for name, angle in self._targets_rad.items() if abs(measured[name] - angle) > least_rad]
+        return tuple(finger for finger in FINGERS if any(name.startswith(finger) for name in off))
+
+    def loads_N(self) -> dict[str, float]:
+        """Contact force on each fingertip at the end of the last cycle, beyond what it showed at rest untared."""
+        return {finger: load_N - self._resting_N.get(finger, 0.0) for finger, load_N in self._loads_N.items()}
+
+    def tip_centre_world_m(self, finger: str, tip: TipEllipsoid) -> Array:
+        """Where a fingertip's centre is now, world frame, shape (3,)."""
+        return np.asarray(self.runtime.perception.world_T_distal[finger].transformFrom(np.array(tip.centre_distal_m)))
+
+
+def smooth(share: float) -> float:
+    """Progress with zero speed at both ends (cubic)."""
+    return share * share * (3.0 - 2.0 * share)

@@ -1,0 +1,257 @@
+"""What may not happen to the hand, and what happens when it does.
+
+The supervisor looks at every cycle. A limit that is passed raises :class:`SafetyError`; whoever runs the session then
+calls :meth:`SafetySupervisor.stop`, which is also the way out of every other failure: zero demands to the hand, the
+positioner held where it is, for several cycles (the hand's own motors halt 20 ms after the last demand). The reason
+goes into the recording with the last cycles. What the hand itself and its process watch, and how soon each cause leads
+to zero demands, stands in docs/real-laboratory.md.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from math import isfinite
+from types import FrameType, TracebackType
+from typing import Any, Protocol
+
+from pydantic import Field
+
+from drivers.core.clock import NANOSECONDS
+from drivers.core.configuration import StrictModel
+from drivers.core.contacts import Array
+from drivers.core.errors import SafetyError, TactileLabError
+from sessions.rig_runtime.flight_recorder import CycleSnapshot, FlightRecorder
+
+
+class SafetySettings(StrictModel):
+    """The limits.
+
+    Attributes:
+        force_limit_N: largest contact force on any fingertip.
+        force_share: largest contact force as a share of the sensor's calibrated range on its smallest axis; the smaller
+            of both limits holds for a finger.
+        force_cycles: cycles in a row over the limit that stop the rig: a fingertip that slips along the object jerks.
+        stale_s: without a fresh hand status for this long the rig stops; never less than ``stale_cycles`` cycles.
+        stale_cycles: see ``stale_s`` and ``tip_stale_s``.
+        tip_stale_s: the same for the readings of a fingertip that has a link of its own.
+        warm_C: from this temperature of the warmest motor on everything moves at ``warm_scale`` of its speed.
+        warm_scale: see ``warm_C``.
+        palm_minimum_height_m: lowest height of the palm's origin above the table.
+        workspace_radius_m: largest horizontal distance of the palm's origin from the workspace centre.
+        workspace_centre_m: centre of the workspace on the table, world x, y.
+        object_radius_m: an object estimated farther than this from the workspace centre is lost.
+        empty_grasps: this many grasps in a row without any contact mean that the object is gone.
+        session_limit_s: the longest session, on the session's clock.
+        first_moves_scale: speed of the first approach as a share of the ordinary one.
+    """
+
+    force_limit_N: float = Field(default=6.0, gt=0.0)
+    force_share: float = Field(default=0.5, gt=0.0, le=0.8)
+    force_cycles: int = Field(default=3, ge=1)
+    stale_s: float = Field(default=0.010, gt=0.0)
+    stale_cycles: int = Field(default=5, ge=1)
+    tip_stale_s: float = Field(default=0.2, gt=0.0)
+    warm_C: float = Field(default=50.0, gt=0.0)
+    warm_scale: float = Field(default=0.5, gt=0.0, le=1.0)
+    palm_minimum_height_m: float = Field(default=0.08, ge=0.0)
+    workspace_radius_m: float = Field(default=0.45, gt=0.0)
+    workspace_centre_m: tuple[float, float] = (0.0, 0.0)
+    object_radius_m: float = Field(default=0.25, gt=0.0)
+    empty_grasps: int = Field(default=3, ge=1)
+    session_limit_s: float = Field(default=3600.0, gt=0.0)
+    first_moves_scale: float = Field(default=0.4, gt=0.0, le=1.0)
+
+
+class Stoppable(Protocol):
+    """What the supervisor can stop: the rig runtime."""
+
+    def stop(self) -> None:
+        """Zero hand demands, hold the base."""
+
+    def cycle(self) -> object:
+        """One cycle over all devices."""
+
+    def report_stop(self, cause: str, cycles: list[dict[str, Any]]) -> None:
+        """Record why everything was stopped, with the last cycles."""
+
+
+_STOP_CYCLES = 5
+
+
+class SafetySupervisor:
+    """Checks each cycle against the limits and knows how to stop.
+
+    Args:
+        rig runtime: what to stop.
+        settings: the limits.
+        cycle_ns: length of a cycle.
+    """
+
+    def __init__(self, runtime: Stoppable, settings: SafetySettings, cycle_ns: int) -> None:
+        self._runtime, self.settings = runtime, settings
+        patience_ns = settings.stale_cycles * cycle_ns
+        self._stale_ns = max(round(settings.stale_s * NANOSECONDS), patience_ns)
+        self._tip_stale_ns = max(round(settings.tip_stale_s * NANOSECONDS), patience_ns)
+        self._flight_recorder = FlightRecorder()
+        self._warm = False
+        self._start_ns: int | None = None
+        self._over_limit: dict[str, int] = {}
+        self._empty_grasps = 0
+        self._approached = False
+
+    # --- every cycle -------------------------------------------------------------------------------------------
+
+    def check(self, snapshot: CycleSnapshot) -> None:
+        """Compare one cycle with the limits.
+
+        Raises:
+            SafetyError: a limit is passed.
+        """
+        if self._start_ns is None:
+            self._start_ns = snapshot.stamp_ns
+        self._flight_recorder.note(snapshot)
+        self._warm = snapshot.warmest_C is not None and snapshot.warmest_C >= self.settings.warm_C
+        self._check_freshness(snapshot)
+        self._check_forces(snapshot)
+        if snapshot.palm_world_m is not None:
+            self._check_workspace(snapshot.palm_world_m)
+
+    def _check_freshness(self, snapshot: CycleSnapshot) -> None:
+        if (silent_ns := self._silent_ns(snapshot, snapshot.hand_stamp_ns)) > self._stale_ns:
+            raise SafetyError(
+                f"no fresh status for {silent_ns / 1e6:.0f} ms", where="hand", hint="Check cable, power and the bus"
+            )
+        for finger, stamp_ns in snapshot.tip_stamps_ns.items():
+            if (silent_ns := self._silent_ns(snapshot, stamp_ns)) > self._tip_stale_ns:
+                what = f"no reading of the fingertip for {silent_ns / 1e6:.0f} ms"
+                raise SafetyError(what, where=finger, hint="Check the sensor's box, power and cable")
+
+    def _silent_ns(self, snapshot: CycleSnapshot, heard_ns: int | None) -> int:
+        last_ns = self._start_ns if heard_ns is None else heard_ns
+        return 0 if last_ns is None else snapshot.stamp_ns - last_ns
+
+    def _check_forces(self, snapshot: CycleSnapshot) -> None:
+        limits_N = {finger: self.force_limit_N(snapshot.force_ranges_N.get(finger)) for finger in snapshot.loads_N}
+        over = {f: load_N for f, load_N in snapshot.loads_N.items() if not load_N <= limits_N[f]}  # NaN is over
+        self._over_limit = {finger: self._over_limit.get(finger, 0) + 1 for finger in over}
+        for finger, cycles in self._over_limit.items():
+            if cycles < self.settings.force_cycles:
+                continue
+            if not isfinite(over[finger]):
+                what = f"its readings tell no force: {snapshot.void_tips.get(finger) or 'they are no numbers'}"
+                hint = "Take the hand off the object, then look at the sensor: tactile-lab rig check"
+                raise SafetyError(what, where=finger, hint=hint)
+            what = f"fingertip force {over[finger]:.1f} N is over the limit of {limits_N[finger]:.1f} N"
+            raise SafetyError(what, where=finger, hint="Look at the hand and the object before going on")
+
+    def force_limit_N(self, range_N: float | None) -> float:
+        """Largest force on a fingertip whose sensor has this range; None where it has none."""
+        own_N = self.settings.force_limit_N
+        return own_N if range_N is None else min(own_N, self.settings.force_share * range_N)
+
+    def _check_workspace(self, palm_world_m: Array) -> None:
+        x_m, y_m, height_m = palm_world_m.tolist()
+        if height_m < self.settings.palm_minimum_height_m:
+            raise SafetyError(f"palm only {height_m * 1e3:.0f} mm above the table", where="base", hint="Lift the arm")
+        if (out_m := self._from_centre_m(x_m, y_m)) > self.settings.workspace_radius_m:
+            raise SafetyError(f"palm {out_m * 1e3:.0f} mm from the workspace centre", where="base", hint="Move it back")
+
+    # --- between cycles ----------------------------------------------------------------------------------------
+
+    def time_over(self, stamp_ns: int) -> str | None:
+        """Why no further grasp should start at this time, or None."""
+        if self._start_ns is None or stamp_ns - self._start_ns <= self.settings.session_limit_s * NANOSECONDS:
+            return None
+        return f"the session limit of {self.settings.session_limit_s:.0f} s is reached"
+
+    def object_lost(self, x_m: float, y_m: float) -> str | None:
+        """Why an object estimated at world x, y counts as lost, or None."""
+        if self._empty_grasps >= self.settings.empty_grasps:
+            return f"no contact in {self._empty_grasps} grasps in a row"
+        out_m = self._from_centre_m(x_m, y_m)
+        if out_m <= self.settings.object_radius_m:
+            return None
+        return f"the object is {out_m * 100:.0f} cm from the workspace centre"
+
+    def count_contacts(self, contacts: int) -> None:
+        """Take note of how many contacts a grasp had."""
+        self._empty_grasps = 0 if contacts else self._empty_grasps + 1
+
+    @property
+    def speed_scale(self) -> float:
+        """Factor on all speeds: slow until the first approach has ended well, and while a motor is warm."""
+        usual = 1.0 if self._approached else self.settings.first_moves_scale
+        return usual * self.settings.warm_scale if self._warm else usual
+
+    def on_approach(self) -> None:
+        """The first approach has ended well: ordinary speed from here on."""
+        self._approached = True
+
+    # --- stopping ----------------------------------------------------------------------------------------------
+
+    def stop(self, cause: BaseException | None = None) -> tuple[str, ...]:
+        """Zero demands and hold the base, for several cycles. Never raises.
+
+        Args:
+            cause: why, when it is no ordinary end; recorded with the last cycles.
+
+        Returns:
+            What went wrong while stopping, in words; a dead device cannot be exchanged with any more.
+        """
+        self._runtime.stop()
+        problems: dict[str, None] = {}
+        for _ in range(_STOP_CYCLES):
+            try:
+                self._runtime.cycle()
+            except TactileLabError as error:
+                problems[str(error)] = None
+        if cause is not None:
+            words = str(cause) or "stopped at once by the operator"
+            with suppress(TactileLabError):  # a recording that is broken has ended the session already
+                self._runtime.report_stop(words, self._flight_recorder.plain())
+        return tuple(words for words in problems if cause is None or words != str(cause))
+
+    def _from_centre_m(self, x_m: float, y_m: float) -> float:
+        centre_x_m, centre_y_m = self.settings.workspace_centre_m
+        return float(((x_m - centre_x_m) ** 2 + (y_m - centre_y_m) ** 2) ** 0.5)
+
+
+class InterruptGuard:
+    """Ctrl+C once: finish the step and close the session. Twice: now.
+
+    A context; while it is open the first SIGINT only sets :attr:`requested`, every later one does what it did before,
+    or raises KeyboardInterrupt where it did nothing. Signals belong to the main thread: elsewhere the guard does
+    nothing.
+    """
+
+    def __init__(self) -> None:
+        self.requested = False
+        self.heard: Callable[[], None] = lambda: None
+        """Called by the first at once, in the midst of whatever goes on: it may note that, and no more."""
+        self._previous: Callable[[int, FrameType | None], Any] | int | None = None
+        self._active = False
+
+    def __enter__(self) -> InterruptGuard:
+        if threading.current_thread() is threading.main_thread():
+            self._previous = signal.signal(signal.SIGINT, self._on_interrupt)
+            self._active = True
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._active:
+            signal.signal(signal.SIGINT, self._previous)
+            self._active = False
+
+    def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
+        if not self.requested:
+            self.requested = True
+            self.heard()
+        elif callable(self._previous):
+            self._previous(number, frame)  # it knows where an interruption would be lost
+        else:
+            raise KeyboardInterrupt

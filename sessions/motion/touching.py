@@ -1,0 +1,241 @@
+"""Touches without a grasp: a tap on the top, a probe from the side.
+
+The hand takes up a posture of one of the closings, fingers partly closed, and the positioner carries it in a straight
+line until something is met; the fingertips then lie against the object, as many as meet it. The contacts wait for
+the next grasp (:attr:`~sessions.recording.session_events.EventKind.TOUCH_END`): it finds the object where the touch
+left it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drivers.core.contacts import FINGERS, Array
+from drivers.shadow.closing.closing import Closing, closing
+from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.tip_motion import motor_rates
+from sessions.motion.cycle_settings import CycleSettings, TouchSettings
+from sessions.motion.motion import GraspFrame, Motion
+from sessions.perception.approach_paths import TipSurface
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """How the fingertips stand to each other in a touch.
+
+    Attributes:
+        closing: whose lines they are on.
+        progress: how far along them, by finger.
+        held_rad: joint angles of fingers that are held out of the way instead, by finger and motor.
+    """
+
+    closing: str
+    progress: Mapping[str, float]
+    held_rad: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    def aside(self, table: Closing) -> dict[str, float]:
+        """What motors turn beyond the closing's table to hold those fingers, radians."""
+        wanted = {motor: angle for motors in self.held_rad.values() for motor, angle in motors.items()}
+        tabled = {m: a for finger in self.held_rad for m, a in table.joints(finger, self.progress[finger]).items()}
+        return {motor: wanted[motor] - angle for motor, angle in tabled.items()}
+
+
+TAP = Pattern("radial", {"FF": 0.70, "MF": 0.86, "RF": 0.78, "LF": 0.68, "TH": 0.62})
+"""Five fingertips around the middle of the grasp frame, far enough apart not to touch each other."""
+
+ROW = Pattern(
+    "pinch",
+    {"FF": 0.75, "MF": 0.75, "RF": 0.75, "LF": 0.75, "TH": 0.0},
+    {"TH": {"THJ1": 0.0, "THJ2": -0.6, "THJ3": 0.0, "THJ4": 0.0, "THJ5": -1.0}},
+)
+"""The four fingers in a row, the thumb beside them 100 mm above the table."""
+
+_DOWN, _BACK = np.array([0.0, 0.0, -1.0]), np.array([-1.0, 0.0, 0.0])
+
+TAP_HEIGHT_m = 0.022
+"""Of the closing's table; the positioner does the rest of the height."""
+
+
+class Toucher:
+    """Touches the object.
+
+    Args:
+        motion: supervised motion.
+        cycle: speeds, forces and times.
+        tip: shape of the fingertips.
+    """
+
+    def __init__(self, motion: Motion, cycle: CycleSettings, tip: TipEllipsoid) -> None:
+        self._motion, self._cycle, self._tip = motion, cycle, tip
+
+    @property
+    def settings(self) -> TouchSettings:
+        """Speeds and forces of touching."""
+        return self._cycle.touch
+
+    def tap(self, frame: GraspFrame) -> Array:
+        """Come down on what stands under a grasp frame, lay the fingertips on it, and rise again.
+
+        Returns:
+            Where fingertips met something, shape (n, 3), world frame.
+        """
+        s, table, motion = self.settings, closing(TAP.closing, TAP_HEIGHT_m, self._tip), self._motion
+        self._poise(table, TAP, frame)
+        lowest_m = s.lowest_m + self._tip.semi_axes_m[2] - TAP_HEIGHT_m
+        motion.runtime.begin_closing()
+        found = np.empty((0, 3))
+        if self._approach(motion.base_joints(frame, table, lowest_m), s.tap_m_s):
+            self._lay_on(table, TAP, _DOWN, frame, s.force_N, s.sink_m)
+            found = self._landing_points(_DOWN, frame)
+        self._capture()
+        motion.move_base(motion.base_joints(frame, table, self._cycle.lift_m), *self._travel)
+        return found
+
+    def rake(self, frame: GraspFrame, from_m: float) -> Array | None:
+        """Come toward the middle of a grasp frame from its +x side, fingers in a row, until they meet something.
+
+        Args:
+            frame: fingers move along its -x axis, over its origin and as far beyond.
+            from_m: where they begin, counted from its origin.
+
+        Returns:
+            Where fingertips met something, shape (n, 3), world frame; None where they could not come down.
+        """
+        s, motion = self.settings, self._motion
+        table = closing(ROW.closing, s.rake_height_m, self._tip)
+        begin, end = (frame.shifted_inside(np.array([x - s.row_m, 0.0])) for x in (from_m, -s.beyond_m))
+        self._poise(table, ROW, begin)
+        if not motion.probe_base(motion.base_joints(begin, table), self._cycle.descent_m_s, self._is_met):
+            self._rise()
+            return None
+        motion.wait(self._cycle.rest_s)
+        motion.runtime.begin_closing()
+        found = np.empty((0, 3))
+        if self._approach(motion.base_joints(end, table), s.rake_m_s):
+            self._lay_on(table, ROW, _BACK, frame, s.rake_N, 0.0)
+            found = self._landing_points(_BACK, frame)
+            self._capture()
+            motion.move_base(motion.base_joints(begin, table), *self._travel)
+        self._rise()
+        return found
+
+    def close_thumb(self, frame: GraspFrame) -> Array | None:
+        """Come down around a grasp frame, the hand open, and close the thumb alone.
+
+        Returns:
+            Where the thumb met something, or stood on it on the way down, shape (n, 3), world frame; None where another
+            finger could not come down.
+        """
+        s, motion = self.settings, self._motion
+        table = closing(ROW.closing, s.rake_height_m, self._tip)
+        progress = {finger: table.path(finger).valid[0] for finger in FINGERS}
+        self._poise(table, Pattern(ROW.closing, progress), frame)
+        stood: list[Array] = []
+
+        def met() -> bool:
+            if self._motion.loads_N().get("TH", 0.0) > s.met_N:
+                stood.append(motion.tip_centre_world_m("TH", self._tip))
+            return self._is_met()
+
+        if not motion.probe_base(motion.base_joints(frame, table), self._cycle.descent_m_s, met):
+            self._rise()
+            return np.array(stood) if stood else None
+        motion.wait(self._cycle.rest_s)
+        motion.runtime.begin_closing()
+        path, found = table.path("TH"), np.empty((0, 3))
+        while progress["TH"] < path.valid[1] and self._motion.loads_N().get("TH", 0.0) <= s.met_N:
+            progress["TH"] += self._cycle.closing_m_s * motion.cycle_s / path.length_m
+            motion.set_fingers(table, progress)
+            motion.tick()
+        if self._motion.loads_N().get("TH", 0.0) > s.met_N:
+            motion.wait(self._cycle.rest_s)
+            found = self._landing_points(path.direction, frame)
+            self._capture()
+        progress["TH"] = path.valid[0]
+        motion.blend_fingers(table, progress, self._cycle.finger_rad_s)
+        self._rise()
+        return found
+
+    def _rise(self) -> None:
+        """Straight up from where the positioner was sent last."""
+        self._motion.rise(self._cycle.lift_m, self._cycle.travel_m_s)
+
+    def _is_met(self) -> bool:
+        return max(self._motion.loads_N().values(), default=0.0) > self.settings.met_N
+
+    def _landing_points(self, direction_grasp: Array, frame: GraspFrame) -> Array:
+        """The foremost places of the fingertips that feel something, shape (n, 3), world frame."""
+        ahead = np.asarray(frame.pose.rotation().rotate(direction_grasp))
+        met = [finger for finger, load_N in self._motion.loads_N().items() if load_N > self.settings.met_N / 2]
+        surface = TipSurface.upright(self._tip.semi_axes_m, self._tip.centre_distal_m)
+        frames = self._motion.runtime.perception.world_T_distal
+        return np.array([surface.leading_point(frames[f].matrix(), ahead) for f in met]).reshape(-1, 3)
+
+    @property
+    def _travel(self) -> tuple[float, float]:
+        return self._cycle.travel_m_s, self._cycle.turn_rad_s
+
+    def _poise(self, table: Closing, pattern: Pattern, frame: GraspFrame) -> None:
+        """The hand above a grasp frame, fingers as they should touch, its sensors tared."""
+        motion, cycle = self._motion, self._cycle
+        motion.blend_fingers(table, pattern.progress, cycle.finger_rad_s, pattern.aside(table))
+        motion.move_base(motion.base_joints(frame, table, cycle.lift_m), *self._travel)
+        motion.tare(cycle.rest_s)
+
+    def _approach(self, goal: Array, speed_m_s: float) -> bool:
+        """Toward ``goal`` until a fingertip meets something; the positioner then stands where it is."""
+        motion = self._motion
+        for q in motion.line(goal, speed_m_s):
+            motion.set_base(q)
+            motion.tick()
+            if self._is_met():
+                motion.set_base(motion.runtime.perception.base_q)
+                return True
+        return False
+
+    def _lay_on(
+        self,
+        table: Closing,
+        pattern: Pattern,
+        direction_grasp: Array,
+        frame: GraspFrame,
+        force_N: float,
+        sink_m: float,
+    ) -> None:
+        """Every fingertip moves along a direction until it touches as it should, or has gone as far as it may.
+
+        The hand sinks a little meanwhile, and the fingers that touch give way: the thumb hardly moves that way itself.
+        Where a fingertip is pressed hard the hand waits, and goes on from there when the finger has given way.
+        """
+        s, motion = self.settings, self._motion
+        rates = motor_rates(table, pattern.progress, direction_grasp, self._tip)
+        gone_m = dict.fromkeys(rates, 0.0)
+        sinking = self._sinking(direction_grasp, frame, sink_m)
+        for _ in motion.shares(s.press_s):
+            if max(self._motion.loads_N().values(), default=0.0) < s.most_N:
+                motion.set_base(next(sinking))
+            for finger, load_N in self._motion.loads_N().items():
+                step_m = s.gain * float(np.clip(force_N - load_N, -1.0, 1.0)) * motion.cycle_s
+                gone_m[finger] = float(np.clip(gone_m[finger] + step_m, -s.reach_m, s.reach_m))
+            aside = pattern.aside(table)
+            for finger in rates.keys() - pattern.held_rad.keys():
+                aside |= {motor: rate * gone_m[finger] for motor, rate in rates[finger].items()}
+            motion.set_fingers(table, pattern.progress, aside)
+            motion.tick()
+
+    def _sinking(self, direction_grasp: Array, frame: GraspFrame, sink_m: float) -> Iterator[Array]:
+        """Positioner targets while the fingertips are laid on, one for each cycle in which the hand may move."""
+        motion, start = self._motion, self._motion.runtime.perception.base_q.copy()
+        way = np.zeros(6)
+        way[:3] = self._motion.runtime.world_T_mount.rotation().unrotate(frame.pose.rotation().rotate(direction_grasp))
+        for share in motion.shares(self.settings.press_s):
+            yield start + min(1.0, 2.0 * share) * sink_m * way
+
+    def _capture(self) -> None:
+        motion = self._motion
+        motion.runtime.begin_capture()
+        motion.wait(self.settings.capture_s)
+        motion.runtime.end_touch()

@@ -1,0 +1,80 @@
+"""The ways of the fingertips while they closed: space that the object does not fill.
+
+A fingertip's surface is taken as an ellipsoid. A way begins at the point of it that leads along the motion; it ends
+at the contact, or at the leading point where the finger stopped. Begin and end lie on the tip, and a convex tip that
+moves straight covers the straight line between them: no part of that line can be inside the object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from gtsam import Pose3
+
+from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact
+
+_LEAST_WAY_m = 0.002
+"""A finger that hardly moved has no way to tell of."""
+
+
+@dataclass(frozen=True)
+class TipSurface:
+    """The touching surface of a fingertip as an ellipsoid.
+
+    Attributes:
+        semi_axes_m: along its own axes, shape (3,).
+        distal_T_tip: its centre and axes in the finger's distal frame.
+    """
+
+    semi_axes_m: Array
+    distal_T_tip: Pose3
+
+    @classmethod
+    def upright(cls, semi_axes_m: Iterable[float], centre_distal_m: Iterable[float]) -> TipSurface:
+        """One whose axes are those of the distal frame."""
+        pose = np.eye(4)
+        pose[:3, 3] = list(centre_distal_m)
+        return cls(np.array(list(semi_axes_m)), Pose3(pose))
+
+    def leading_point(self, world_T_distal: Array, direction_world: Array) -> Array:
+        """The point of the surface that is farthest along a direction, shape (3,), world frame.
+
+        Args:
+            world_T_distal: homogeneous matrix, shape (4, 4).
+            direction_world: unit vector, shape (3,).
+        """
+        world_T_tip = world_T_distal @ self.distal_T_tip.matrix()
+        stretched = self.semi_axes_m * (world_T_tip[:3, :3].T @ direction_world)
+        along = self.semi_axes_m * stretched / np.linalg.norm(stretched)
+        return np.asarray(world_T_tip[:3, :3] @ along + world_T_tip[:3, 3])
+
+    def centre(self, world_T_distal: Array) -> Array:
+        """Its centre, shape (3,), world frame."""
+        return np.asarray((world_T_distal @ self.distal_T_tip.matrix())[:3, 3])
+
+
+def approach_paths(
+    begun: Array, ended: Array, tips: Mapping[str, TipSurface], contacts: Iterable[Contact]
+) -> tuple[ApproachPath, ...]:
+    """The ways of all fingers that moved, in the order of :data:`FINGERS`.
+
+    Args:
+        begun, ended: the distal frames in the world when the closing began and when it had ended, shape (5, 4, 4).
+        tips: surfaces of the fingertips, by finger.
+        contacts: those of the grasp.
+    """
+    touched = {contact.finger: contact.point_world_m for contact in contacts}
+    found = []
+    for finger, start, end in zip(FINGERS, begun, ended, strict=True):
+        if finger not in tips:
+            continue
+        tip = tips[finger]
+        way = tip.centre(end) - tip.centre(start)
+        if (length_m := float(np.linalg.norm(way))) < _LEAST_WAY_m:
+            continue
+        first = tip.leading_point(start, way / length_m)
+        last = touched[finger] if finger in touched else tip.leading_point(end, way / length_m)
+        found.append(ApproachPath(finger, first, last, finger in touched))
+    return tuple(found)

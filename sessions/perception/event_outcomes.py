@@ -1,0 +1,41 @@
+"""What a event completes: a grasp, a picture that shows the truth, a tare, or the last grasp taken back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from drivers.core.contacts import Grasp
+from sessions.perception.instruments import FrameReading
+
+
+@dataclass(frozen=True)
+class TruthFrame:
+    """A camera frame that shows the object at rest.
+
+    Attributes:
+        grasp_index: the grasp whose capture is open, else the last one; None before the first.
+        frame: the picture.
+    """
+
+    grasp_index: int | None
+    frame: FrameReading
+
+
+@dataclass(frozen=True)
+class TareReport:
+    """What came of a tare: the fingers that could not be zeroed, and why."""
+
+    stamp_ns: int
+    refused: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Undone:
+    """The grasp with this number was taken back; the next one has its number."""
+
+    index: int
+
+
+Outcome: TypeAlias = Grasp | TruthFrame | TareReport | Undone

@@ -1,0 +1,62 @@
+"""Where the hand is in the world, by the newest joints of the hand and of the positioner."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from gtsam import Pose3
+
+from drivers.core.contacts import Array
+from drivers.core.errors import DeviceError
+from drivers.shadow.model.kinematics import forearm_T_palm_matrix
+from sessions.perception.contact_world import HandGeometry
+
+
+class HandPlacement:
+    """Keeps the newest joints; works out the hand's geometry when it is asked for, once.
+
+    Args:
+        mount_T_forearm: the positioner's kinematics, from its joint vector (6,).
+        world_T_mount: the forearm-to-world calibration.
+    """
+
+    def __init__(self, mount_T_forearm: Callable[[Array], Pose3], world_T_mount: Pose3) -> None:
+        self._mount_T_forearm, self._world_T_mount = mount_T_forearm, world_T_mount
+        self._joints_rad: Array | None = None
+        self._base_q: Array | None = None
+        self._geometry: HandGeometry | None = None
+
+    @property
+    def ready(self) -> bool:
+        """The hand and the positioner have both been heard."""
+        return self._joints_rad is not None and self._base_q is not None
+
+    def take_joints(self, joints_rad: Array) -> Array:
+        """Newest joint angles, shape (24,), radians; gives them as an array."""
+        self._joints_rad, self._geometry = np.asarray(joints_rad, dtype=float), None
+        return self._joints_rad
+
+    def take_base(self, base_q: Array) -> Array:
+        """Newest positioner joints, shape (6,), metres and radians; gives them as an array."""
+        self._base_q, self._geometry = np.asarray(base_q, dtype=float), None
+        return self._base_q
+
+    def latest(self) -> tuple[Array, Array]:
+        """Newest joints of the hand and of the positioner. Raises DeviceError before the first of either."""
+        if self._joints_rad is None:
+            raise DeviceError("no joint angles have arrived yet", where="hand", hint="Check that the palm answers")
+        if self._base_q is None:
+            raise DeviceError("no position has arrived yet", where="base", hint="Check that the positioner answers")
+        return self._joints_rad, self._base_q
+
+    def current(self) -> HandGeometry:
+        """The hand by the newest joints. Raises DeviceError before the first."""
+        if self._geometry is None:
+            self._geometry = self.place(*self.latest())
+        return self._geometry
+
+    def place(self, joints_rad: Array, base_q: Array) -> HandGeometry:
+        """The hand by these joints."""
+        world_T_forearm = self._world_T_mount * self._mount_T_forearm(base_q)
+        return HandGeometry(joints_rad, world_T_forearm.matrix() @ forearm_T_palm_matrix(joints_rad))

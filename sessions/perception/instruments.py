@@ -1,0 +1,197 @@
+"""What the session layer asks of devices, samples and fingertips: structural types, met by the drivers.
+
+An *instrument* is a live device with a transport. A *decoder* is the half of a device that turns one received datagram
+into a sample and does nothing else; live and in replay the session's understanding comes from decoders alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from drivers.core.fingertip import FingertipSensor
+from drivers.core.transports import Datagram
+
+Sample_co = TypeVar("Sample_co", covariant=True)
+
+
+class HandReading(Protocol):
+    """Joint angles of the hand, shape (24,), radians, and when they arrived."""
+
+    @property
+    def stamp_ns(self) -> int: ...
+    @property
+    def joints_rad(self) -> Array: ...
+    @property
+    def fresh(self) -> bool: ...
+
+
+@runtime_checkable
+class MotorTemperatures(Protocol):
+    """Temperatures near the motors, shape (20,), degrees Celsius; NaN where none is known."""
+
+    @property
+    def temperature_C(self) -> Array: ...
+
+
+def warmest_C(reading: object) -> float | None:
+    """Temperature of the warmest motor in a sample of the hand; None while none is known."""
+    motors = getattr(reading, "motor", None)
+    if not isinstance(motors, MotorTemperatures) or not (known := np.isfinite(motors.temperature_C)).any():
+        return None
+    return float(motors.temperature_C[known].max())
+
+
+class BaseReading(Protocol):
+    """Joint positions of the positioner, shape (6,), metres and radians."""
+
+    @property
+    def stamp_ns(self) -> int: ...
+    @property
+    def q(self) -> Array: ...
+
+
+class FrameReading(Protocol):
+    """One camera image."""
+
+    @property
+    def stamp_ns(self) -> int: ...
+    @property
+    def image(self) -> Any: ...
+
+
+class Decoder(Protocol[Sample_co]):
+    """The receiving half of a device.
+
+    ``receive`` may keep state of its own transport (sequence numbers, the newest motor readings) and may ask its clock;
+    it must use nothing else, or a replay differs from the session.
+    """
+
+    def receive(self, datagram: Datagram) -> Sample_co | None:
+        """The sample in a datagram; None when it holds none. Raises CodecError for bytes of another protocol."""
+
+
+class WrenchFingertip(FingertipSensor, Protocol):
+    """A fingertip fed by a transport of its own."""
+
+    def update(self, samples: Sequence[Any], /) -> None:
+        """Take the samples of one datagram."""
+
+
+class SlotFingertip(FingertipSensor, Protocol):
+    """A fingertip whose data come inside the hand's samples."""
+
+    def update(self, sample: Any, /) -> None:
+        """Take one sample of the hand."""
+
+
+class Instrument(Protocol):
+    """Something that is connected and closed."""
+
+    def connect(self) -> None:
+        """All or nothing, repeatable. Raises DeviceError."""
+
+    def close(self) -> None:
+        """Idempotent."""
+
+
+class HandInstrument(Instrument, Protocol):
+    """The live hand."""
+
+    def set_targets(self, targets_rad: Mapping[str, float], /) -> None:
+        """Joint targets by motor name, J0 for a coupled pair; motors not named keep theirs."""
+
+    def exchange(self) -> object:
+        """One cycle: send demands, receive and decode."""
+
+    def stop(self) -> None:
+        """No demand from now on; never raises."""
+
+    def resume(self) -> None:
+        """Take back a stop or a fault; nothing moves before new targets are set."""
+
+    def health(self) -> tuple[str, ...]:
+        """What is wrong, in words; empty when all is well."""
+
+    def losses(self) -> Mapping[str, int]:
+        """What is missing of its traffic since connecting, by kind. Raises DeviceError when nobody knows."""
+
+
+class BaseInstrument(Instrument, Protocol):
+    """The live positioner."""
+
+    def set_target(self, q: Array, /) -> None:
+        """Joint targets, shape (6,), metres and radians."""
+
+    def exchange(self) -> object:
+        """One cycle: send targets, receive and decode."""
+
+    def stop(self) -> None:
+        """Stay here; never raises."""
+
+    def resume(self) -> None:
+        """Take back a stop or a fault; the target is where it stands."""
+
+
+@runtime_checkable
+class WatchedInstrument(Protocol):
+    """A device that knows what is wrong with itself."""
+
+    def health(self) -> tuple[str, ...]:
+        """In words; empty when all is well."""
+
+
+class PolledInstrument(Instrument, Protocol):
+    """A device that sends by itself and is emptied once a cycle."""
+
+    def poll(self) -> object:
+        """Take everything that has arrived."""
+
+
+@runtime_checkable
+class AskedInstrument(Protocol):
+    """A device that may send only when it is asked."""
+
+    def ask(self) -> None:
+        """Ask for the next reading where the device needs it. Raises DeviceError."""
+
+
+@runtime_checkable
+class NamedInstrument(Protocol):
+    """A device that can tell who it is."""
+
+    @property
+    def identity(self) -> str:
+        """Serial number and firmware as it told when it was connected; empty for what it does not tell."""
+
+
+@runtime_checkable
+class CyclingInstrument(Protocol):
+    """A device that another process keeps cycling, whatever the session does."""
+
+    def catch_up(self) -> None:
+        """Show the tap what has come since the last look. Raises DeviceError."""
+
+    def description(self) -> str:
+        """What was found when it was connected, in words."""
+
+
+class CameraInstrument(Instrument, Protocol):
+    """The live camera."""
+
+    def ask(self) -> None:
+        """Trigger; the picture comes with :meth:`taken`. Raises DeviceError."""
+
+    def take_picture(self) -> FrameReading | None:
+        """The picture asked for; None while it is on its way. Raises DeviceError when it stays away."""
+
+
+@runtime_checkable
+class WatchingCamera(Protocol):
+    """A camera that sends markers by itself."""
+
+    def poll(self) -> None:
+        """Take what it has sent, so that it is recorded in time. Raises DeviceError."""

@@ -1,0 +1,298 @@
+"""From decoded samples and session events to grasps.
+
+Perception has no clock, no transport and no chance: what it knows depends on the samples and session events it was
+given and on their order, nothing else. So the live session and a replay of its bytes build the same grasps, bit for
+bit.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from math import inf, isinf, isnan
+from typing import Any
+
+import numpy as np
+from gtsam import Pose3
+from pydantic import Field
+
+from drivers.core.configuration import StrictModel
+from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact, Grasp
+from drivers.core.errors import DeviceError, SessionError
+from drivers.core.fingertip import FingertipSensor
+from sessions.perception.approach_paths import TipSurface, approach_paths
+from sessions.perception.contact_world import HandGeometry, MountUncertainty
+from sessions.perception.event_outcomes import Outcome, TareReport, TruthFrame, Undone
+from sessions.perception.hand_odometry import HandOdometry
+from sessions.perception.hand_placement import HandPlacement
+from sessions.perception.instruments import BaseReading, FrameReading, HandReading, SlotFingertip, WrenchFingertip
+from sessions.perception.touch_capture import Capture, Measured, Probed, TouchSelection
+from sessions.recording.session_events import EventKind, SessionEvent
+
+
+class PerceptionSettings(StrictModel):
+    """What turns a touch into a contact.
+
+    Attributes:
+        joint_sigma_rad: standard deviation of each joint angle that averaging does not remove (0.6 deg).
+        minimum_force_N: a lighter touch is not a contact.
+    """
+
+    joint_sigma_rad: float = Field(default=float(np.radians(0.6)), ge=0.0)
+    minimum_force_N: float = Field(default=0.1, ge=0.0)
+
+
+class Perception:
+    """State of the hand in the world, and the grasps made of it.
+
+    Args:
+        wrench_fingertips: fingertips with a transport of their own, by finger.
+        slot_fingertips: fingertips whose data come with the hand's samples, by finger.
+        mount_T_forearm: the positioner's kinematics, from its joint vector (6,).
+        world_T_mount: the forearm-to-world calibration.
+        mount_covariance: its covariance, see :class:`MountUncertainty`; None when not known.
+        tip_surfaces: of the fingertips whose ways are to be told, by finger.
+    """
+
+    def __init__(
+        self,
+        *,
+        wrench_fingertips: Mapping[str, WrenchFingertip] | None = None,
+        slot_fingertips: Mapping[str, SlotFingertip] | None = None,
+        mount_T_forearm: Callable[[Array], Pose3],
+        world_T_mount: Pose3,
+        mount_covariance: Array | None = None,
+        tip_surfaces: Mapping[str, TipSurface] | None = None,
+        settings: PerceptionSettings | None = None,
+    ) -> None:
+        self._wrench = dict(wrench_fingertips or {})
+        self._slots = dict(slot_fingertips or {})
+        everyone: dict[str, FingertipSensor] = {**self._wrench, **self._slots}
+        self.fingertips: dict[str, FingertipSensor] = {f: everyone[f] for f in FINGERS if f in everyone}
+        self.world_T_mount, self.settings = world_T_mount, settings or PerceptionSettings()
+        self._placement = HandPlacement(mount_T_forearm, world_T_mount)
+        self._selection = TouchSelection(self.fingertips, self.settings.minimum_force_N)
+        self._mount = (
+            None if mount_covariance is None else MountUncertainty(world_T_mount.matrix(), np.asarray(mount_covariance))
+        )
+        self.hand_stamp_ns: int | None = None
+        """Arrival of the newest fresh joint angles; None before the first."""
+        self._loads_N: dict[str, float] | None = None
+        self._frame: FrameReading | None = None
+        self._capture: Capture | None = None
+        self._tip_surfaces = dict(tip_surfaces or {})
+        self._closing_start: HandGeometry | None = None
+        self._probed = Probed()
+        self._carried = HandOdometry()
+
+    # --- samples -----------------------------------------------------------------------------------------------
+
+    def on_hand(self, sample: HandReading) -> None:
+        """Joint angles, and the slots of fingertips that come with them."""
+        self._loads_N = None
+        for fingertip in self._slots.values():
+            fingertip.update(sample)
+        if not sample.fresh:
+            return
+        joints_rad = self._placement.take_joints(sample.joints_rad)
+        self.hand_stamp_ns = sample.stamp_ns
+        if self._capture is not None:
+            self._capture.joints_rad.append(joints_rad)
+
+    def on_base(self, sample: BaseReading) -> None:
+        """The positioner's joints."""
+        self._loads_N = None
+        base_q = self._placement.take_base(sample.q)
+        if self._capture is not None:
+            self._capture.base_q.append(base_q)
+
+    def on_wrench(self, finger: str, samples: Sequence[Any]) -> None:
+        """Samples of one fingertip's own transport."""
+        self._loads_N = None
+        self._wrench[finger].update(samples)
+
+    def on_frame(self, frame: FrameReading) -> None:
+        """A camera frame; kept until the next one."""
+        self._frame = frame
+
+    # --- state -------------------------------------------------------------------------------------------------
+
+    @property
+    def ready(self) -> bool:
+        """The hand and the positioner have both been heard."""
+        return self._placement.ready
+
+    @property
+    def grasp_count(self) -> int:
+        """Grasps made so far."""
+        return self._carried.grasp_count
+
+    @property
+    def is_holding(self) -> bool:
+        """A hold has begun and not ended."""
+        return self._carried.is_holding
+
+    @property
+    def hand_motion_world(self) -> Pose3:
+        """How the hand has carried the object since the last grasp, as far as that is complete."""
+        return self._carried.motion_world
+
+    @property
+    def joints_rad(self) -> Array:
+        """Newest joint angles, shape (24,), radians. Raises DeviceError before the first."""
+        return self._placement.latest()[0]
+
+    @property
+    def base_q(self) -> Array:
+        """Newest positioner joints, shape (6,), metres and radians. Raises DeviceError before the first."""
+        return self._placement.latest()[1]
+
+    @property
+    def world_T_palm(self) -> Pose3:
+        """The palm, from the newest samples. Raises DeviceError before the first."""
+        return Pose3(self._placement.current().world_T_palm)
+
+    @property
+    def palm_world_m(self) -> Array:
+        """Origin of the palm, shape (3,), from the newest samples. Raises DeviceError before the first."""
+        return np.asarray(self._placement.current().world_T_palm[:3, 3])
+
+    @property
+    def world_T_distal(self) -> dict[str, Pose3]:
+        """The distal frame of each finger, from the newest samples. Raises DeviceError before the first."""
+        return {finger: Pose3(self._placement.current().world_T_distal[i]) for i, finger in enumerate(FINGERS)}
+
+    def world_R_distal(self, finger: str) -> Array:
+        """Orientation of one distal frame, shape (3, 3). Raises DeviceError before the first sample."""
+        return np.asarray(self._placement.current().world_T_distal[FINGERS.index(finger), :3, :3])
+
+    def load_N(self, finger: str) -> float:
+        """Contact force on one fingertip, the tip's own weight taken off, newest sample."""
+        return self.loads_N()[finger]
+
+    def loads_N(self) -> dict[str, float]:
+        """Contact force on each fingertip of the rig; infinite where the newest sample is void."""
+        if self._loads_N is None:
+            rotations = dict(zip(FINGERS, self._placement.current().world_T_distal[:, :3, :3], strict=True))
+            told = {finger: tip.load_N(rotations[finger]) for finger, tip in self.fingertips.items()}
+            self._loads_N = {finger: inf if isnan(load_N) else load_N for finger, load_N in told.items()}
+        return dict(self._loads_N)
+
+    def void_tips(self) -> dict[str, str]:
+        """Why the newest sample of a fingertip tells no force, in words, by finger; without those that tell one."""
+        void = [finger for finger, load_N in self.loads_N().items() if isinf(load_N)]
+        return {finger: self.fingertips[finger].void() or "its load is no number" for finger in void}
+
+    @property
+    def dropped(self) -> dict[str, str]:
+        """Fingers without a contact in the last grasp, and why; what a sensor says of itself is in problems()."""
+        return self._selection.dropped
+
+    @property
+    def drop_counts(self) -> Counter[str]:
+        """The reasons over the whole session."""
+        return self._selection.drop_counts
+
+    def problems(self) -> tuple[str, ...]:
+        """What is wrong with fingertips, in words, each beginning with the finger's name."""
+        return tuple(f"{finger}: {text}" for finger, tip in self.fingertips.items() for text in tip.health())
+
+    # --- session events
+    # -------------------------------------------------------------------------------------------------
+
+    def event(self, event: SessionEvent) -> Outcome | None:
+        """Take a event; gives the grasp, frame or report it completes.
+
+        Raises:
+            SessionError: the event has no meaning here (an end without a beginning).
+            DeviceError: the hand or the positioner has not been heard yet.
+        """
+        match event.kind:
+            case EventKind.TARE:
+                return self._tare(event)
+            case EventKind.CLOSE_BEGIN:
+                self._closing_start = self._placement.current()
+                return None
+            case EventKind.CAPTURE_BEGIN:
+                self._begin_capture(event)
+                return None
+            case EventKind.CAPTURE_END:
+                return self._grasp(event)
+            case EventKind.TOUCH_END:
+                self._probed.add(self._end_capture(event))
+                return None
+            case EventKind.HOLD_BEGIN:
+                self._carried.begin(self.world_T_palm)
+                self._probed = Probed()
+                return None
+            case EventKind.HOLD_END:
+                self._carried.end(self.world_T_palm)
+                return None
+            case EventKind.TRUTH_FRAME:
+                return self._truth_frame()
+            case EventKind.UNDO:
+                return self._undo()
+
+    def _tare(self, event: SessionEvent) -> TareReport:
+        self._placement.latest()
+        self._loads_N = None
+        refused = {}
+        for finger in event.fingers:
+            if finger not in self.fingertips:
+                continue
+            try:
+                self.fingertips[finger].tare(self.world_R_distal(finger))
+            except DeviceError as error:
+                refused[finger] = error.what
+        return TareReport(event.stamp_ns, refused)
+
+    def _begin_capture(self, event: SessionEvent) -> None:
+        self._placement.latest()
+        for fingertip in self.fingertips.values():
+            fingertip.begin_capture()
+        self._capture = Capture(event.stamp_ns)
+
+    def _grasp(self, event: SessionEvent) -> Grasp:
+        measured, probed = self._end_capture(event), self._probed
+        self._probed = Probed()
+        index, motion = self.grasp_count, self._carried.take(self.world_T_palm)
+        return Grasp(
+            index=index,
+            stamp_ns=measured.stamp_ns,
+            contacts=(*measured.contacts, *probed.contacts),
+            world_T_palm=Pose3(measured.world_T_palm),
+            hand_motion_world=motion if index else Pose3(),
+            approach_paths=(*measured.ways, *probed.ways),
+        )
+
+    def _end_capture(self, event: SessionEvent) -> Measured:
+        """What the samples since the capture began say."""
+        capture, self._capture = self._capture, None
+        if capture is None:
+            text = f"{event.kind.value} without capture_begin"
+            raise SessionError(text, where="/marks", hint="The marks are out of order")
+        joints_rad, base_q = self._placement.latest()
+        geometry = self._placement.place(capture.joints(joints_rad), capture.base(base_q))
+        tips = self._selection.touches(geometry, heard=bool(capture.joints_rad))
+        contacts = geometry.contacts(tips, self.settings.joint_sigma_rad, self._mount)
+        stamp_ns = (capture.stamp_ns + event.stamp_ns) // 2
+        return Measured(stamp_ns, geometry.world_T_palm, contacts, self._ways(geometry, contacts))
+
+    def _ways(self, geometry: HandGeometry, contacts: Sequence[Contact]) -> tuple[ApproachPath, ...]:
+        """How the fingers came to this grasp; of a second capture after one closing nothing is known."""
+        begun, self._closing_start = self._closing_start, None
+        if begun is None:
+            return ()
+        return approach_paths(begun.world_T_distal, geometry.world_T_distal, self._tip_surfaces, contacts)
+
+    def _truth_frame(self) -> TruthFrame | None:
+        frame, self._frame = self._frame, None
+        if frame is None:
+            return None
+        current = self.grasp_count if self._capture is not None else self.grasp_count - 1
+        return TruthFrame(current if current >= 0 else None, frame)
+
+    def _undo(self) -> Undone:
+        self._carried.undo()
+        self._capture = None
+        return Undone(self.grasp_count)

@@ -1,0 +1,79 @@
+"""What a person adds to a session: notes, pictures, files, in the folder ``attachments/`` of the session."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from drivers.core.errors import SessionError
+
+FOLDER, NOTES = "attachments", "notes.txt"
+LARGEST_BYTES = 50_000_000
+"""A file that is attached may not be larger."""
+
+
+class Attachments:
+    """The folder of a session for what a person adds.
+
+    Args:
+        session_folder: of the session; nothing is made before something is added.
+    """
+
+    def __init__(self, session_folder: Path) -> None:
+        self.folder = session_folder / FOLDER
+
+    def note(self, text: str) -> None:
+        """Append a line to the notes, on the disk when this returns. Raises SessionError."""
+        line = " ".join(text.split())
+        try:
+            self.folder.mkdir(exist_ok=True)
+            with (self.folder / NOTES).open("a", encoding="utf-8") as notes:
+                notes.write(f"{line}\n")
+                notes.flush()
+                os.fsync(notes.fileno())
+        except OSError as error:
+            raise SessionError(f"the note cannot be kept ({error.strerror})", where=str(self.folder)) from error
+
+    def picture(self, name: str, image: Any) -> str:
+        """Keep a picture (rows, columns[, 3], uint8) as PNG; gives its name. Raises SessionError."""
+        encoded, data = cv2.imencode(".png", image)
+        if not encoded:
+            raise SessionError("the picture cannot be encoded", where=name)
+        self._write(name, data.tobytes())
+        return name
+
+    def file(self, source: str) -> str:
+        """Copy a file in, under its own name or that with a number; gives the name. Raises SessionError."""
+        path = Path(source).expanduser()
+        try:
+            status = path.stat()
+            if not stat.S_ISREG(status.st_mode):
+                raise SessionError("not a file", where=source, hint="Name one file")
+            if status.st_size > LARGEST_BYTES:
+                text = f"{status.st_size / 1e6:.0f} MB, more than {LARGEST_BYTES / 1e6:.0f}"
+                raise SessionError(text, where=source, hint="Keep it elsewhere and leave a note")
+            self.folder.mkdir(exist_ok=True)
+            name = self._free_name(path.name)
+            shutil.copyfile(path, self.folder / name)
+        except OSError as error:
+            raise SessionError(f"cannot be attached ({error.strerror})", where=source) from error
+        return name
+
+    def _free_name(self, name: str) -> str:
+        stem, suffix, number = Path(name).stem, Path(name).suffix, 1
+        while (self.folder / name).exists():
+            number += 1
+            name = f"{stem}-{number}{suffix}"
+        return name
+
+    def _write(self, name: str, data: bytes) -> None:
+        try:
+            self.folder.mkdir(exist_ok=True)
+            (self.folder / name).write_bytes(data)
+        except OSError as error:
+            raise SessionError(f"cannot be kept ({error.strerror})", where=str(self.folder / name)) from error

@@ -1,0 +1,150 @@
+"""Finding sessions and telling what is in them, broken ones included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.core.errors import SessionError
+from sessions.recording.manifest import MANIFEST
+from sessions.recording.session import TRAFFIC, Session
+from sessions.recording.session_ids import recovered_id
+from sessions.recording.traffic.mcap_frames import ends_well
+from sessions.recording.traffic.reader import segment_paths
+
+
+@dataclass(frozen=True)
+class SessionSummary:
+    """One line of a list of sessions.
+
+    Attributes:
+        status: that of the manifest, where ``open`` means that it is being recorded; or ``damaged``: left open by a
+            crash, torn, or not readable.
+        grasps: number of grasps, when the session was closed.
+        traffic_bytes: size of the traffic file, 0 when there is none.
+        data_loss: something was lost, by the manifest.
+        problem: why it cannot be read, why it failed, or what to do about the damage; else empty.
+        readable: its manifest can be read.
+        left_open: a crash ended it.
+        derived: how it was made of a recorded one (``piece``, ``import``, ``recovered``); empty for a recording.
+        recorded_here: it is a recording, or one's recovery, and may be the last one.
+    """
+
+    name: str
+    folder: Path
+    status: str
+    rig: str = ""
+    object_name: str = ""
+    started_utc: str = ""
+    grasps: int | None = None
+    traffic_bytes: int = 0
+    data_loss: bool = False
+    problem: str = ""
+    readable: bool = True
+    left_open: bool = False
+    derived: tuple[str, ...] = ()
+    recorded_here: bool = True
+
+
+def summarize(folder: Path) -> SessionSummary:
+    """What a session folder holds; a manifest that cannot be read is told, not raised."""
+    traffic = folder / TRAFFIC
+    size = sum(path.stat().st_size for path in segment_paths(traffic) if path.is_file())
+    try:
+        session = Session.open(folder)
+    except SessionError as error:
+        return SessionSummary(folder.name, folder, "damaged", traffic_bytes=size, problem=str(error), readable=False)
+    manifest, damage = session.manifest, _damage(session)
+    return SessionSummary(
+        name=manifest.name,
+        folder=folder,
+        status="damaged" if damage else manifest.status,
+        rig=manifest.rig,
+        object_name=manifest.object_name,
+        started_utc=manifest.started_utc,
+        grasps=manifest.counts.get("grasps"),
+        traffic_bytes=size,
+        data_loss=bool(manifest.data_loss),
+        problem=damage or manifest.problem,
+        left_open=manifest.status == "open" and not session.being_recorded,
+        derived=tuple(step.how for step in manifest.derived),
+        recorded_here=manifest.recorded_here,
+    )
+
+
+def _damage(session: Session) -> str:
+    """What is wrong with a recording, as far as a glance at its end shows; empty when nothing is."""
+    advice = f"tactile-lab session recover {session.folder}"
+    if session.manifest.status == "open":
+        return "" if session.being_recorded else f"left open by a crash. Recover it: {advice}"
+    if session.manifest.status == "failed":  # told by its own problem
+        return ""
+    last = segment_paths(session.folder / TRAFFIC)[-1]
+    if not last.is_file():
+        return f"{last.name} is missing"
+    return "" if ends_well(last) else f"{last.name} is cut off. Recover what there is: {advice}"
+
+
+def left_open(root: Path) -> list[SessionSummary]:
+    """The sessions under ``root`` that a crash left open, without those that were recovered already."""
+    try:
+        found = list_sessions(root)
+    except SessionError:
+        return []  # whoever wants to write there is told why that is not possible
+    names = {item.folder.name for item in found}
+    return [item for item in found if item.left_open and recovered_id(item.folder.name) not in names]
+
+
+def list_sessions(root: Path) -> list[SessionSummary]:
+    """All sessions directly under ``root``, by the time of their recording, oldest first; none without the folder.
+
+    What was made of a recording stands behind it.
+
+    Raises:
+        SessionError: ``root`` is not a folder that can be read.
+    """
+    if not root.exists():
+        return []
+    try:
+        folders = sorted(
+            entry for entry in root.iterdir() if (entry / MANIFEST).is_file() or (entry / TRAFFIC).is_file()
+        )
+    except OSError as error:
+        raise SessionError(f"cannot be read ({error.strerror})", where=str(root)) from error
+    return sorted(map(summarize, folders), key=lambda item: (item.started_utc, len(item.derived), item.name))
+
+
+def find_session(root: Path, name: str) -> Session:
+    """A session by its folder's path, by its name under ``root``, or ``last``.
+
+    ``last`` is the session whose recording under ``root`` began last; its recovery stands in for a torn one. Pieces and
+    imports are never meant: they carry the time of a recording made earlier or elsewhere, by another clock, and
+    whoever made one has its name.
+
+    Raises:
+        SessionError: there is none, or its manifest cannot be read.
+    """
+    return Session.open(session_folder(root, name))
+
+
+def session_folder(root: Path, name: str) -> Path:
+    """The folder of a session, which need not be whole; named as for :func:`find_session`. Raises SessionError."""
+    if name == "last":
+        return _last_recorded(root)
+    folder = root / name if (root / name).is_dir() else Path(name)
+    if not folder.is_dir():
+        raise SessionError("no such session", where=name, hint=f"See: tactile-lab session list --root {root}")
+    return folder
+
+
+def _last_recorded(root: Path) -> Path:
+    readable = [item for item in list_sessions(root) if item.readable]
+    recorded = [item for item in readable if item.recorded_here]
+    if recorded:
+        return recorded[-1].folder
+    if readable:
+        names = ", ".join(item.folder.name for item in readable[-3:])
+        hint = f"'last' means none of them; name one: {names}"
+        what = "no session was recorded here, there are only pieces and imports"
+        raise SessionError(what, where=str(root), hint=hint)
+    raise SessionError("no session yet", where=str(root), hint="Record one first: tactile-lab run")

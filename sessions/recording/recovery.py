@@ -1,0 +1,224 @@
+"""What a crash left is made into a whole session again.
+
+A recording that was cut off, or has damaged parts, is read as far as it can be, written into a new session folder and
+counted there. The torn one is never touched. What cannot be brought back is told by topic: messages of damaged parts
+are known from the index behind them; of the last moments only the bound is known, a tenth of a second.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter, deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.core.atomic_files import write_whole
+from drivers.core.clock import NANOSECONDS
+from drivers.core.errors import SessionError
+from sessions.recording.manifest import MANIFEST, Manifest, manifest_from, read_manifest, write_manifest
+from sessions.recording.session import CALIBRATION, RESULTS, TRAFFIC, TRAJECTORY, new_folder
+from sessions.recording.session_ids import recovered_id
+from sessions.recording.traffic.disk import being_written
+from sessions.recording.traffic.reader import Loss, TrafficMessage, TrafficReader
+from sessions.recording.traffic.settings import Attached, TrafficSettings
+from sessions.recording.traffic.writer import TrafficWriter
+
+LAST_MOMENTS_s = 0.1
+"""What a killed program can have recorded without its reaching the file."""
+
+
+@dataclass(frozen=True)
+class TopicRecovery:
+    """What became of one topic.
+
+    Attributes:
+        read: messages brought back.
+        lost: messages known to be lost.
+        at_most_more: messages of the last moments that may be lost beside them, by the rate before.
+        last_s: stamp of the last message brought back, session clock, seconds.
+    """
+
+    read: int
+    lost: int
+    at_most_more: int
+    last_s: float
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """What became of a session.
+
+    Attributes:
+        source: the folder that was recovered.
+        folder: the new session; None when the old one was whole and nothing was to be done.
+        topics: by topic.
+        loss: what could not be read.
+        left_out: folders of results in the old session, by their names in it: they were made of another recording than
+            the new one, and would pass for its own.
+    """
+
+    source: Path
+    folder: Path | None
+    topics: dict[str, TopicRecovery]
+    loss: Loss
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def lossy(self) -> bool:
+        """Whether anything is lost."""
+        return bool(self.loss)
+
+
+def recover(source: Path, root: Path | None = None) -> Recovery:
+    """Make a whole session of a torn one.
+
+    Args:
+        source: a session's folder.
+        root: folder in which the new session is made; the one of the old session by default.
+
+    Raises:
+        SessionError: it is being recorded at this moment, is no session, holds nothing that can be read, or the new
+            folder cannot be made.
+        WriteError: the new folder cannot be written.
+    """
+    if being_written(source / TRAFFIC):
+        raise SessionError("is being recorded", where=str(source), hint="Wait until that has ended")
+    reader = TrafficReader(source / TRAFFIC)
+    manifest = _manifest(source, reader)
+    if manifest.status not in ("open", "failed") and not _read_through(reader):
+        return Recovery(source, None, {}, reader.loss)
+    folder = new_folder(root or source.parent, recovered_id(source.name))
+    try:
+        return _recover_into(folder, source, manifest, reader)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)  # nothing but what this function has put there
+        raise
+
+
+def _recover_into(folder: Path, source: Path, manifest: Manifest, reader: TrafficReader) -> Recovery:
+    _copy_files(source, folder, reader)
+    written, topics = _copy_traffic(reader, folder)
+    if not written:
+        raise SessionError("holds no message that can be read", where=str(reader.path), hint="Nothing can be recovered")
+    _count_again(folder, written)
+    recovery = Recovery(source, folder, topics, reader.loss, _result_folders(source))
+    write_manifest(folder, _recovered_manifest(manifest, folder, written, recovery))
+    return recovery
+
+
+def _manifest(source: Path, reader: TrafficReader) -> Manifest:
+    """The session's description: the folder's, or where that cannot be read the one kept in the recording."""
+    try:
+        return read_manifest(source)
+    except SessionError:
+        for attachment in reader.attachments():
+            if attachment.name == MANIFEST:
+                return manifest_from(attachment.data, f"{MANIFEST} inside {reader.path}")
+        raise
+
+
+def _read_through(reader: TrafficReader) -> bool:
+    """Read everything once; whether anything is lost."""
+    deque(reader.messages(), maxlen=0)
+    return bool(reader.loss)
+
+
+def _copy_files(source: Path, folder: Path, reader: TrafficReader) -> None:
+    """Everything but recording, description and results; calibrations that are gone come from the recording."""
+    for item in sorted(source.iterdir()):
+        if item.is_symlink() or item.name == MANIFEST or item.suffix in (".mcap", ".part") or _holds_results(item):
+            continue
+        if item.is_dir():
+            shutil.copytree(item, folder / item.name, symlinks=True, ignore=_results_among)
+        else:
+            shutil.copyfile(item, folder / item.name)
+    (folder / CALIBRATION).mkdir(exist_ok=True)
+    for attachment in reader.attachments():
+        kept, _, name = attachment.name.rpartition("/")
+        if kept == CALIBRATION and not (folder / CALIBRATION / name).exists():
+            write_whole(folder / CALIBRATION / name, attachment.data)
+
+
+def _holds_results(item: Path) -> bool:
+    return item.name == RESULTS or (item / TRAJECTORY).is_file()
+
+
+def _results_among(folder: str, names: list[str]) -> list[str]:
+    return [name for name in names if _holds_results(Path(folder) / name)]
+
+
+def _result_folders(source: Path) -> tuple[str, ...]:
+    """Folders with results in them, wherever they are in a session."""
+    return tuple(sorted(path.parent.relative_to(source).as_posix() for path in source.rglob(TRAJECTORY)))
+
+
+def _copy_traffic(reader: TrafficReader, folder: Path) -> tuple[Counter[str], dict[str, TopicRecovery]]:
+    attached = tuple(Attached(item.name, item.media_type, item.data) for item in reader.attachments())
+    info = {key: value for key, value in reader.info.items() if key not in ("format", "segment")}
+    settings = TrafficSettings(tell_streams=False)
+    writer = TrafficWriter(folder / TRAFFIC, info, attachments=attached, settings=settings)
+    rates = _Rates()
+    try:
+        for message in rates.watch(reader.messages()):
+            writer.write(message.topic, message.data, message.stamp_ns, message.device)
+    finally:
+        writer.close({"recovered": "yes", "lost": reader.loss.describe()})
+    return writer.streams.messages, rates.topics(reader.loss)
+
+
+class _Rates:
+    """How many messages each topic had, and how many in its last second."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[str] = Counter()
+        self._recent: dict[str, deque[int]] = {}
+        self._newest_ns = 0
+
+    def watch(self, messages: Iterator[TrafficMessage]) -> Iterator[TrafficMessage]:
+        """The same messages."""
+        for message in messages:
+            self._counts[message.topic] += 1
+            self._newest_ns = max(self._newest_ns, message.stamp_ns)
+            recent = self._recent.setdefault(message.topic, deque(maxlen=20_000))
+            recent.append(message.stamp_ns)
+            while recent[0] < message.stamp_ns - NANOSECONDS:
+                recent.popleft()
+            yield message
+
+    def topics(self, loss: Loss) -> dict[str, TopicRecovery]:
+        """What became of each topic."""
+        since_ns = self._newest_ns - NANOSECONDS
+        found = {}
+        for topic in sorted(self._counts | Counter(loss.by_topic)):
+            recent = self._recent.get(topic, deque())
+            per_second = sum(stamp_ns > since_ns for stamp_ns in recent)
+            last_moments = -(-per_second // round(1 / LAST_MOMENTS_s)) if loss.truncated else 0
+            last_s = recent[-1] / NANOSECONDS if recent else 0.0
+            found[topic] = TopicRecovery(self._counts[topic], loss.by_topic.get(topic, 0), last_moments, last_s)
+        return found
+
+
+def _count_again(folder: Path, written: Counter[str]) -> None:
+    """Open the new recording and compare. Raises SessionError."""
+    reader = TrafficReader(folder / TRAFFIC)
+    found = Counter(message.topic for message in reader.messages())
+    if found != written or reader.loss:
+        what = f"was written, but reads differently: {sum(found.values())} of {sum(written.values())} messages"
+        raise SessionError(what, where=str(reader.path), hint="Check the disk, then recover again")
+
+
+def _recovered_manifest(manifest: Manifest, folder: Path, written: Counter[str], recovery: Recovery) -> Manifest:
+    lost = {f"lost {topic}": item.lost for topic, item in recovery.topics.items() if item.lost}
+    described = recovery.loss.describe()
+    return manifest.model_copy(
+        update={
+            "name": folder.name,
+            "status": "recovered",
+            "ended_utc": manifest.ended_utc,
+            "counts": {**manifest.counts, **dict(sorted(written.items()))},
+            "data_loss": {**manifest.data_loss, **recovery.loss.counts(), **lost},
+            "derived": manifest.derivation("recovered", recovery.source.name),
+            "problem": f"recovered with loss: {described}" if described else "",
+        }
+    )

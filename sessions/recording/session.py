@@ -1,0 +1,288 @@
+"""The session folder: what was done, with what, and everything that was recorded.
+
+::
+
+    20261121-093000-sim-box/
+        session.yaml        written first (status open), closed last
+        calibration/        copies of the calibration files used
+        traffic.mcap        bytes, session events, samples, truth; a long one goes on in traffic-2.mcap
+        truth/object.ply    the object's true mesh, for evaluation only
+        results/            what was made of it
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from drivers.core.atomic_files import write_whole
+from drivers.core.clock import utc_text
+from drivers.core.errors import SessionError
+from sessions.recording.manifest import (
+    MANIFEST,
+    CalibrationCopy,
+    Manifest,
+    Status,
+    installed_versions,
+    read_manifest,
+    write_manifest,
+)
+from sessions.recording.recorder import Recorder
+from sessions.recording.session_ids import LONGEST_ID, slug
+from sessions.recording.traffic.disk import being_written
+from sessions.recording.traffic.raw_frames import Stamper
+from sessions.recording.traffic.reader import TrafficReader
+from sessions.recording.traffic.settings import Attached, TrafficSettings
+from sessions.recording.traffic.writer import TrafficWriter
+
+TRAFFIC, CALIBRATION, RESULTS, TRUTH_MESH = "traffic.mcap", "calibration", "results", "truth/object.ply"
+
+TRAJECTORY = "trajectory.csv"
+"""The file that every folder of results holds, and no other folder."""
+
+
+class Session:
+    """A session folder, new or opened."""
+
+    def __init__(self, folder: Path, manifest: Manifest) -> None:
+        self.folder, self.manifest = folder, manifest
+
+    @classmethod
+    def open(cls, folder: Path) -> Session:
+        """Open an existing session.
+
+        Raises:
+            SessionError: not a session folder, or its ``session.yaml`` cannot be used.
+        """
+        return cls(folder, read_manifest(folder))
+
+    @property
+    def results(self) -> Path:
+        """Folder of results; made when missing. Raises SessionError."""
+        folder = self.folder / RESULTS
+        try:
+            folder.mkdir(exist_ok=True)
+        except OSError as error:
+            hint = "Move what stands in its place"
+            raise SessionError(f"cannot be made ({error.strerror})", where=str(folder), hint=hint) from error
+        return folder
+
+    @property
+    def truth_mesh(self) -> Path | None:
+        """The object's true mesh, if the session has one; for evaluation only."""
+        path = self.folder / TRUTH_MESH
+        return path if path.is_file() else None
+
+    def calibration_file(self, role: str) -> Path:
+        """The copy of a calibration file, checked against its hash.
+
+        Raises:
+            SessionError: there is none for that role, or it was changed since.
+        """
+        if role not in self.manifest.calibration:
+            raise SessionError(f"no calibration called {role!r}", where=str(self.folder / MANIFEST))
+        copy = self.manifest.calibration[role]
+        path = self.folder / CALIBRATION / copy.file
+        if _sha256(_read(path)) != copy.sha256:
+            raise SessionError("changed since it was recorded", where=str(path), hint="Restore the recorded file")
+        return path
+
+    @property
+    def being_recorded(self) -> bool:
+        """Whether a living program is recording into it."""
+        return self.manifest.status == "open" and being_written(self.folder / TRAFFIC)
+
+    def traffic(self) -> TrafficReader:
+        """The recorded traffic. Raises SessionError."""
+        return TrafficReader(self.folder / TRAFFIC)
+
+
+class RunningSession(Session):
+    """A session that is being recorded; a context manager that closes it with the status that fits.
+
+    Leaving the ``with`` block well gives ``closed``, a keyboard interrupt ``interrupted``, another exception
+    ``failed``.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        manifest: Manifest,
+        stampers: Mapping[str, Stamper] | None = None,
+        traffic_settings: TrafficSettings | None = None,
+    ) -> None:
+        super().__init__(folder, manifest)
+        self._traffic = TrafficWriter(
+            folder / TRAFFIC,
+            {"session": manifest.name, "rig": manifest.rig},
+            attachments=_attachments(folder, manifest),
+            stampers=stampers,
+            settings=traffic_settings,
+        )
+        self.recorder = Recorder(self._traffic)
+
+    @property
+    def traffic_sink(self) -> TrafficWriter:
+        """Where its recorder writes."""
+        return self._traffic
+
+    def settle(self) -> None:
+        """Wait until everything that was handed over to the disk is written, or cannot be."""
+        self._traffic.settle()
+
+    def close(
+        self,
+        status: Status = "closed",
+        *,
+        counts: Mapping[str, int] | None = None,
+        data_loss: Mapping[str, int] | None = None,
+        problem: str = "",
+        now: datetime | None = None,
+    ) -> None:
+        """Finish the traffic file and ``session.yaml``; idempotent, the first call counts.
+
+        Args:
+            counts: figures beside those of the messages (grasps, cycles, overruns).
+            data_loss: undecodable messages and the like; zeros are left out. What the recorder itself knows to be
+                lost (gaps, late and dropped messages) is added.
+
+        Raises:
+            WriteError: the folder cannot be written.
+        """
+        if self.manifest.status != "open":
+            return
+        known = {kind: str(number) for kind, number in {**(counts or {}), **(data_loss or {})}.items()}
+        try:
+            self._traffic.close({"status": status, "problem": problem, **known})
+        except SessionError as error:
+            status, problem = "failed", problem or str(error)
+        streams = self._traffic.streams
+        lost = {**(data_loss or {}), **streams.losses(), "traffic_cut_short": int(not self._traffic.complete)}
+        self.manifest = self.manifest.model_copy(
+            update={
+                "status": status,
+                "ended_utc": utc_text(now or datetime.now(UTC)),
+                "counts": {**dict(sorted(streams.messages.items())), **(counts or {})},
+                "streams": streams.plain(),
+                "data_loss": {kind: number for kind, number in lost.items() if number},
+                "problem": problem,
+            }
+        )
+        write_manifest(self.folder, self.manifest)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        elif isinstance(error, KeyboardInterrupt):
+            self.close("interrupted")
+        else:
+            self.close("failed", problem=str(error) or type(error).__name__)
+
+
+def create_session(
+    root: Path,
+    *,
+    rig: str,
+    rig_description: Mapping[str, Any],
+    object_name: str,
+    calibration_files: Mapping[str, Path] | None = None,
+    seeds: Mapping[str, int] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    notes: str = "",
+    truth_mesh_ply: bytes | None = None,
+    started: datetime | None = None,
+    stampers: Mapping[str, Stamper] | None = None,
+    traffic_settings: TrafficSettings | None = None,
+) -> RunningSession:
+    """Make a new session folder under ``root`` and begin recording.
+
+    Args:
+        rig_description, settings: plain data (what a YAML file can hold).
+        calibration_files: role to file; copied with their hashes.
+        truth_mesh_ply: the true mesh as PLY bytes, where the rig knows it.
+        started: time of the start, UTC; now when not given.
+        stampers: by transport, what reads the device's own counter and clock out of its messages.
+        traffic_settings: how the recording is kept; the usual ones suit a rig whose time waits for the disk.
+
+    Raises:
+        SessionError: the folder cannot be made or a calibration file cannot be read.
+        WriteError: the folder cannot be written.
+    """
+    started = started or datetime.now(UTC)
+    folder = new_folder(root, f"{started:%Y%m%d-%H%M%S}-{slug(rig)}-{slug(object_name)}")
+    manifest = Manifest(
+        name=folder.name,
+        status="open",
+        rig=rig,
+        rig_description=dict(rig_description),
+        object_name=object_name,
+        calibration=_copy_calibration(folder, calibration_files or {}),
+        versions=installed_versions(),
+        seeds=dict(seeds or {}),
+        settings=dict(settings or {}),
+        notes=notes,
+        started_utc=utc_text(started),
+    )
+    write_manifest(folder, manifest)
+    (folder / RESULTS).mkdir()
+    if truth_mesh_ply is not None:
+        (folder / TRUTH_MESH).parent.mkdir()
+        write_whole(folder / TRUTH_MESH, truth_mesh_ply)
+    return RunningSession(folder, manifest, stampers, traffic_settings)
+
+
+def _attachments(folder: Path, manifest: Manifest) -> tuple[Attached, ...]:
+    """What the recording itself keeps, so that it can be understood without the folder."""
+    names = [CALIBRATION + "/" + copy.file for copy in manifest.calibration.values()]
+    return tuple(Attached(name, "application/yaml", _read(folder / name)) for name in (MANIFEST, *names))
+
+
+def new_folder(root: Path, name: str) -> Path:
+    """A folder of that name, or of that name with a number behind it, that was not there. Raises SessionError."""
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        for attempt in range(1, 1000):
+            end = "" if attempt == 1 else f"-{attempt}"
+            folder = root / (name[: LONGEST_ID - len(end)].rstrip("-_") + end)
+            try:
+                folder.mkdir()
+            except FileExistsError:
+                continue
+            return folder
+    except OSError as error:
+        raise SessionError(
+            f"cannot be made ({error.strerror})", where=str(root), hint="Choose another folder"
+        ) from error
+    raise SessionError("a thousand sessions of this second exist already", where=str(root / name))
+
+
+def _copy_calibration(folder: Path, files: Mapping[str, Path]) -> dict[str, CalibrationCopy]:
+    (folder / CALIBRATION).mkdir()
+    copies = {}
+    for role, source in files.items():
+        content = _read(source)
+        name = re.sub(r"[^A-Za-z0-9]+", "-", role).strip("-") + source.suffix
+        write_whole(folder / CALIBRATION / name, content)
+        copies[role] = CalibrationCopy(file=name, sha256=_sha256(content))
+    return copies
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise SessionError(f"cannot be read ({error.strerror})", where=str(path)) from error
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

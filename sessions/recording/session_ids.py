@@ -1,0 +1,37 @@
+"""Names of sessions: the folder's name is the session's id."""
+
+from __future__ import annotations
+
+import re
+
+from drivers.core.errors import SessionError
+
+LONGEST_ID = 64
+_ID = re.compile(r"[a-z0-9_-]{1,64}")
+
+
+def check_id(name: str, where: str = "") -> str:
+    """The name, if it is a session's id: 1 to 64 of a-z, 0-9, underscore and hyphen.
+
+    Raises:
+        SessionError: it is not.
+    """
+    if not _ID.fullmatch(name):
+        raise SessionError(
+            f"{name!r} cannot be the name of a session",
+            where=where,
+            hint=f"Names have 1 to {LONGEST_ID} of the characters a-z, 0-9, _ and -",
+        )
+    return name
+
+
+def slug(text: str) -> str:
+    """A part of an id; of a path (``mesh:some/part.stl``) its last part without suffix."""
+    last = re.split(r"[/\\:]", text.strip())[-1]
+    return re.sub(r"[^a-z0-9]+", "-", re.sub(r"\.[a-z0-9]+$", "", last.lower())).strip("-") or "unnamed"
+
+
+def recovered_id(name: str) -> str:
+    """The id of what is recovered from a session."""
+    end = "-recovered"
+    return name[: LONGEST_ID - len(end)] + end

@@ -1,0 +1,1 @@
+"""The traffic file: raw bytes and samples in MCAP, written and read."""

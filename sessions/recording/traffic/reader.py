@@ -1,0 +1,268 @@
+"""Reading a traffic file, whole or torn.
+
+A file that was cut off (killed process, full disk, power cut) has no summary, and its last record may be torn. Every
+complete chunk is read, and :attr:`TrafficReader.loss` says what was not. A chunk that was damaged on the disk is left
+out and counted; the chunks after it are read. A recording in several files is read as one. Recordings of older
+versions are converted while they are read (see :mod:`sessions.recording.traffic.formats`).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.records import Attachment, Channel, Chunk, Header, McapRecord, Message, MessageIndex, Metadata
+from mcap.stream_reader import breakup_chunk
+
+from drivers.core.errors import SessionError
+from sessions.recording.traffic import formats, raw_frames, schemas
+from sessions.recording.traffic.files import END_RECORD, PROFILE, segment_path
+from sessions.recording.traffic.mcap_frames import Frames
+from sessions.recording.traffic.raw_frames import UNSTAMPED, DeviceStamp
+
+_UNREADABLE = (McapError, zstandard.ZstdError, struct.error, ValueError, OverflowError, MemoryError)
+"""What the mcap package raises on damaged content."""
+
+
+@dataclass(frozen=True)
+class TrafficMessage:
+    """One message: topic, bytes, its own stamp (session clock), its number in the file, the device's own stamp."""
+
+    topic: str
+    data: bytes
+    stamp_ns: int
+    sequence: int
+    device: DeviceStamp = UNSTAMPED
+
+
+@dataclass
+class Loss:
+    """What could not be read.
+
+    Attributes:
+        truncated: the file ends too early; the last tenth of a second was never written.
+        unreadable_bytes: bytes after the last complete record.
+        damaged_chunks: chunks left out.
+        missing_messages: gaps in the numbering of what was read.
+        by_topic: messages of damaged chunks whose index could be read, by topic; part of ``missing_messages``.
+    """
+
+    truncated: bool = False
+    unreadable_bytes: int = 0
+    damaged_chunks: int = 0
+    missing_messages: int = 0
+    by_topic: dict[str, int] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return self.truncated or self.damaged_chunks > 0 or self.missing_messages > 0
+
+    def describe(self) -> str:
+        """The loss in words; empty when nothing was lost."""
+        parts = []
+        if self.truncated:
+            torn = f" ({self.unreadable_bytes} bytes of an incomplete record)" if self.unreadable_bytes else ""
+            parts.append(f"the file ends too early{torn}")
+        if self.damaged_chunks:
+            parts.append(f"{self.damaged_chunks} damaged chunks left out")
+        if self.missing_messages:
+            parts.append(f"{self.missing_messages} messages missing")
+        return "; ".join(parts)
+
+    def counts(self) -> dict[str, int]:
+        """The loss as numbers by kind, for a session's record; empty when nothing was lost."""
+        kinds = {
+            "truncated": int(self.truncated),
+            "unreadable_bytes": self.unreadable_bytes,
+            "damaged_chunks": self.damaged_chunks,
+            "missing_messages": self.missing_messages,
+        }
+        return {kind: number for kind, number in kinds.items() if number}
+
+
+class TrafficReader:
+    """Streams the messages of a recording in the order in which they happened.
+
+    Args:
+        path: of its first file; those that follow it stand beside it.
+
+    Raises:
+        SessionError: the file is missing, no MCAP file, not one of a session, or of a version that is not known.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.info: dict[str, str] = {}
+        """What the writer noted about the session."""
+        self.end: dict[str, str] = {}
+        """What the writer noted at the end; complete once :meth:`messages` has been read to the end."""
+        self.loss = Loss()
+        """Complete once :meth:`messages` has been read to the end."""
+        self._convert = self._read_preamble(path)
+
+    def messages(self) -> Iterator[TrafficMessage]:
+        """All messages that can be read, from the beginning."""
+        self.loss, self.end, expected = Loss(), {}, 0
+        for path in segment_paths(self.path):
+            segment = _SegmentMessages(path, self.loss)
+            for topic, message in segment:
+                self.loss.missing_messages += (message.sequence - expected) & 0xFFFFFFFF
+                expected = message.sequence + 1
+                if topic is None:  # its description was in a damaged chunk
+                    self.loss.missing_messages += 1
+                    continue
+                yield self._as_now(topic, message)
+            self.end = segment.end
+        self.loss.truncated |= not self.end and self.info.get("format") != formats.TRAFFIC_FORMATS[0]
+
+    def streams(self) -> dict[str, dict[str, int]]:
+        """What the writer counted on each stream, by its record at the end; empty when there is none."""
+        try:
+            found = json.loads(self.end.get("streams", "{}"))
+        except ValueError:
+            return {}
+        return found if isinstance(found, dict) else {}
+
+    def attachments(self) -> Iterator[Attachment]:
+        """The files kept inside the recording. Raises SessionError."""
+        with _open(self.path) as file:
+            for opcode, content in Frames(file):
+                if opcode == Opcode.CHUNK:
+                    return
+                if opcode == Opcode.ATTACHMENT:
+                    try:
+                        yield Attachment.read(ReadDataStream(BytesIO(content)))
+                    except _UNREADABLE as error:
+                        raise SessionError(f"an attachment is damaged ({error})", where=str(self.path)) from error
+
+    def _as_now(self, topic: str, message: Message) -> TrafficMessage:
+        """A message in the present form, taken out of its envelope."""
+        topic, data, stamp_ns = self._convert((topic, message.data, message.publish_time))
+        if not schemas.is_raw(topic):
+            return TrafficMessage(topic, data, stamp_ns, message.sequence)
+        try:
+            payload, device = raw_frames.decode(data)
+        except ValueError as error:
+            raise SessionError(f"a message of {topic} cannot be read ({error})", where=str(self.path)) from error
+        return TrafficMessage(topic, payload, stamp_ns, message.sequence, device)
+
+    def _read_preamble(self, path: Path) -> Callable[[formats.Message], formats.Message]:
+        with _open(path) as file:
+            frames = Frames(file)
+            if not frames.is_mcap:
+                raise SessionError("not an MCAP file", where=str(path), hint="Restore it from a copy of the session")
+            try:
+                for opcode, content in frames:
+                    if opcode == Opcode.HEADER:
+                        self._check_profile(Header.read(ReadDataStream(BytesIO(content))).profile)
+                    elif opcode == Opcode.METADATA:
+                        self.info = Metadata.read(ReadDataStream(BytesIO(content))).metadata
+                        return formats.traffic_converter(self.info.get("format"), str(path))
+                    else:
+                        return formats.traffic_converter(None, str(path))
+            except _UNREADABLE as error:
+                raise SessionError(f"its beginning is damaged ({error})", where=str(path)) from error
+        return formats.traffic_converter(formats.TRAFFIC_FORMATS[-1], str(path))  # torn before it says anything
+
+    def _check_profile(self, profile: str) -> None:
+        if profile != PROFILE:
+            raise SessionError(
+                f"an MCAP file, but not one of a session (its profile is {profile!r}, not {PROFILE!r})",
+                where=str(self.path),
+                hint="Restore the session's own traffic.mcap",
+            )
+
+
+def segment_paths(path: Path) -> list[Path]:
+    """The files of a recording, in their order; a hole in their numbers shows as missing messages."""
+    numbered = re.compile(rf"{re.escape(path.stem)}-([1-9][0-9]{{0,8}}){re.escape(path.suffix)}")
+    numbers = [int(found[1]) for item in path.parent.glob("*") if (found := numbered.fullmatch(item.name))]
+    return [path, *(segment_path(path, number) for number in sorted(numbers) if number > 1)]
+
+
+class _SegmentMessages:
+    """The messages of one file with their topics (None where that is not known)."""
+
+    def __init__(self, path: Path, loss: Loss) -> None:
+        self.end: dict[str, str] = {}
+        self._path, self._loss = path, loss
+        self._topics: dict[int, str] = {}
+        self._lost: Counter[int] = Counter()
+        self._after_damage = False
+
+    def __iter__(self) -> Iterator[tuple[str | None, Message]]:
+        with _open(self._path) as file:
+            frames = Frames(file)
+            for opcode, content in frames:
+                for record in self._records(opcode, content):
+                    if isinstance(record, Channel):
+                        self._topics[record.id] = record.topic
+                    elif isinstance(record, Message):
+                        yield self._topics.get(record.channel_id), record
+            self._loss.truncated |= not frames.complete
+            self._loss.unreadable_bytes += frames.unreadable_bytes
+            for channel, number in self._lost.items():
+                topic = self._topics.get(channel, f"channel {channel}")
+                self._loss.by_topic[topic] = self._loss.by_topic.get(topic, 0) + number
+
+    def _records(self, opcode: int, content: bytes) -> list[McapRecord]:
+        try:
+            if opcode == Opcode.CHUNK:
+                self._after_damage = True  # until it is read
+                records = breakup_chunk(Chunk.read(ReadDataStream(BytesIO(content))), validate_crc=True)
+                self._after_damage = False
+                return records
+            if opcode == Opcode.MESSAGE_INDEX and self._after_damage:
+                index = MessageIndex.read(ReadDataStream(BytesIO(content)))
+                self._lost[index.channel_id] += len(index.records)
+            elif opcode == Opcode.METADATA:
+                found = Metadata.read(ReadDataStream(BytesIO(content)))
+                self.end = found.metadata if found.name == END_RECORD else self.end
+            elif opcode == Opcode.CHANNEL:  # of the summary: names what damaged chunks described
+                channel = Channel.read(ReadDataStream(BytesIO(content)))
+                self._topics.setdefault(channel.id, channel.topic)
+        except _UNREADABLE:
+            self._loss.damaged_chunks += opcode == Opcode.CHUNK
+        return []
+
+
+def _open(path: Path) -> BinaryIO:
+    try:
+        return path.open("rb")
+    except OSError as error:
+        raise SessionError(
+            f"cannot be opened ({error.strerror})", where=str(path), hint="Check the session folder"
+        ) from error
+
+
+def may_hold(path: Path, topics: Collection[str]) -> bool:
+    """Whether a recording may hold a message of one of these topics.
+
+    Args:
+        path: of its first file.
+        topics: to look for.
+
+    Returns:
+        False only when every file of it has a summary, and none names one of the topics.
+    """
+    return any(_names_one(segment, topics) for segment in segment_paths(path))
+
+
+def _names_one(path: Path, topics: Collection[str]) -> bool:
+    try:
+        with path.open("rb") as file:
+            summary = make_reader(file).get_summary()
+    except (OSError, McapError, ValueError):
+        return True  # whoever reads it will find out
+    return summary is None or any(channel.topic in topics for channel in summary.channels.values())

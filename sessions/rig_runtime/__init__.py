@@ -1,0 +1,1 @@
+"""The connected devices of a rig, run in one common cycle."""

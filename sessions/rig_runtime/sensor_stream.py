@@ -1,0 +1,42 @@
+"""A sensor that sends by itself, on a transport that is tapped."""
+
+from __future__ import annotations
+
+from drivers.core.transports import Transport, link_health
+from sessions.perception.instruments import AskedInstrument, Instrument, NamedInstrument
+
+
+class SensorStream:
+    """A device that sends by itself, emptied without decoding: the tap of its transport has fed Perception already.
+
+    Args:
+        device: what starts and ends the stream.
+        transport: the tapped transport it was built on.
+    """
+
+    def __init__(self, device: Instrument, transport: Transport) -> None:
+        self._device, self._transport = device, transport
+        self._asked = device if isinstance(device, AskedInstrument) else None  # looked up once, not in every cycle
+
+    def connect(self) -> None:
+        """Start the stream. Raises DeviceError."""
+        self._device.connect()
+
+    def close(self) -> None:
+        """End the stream; idempotent."""
+        self._device.close()
+
+    def poll(self) -> None:
+        """Take what waits on the transport, and ask for more where the device needs it. Raises DeviceError."""
+        self._transport.receive()
+        if self._asked is not None:
+            self._asked.ask()
+
+    @property
+    def identity(self) -> str:
+        """See :class:`NamedInstrument`."""
+        return self._device.identity if isinstance(self._device, NamedInstrument) else ""
+
+    def health(self) -> tuple[str, ...]:
+        """What the transport knows to be wrong; of the readings, the decoder that Perception has knows."""
+        return link_health(self._transport)

@@ -1,0 +1,1 @@
+"""Who decides on the hand: planners, candidates, regrasping, and the estimator's service and process."""

@@ -1,0 +1,98 @@
+"""The roles of a session without a person: the hand moves by itself, the planner decides."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivers.shadow.closing.posture import TipEllipsoid
+from sessions.conductor.decisions import SessionRoles
+from sessions.conductor.policy_decisions import Approve, PolicyDecisions, approve_everything, record_choices
+from sessions.motion.bounding_box import BoxProber
+from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.grasp_cycle import GraspCycle
+from sessions.motion.motion import Motion
+from sessions.motion.safety import InterruptGuard, SafetySettings, SafetySupervisor
+from sessions.motion.touching import Toucher
+from sessions.rig_runtime.rig_runtime import RigRuntime
+from tactile_lab.autonomy.closing_tables import solve_closings
+from tactile_lab.autonomy.estimator_process import client_for
+from tactile_lab.autonomy.hand_candidates import HandLimits
+from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
+from tactile_lab.autonomy.planner import Planner
+from tactile_lab.autonomy.policy_choice import PolicyChooser
+from tactile_lab.autonomy.settings import SessionSettings
+from tactile_lab.autonomy.slam_service import SlamService
+from tactile_lab.autonomy.variance_planner import ExplorationSettings
+from tactile_lab.slam.exploration.policies import make_policy
+from tactile_lab.slam.tactile_slam import TactileSlam
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+
+
+def autonomous_roles(
+    runtime: RigRuntime,
+    slam: TactileSlam,
+    settings: SessionSettings,
+    *,
+    seed: int = 0,
+    dimension: int = 2,
+    approve: Approve = approve_everything,
+) -> SessionRoles:
+    """The roles of a session without a person: the hand moves by itself, the planner decides.
+
+    Args:
+        rig runtime, slam, settings: of the session.
+        seed: of what is left to chance.
+        dimension: of the estimation.
+        approve: asked before every grasp; refuses what a person does not want.
+
+    Raises:
+        ConfigurationError: there is no policy of the name in the settings.
+    """
+    supervisor = SafetySupervisor(runtime, settings.safety, runtime.cycle_ns)
+    tip, window = tip_shape(runtime), settings.plan.yaw_window_rad
+    solve_closings(runtime.clock, settings, tip, dimension)
+    motion = Motion(runtime, supervisor)
+    cycle = GraspCycle(motion, settings.cycle, tip, window)
+    planner = planner_for(slam, settings, tip, seed, dimension)
+    client = client_for(runtime.clock, SlamService(slam, planner), cycle.idle)
+    guard = InterruptGuard()
+    decisions = PolicyDecisions(client, record_choices(runtime), approve, guard)
+    if not settings.probing.enabled:
+        return SessionRoles(supervisor, cycle, decisions, client, guard=guard)
+    prober = BoxProber(Toucher(motion, settings.cycle, tip), settings.probing, window, settings.plan.start_m)
+    return SessionRoles(supervisor, cycle, decisions, client, prober.feel, guard)
+
+
+def planner_for(slam: TactileSlam, settings: SessionSettings, tip: TipEllipsoid, seed: int, dimension: int) -> Planner:
+    """What chooses the grasps of a session, with the policy of its settings.
+
+    Raises:
+        ConfigurationError: there is no policy of that name.
+    """
+    rule = HeuristicPlanner(settings.plan, np.random.default_rng(seed), dimension)
+    chooser = None
+    if policy := settings.exploration.policy:
+        limits = settings.plan, settings.exploration, settings.cycle, settings.safety
+        chooser = chooser_for(policy, limits, tip, dimension, slam.settings.motion, seed)
+    return Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension, chooser, settings.grasps)
+
+
+def tip_shape(runtime: RigRuntime) -> TipEllipsoid:
+    """The fingertip's shape by calibration; the default one where a rig has none."""
+    for calibration in runtime.fingertip_calibrations.values():
+        return TipEllipsoid(calibration.semi_axes_m, calibration.centre_distal_m)
+    return TipEllipsoid()
+
+
+def chooser_for(
+    policy: str,
+    settings: tuple[PlanSettings, ExplorationSettings, CycleSettings, SafetySettings],
+    tip: TipEllipsoid,
+    dimension: int,
+    noise: MotionNoise,
+    seed: int,
+) -> PolicyChooser:
+    """The policy called ``policy`` over what the hand can do. Raises ConfigurationError if there is none."""
+    plan, exploration, cycle, safety = settings
+    limits = HandLimits(plan, exploration, cycle, safety, tip, dimension)
+    return PolicyChooser(make_policy(policy, exploration.information), limits, noise, np.random.default_rng([seed, 1]))

@@ -1,0 +1,31 @@
+"""The closings of a session, solved before its devices are connected."""
+
+from __future__ import annotations
+
+from itertools import product
+
+from drivers.core.clock import Clock, VirtualClock
+from drivers.shadow.closing.closing import closing
+from drivers.shadow.closing.posture import TipEllipsoid
+from sessions.motion.touching import ROW, TAP, TAP_HEIGHT_m
+from tactile_lab.autonomy.settings import SessionSettings
+
+
+def solve_closings(clock: Clock, settings: SessionSettings, tip: TipEllipsoid, dimension: int) -> None:
+    """Have every table that the session may need in memory; simulated time can wait for each until it is needed.
+
+    A table takes up to a second, in which no cycle would run: the process that plans has its own.
+    """
+    if isinstance(clock, VirtualClock):
+        return
+    plan = settings.plan
+    heights_m = plan.contour_heights_m if dimension == 2 else plan.surface_heights_m
+    wanted = set(product(plan.closings, heights_m))
+    if dimension == 3:
+        wanted.add((TAP.closing, TAP_HEIGHT_m))
+        if (exploration := settings.exploration).policy:
+            wanted |= set(product(exploration.side_closings, exploration.side_heights_m))
+    if settings.probing.enabled:
+        wanted |= {(TAP.closing, TAP_HEIGHT_m), (ROW.closing, settings.cycle.touch.rake_height_m)}
+    for name, height_m in sorted(wanted):
+        closing(name, height_m, tip)

@@ -1,0 +1,269 @@
+"""What the hand can do next around an object as it is estimated now: the real candidates, and why others are none.
+
+A candidate is a grasp frame (every yaw of the arm's window, shifts across it), a closing, a height of the fingertips
+and, where a surface is wanted, perhaps a tap on the top before it, or a hand that leans to one side. Its expected
+contacts follow from the kinematics: round fingertips on the closing's lines against the estimated surface. What the arm
+cannot reach, where the open fingers would come down on the object or the palm rest on it, and what the hand has just
+landed on, is no candidate. What would push the object by a link that feels nothing is marked.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from typing import TypeAlias
+
+import numpy as np
+from gtsam import Pose2
+
+from drivers.core.contacts import FINGERS, Array
+from drivers.shadow.closing.closing import Closing, closing
+from drivers.shadow.closing.collision_spheres import Verdicts
+from drivers.shadow.closing.posture import TipEllipsoid
+from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.motion import GraspFrame
+from sessions.motion.safety import SafetySettings
+from sessions.motion.touching import TAP, TAP_HEIGHT_m
+from tactile_lab.autonomy.collision_check import links_are_clear, standing
+from tactile_lab.autonomy.heuristic_planner import PlanSettings
+from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, closing_rays
+from tactile_lab.slam.exploration.candidates import Candidate, ClosingRays
+from tactile_lab.slam.tracking.contacts.contact_set import planar_rotation
+
+HasRoom: TypeAlias = Callable[[GraspPlan], bool]
+"""Whether nothing that only the session knows of stands against a plan."""
+
+_TAP_FROM_m = 0.025
+"""Height over the object's top that the rays of a tap begin at."""
+
+_PALM_THICKNESS_m = 0.030
+"""Of the palm below its own origin, where the object's top must not be."""
+
+_DESCENT_STEP_m = 0.010
+_OWN_TIME_s = 1.6  # opening, closing and waiting for motors, beside what the settings tell
+
+OUT_OF_REACH = "the arm does not reach there"
+NO_ROOM = "no room for the open hand"
+TOO_TALL = "the object is as high as the palm"
+TOO_HIGH = "the fingers would close above the object"
+LANDED = "the hand has just landed there, or the bounding box is in the way"
+
+
+@dataclass(frozen=True)
+class HandCandidate:
+    """A grasp for the hand, and the same as policies see it."""
+
+    plan: GraspPlan
+    candidate: Candidate
+
+
+@dataclass(frozen=True)
+class Offer:
+    """Everything the hand can do, and how many plans each obstacle ruled out."""
+
+    usable: tuple[HandCandidate, ...]
+    ruled_out: Mapping[str, int]
+
+    @property
+    def obstacles(self) -> str:
+        """Why the others are none, in words."""
+        return ", ".join(f"{count}: {reason}" for reason, count in self.ruled_out.items())
+
+
+@dataclass(frozen=True)
+class HandLimits:
+    """What the candidates of a session have in common."""
+
+    plan: PlanSettings
+    exploration: ExplorationSettings
+    cycle: CycleSettings
+    safety: SafetySettings
+    tip: TipEllipsoid
+    dimension: int
+
+    @property
+    def heights_m(self) -> tuple[float, ...]:
+        """Contact heights."""
+        return self.plan.contour_heights_m if self.dimension == 2 else self.plan.surface_heights_m
+
+    @property
+    def side_closings(self) -> tuple[str, ...]:
+        """Closings with the hand leaning; none for a contour, which is one height's."""
+        return () if self.dimension == 2 else self.exploration.side_closings
+
+
+def anywhere(plan: GraspPlan) -> bool:
+    """There is room for every plan."""
+    return True
+
+
+def offer(
+    limits: HandLimits,
+    known: KnownShape,
+    world_T_object: Pose2,
+    here: GraspFrame | None = None,
+    has_room: HasRoom = anywhere,
+) -> Offer:
+    """The candidates around an object that is expected at ``world_T_object``.
+
+    Args:
+        limits: of the hand.
+        known: the object's shape as estimated.
+        world_T_object: where it is expected, in the table plane.
+        here: where the hand is now, for the time to travel; None where that is not known.
+        has_room: what else stands against a plan (where the hand has just landed on the object).
+    """
+    plans = list(_plans(limits, np.asarray(world_T_object.transformFrom(known.centre_m))))
+    ruled_out: Counter[str] = Counter()
+    tests: list[tuple[str, Callable[[Sequence[GraspPlan]], Verdicts]]] = [
+        (OUT_OF_REACH, lambda some: np.array([_reachable(plan, limits) for plan in some])),
+        (LANDED, lambda some: np.array([has_room(plan) for plan in some])),
+        (TOO_TALL, lambda some: np.array([_palm_is_clear(plan, limits, known) for plan in some])),
+        (TOO_HIGH, lambda some: np.array([_is_below_top(plan, known) for plan in some])),
+        (NO_ROOM, lambda some: _tips_are_clear(some, limits, known, world_T_object)),
+    ]
+    for reason, test in tests:
+        passed = test(plans) if plans else np.empty(0, dtype=bool)
+        if failed := int(np.count_nonzero(~passed)):
+            ruled_out[reason] += failed
+        plans = [plan for plan, fine in zip(plans, passed, strict=True) if fine]
+    tap_from_m = (known.top_height_m or 0.0) + _TAP_FROM_m
+    rays_of = cache(partial(_rays, limits, tap_from_m))  # yaws and shifts of one closing share them
+    marked = zip(plans, _pushing(plans, limits, known, world_T_object), strict=True)
+    usable = tuple(_as_candidate(plan, limits, here, rays_of, bool(pushes)) for plan, pushes in marked)
+    return Offer(usable, dict(ruled_out))
+
+
+def _plans(limits: HandLimits, centre_world_m: Array) -> Iterator[GraspPlan]:
+    """Every combination; a tap only where the hand stands in the middle and at one height, as the rest changes none."""
+    shifts, heights = limits.exploration.shifts_m, limits.heights_m
+    for yaw in np.linspace(*limits.plan.yaw_window_rad, limits.exploration.yaws):
+        for shift in shifts:
+            x, y = centre_world_m + planar_rotation(float(yaw)) @ np.array([0.0, shift])
+            frame = GraspFrame(float(x), float(y), float(yaw))
+            for name in limits.plan.closings:
+                for height_m in heights:
+                    plan = GraspPlan(frame, name, height_m)
+                    yield plan
+                    if limits.dimension == 3 and shift == shifts[len(shifts) // 2] and height_m == heights[0]:
+                        yield replace(plan, tap=True)
+            for name in limits.side_closings:
+                for height_m in limits.exploration.side_heights_m:
+                    yield GraspPlan(frame, name, height_m)
+
+
+def table_of(plan: GraspPlan, tip: TipEllipsoid) -> Closing:
+    """The closing of a plan."""
+    return closing(plan.closing, plan.height_m, tip)
+
+
+def _reachable(plan: GraspPlan, limits: HandLimits) -> bool:
+    """Whether the palm stays in the workspace that the safety supervisor watches."""
+    palm = plan.frame.pose * table_of(plan, limits.tip).grasp_T_palm
+    centre = np.array(limits.safety.workspace_centre_m)
+    return float(np.linalg.norm(np.asarray(palm.translation())[:2] - centre)) < limits.safety.workspace_radius_m
+
+
+def _palm_is_clear(plan: GraspPlan, limits: HandLimits, known: KnownShape) -> bool:
+    if known.top_height_m is None:
+        return True
+    return float(table_of(plan, limits.tip).grasp_T_palm.z()) - _PALM_THICKNESS_m > known.top_height_m
+
+
+def _is_below_top(plan: GraspPlan, known: KnownShape) -> bool:
+    return known.top_height_m is None or plan.height_m < known.top_height_m
+
+
+def _tips_are_clear(plans: Sequence[GraspPlan], limits: HandLimits, known: KnownShape, pose: Pose2) -> Verdicts:
+    """Whether the open fingertips come down clear of the estimated surface, all the way, and of its uncertainty."""
+    starts_m = np.array([_open_tips_m(plan, limits.tip) for plan in plans])
+    turn, place = planar_rotation(float(pose.theta())), np.array([pose.x(), pose.y()])
+    flat_m = (starts_m[..., :2] - place) @ turn
+    if known.dimension == 2:
+        places_m = flat_m[:, None]
+    else:
+        highest_m = max(known.top_height_m or 0.0, 0.0) + limits.exploration.clearance_m
+        above_m = np.arange(0.0, max(highest_m - starts_m[..., 2].min(), _DESCENT_STEP_m), _DESCENT_STEP_m)
+        heights_m = starts_m[:, None, :, 2] + above_m[None, :, None] - known.origin_height_m
+        level_m = np.broadcast_to(flat_m[:, None], (*heights_m.shape, 2))
+        places_m = np.concatenate([level_m, heights_m[..., None]], axis=-1)
+    clear = _are_clear(places_m.reshape(-1, known.dimension), limits.exploration, known)
+    return np.asarray(clear.reshape(len(plans), -1).all(axis=1))
+
+
+def _are_clear(places_m: Array, settings: ExplorationSettings, known: KnownShape) -> Verdicts:
+    """Which places keep clear of the surface; its uncertainty is asked where it decides, as it is dear."""
+    spare_m = known.field.predict(places_m).mean_m - settings.clearance_m
+    clear = spare_m > settings.caution * settings.clearance_m
+    decisive = (spare_m > 0.0) & ~clear
+    if decisive.any():
+        sigma_m = np.minimum(np.sqrt(known.field.variance(places_m[decisive])), settings.clearance_m)
+        clear[decisive] = spare_m[decisive] > settings.caution * sigma_m
+    return np.asarray(clear)
+
+
+def _pushing(plans: Sequence[GraspPlan], limits: HandLimits, known: KnownShape, world_T_object: Pose2) -> Verdicts:
+    """Which plans have a link above the fingertips in the object."""
+    target = standing(known, world_T_object, limits.plan.contour_top_m)
+    if target is None:
+        return np.zeros(len(plans), dtype=bool)
+    return ~links_are_clear(plans, limits.tip, target)
+
+
+def _open_tips_m(plan: GraspPlan, tip: TipEllipsoid) -> Array:
+    """Centres of the open hand's tips, world frame, shape (5, 3)."""
+    paths = table_of(plan, tip).paths
+    return np.array([plan.frame.pose.transformFrom(paths[f].centre_m(paths[f].valid[0])) for f in FINGERS])
+
+
+# --- what policies see ---------------------------------------------------------------------------------------------
+
+
+def _as_candidate(
+    plan: GraspPlan, limits: HandLimits, here: GraspFrame | None, rays_of: Callable[..., ClosingRays], pushes: bool
+) -> HandCandidate:
+    frame, rays = plan.frame, rays_of(plan.closing, plan.height_m, plan.tap)
+    pose = Pose2(frame.x_m, frame.y_m, frame.yaw_rad)
+    return HandCandidate(plan, Candidate(pose, plan.closing, rays, grasp_time_s(plan, limits.cycle, here), pushes))
+
+
+def _rays(limits: HandLimits, tap_from_m: float, name: str, height_m: float, tap: bool) -> ClosingRays:
+    rays = closing_rays(closing(name, height_m, limits.tip))
+    return _with_tap(rays, tap, tap_from_m, limits.tip) if limits.dimension == 3 else rays
+
+
+def _with_tap(rays: ClosingRays, taps: bool, from_m: float, tip: TipEllipsoid) -> ClosingRays:
+    """The rays with those of a tap behind them; without a tap these have no length, so that all plans have as many."""
+    table = closing(TAP.closing, TAP_HEIGHT_m, tip)
+    above_m = np.array([table.path(finger).centre_m(TAP.progress[finger]) for finger in FINGERS])
+    above_m[:, 2] = from_m
+    return ClosingRays(
+        fingers=(*rays.fingers, *FINGERS),
+        starts_m=np.vstack([rays.starts_m, above_m]),
+        directions=np.vstack([rays.directions, np.tile([0.0, 0.0, -1.0], (len(FINGERS), 1))]),
+        lengths_m=np.append(rays.lengths_m, np.full(len(FINGERS), from_m if taps else 0.0)),
+        radius_m=rays.radius_m,
+    )
+
+
+def grasp_time_s(plan: GraspPlan, cycle: CycleSettings, here: GraspFrame | None) -> float:
+    """How long a grasp takes from where the hand is, until the object is let go again."""
+    travel_s = 0.0
+    if here is not None:
+        way_m = float(np.hypot(plan.frame.x_m - here.x_m, plan.frame.y_m - here.y_m))
+        turn_rad = abs(plan.frame.yaw_rad - here.yaw_rad)
+        travel_s = max(way_m / cycle.travel_m_s, turn_rad / cycle.turn_rad_s)
+    down_and_up_s = cycle.lift_m / cycle.descent_m_s + cycle.lift_m / cycle.travel_m_s
+    closing_s = 0.05 / cycle.closing_m_s
+    rests_s = 4 * cycle.rest_s + cycle.settle_s + cycle.capture_s + cycle.squeeze_s
+    return travel_s + down_and_up_s + closing_s + rests_s + _OWN_TIME_s + (tap_time_s(cycle) if plan.tap else 0.0)
+
+
+def tap_time_s(cycle: CycleSettings) -> float:
+    """How long a tap on the top takes beside the grasp that follows it."""
+    touch = cycle.touch
+    moving_s = cycle.lift_m / touch.tap_m_s + cycle.lift_m / cycle.travel_m_s
+    return moving_s + cycle.rest_s + touch.press_s + touch.capture_s + _OWN_TIME_s / 2

@@ -1,0 +1,171 @@
+"""Where to grasp next, as far as the hand's own contacts tell it.
+
+The first grasps of a session, and all grasps after the estimation has lost the object, follow a fixed rule: the grasp
+frame goes where the last contacts say that the object is, the yaw alternates between both sides of the arm's window,
+the closings alternate too. :mod:`tactile_lab.autonomy.variance_planner` chooses better once there is an estimate to
+choose by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from drivers.core.configuration import StrictModel
+from drivers.core.contacts import Array, Grasp
+from drivers.core.poses import transform_points
+from drivers.shadow.closing.closing import PRESHAPES
+from sessions.motion.grasp_plan import ContactHeight, GraspPlan
+from sessions.motion.motion import GraspFrame
+
+
+class PlanSettings(StrictModel):
+    """What may be grasped, and how.
+
+    Attributes:
+        closings: closings to alternate between; radial first, as its contacts tell the pose of the object frame
+            that is born then, while a pinch leaves the place along the fingers open.
+        contour_heights_m: heights of the fingertip centres above the table, in turn, when a contour is wanted.
+        surface_heights_m: the same when the whole surface is wanted; what does not fit the object's height is left out
+            as soon as its top was felt.
+        contour_top_m: height that objects are taken to have where a contour is wanted: nothing feels their top then.
+        yaw_window_rad: lowest and highest yaw of the grasp frame that the arm can reach.
+        start_m: where the object is expected before the first grasp, world x, y.
+        turn_rad: smallest and largest re-orientation.
+        return_m: largest step back toward ``start_m`` while the object is carried.
+        tap_every: every so many grasps begins with a tap on the top when the whole surface is wanted; 0 never.
+    """
+
+    closings: tuple[str, ...] = Field(default=("radial", "pinch"), min_length=1)
+    contour_heights_m: tuple[ContactHeight, ...] = Field(default=(0.034,), min_length=1)
+    surface_heights_m: tuple[ContactHeight, ...] = Field(default=(0.034, 0.018, 0.048), min_length=1)
+    contour_top_m: float = Field(default=0.05, gt=0.0)
+    yaw_window_rad: tuple[float, float] = (-1.31, 1.31)
+    start_m: tuple[float, float] = (0.0, 0.0)
+    turn_rad: tuple[float, float] = (0.23, 0.79)
+    return_m: float = Field(default=0.03, ge=0.0)
+    tap_every: int = Field(default=2, ge=0)
+
+    @model_validator(mode="after")
+    def _sensible(self) -> PlanSettings:
+        if unknown := sorted(set(self.closings) - set(PRESHAPES)):
+            raise ValueError(f"closings {unknown} are not known; choose from {', '.join(PRESHAPES)}")
+        if not self.yaw_window_rad[0] < self.yaw_window_rad[1]:
+            raise ValueError("the yaw window's first value must be the smaller one")
+        if not 0.0 <= self.turn_rad[0] <= self.turn_rad[1]:
+            raise ValueError("the re-orientation's first value must be the smaller one, and not negative")
+        return self
+
+
+_OTHER_YAWS = 12
+_BELOW_TOP_m, _ROOM_m = 0.005, 0.033  # above the fingertips' centres, the lowest proximal link being 33 mm higher
+_TYPICAL_HALF_WIDTH_m = 0.030  # between one side's contacts and the middle, where only one side touches
+_MISSED_SIDE_m = {"FF": -0.012, "MF": -0.004, "RF": 0.004, "LF": 0.012}  # a finger that met nothing: object is aside
+
+
+def contact_centre(grasp: Grasp, plan: GraspPlan) -> Array:
+    """Where the middle of the object is, world x, y, from one grasp's contacts alone.
+
+    Across the hand it is midway between thumb and fingers; along it, midway between first and little finger where
+    they close from the sides, else away from the fingers that met nothing.
+    """
+    frame = plan.frame.pose
+    closed = [contact for contact in grasp.contacts if not contact.probed]
+    points_m = transform_points(frame.inverse(), np.array([c.point_world_m for c in closed]).reshape(-1, 3))[:, :2]
+    touched = dict(zip((contact.finger for contact in closed), points_m, strict=True))
+    centre_m = np.array([_across(touched), _along(touched, plan.closing), 0.0])
+    return np.asarray(transform_points(frame, centre_m[None])[0, :2])
+
+
+def _across(touched: dict[str, Array]) -> float:
+    fronts = [point[0] for finger, point in touched.items() if finger != "TH"]
+    match bool(fronts), "TH" in touched:
+        case True, True:
+            return float(max(fronts) + touched["TH"][0]) / 2
+        case True, False:
+            return float(np.mean(fronts)) - _TYPICAL_HALF_WIDTH_m
+        case False, True:
+            return float(touched["TH"][0]) + _TYPICAL_HALF_WIDTH_m
+        case _:
+            return 0.0
+
+
+def _along(touched: dict[str, Array], closing: str) -> float:
+    if not touched:
+        return 0.0
+    if closing == "radial" and {"FF", "LF"} <= set(touched):
+        return float(touched["FF"][1] + touched["LF"][1]) / 2
+    return sum(shift for finger, shift in _MISSED_SIDE_m.items() if finger not in touched)
+
+
+class HeuristicPlanner:
+    """Plans grasps and re-orientations without an estimate of the shape.
+
+    Args:
+        settings: what may be grasped.
+        rng: the session's own source of chance.
+        dimension: 2 when a contour is wanted, 3 for a surface.
+    """
+
+    def __init__(self, settings: PlanSettings, rng: np.random.Generator, dimension: int = 2) -> None:
+        self.settings, self._rng = settings, rng
+        self._wants_top = dimension == 3
+        self._heights_m = settings.contour_heights_m if dimension == 2 else settings.surface_heights_m
+        self.centre_m: Array = np.array(settings.start_m)
+        """Where the object is thought to be, world x, y."""
+
+        self.top_m: float | None = None
+        """Height of its top over the table, where that was felt."""
+
+    def plan(self, index: int, has_room: Callable[[GraspPlan], bool] = lambda plan: True) -> GraspPlan:
+        """The grasp number ``index``, from 0: on the side whose turn it is, or wherever else there is room."""
+        side = 0.53 if index % 2 else -0.53
+        plan = self._at(index, side + self._rng.uniform(-0.19, 0.19), "alternating yaw")
+        for _ in range(_OTHER_YAWS):
+            if has_room(plan):
+                break
+            plan = self._at(index, self._rng.uniform(-1.0, 1.0), "a yaw with room for the hand")
+        return plan
+
+    def _at(self, index: int, place: float, reason: str) -> GraspPlan:
+        """A grasp at a place in the yaw window, from -1 to 1."""
+        low, high = self.settings.yaw_window_rad
+        yaw = (low + high) / 2 + place * (high - low) / 2
+        frame = GraspFrame(float(self.centre_m[0]), float(self.centre_m[1]), float(yaw))
+        return GraspPlan(frame, self.closing(index), self.height_m(index), reason)
+
+    def closing(self, index: int) -> str:
+        """The closing whose turn it is: each twice, so that it meets both sides of the window."""
+        return self.settings.closings[(index // 2) % len(self.settings.closings)]
+
+    def taps(self, index: int) -> bool:
+        """Whether the grasp begins with a tap on the top."""
+        return self._wants_top and self.settings.tap_every > 0 and index % self.settings.tap_every == 0
+
+    def height_m(self, index: int) -> float:
+        """The contact height whose turn it is, among those at which the hand has room over the object."""
+        heights_m, top_m = self._heights_m, self.top_m
+        if top_m is not None:
+            fitting_m = [height_m for height_m in heights_m if height_m + _BELOW_TOP_m < top_m < height_m + _ROOM_m]
+            heights_m = tuple(fitting_m) or (min(heights_m, key=lambda height_m: abs(height_m - top_m)),)
+        return heights_m[(index + index // 4) % len(heights_m)]
+
+    def turn(self, yaw_rad: float) -> float:
+        """A re-orientation that keeps the hand in its yaw window."""
+        low, high = self.settings.yaw_window_rad
+        least, most = self.settings.turn_rad
+        size = float(self._rng.uniform(least, most))
+        if yaw_rad + size <= high:
+            return size
+        if yaw_rad - size >= low:
+            return -size
+        room_up, room_down = max(0.0, high - yaw_rad), max(0.0, yaw_rad - low)
+        return room_up if room_up >= room_down else -room_down
+
+    def step_back(self, centre_m: Array) -> Array:
+        """Shift (2,) in the world that brings an object at ``centre_m`` nearer to where it started."""
+        step_m = np.array(self.settings.start_m) - centre_m
+        size_m = float(np.linalg.norm(step_m))
+        return np.asarray(step_m * min(1.0, self.settings.return_m / size_m)) if size_m > 0 else step_m

@@ -1,0 +1,248 @@
+"""The planner: chooses every grasp of a session, by the estimate where there is one, else by the fixed rule."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from gtsam import Pose2, Pose3
+
+from drivers.core.contacts import FINGERS, Array, Grasp
+from drivers.core.poses import planar
+from drivers.shadow.closing.closing import Closing, closing
+from drivers.shadow.closing.posture import TipEllipsoid
+from sessions.conductor.estimator import Reorientation
+from sessions.motion.bounding_box import BoundingBox
+from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.motion import GraspFrame
+from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
+from tactile_lab.autonomy.policy_choice import Choice, Knowledge, PolicyChooser
+from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, choose_grasp, known_shape
+from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
+from tactile_lab.slam.tactile_slam import TactileSlam
+
+_LANDING_m = 0.020
+"""An open fingertip's centre must stay this far from where one has landed on the object."""
+
+_UPWARD = 0.7
+"""Least vertical part of the normal of a contact on the object's top."""
+
+_LEAST_BY_POLICY = 2
+"""A policy may be after few contacts; with fewer than that the object is not where it was expected."""
+
+
+class Planner:
+    """Where to grasp, and how to carry the object then.
+
+    Args:
+        slam: the estimation.
+        rule: plans where there is no estimate.
+        exploration: the candidates of the estimate.
+        fixed_grasps: so many grasps follow the rule in any case.
+        tip: shape of the fingertips.
+        dimension: the estimation's, 2 or 3.
+        chooser: the policy that chooses where there is an estimate; None for the reward of equation 4.20 alone.
+        grasps: how many the session may make, for the policy.
+    """
+
+    def __init__(
+        self,
+        slam: TactileSlam,
+        rule: HeuristicPlanner,
+        exploration: ExplorationSettings,
+        fixed_grasps: int,
+        tip: TipEllipsoid,
+        dimension: int,
+        chooser: PolicyChooser | None = None,
+        grasps: int | None = None,
+    ) -> None:
+        self._slam, self._rule, self._exploration = slam, rule, exploration
+        self._fixed_grasps, self._tip, self._dimension = fixed_grasps, tip, dimension
+        self._known: tuple[Gpis, KnownShape] | None = None
+        self._hand_motion = Pose3()
+        self._landings_m: list[Array] = []
+        self._by_estimate = False
+        self._doubted = False
+        self._chooser, self._grasps = chooser, grasps
+        self._here: GraspFrame | None = None
+        self._carried = False
+        self._box: BoundingBox | None = None
+        self.choice: Choice | None = None
+        """The policy's decision about the grasp that comes next; None where the policy was not asked."""
+
+    @property
+    def centre_m(self) -> Array:
+        """Where the middle of the object is thought to be, world x, y."""
+        return self._rule.centre_m
+
+    @property
+    def settings(self) -> PlanSettings:
+        """What may be grasped."""
+        return self._rule.settings
+
+    # --- the next grasp ----------------------------------------------------------------------------------------
+
+    def plan(self, index: int) -> GraspPlan:
+        """The grasp number ``index``, from 0, clear of all places where the hand has landed on the object.
+
+        After a grasp that the estimate had chosen and that missed the object with some fingers, the contacts' own
+        word counts for one grasp.
+        """
+        trusted, self.choice = index >= self._fixed_grasps and not self._doubted, None
+        if trusted and self._chooser is not None:
+            return self._by_policy(index, self._chooser)
+        chosen = self._best_by_estimate(index) if trusted else None
+        self._by_estimate = chosen is not None
+        return replace(chosen or self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
+
+    def replan(self, index: int) -> GraspPlan:
+        """Another plan for the same grasp, after a person has refused the last one."""
+        if self.choice is None or self.choice.decision.chosen is None:
+            plan = replace(self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
+            return replace(plan, reason=f"{plan.reason}, as the last was vetoed")
+        self.choice = self.choice.without_chosen()
+        return self._plan_of(self.choice, index)
+
+    def _by_policy(self, index: int, chooser: PolicyChooser) -> GraspPlan:
+        """The policy's choice; the fixed rule where it has none, and where there is nothing to choose by."""
+        knowledge = self._knowledge(index)
+        if knowledge is None:
+            self._by_estimate = False
+            return replace(self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
+        self.choice = chooser.choose(index + 1, knowledge, self._has_room)
+        return self._plan_of(self.choice, index)
+
+    def _plan_of(self, choice: Choice, index: int) -> GraspPlan:
+        plan, self._by_estimate = choice.plan, choice.plan is not None
+        knowledge = self._knowledge(index)
+        if plan is not None and self._chooser is not None and knowledge is not None:
+            self._chooser.on_decision(choice, knowledge)
+            return plan
+        rule = self._rule.plan(index, self._has_room)
+        return replace(rule, tap=self._rule.taps(index), reason=f"{rule.reason}, as {choice.decision.reason}")
+
+    def _knowledge(self, index: int) -> Knowledge | None:
+        known, expected, covariance = self.known_shape(), self._expected_pose(), self._slam.pose_covariance
+        if known is None or expected is None or covariance is None or self._chooser is None:
+            return None
+        left = None if self._grasps is None else self._grasps - index
+        spread = self._chooser.spread(covariance, self._carried)
+        return Knowledge(known, expected, spread, self._slam.surface_grasps, left, self._here)
+
+    def on_bounding_box(self, box: BoundingBox) -> None:
+        """Take note of the bounding box: the object is in its middle, and open fingers keep out of it.
+
+        It counts until the estimate takes over: every time the object is carried it slips within the box.
+        """
+        self._box = box
+        if box.is_found:
+            self._rule.centre_m = box.centre_world_m
+
+    def on_landings(self, points_world_m: list[Array]) -> None:
+        """Take note of where fingertips stood on the object; it counts until the object has been moved."""
+        self._landings_m += points_world_m
+
+    def _best_by_estimate(self, index: int) -> GraspPlan | None:
+        known, expected = self.known_shape(), self._expected_pose()
+        if known is None or expected is None:
+            return None
+        height_m, settings = self._rule.height_m(index), self._rule.settings
+
+        def table(name: str) -> Closing:
+            return closing(name, height_m, self._tip)
+
+        return choose_grasp(
+            known, expected, settings.closings, table, settings.yaw_window_rad, self._exploration, self._has_room
+        )
+
+    def _expected_pose(self) -> Pose2 | None:
+        """Where the object is after it was carried; None where it is not known."""
+        pose = self._slam.world_T_object
+        return None if pose is None or self._slam.is_lost else planar(self._hand_motion * pose)
+
+    def _has_room(self, plan: GraspPlan) -> bool:
+        if not self._landings_m and self._box is None:
+            return True
+        paths = closing(plan.closing, plan.height_m, self._tip).paths
+        open_m = np.array([plan.frame.pose.transformFrom(paths[f].centre_m(paths[f].valid[0])) for f in FINGERS])
+        if self._box is not None and not self._box.is_clear(open_m[:, :2]):
+            return False
+        apart_m = open_m[:, None, :2] - np.array(self._landings_m).reshape(-1, 3)[None, :, :2]
+        return bool(np.linalg.norm(apart_m, axis=-1).min(initial=np.inf) >= _LANDING_m)
+
+    # --- carrying ----------------------------------------------------------------------------------------------
+
+    def on_grasp(self, grasp: Grasp, plan: GraspPlan) -> Reorientation:
+        """Take note of a captured grasp; how the object should be carried from there."""
+        least = self._exploration.least_contacts if self._chooser is None else _LEAST_BY_POLICY
+        self._doubted = self._by_estimate and len(grasp.touching) < least
+        if grasp.touching and (self._doubted or not self._by_estimate):
+            self._rule.centre_m = contact_centre(grasp, plan)
+        if tops_m := [float(c.point_world_m[2]) for c in grasp.contacts if c.probed and c.normal_world[2] > _UPWARD]:
+            self._rule.top_m = max(tops_m)
+        turn_rad = self._turn(grasp, plan)
+        self._hand_motion, self._here = Pose3(), plan.frame
+        shift_m = np.zeros(2) if turn_rad is None else self._rule.step_back(self.centre_m)
+        return Reorientation(turn_rad or 0.0, shift_m)
+
+    def _turn(self, grasp: Grasp, plan: GraspPlan) -> float | None:
+        """How far to turn the object, None to leave it: as the policy would have it, where there is one to ask."""
+        turn_rad = self._rule.turn(plan.frame.yaw_rad)
+        if self._chooser is None:
+            return turn_rad
+        self._chooser.on_grasp(grasp)
+        knowledge = self._knowledge(grasp.index) if grasp.index >= self._fixed_grasps else None
+        covariance = self._slam.pose_covariance
+        if knowledge is None or covariance is None:
+            return None if self._chooser.may_leave else turn_rad
+        knowledge = replace(knowledge, covariance=covariance)
+        return self._chooser.turn(plan.frame, knowledge, grasp, turn_rad, self._has_room)
+
+    def on_carry(self, hand_motion_world: Pose3) -> None:
+        """Take note that the hand carried the object since the last grasp."""
+        self._hand_motion, motion = hand_motion_world, planar(hand_motion_world)
+        self._box = None if self._box is None else self._box.move(motion)
+        self._carried = not hand_motion_world.equals(Pose3(), 1e-9)
+        if self._carried:
+            self._landings_m = []
+        if self._here is not None:
+            pose = motion * Pose2(self._here.x_m, self._here.y_m, self._here.yaw_rad)
+            self._here = GraspFrame(float(pose.x()), float(pose.y()), float(pose.theta()))
+        self._rule.centre_m = np.asarray(planar(hand_motion_world).transformFrom(self.centre_m))
+
+    def on_undo(self, hand_motion_world: Pose3) -> None:
+        """Take note that the last grasp was taken back; the hand carried the object so far since the one before."""
+        self._hand_motion, self._doubted = hand_motion_world, False
+
+    def on_estimate(self, index: int, is_placed: bool) -> None:
+        """Take note that grasp number ``index`` has been estimated: from here on its middle may count.
+
+        Args:
+            index: of the grasp, from 0.
+            is_placed: its contacts fit somewhere; else a policy has to look elsewhere, or it would try the same again.
+        """
+        if self._chooser is not None and not is_placed:
+            self._chooser.on_unplaced_grasp()
+        known, expected = self.known_shape(), self._expected_pose()
+        trusted = index + 1 >= self._fixed_grasps and not self._doubted
+        if trusted and known is not None and expected is not None:
+            self._box = None
+            self._rule.centre_m = np.asarray(expected.transformFrom(known.centre_m))
+
+    def known_shape(self) -> KnownShape | None:
+        """The shape as estimated now; None before there is one.
+
+        In space its surface is that of the most probable model, as the result of the session would be by now.
+        """
+        field = self._slam.surface
+        if field is None:
+            return None
+        if self._known is None or self._known[0] is not field:
+            self._known = (field, self._measure_shape(field))
+        return self._known[1]
+
+    def _measure_shape(self, field: Gpis) -> KnownShape:
+        shape = self._slam.shape(self._exploration.mesh_resolution_m) if self._dimension == 3 else None
+        mesh = shape if isinstance(shape, SurfaceMesh) else None
+        return known_shape(field, self._dimension, self._slam.origin_height_m, self._exploration, mesh)

@@ -1,0 +1,239 @@
+"""A policy at work in a session: it is told what is known, chooses among what the hand can do, and is recorded.
+
+Nothing here knows the truth: the belief is the estimation's, the candidates are kinematics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from gtsam import Pose2
+from numpy.typing import NDArray
+
+from drivers.core.contacts import Array, Grasp
+from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.motion import GraspFrame
+from tactile_lab.autonomy.hand_candidates import HandCandidate, HandLimits, HasRoom, Offer, anywhere, offer
+from tactile_lab.autonomy.regrasp_planner import RegraspPlanner, with_contacts
+from tactile_lab.autonomy.variance_planner import KnownShape
+from tactile_lab.slam.exploration.asking import ask
+from tactile_lab.slam.exploration.candidates import ModelledObject, PredictedContacts, predict_contacts
+from tactile_lab.slam.exploration.policy import Belief, Decision, Policy
+from tactile_lab.slam.exploration.prediction import sampled_displacements
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+
+_SAMPLED_SURFACES = 32
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """What a session knows when a grasp is chosen.
+
+    Attributes:
+        known: the shape as estimated.
+        world_T_object: where the object is expected now.
+        covariance: of that, (x m, y m, yaw rad), shape (3, 3).
+        grasp_indices: which grasp each contact of the shape belongs to.
+        grasps_left: that the session may still make.
+        here: where the hand is; None where that is not known.
+    """
+
+    known: KnownShape
+    world_T_object: Pose2
+    covariance: Array
+    grasp_indices: NDArray[np.intp]
+    grasps_left: int | None = None
+    here: GraspFrame | None = None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One decision of a policy, with everything it was about.
+
+    Attributes:
+        number: of the grasp, from 1.
+        offered: the candidates.
+        decision: the policy's.
+        vetoed: candidates that a person has refused, in order.
+    """
+
+    number: int
+    offered: Offer
+    decision: Decision
+    vetoed: tuple[int, ...] = ()
+
+    @property
+    def plan(self) -> GraspPlan | None:
+        """What to do, with the reason; None when the policy does not grasp."""
+        if self.decision.chosen is None:
+            return None
+        plan = self.offered.usable[self.decision.chosen].plan
+        return replace(plan, reason=f"{self.decision.policy}: {self.decision.reason}")
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the policy has nothing more to gain."""
+        return self.decision.outcome == "stop"
+
+    @property
+    def reason(self) -> str:
+        """Why the policy decided so."""
+        return self.decision.reason
+
+    @property
+    def failure(self) -> str:
+        """What is wrong with the policy itself, in words; empty while its answers can be followed."""
+        return self.decision.failure
+
+    def without_chosen(self) -> Choice:
+        """The next best decision after a person has refused the chosen candidate."""
+        assert self.decision.chosen is not None
+        vetoed = (*self.vetoed, self.decision.chosen)
+        scores = [-np.inf if i in vetoed else score for i, score in enumerate(self.decision.scores)]
+        best = int(np.argmax(scores)) if scores else 0
+        if not scores or not np.isfinite(scores[best]):
+            reason = f"all {len(vetoed)} candidates that could be used were vetoed"
+            decision = replace(self.decision, outcome="nothing", chosen=None, reason=reason, promised_gain=None)
+        else:
+            reason = f"the best that is left after {len(vetoed)} vetoed by the operator"
+            decision = replace(self.decision, chosen=best, reason=reason, promised_gain=None)
+        return replace(self, decision=decision, vetoed=vetoed)
+
+    def as_plain(self) -> dict[str, Any]:
+        """Everything as plain data, for the record; scores that are not finite become None."""
+        decision = self.decision
+        return {
+            "number": self.number,
+            "policy": decision.policy,
+            "outcome": decision.outcome,
+            "chosen": decision.chosen,
+            "reason": decision.reason,
+            "promised_gain": decision.promised_gain,
+            "vetoed": list(self.vetoed),
+            "ruled_out": dict(self.offered.ruled_out),
+            "candidates": [
+                _plain(candidate, score) for candidate, score in zip(self.offered.usable, decision.scores, strict=True)
+            ],
+        }
+
+    def sentence(self) -> str:
+        """The decision in one line."""
+        counted = f"{len(self.offered.usable)} candidates"
+        if self.offered.ruled_out:
+            counted += f" ({self.offered.obstacles})"
+        return f"grasp {self.number}, {self.decision.policy}: {self.decision.reason}; {counted}"
+
+
+def _plain(candidate: HandCandidate, score: float) -> dict[str, Any]:
+    plan = candidate.plan
+    return {
+        "x_m": plan.frame.x_m,
+        "y_m": plan.frame.y_m,
+        "yaw_rad": plan.frame.yaw_rad,
+        "closing": plan.closing,
+        "height_m": plan.height_m,
+        "tap": plan.tap,
+        "time_s": candidate.candidate.time_s,
+        "pushes": candidate.candidate.pushes,
+        "score": score if np.isfinite(score) else None,
+    }
+
+
+class PolicyChooser:
+    """Chooses grasps and re-orientations by a policy.
+
+    Args:
+        policy: what chooses.
+        limits: what the hand can do.
+        noise: how far the object strays when it is carried.
+        rng: the policy's own source of chance.
+    """
+
+    def __init__(self, policy: Policy, limits: HandLimits, noise: MotionNoise, rng: np.random.Generator) -> None:
+        self.policy, self._limits, self._noise, self._rng = policy, limits, noise, rng
+        self._turns = RegraspPlanner(policy, limits, noise)
+        self._expected: PredictedContacts | None = None
+        self._missed_m: list[Array] = []
+        self._met_m: list[Array] = []
+
+    def choose(self, number: int, knowledge: Knowledge, has_room: HasRoom = anywhere) -> Choice:
+        """The next grasp among all the hand can do."""
+        offered = offer(self._limits, knowledge.known, knowledge.world_T_object, knowledge.here, has_room)
+        belief = self._belief(knowledge)
+        decision = ask(self.policy, [one.candidate for one in offered.usable], belief, self._rng)
+        if decision.outcome == "nothing" and not offered.usable and not decision.failure:
+            decision = replace(decision, reason=f"{decision.reason} ({offered.obstacles})")
+        return Choice(number, offered, decision)
+
+    def on_decision(self, choice: Choice, knowledge: Knowledge) -> None:
+        """Take note of what is done: where its fingers are expected to touch."""
+        self._expected = None
+        if choice.decision.chosen is not None:
+            candidate = choice.offered.usable[choice.decision.chosen].candidate
+            self._expected = predict_contacts(candidate, _as_modelled_object(knowledge, knowledge.world_T_object))
+
+    def on_grasp(self, grasp: Grasp) -> None:
+        """Take note of the fingers that met nothing where they were expected to touch."""
+        expected, self._expected = self._expected, None
+        self._met_m = []
+        if expected is None:
+            return
+        met = {(contact.finger, contact.probed) for contact in grasp.contacts}
+        seen: set[str] = set()
+        for finger, point_m in zip(expected.fingers, expected.points_object_m, strict=True):
+            (self._met_m if (finger, finger in seen) in met else self._missed_m).append(point_m)
+            seen.add(finger)
+
+    def on_unplaced_grasp(self) -> None:
+        """Take note that the last grasp's contacts fit nowhere: where they were expected is as unknown as before."""
+        self._missed_m += self._met_m
+
+    @property
+    def may_leave(self) -> bool:
+        """Whether the object stays where it is unless there is a reason to turn it."""
+        return self._turns.may_leave
+
+    def turn(
+        self, frame: GraspFrame, knowledge: Knowledge, grasp: Grasp, otherwise: float, has_room: HasRoom = anywhere
+    ) -> float | None:
+        """How to turn the object in hand, radians; None to leave it where it is.
+
+        Args:
+            frame: of the hand.
+            knowledge: from before this grasp, the pose as certain as it will be after it.
+            grasp: this one.
+            otherwise: the turn where nothing tells them apart, radians.
+            has_room: what else stands against a plan as long as the object is left where it is.
+        """
+        belief = with_contacts(self._belief(knowledge), grasp)
+        return self._turns.choose(frame, knowledge.known, belief, otherwise, self._rng, has_room)
+
+    def _belief(self, knowledge: Knowledge) -> Belief:
+        known, field = knowledge.known, knowledge.known.field
+        moves = np.empty((0, 0))
+        if known.surface is not None:
+            moves = sampled_displacements(field, known.surface, _SAMPLED_SURFACES, self._rng)
+        return Belief(
+            field=field,
+            surface=known.surface,
+            contacts_m=field.contacts_m,
+            normals=field.normals,
+            grasp_indices=knowledge.grasp_indices.astype(np.int64),
+            world_T_object=knowledge.world_T_object,
+            pose_covariance=knowledge.covariance,
+            displacements_m=moves,
+            missed_m=np.array(self._missed_m).reshape(-1, known.dimension),
+            origin_height_m=known.origin_height_m,
+            grasps_left=knowledge.grasps_left,
+        )
+
+    def spread(self, covariance: Array, carried: bool) -> Array:
+        """Covariance of the pose now, from that at the last grasp."""
+        return covariance + np.diag(self._noise.sigmas**2) if carried else covariance
+
+
+def _as_modelled_object(knowledge: Knowledge, pose: Pose2) -> ModelledObject:
+    known = knowledge.known
+    return ModelledObject(known.field, known.dimension, pose, known.origin_height_m)

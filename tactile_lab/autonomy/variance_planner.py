@@ -1,0 +1,227 @@
+"""Where to grasp next by what is known of the object: the reward of equation 4.20 over candidate grasps.
+
+Candidates stand around the estimated object: every yaw of the arm's window, a few shifts across the hand, every
+closing. Where a candidate's fingers will touch is read off the estimated surface along their approach paths; the
+candidate whose predicted contacts are least known wins, among those that have room for the open hand, promise enough
+contacts, and whose contacts would also tell the object's pose (eq. 3.18): a grasp that cannot be placed adds nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from gtsam import Pose2
+from pydantic import Field, field_validator
+
+from drivers.core.configuration import StrictModel
+from drivers.core.contacts import FINGERS, Array
+from drivers.core.errors import ShapeError
+from drivers.core.observability import planar_observability
+from drivers.shadow.closing.closing import LEANING, Closing
+from sessions.motion.grasp_plan import ContactHeight, GraspPlan
+from sessions.motion.motion import GraspFrame
+from tactile_lab.slam.exploration.candidates import Candidate, ClosingRays, ModelledObject, outward, ring_of_candidates
+from tactile_lab.slam.exploration.expected_information import InformationSettings
+from tactile_lab.slam.exploration.policies import POLICIES
+from tactile_lab.slam.exploration.policy import Surface
+from tactile_lab.slam.exploration.rewards import RatedCandidate, explored_share, rate
+from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extract_contour, extract_mesh
+
+
+class ExplorationSettings(StrictModel):
+    """The candidates, and which of them count.
+
+    Attributes:
+        yaws: how many, spread evenly over the arm's window.
+        shifts_m: offsets of the grasp frame across the hand.
+        least_contacts: candidates that promise fewer lose against all that promise as many.
+        least_observability: smallest eigenvalue of (3.18) that the predicted contacts should have; where no candidate
+            reaches it (a round object cannot tell its turn) it does not count.
+        policy: name of the policy that chooses among everything the hand can do (:mod:`tactile_lab.slam.exploration`);
+            None for the reward of equation 4.20 alone, as above, every object being carried.
+        information: of the policy ``information``, whether it is named here or on the command line.
+        side_closings: closings with the hand leaning to one side that policies may choose besides, where a surface is
+            wanted.
+        side_heights_m: of the lowest fingertip there: from lower down it lifts what it grasps.
+        caution: standard deviations of the estimated surface that the open fingertips keep clear of besides, of at
+            most the clearance each; for policies.
+        clearance_m: distance from the estimated surface that the open fingertips' centres must keep.
+        contour_resolution_m, mesh_resolution_m: of the surface that the explored share is measured on.
+    """
+
+    yaws: int = Field(default=12, ge=1)
+    shifts_m: tuple[float, ...] = Field(default=(-0.036, -0.024, -0.012, 0.0, 0.012, 0.024, 0.036), min_length=1)
+    least_contacts: int = Field(default=4, ge=0)
+    least_observability: float = Field(default=0.15, ge=0.0)
+    policy: str | None = "information"
+    information: InformationSettings = InformationSettings()
+    side_closings: tuple[str, ...] = tuple(LEANING)
+    side_heights_m: tuple[ContactHeight, ...] = (0.026, 0.034)
+    caution: float = Field(default=0.5, ge=0.0)
+    clearance_m: float = Field(default=0.012, ge=0.0)
+    contour_resolution_m: float = Field(default=0.002, gt=0.0)
+    mesh_resolution_m: float = Field(default=0.006, gt=0.0)
+
+    @field_validator("policy")
+    @classmethod
+    def _is_known(cls, name: str | None) -> str | None:
+        return None if name is None else POLICIES.known(name)
+
+    @field_validator("side_closings")
+    @classmethod
+    def _are_known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        if unknown := sorted(set(names) - set(LEANING)):
+            raise ValueError(f"closings {unknown} are not known; choose from {', '.join(LEANING)}")
+        return names
+
+
+@dataclass(frozen=True)
+class KnownShape:
+    """The object's shape as estimated now, object frame.
+
+    Attributes:
+        field: the implicit surface.
+        dimension: 2 or 3.
+        origin_height_m: height of the object frame's origin over the table.
+        centre_m: middle of the shape's extent, x, y.
+        explored: share of the surface that is known, 0..1.
+        surface: what was measured; None where the contacts enclose nothing yet.
+        top_height_m: highest place of it over the table; None where it is not known.
+    """
+
+    field: Gpis
+    dimension: int
+    origin_height_m: float
+    centre_m: Array
+    explored: float
+    surface: Surface | None = None
+    top_height_m: float | None = None
+
+
+def known_shape(
+    field: Gpis, dimension: int, origin_height_m: float, settings: ExplorationSettings, mesh: SurfaceMesh | None = None
+) -> KnownShape:
+    """Measure the estimated surface.
+
+    Where the contacts enclose nothing yet, the object frame's origin stands in for the middle and nothing is explored.
+
+    Args:
+        field: of the contacts.
+        dimension: 2 or 3.
+        origin_height_m: height of the object frame's origin over the table.
+        settings: resolutions.
+        mesh: the surface of the most probable model, in space; without it the field's own is measured. What is
+            explored is judged by the field in any case, see :func:`_as_far_as_felt`.
+    """
+    try:
+        extracted = _surface(field, dimension, settings) if mesh is None else _as_far_as_felt(mesh, field)
+    except ShapeError:
+        return KnownShape(field, dimension, origin_height_m, np.zeros(2), 0.0)
+    surface = Surface.of(extracted)
+    centre_m = (surface.points_m[:, :2].min(axis=0) + surface.points_m[:, :2].max(axis=0)) / 2
+    top_m = None if dimension == 2 else float(surface.points_m[:, 2].max()) + origin_height_m
+    return KnownShape(field, dimension, origin_height_m, centre_m, explored_share(extracted), surface, top_m)
+
+
+def _surface(field: Gpis, dimension: int, settings: ExplorationSettings) -> Contour | SurfaceMesh:
+    if dimension == 2:
+        return extract_contour(field, resolution_m=settings.contour_resolution_m)
+    return extract_mesh(field, resolution_m=settings.mesh_resolution_m)
+
+
+def _as_far_as_felt(mesh: SurfaceMesh, field: Gpis) -> SurfaceMesh:
+    """A model's surface with the field's standard deviations.
+
+    The model concludes from a few contacts where a whole face is, and its sigma there is small if the model is right.
+    Exploring is to find out whether it is: so what counts as known is what contacts have told, which wears off with
+    the distance from them. The field's values are distances, so their standard deviation is the surface's.
+    """
+    return replace(mesh, sigma_m=field.sigma_inflation * np.sqrt(field.variance(mesh.vertices)))
+
+
+def closing_rays(table: Closing) -> ClosingRays:
+    """The usable parts of a closing's lines as rays in the grasp frame."""
+    paths = [table.path(finger) for finger in FINGERS]
+    return ClosingRays(
+        fingers=FINGERS,
+        starts_m=np.array([path.centre_m(path.valid[0]) for path in paths]),
+        directions=np.array([path.direction for path in paths]),
+        lengths_m=np.array([path.length_m * (path.valid[1] - path.valid[0]) for path in paths]),
+        radius_m=table.radius_m,
+    )
+
+
+def choose_grasp(
+    shape: KnownShape,
+    world_T_object: Pose2,
+    closings: Sequence[str],
+    table: Callable[[str], Closing],
+    yaw_window_rad: tuple[float, float],
+    settings: ExplorationSettings,
+    has_room: Callable[[GraspPlan], bool] = lambda plan: True,
+) -> GraspPlan | None:
+    """The most promising grasp around an object at ``world_T_object``; None when no candidate has room.
+
+    Args:
+        shape: as estimated.
+        world_T_object: where the object is expected, in the table plane.
+        closings: names to choose from.
+        table: gives the closing of a name at the height of this grasp.
+        yaw_window_rad: what the arm can reach.
+        settings: the candidates.
+        has_room: what else stands against a grasp (where the hand has just landed on the object).
+    """
+    known = ModelledObject(shape.field, shape.dimension, world_T_object, shape.origin_height_m)
+    rays = {name: closing_rays(table(name)) for name in closings}
+    yaws_rad = np.linspace(*yaw_window_rad, settings.yaws)
+    centre_world_m = np.asarray(world_T_object.transformFrom(shape.centre_m))
+    ring = ring_of_candidates(centre_world_m, yaws_rad, np.array(settings.shifts_m), rays)
+    free = [candidate for candidate in ring if has_room(_plan(candidate, table))]
+    roomy = [candidate for candidate in free if _is_clear(candidate, known, settings.clearance_m)]
+    if not roomy:
+        return None
+    best = _best(rate(roomy, known), known, settings)
+    return replace(_plan(best.candidate, table), reason=_reason(best))
+
+
+def _best(rated: Sequence[RatedCandidate], known: ModelledObject, settings: ExplorationSettings) -> RatedCandidate:
+    """The highest reward among the observable candidates with enough contacts; see the settings for what gives way."""
+    enough = [item for item in rated if len(item.contacts.fingers) >= settings.least_contacts]
+    telling = (item for item in enough if _observability(item, known) >= settings.least_observability)
+    if best := next(telling, None):
+        return best
+    return enough[0] if enough else max(rated, key=lambda item: len(item.contacts.fingers))
+
+
+def _observability(item: RatedCandidate, known: ModelledObject) -> float:
+    points_m = item.contacts.points_object_m
+    if not len(points_m):
+        return 0.0
+    return planar_observability(points_m, outward(known.field, points_m)).smallest
+
+
+def _plan(candidate: Candidate, table: Callable[[str], Closing]) -> GraspPlan:
+    pose = candidate.world_T_grasp
+    frame = GraspFrame(float(pose.x()), float(pose.y()), float(pose.theta()))
+    return GraspPlan(frame, candidate.closing, table(candidate.closing).height_m)
+
+
+def _reason(best: RatedCandidate) -> str:
+    sigma_mm = 1e3 * float(np.sqrt(np.mean(best.contacts.variances_m2))) if best.contacts.fingers else 0.0
+    return f"{len(best.contacts.fingers)} contacts expected where the surface is known to {sigma_mm:.1f} mm"
+
+
+def _is_clear(candidate: Candidate, known: ModelledObject, clearance_m: float) -> bool:
+    """Whether the open fingertips are all clear of the estimated surface."""
+    starts_world_m = _to_world(candidate, candidate.rays.starts_m[:, :2])
+    starts_m = np.array([known.world_T_object.transformTo(point) for point in starts_world_m])
+    if known.dimension == 3:
+        starts_m = np.column_stack([starts_m, candidate.rays.starts_m[:, 2] - known.origin_height_m])
+    return bool(np.all(known.field.predict(starts_m).mean_m > clearance_m))
+
+
+def _to_world(candidate: Candidate, points_m: Array) -> Array:
+    return np.array([candidate.world_T_grasp.transformFrom(point) for point in points_m])

@@ -1,0 +1,268 @@
+"""Both EtherCAT masters on the emulated two-slave hand, over a virtual cable: punctuality, losses, and recoveries.
+
+Losses are set against what the emulator itself counts, and punctuality against a loop of the same priority that does
+nothing but wait: what that leaves out, nobody on this machine could have kept. Run it when the machine is quiet.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import tactile_lab
+from drivers.core.clock import NANOSECONDS, MonotonicClock
+from drivers.core.errors import DeviceError
+from drivers.emulators.ethercat.server import EmulatedHandProcess
+from drivers.emulators.ethercat.shadow_chain import ChainSettings
+from drivers.emulators.laboratory.virtual_cable import virtual_cable
+from drivers.ethercat.master import MasterSettings
+from drivers.shadow.device.cycle_pace import CyclePace
+from drivers.shadow.device.cycle_statistics import CycleStatistics, Punctuality
+from drivers.shadow.device.hand import ShadowHand
+from drivers.shadow.device.hand_process import HandProcess
+from drivers.shadow.device.hand_settings import HandSettings
+from drivers.shadow.device.hand_setup import HandSetup, Master
+from drivers.shadow.device.real_time import PRIORITY, prefer
+from drivers.shadow.ethercat.hand_transport import EthercatSettings
+
+CALIBRATION = Path(tactile_lab.__file__).parent / "rigs" / "calibrations" / "simulated-hand"
+CYCLE_s = 0.001
+LOSS_SHARE, LOSSY_s = 0.01, 3.0
+WATCHDOG_s = 0.1
+_DRAIN_s, _PATIENCE_s, _GOOD_CYCLES = 0.02, 10.0, 20
+_SAFEOP, _WATCHDOG_CODE = 4, 0x1B
+
+
+@dataclass(frozen=True)
+class WireRow:
+    """One measurement.
+
+    Attributes:
+        master: ours, pysoem, or none.
+        what: was done.
+        noticed_ms: until the hand told of it; None where there is nothing to tell.
+        back_ms: until the hand was in operation again, or for the first time.
+        detail: figures and words.
+    """
+
+    master: str
+    what: str
+    noticed_ms: float | None
+    back_ms: float | None
+    detail: str
+
+
+def measure_ethercat(seconds: float) -> list[WireRow]:
+    """All measurements of both masters; of ours alone where SOEM is not installed, which a row says.
+
+    Args:
+        seconds: how long each holds its cycle of 1 kHz.
+
+    Raises:
+        DeviceError: no virtual cable can be made, or no raw socket opened; says what to do.
+    """
+    near, far = f"tlb{os.getpid()}", f"tlc{os.getpid()}"
+    rows = [_nothing_but_waiting(seconds)]
+    masters: tuple[Master, ...] = ("own", "pysoem")
+    with virtual_cable(near, far):
+        for master in masters:
+            if master == "pysoem" and find_spec("pysoem") is None:
+                rows.append(WireRow(master, "not measured", None, None, "the package pysoem is not installed"))
+                continue
+            trial = Trial(near, far, master)
+            rows += [*trial.steady(seconds), trial.losses(), trial.kill(), trial.watchdog(), trial.bare()]
+    return rows
+
+
+class Trial:
+    """One master on one cable.
+
+    Args:
+        near, far: the cable's ends.
+        master: whose.
+    """
+
+    def __init__(self, near: str, far: str, master: Master) -> None:
+        self._near, self._far, self._master = near, far, master
+        self._clock = MonotonicClock()
+
+    def steady(self, seconds: float) -> list[WireRow]:
+        """Hold 1 kHz in a process of its own, with zero demands; and what a cycle costs."""
+        with self._emulator("mapped") as emulator:
+            process = HandProcess(self._setup(CYCLE_s))
+            began_ns = self._clock.now_ns()
+            process.connect()
+            took_ms = self._since_ms(began_ns)
+            try:
+                first, before = process.report(), emulator.order()
+                self._drain(process, seconds)
+                report, after = process.report(), emulator.order()
+            finally:
+                process.close()
+        return [
+            WireRow(self._master, f"1 kHz for {seconds:g} s", None, took_ms, _steady(report, before, after)),
+            WireRow(self._master, "processor time of a cycle", None, None, _processor(first, report)),
+        ]
+
+    def losses(self) -> WireRow:
+        """Lose one frame in a hundred, and count."""
+        with self._emulator("mapped") as emulator, self._hand(lost_limit=1000) as (hand, _):
+            before, counted = emulator.order(cable={"drop_share": LOSS_SHARE}), hand.counters
+            longest_ns = fresh_ns = began_ns = self._clock.now_ns()
+            longest_ns = 0
+            while self._clock.now_ns() - began_ns < LOSSY_s * NANOSECONDS:
+                if self._cycle(hand):
+                    longest_ns, fresh_ns = max(longest_ns, self._clock.now_ns() - fresh_ns), self._clock.now_ns()
+            after, now = emulator.order(cable={"drop_share": 0.0}), hand.counters
+            back_ms = self._until(lambda: self._cycle(hand))
+        lost = after["lost"] - before["lost"]
+        detail = (
+            f"{lost} of {after['frames'] - before['frames']} frames lost by the cable, {now.lost - counted.lost} "
+            f"cycles lost by the hand's count; at most {longest_ns / 1e6:.1f} ms without a status"
+        )
+        return WireRow(self._master, f"{LOSS_SHARE:.0%} of frames lost", None, back_ms, detail)
+
+    def kill(self) -> WireRow:
+        """Kill the slaves' process, start it again, and reconnect."""
+        emulator = EmulatedHandProcess(self._far, CALIBRATION / "joints.yaml", ChainSettings(eeprom="mapped"))
+        emulator.start()
+        try:
+            with self._hand() as (hand, _):
+                emulator.kill()
+                noticed_ms, words = self._time_to_notice(hand)
+                with self._emulator("mapped"):
+                    back_ms = self._back(hand)
+        finally:
+            emulator.close()
+        return WireRow(self._master, "slaves killed and restarted", noticed_ms, back_ms, words)
+
+    def watchdog(self) -> WireRow:
+        """Let the palm's watchdog trip: by a pause where the master sets it, else the palm falls as if it had."""
+        own = self._master == "own"
+        with self._emulator("mapped") as emulator, self._hand(watchdog_s=WATCHDOG_s if own else None) as (hand, _):
+            if own:
+                self._clock.sleep_until_ns(self._clock.now_ns() + round(3 * WATCHDOG_s * NANOSECONDS))
+            else:
+                emulator.order(fall=[_SAFEOP, _WATCHDOG_CODE])
+            noticed_ms, words = self._time_to_notice(hand)
+            back_ms = self._back(hand)
+        return WireRow(self._master, "watchdog of the palm", noticed_ms, back_ms, words)
+
+    def bare(self) -> WireRow:
+        """Bring up a hand whose EEPROM holds its identity alone."""
+        began_ns = self._clock.now_ns()
+        with self._emulator("bare"):
+            began_ns = self._clock.now_ns()
+            try:
+                with self._hand():
+                    back_ms = self._since_ms(began_ns)
+                return WireRow(self._master, "bare EEPROM", None, back_ms, "in operation")
+            except DeviceError as error:
+                return WireRow(self._master, "bare EEPROM", self._since_ms(began_ns), None, f"refused: {error}")
+
+    # --- parts -------------------------------------------------------------------------------------------------
+
+    def _emulator(self, eeprom: Any) -> EmulatedHandProcess:
+        return EmulatedHandProcess(self._far, CALIBRATION / "joints.yaml", ChainSettings(eeprom=eeprom))
+
+    def _setup(self, cycle_s: float, watchdog_s: float | None = None, **hand: Any) -> HandSetup:
+        settings = EthercatSettings(interface=self._near, watchdog_s=watchdog_s, master=MasterSettings(answer_s=0.01))
+        return HandSetup(
+            ethercat=settings,
+            master=self._master,
+            hand=HandSettings(cycle_s=cycle_s, **hand),
+            joints=CALIBRATION / "joints.yaml",
+            motors=CALIBRATION / "motors.yaml",
+        )
+
+    @contextmanager
+    def _hand(self, **settings: Any) -> Iterator[tuple[ShadowHand, Any]]:
+        """A connected hand in this process, closed afterwards whatever has become of its slaves."""
+        setup = self._setup(0.002, **settings)
+        transport = setup.transport(self._clock)
+        hand = setup.device(transport, self._clock)
+        hand.connect()
+        try:
+            yield hand, transport
+        finally:
+            _close(hand)
+
+    def _cycle(self, hand: ShadowHand) -> bool:
+        fresh = hand.exchange().fresh
+        self._clock.sleep_until_ns(self._clock.now_ns() + round(CYCLE_s * NANOSECONDS))
+        return fresh
+
+    def _time_to_notice(self, hand: ShadowHand) -> tuple[float, str]:
+        """Cycle until the hand stops itself: how long that took, milliseconds, and its words."""
+        began_ns = self._clock.now_ns()
+        while self._since_ms(began_ns) < 1000 * _PATIENCE_s:
+            try:
+                self._cycle(hand)
+            except DeviceError as error:
+                return self._since_ms(began_ns), str(error)
+        raise DeviceError("the hand did not notice", where=self._master)
+
+    def _back(self, hand: ShadowHand) -> float:
+        """Reconnect, and see that the hand keeps answering; milliseconds."""
+        began_ns = self._clock.now_ns()
+        hand.reconnect()
+        self._until(lambda: self._cycle(hand))
+        back_ms = self._since_ms(began_ns)
+        good = sum(self._cycle(hand) for _ in range(_GOOD_CYCLES))
+        if not good:
+            raise DeviceError("the hand answers no more after reconnecting", where=self._master)
+        return back_ms
+
+    def _until(self, done: Callable[[], bool]) -> float:
+        began_ns = self._clock.now_ns()
+        while not done():
+            if self._since_ms(began_ns) > 1000 * _PATIENCE_s:
+                raise DeviceError("the hand does not come back", where=self._master)
+        return self._since_ms(began_ns)
+
+    def _drain(self, process: HandProcess, seconds: float) -> None:
+        until_ns = self._clock.now_ns() + round(seconds * NANOSECONDS)
+        while self._clock.now_ns() < until_ns:
+            self._clock.sleep_until_ns(self._clock.now_ns() + round(_DRAIN_s * NANOSECONDS))
+            process.receive()
+
+    def _since_ms(self, began_ns: int) -> float:
+        return (self._clock.now_ns() - began_ns) / 1e6
+
+
+def _nothing_but_waiting(seconds: float) -> WireRow:
+    """How well this machine keeps a cycle of 1 kHz for a program with nothing to do in it."""
+    clock, statistics = MonotonicClock(), CycleStatistics()
+    with prefer(PRIORITY):
+        pace, until_ns = CyclePace(clock, round(CYCLE_s * NANOSECONDS)), clock.now_ns() + round(seconds * NANOSECONDS)
+        while clock.now_ns() < until_ns:
+            statistics.add(*pace.wait())
+    return WireRow("none", f"1 kHz for {seconds:g} s, only waiting", None, None, str(statistics.summary()))
+
+
+def _close(hand: ShadowHand) -> None:
+    """Close it; a hand that is gone already, as these trials make it, is no error."""
+    try:
+        hand.close()
+    except DeviceError:
+        return
+
+
+def _steady(report: Mapping[str, Any], before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    hand, wire = report["hand"], report["wire"]
+    stale = f", {wire['stale']} came back late and were left out" if wire else ""
+    return (
+        f"{Punctuality(**report['punctuality'])}; {hand['lost']} lost{stale}; the emulator saw "
+        f"{after['frames'] - before['frames']} frames and lost {after['lost'] - before['lost']}"
+    )
+
+
+def _processor(first: Mapping[str, Any], last: Mapping[str, Any]) -> str:
+    """Processor time of the hand's process for each cycle between two reports."""
+    cycles = last["punctuality"]["cycles"] - first["punctuality"]["cycles"]
+    return f"{1000.0 * (last['processor_s'] - first['processor_s']) / max(cycles, 1):.3f} ms in the hand's process"

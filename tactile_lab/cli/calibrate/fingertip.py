@@ -1,0 +1,119 @@
+"""``tactile-lab calibrate fingertip``: a force fingertip's mounting, sign, weight and shape."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactile_lab.cli.calibrate.biotac import Finger
+from tactile_lab.cli.options import Json, NoInput, RigName
+from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
+
+if TYPE_CHECKING:
+    from calibration.fingertip.data import FingertipData
+    from calibration.fingertip.fit import FingertipFit
+    from calibration.fingertip.record import FingertipLimits
+    from tactile_lab.cli.calibrate.wizard import Asker
+    from tactile_lab.workflow.calibrating_fingertip import FingertipRequest, FingertipSettings
+
+
+def fingertip(
+    rig: RigName = "sim",
+    finger: Annotated[Finger, typer.Option(help="Long finger to measure on the rig.")] = Finger.FF,
+    source: Annotated[
+        Path | None, typer.Option("--from", help="Solve recorded wrenches instead of measuring (any finger).")
+    ] = None,
+    record: Annotated[Path | None, typer.Option(help="Keep the measured wrenches in this file too.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/fingertips.yaml")
+    ] = None,
+    settings: Annotated[Path | None, typer.Option(help="Settings: limits, speeds, force.")] = None,
+    presses: Annotated[int, typer.Option(min=6, help="Presses on the table.")] = 10,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
+    notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
+    view: View = False,
+    view_port: Port = PORT,
+    listen: Listen = "127.0.0.1",
+    token: Token = "",
+    as_json: Json = False,
+    no_input: NoInput = False,
+) -> None:
+    """Find a force fingertip's mounting, sign, weight and shape, step by step.
+
+    The hand is turned with free fingers, then presses the table and rolls about. The other fingers keep what the
+    rig's file says. Ctrl+C or q at any step stores nothing.
+
+    Exit code 0: PASS; 2: the input, or too few orientations; 3: FAIL, outside a limit (kept as NAME.failed.yaml,
+    which sessions refuse); 4: a device; 130: ended by the operator.
+    """
+    from calibration.fingertip.data import load_fingertip_data, save_fingertip_data
+    from calibration.fingertip.fit import fit_fingertip
+    from calibration.fingertip.record import fingertip_record
+    from tactile_lab.cli.calibrate.steps import store_result
+    from tactile_lab.cli.calibrate.wizard import may_write, wizard
+    from tactile_lab.rigs.description import load_rig
+    from tactile_lab.workflow.calibrating_fingertip import FingertipRequest, force_fingertips
+
+    described, wanted = load_rig(rig), _settings(settings)
+    here, page = described.installation, PageAddress.if_wanted(view, listen, view_port, token)
+    file = out or Path("calibrations") / here.rig / "fingertips.yaml"
+    with wizard(f"calibrate fingertip, rig {rig}", no_input, page) as asker:
+        may_write(file, replace, asker, no_input)
+        if source is not None:
+            data = load_fingertip_data(source, here)
+        else:
+            data = _measure(FingertipRequest(rig, finger.value, seed, presses, wanted), asker)
+            if record is not None:
+                save_fingertip_data(record, data)
+        tips = force_fingertips(described, data.finger)
+        fit = fit_fingertip(data, tips[data.finger], wanted.noise)
+        _show(data, fit, wanted.limits)
+        found = fingertip_record(data, fit, tips, here, notes, wanted.limits)
+        store_result(file, found, asker, as_json)
+
+
+def _settings(path: Path | None) -> FingertipSettings:
+    from drivers.core.configuration import load_model
+    from tactile_lab.workflow.calibrating_fingertip import FingertipSettings
+
+    return FingertipSettings() if path is None else load_model(path, FingertipSettings)
+
+
+def _measure(request: FingertipRequest, asker: Asker) -> FingertipData:
+    from tactile_lab.cli.calibrate.steps import measure_all
+    from tactile_lab.cli.console import say
+    from tactile_lab.workflow.calibrating_fingertip import fingertip_wizard
+
+    with fingertip_wizard(request, asker.onlooker) as (wizard, measurer):
+        say(f"Fingertip {request.finger} on rig {request.rig}: {len(wizard.plan)} wrenches, free and pressed", "bold")
+        asker.choose("The hand will move, and turn. Is its way clear?", {"y": "begin"}, "y")
+        measure_all(wizard, measurer, asker)
+        return wizard.measured
+
+
+def _show(data: FingertipData, fit: FingertipFit, limits: FingertipLimits) -> None:
+    """What was found, and the figures against their limits."""
+    from math import degrees
+
+    from calibration.fingertip.record import judge_fingertip
+    from tactile_lab.cli.calibrate.tables import show_quality
+    from tactile_lab.cli.console import show_facts
+
+    new = fit.calibration
+    facts = [
+        ("mounting", "  ".join(f"{degrees(angle):.2f}" for angle in new.distal_T_sensor.rpy_rad) + " deg"),
+        ("turned by", f"{degrees(fit.turned_rad):.2f} deg"),
+        ("mass", f"{1e3 * new.mass_kg:.2f} g"),
+        ("centre of mass", _millimetres(new.com_distal_m)),
+        ("ellipsoid's centre", _millimetres(new.centre_distal_m)),
+        ("semi-axes", _millimetres(new.semi_axes_m)),
+    ]
+    show_facts(f"Fingertip {data.finger}", facts)
+    show_quality(judge_fingertip(fit, limits))
+
+
+def _millimetres(values: tuple[float, float, float]) -> str:
+    return "  ".join(f"{1e3 * value:.2f}" for value in values) + " mm"

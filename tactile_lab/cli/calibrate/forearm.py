@@ -1,0 +1,224 @@
+"""``tactile-lab calibrate forearm``: where the forearm's mount stands in the world, and how well that is known."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactile_lab.cli.options import Json, NoInput, RigName
+from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
+
+if TYPE_CHECKING:
+    from calibration.forearm.recordings import ForearmData
+    from calibration.forearm.wizard import ForearmResult, ForearmWizard
+    from tactile_lab.cli.calibrate.wizard import Asker
+    from tactile_lab.workflow.calibrating_forearm import CalibrationSettings
+
+
+class ForearmMethod(StrEnum):
+    """Ways to find where the mount stands."""
+
+    TOUCH = "touch"
+    MARKER = "marker"
+    MANUAL = "manual"
+
+
+Triple = tuple[float, float, float]
+
+
+def forearm(
+    rig: RigName = "sim",
+    method: Annotated[
+        ForearmMethod,
+        typer.Option(help="touch: fingertips press known geometry; marker: a board on the hand; manual: stated."),
+    ] = ForearmMethod.TOUCH,
+    out: Annotated[
+        Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/forearm.yaml")
+    ] = None,
+    source: Annotated[
+        Path | None, typer.Option("--from", help="Solve recorded poses instead of measuring (any method but manual).")
+    ] = None,
+    record: Annotated[Path | None, typer.Option(help="Keep the measured poses in this file too.")] = None,
+    settings: Annotated[Path | None, typer.Option(help="Settings: limits, least motion, errors, speeds.")] = None,
+    geometry: Annotated[Path | None, typer.Option(help="What is pressed, instead of the rig's.")] = None,
+    board: Annotated[Path | None, typer.Option(help="Board on the hand, instead of the rig's.")] = None,
+    fingers: Annotated[str, typer.Option(help="Long fingers that press.")] = "FF,MF",
+    touches: Annotated[int, typer.Option(min=1, help="Touches of each face.")] = 8,
+    pictures: Annotated[int | None, typer.Option(min=3, help="Pictures of the board.", show_default="20")] = None,
+    translation_mm: Annotated[Triple, typer.Option(help="manual: world_T_mount, x y z.")] = (0.0, 0.0, 0.0),
+    rpy_deg: Annotated[Triple, typer.Option(help="manual: roll pitch yaw about fixed axes.")] = (0.0, 0.0, 0.0),
+    sigma_mm: Annotated[float | None, typer.Option(min=0.0, help="manual: standard deviation per axis.")] = None,
+    sigma_deg: Annotated[float | None, typer.Option(min=0.0, help="manual: the same of the rotation.")] = None,
+    valid_days: Annotated[float, typer.Option(min=0.01, help="How long the result may be used.")] = 90.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
+    notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
+    view: View = False,
+    view_port: Port = PORT,
+    listen: Listen = "127.0.0.1",
+    token: Token = "",
+    as_json: Json = False,
+    no_input: NoInput = False,
+) -> None:
+    """Find where the forearm's mount stands in the world, step by step, and say how good the answer is.
+
+    The motion is checked before anything is solved, and what is missing is told. Ctrl+C or q at any step stores
+    nothing. With --view a page in the browser shows the hand and the steps, and takes the answers too.
+
+    Exit code 0: PASS; 2: the input, or too little motion; 3: FAIL, outside a limit (kept as NAME.failed.yaml, which
+    sessions refuse); 4: a device; 130: ended by the operator.
+    """
+    from calibration.forearm.record import manual_record, record_of, transform_of
+    from calibration.forearm.recordings import save_data
+    from tactile_lab.cli.calibrate.steps import store_result
+    from tactile_lab.cli.calibrate.wizard import may_write, wizard
+    from tactile_lab.rigs.description import load_rig
+
+    here, page = load_rig(rig).installation, PageAddress.if_wanted(view, listen, view_port, token)
+    file = out or Path("calibrations") / here.rig / "forearm.yaml"
+    with wizard(f"calibrate forearm, rig {rig}", no_input, page) as asker:
+        may_write(file, replace, asker, no_input)
+        if method is ForearmMethod.MANUAL:
+            sigmas = _stated_sigma(sigma_mm, sigma_deg)
+            pose = transform_of([value / 1e3 for value in translation_mm], rpy_deg)
+            found = manual_record(pose, *sigmas, here, notes=notes, valid_days=valid_days)
+        else:
+            wanted = _settings(settings)
+            if source is not None:
+                data = _load_recorded(source, here)
+            else:
+                names = tuple(name.strip() for name in fingers.split(","))
+                data = _measure(asker, wanted, rig, method, seed, geometry, board, names, touches, pictures)
+                if record is not None:
+                    save_data(record, data)
+            result = _solve(data, wanted)
+            show_result(result)
+            found = record_of(result, here, notes=notes, valid_days=valid_days)
+        comment = "Forearm to world: pose of the positioner's mount in the world frame."
+        store_result(file, found, asker, as_json, comment)
+
+
+def _stated_sigma(sigma_mm: float | None, sigma_deg: float | None) -> tuple[float, float]:
+    """The stated uncertainty, metres and radians. Raises ConfigurationError when there is none."""
+    from math import radians
+
+    from drivers.core.errors import ConfigurationError
+
+    if not sigma_mm or not sigma_deg:
+        hint = "Give --sigma-mm and --sigma-deg: how far the figures may be off, one standard deviation, above 0"
+        raise ConfigurationError("a pose without its uncertainty", where="--method manual", hint=hint)
+    return sigma_mm / 1e3, radians(sigma_deg)
+
+
+def _settings(path: Path | None) -> CalibrationSettings:
+    from drivers.core.configuration import load_model
+    from tactile_lab.workflow.calibrating_forearm import CalibrationSettings
+
+    return CalibrationSettings() if path is None else load_model(path, CalibrationSettings)
+
+
+def _load_recorded(path: Path, here: object) -> ForearmData:
+    """Recorded poses of this rig. Raises ConfigurationError for another's."""
+    from calibration.forearm.record import check_origin
+    from calibration.forearm.recordings import load_data
+    from calibration.store.admission import Installation
+
+    assert isinstance(here, Installation)
+    data = load_data(path)
+    check_origin(data, here, str(path))
+    return data
+
+
+def _measure(
+    asker: Asker,
+    settings: CalibrationSettings,
+    rig: str,
+    method: ForearmMethod,
+    seed: int,
+    geometry: Path | None,
+    board: Path | None,
+    fingers: tuple[str, ...],
+    touches: int,
+    pictures: int | None,
+) -> ForearmData:
+    from tactile_lab.cli.calibrate.steps import measure_all
+    from tactile_lab.rigs.description import load_rig
+    from tactile_lab.workflow.calibrating_forearm import ForearmRequest, forearm_wizard
+
+    request = ForearmRequest(load_rig(rig), method.value, seed, geometry, board, fingers, touches, pictures, settings)
+    with forearm_wizard(request, asker.onlooker) as (wizard, measurer):
+        _tell_plan(rig, wizard)
+        asker.choose("The hand will move. Is its way clear?", {"y": "begin"}, "y")
+        measure_all(wizard, measurer, asker)
+        return wizard.measured
+
+
+def _tell_plan(rig: str, wizard: ForearmWizard) -> None:
+    from tactile_lab.cli.console import say
+
+    what = "touches of known geometry" if wizard.method == "touch" else "pictures of the board on the hand"
+    say(f"Forearm to world on rig {rig}: {len(wizard.plan)} {what}", "bold")
+
+
+def _solve(data: ForearmData, settings: CalibrationSettings) -> ForearmResult:
+    from rich.progress import Progress
+
+    from calibration.forearm.wizard import solve_forearm, solving_steps
+    from tactile_lab.cli.console import people
+
+    with Progress(console=people, transient=True, disable=not people.is_terminal) as progress:
+        task = progress.add_task("solving, and leaving out one after the other", total=solving_steps(data))
+        return solve_forearm(data, settings.wizard, lambda: progress.advance(task))
+
+
+def show_result(result: ForearmResult) -> None:
+    """Residuals of every pose, the figures against their limits, and the transform."""
+    from math import degrees
+
+    from tactile_lab.cli.calibrate.tables import show_quality
+    from tactile_lab.cli.console import show_table
+
+    rows = [
+        [
+            residual.label,
+            f"{1e3 * residual.distance_m:.2f}",
+            "" if residual.angle_rad is None else f"{degrees(residual.angle_rad):.2f}",
+            "" if residual.pixels is None else f"{residual.pixels:.2f}",
+            "outlier" if residual.label in result.quality.outliers else "",
+        ]
+        for residual in result.quality.residuals
+    ]
+    show_table("Residuals", ["pose", "mm", "deg", "px", ""], rows, right=(1, 2, 3))
+    _show_pose(result)
+    show_quality(result.quality.judgements)
+
+
+def _show_pose(result: ForearmResult) -> None:
+    from math import degrees, sqrt
+
+    from tactile_lab.cli.console import show_facts
+
+    pose, spread = result.solution.world_T_mount, result.solution.covariance
+    sigmas = [sqrt(spread[i, i]) for i in range(6)]
+    inverse = pose.inverse().translation()
+    facts = [
+        ("world_T_mount", _three([1e3 * value for value in pose.translation()], "mm")),
+        ("", _three([degrees(value) for value in pose.rotation().xyz()], "deg roll pitch yaw")),
+        ("sigma", _three([1e3 * value for value in sigmas[3:]], "mm")),
+        ("", _three([degrees(value) for value in sigmas[:3]], "deg")),
+        ("mount_T_world", _three([1e3 * value for value in inverse], "mm")),
+        ("noise", f"{sqrt(result.solution.variance_factor):.2f} of what was stated"),
+    ]
+    for joint, offset in result.solution.offsets.items():
+        if offset.observable:
+            facts.append(
+                (f"offset of {joint}", f"{degrees(offset.offset_rad):+.2f} +- {degrees(offset.sigma_rad):.2f} deg")
+            )
+    show_facts("Result", facts)
+
+
+def _three(values: list[float], unit: str) -> str:
+    return "  ".join(f"{value:9.3f}" for value in values) + f"  {unit}"

@@ -1,0 +1,1 @@
+"""``tactile-lab run`` and ``sweep``, and who is present."""

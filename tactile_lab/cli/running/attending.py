@@ -1,0 +1,77 @@
+"""Who is at a session, by what was asked for on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Literal
+
+from sessions.guided.operator import Operator, Together
+from sessions.guided.simulated_operator import SimulatedOperator
+from tactile_lab.cli.console import say, warn
+from tactile_lab.cli.running.guided_terminal import terminal_for
+from tactile_lab.cli.running.page_address import PageAddress
+from tactile_lab.view.feed import ViewFeed
+from tactile_lab.workflow.attending import Attendance
+
+
+@dataclass(frozen=True)
+class GuidedWay:
+    """How a session is guided, as asked for.
+
+    Attributes:
+        led_by: how the hand is moved; None for what the rig says.
+        automatic: captures come by themselves; None for what the rig says.
+        pedal: a further key that captures.
+        pace: simulated seconds for a real one.
+        no_input: nobody is there: a simulated operator does what the prompts say.
+    """
+
+    led_by: Literal["keys", "hand"] | None
+    automatic: bool | None
+    pedal: str
+    pace: float
+    no_input: bool
+
+
+@contextmanager
+def attendance(way: GuidedWay | None, page: PageAddress | None, title: str) -> Iterator[Attendance]:
+    """Who is there, for as long as the session runs; the terminal is as it was afterwards.
+
+    Args:
+        way: None for an autonomous session.
+        page: where the live page is to be; None for none.
+        title: of the page.
+
+    Raises:
+        ConfigurationError: there is no such key for a pedal.
+        ConfigurationError, DeviceError: the page cannot be opened there.
+    """
+    with ExitStack() as stack:
+        feed = None if page is None else stack.enter_context(_page(page, title))
+        operators: list[Operator] = [] if feed is None else [feed]
+        if way is not None and way.no_input:
+            operators.append(SimulatedOperator())
+        elif way is not None:
+            terminal = terminal_for(way.pedal)
+            stack.enter_context(terminal)
+            operators.append(terminal)
+        yield _attendance(way, Together(*operators) if operators else None, feed)
+
+
+def _attendance(way: GuidedWay | None, operator: Operator | None, feed: ViewFeed | None) -> Attendance:
+    if way is None:
+        return Attendance(operator, onlooker=feed)
+    pace = 0.0 if way.no_input else way.pace
+    return Attendance(operator, True, way.led_by, way.automatic, pace, feed)
+
+
+@contextmanager
+def _page(page: PageAddress, title: str) -> Iterator[ViewFeed]:
+    address, port, token = page.check()
+    with ViewFeed(address, port, token, title) as feed:
+        say(f"page: {feed.url}")
+        yield feed
+    if feed.dropped:
+        warn(f"the page was slower than the session: {feed.dropped} messages were not shown; all of them are recorded")

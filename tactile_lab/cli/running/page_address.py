@@ -1,0 +1,72 @@
+"""Where a page is to be, by what was asked for on the command line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import typer
+
+from drivers.core.errors import ConfigurationError
+
+HERE, PORT = "127.0.0.1", 8090
+_PANEL = "Page in the browser"
+LEAST_TOKEN = 16
+
+View = Annotated[bool, typer.Option("--view", help="Show and lead this in a browser too.", rich_help_panel=_PANEL)]
+Port = Annotated[
+    int,
+    typer.Option("--view-port", min=0, max=65535, help="Port of the page; 0 takes a free one.", rich_help_panel=_PANEL),
+]
+Listen = Annotated[
+    str,
+    typer.Option(
+        "--listen",
+        metavar="ADDRESS",
+        help="Address of the page; others than this computer's need --token.",
+        rich_help_panel=_PANEL,
+    ),
+]
+Token = Annotated[
+    str,
+    typer.Option(
+        "--token",
+        envvar="TACTILE_LAB_TOKEN",
+        help="What a visitor of the page must show; 'new' makes one.",
+        rich_help_panel=_PANEL,
+    ),
+]
+
+
+@dataclass(frozen=True)
+class PageAddress:
+    """Address, port and token as typed."""
+
+    address: str
+    port: int
+    token: str
+
+    @classmethod
+    def if_wanted(cls, view: bool, address: str, port: int, token: str) -> PageAddress | None:
+        """The address when a page was asked for. Raises BadParameter for one without a page."""
+        for option, given in (("--listen", address != HERE), ("--view-port", port != PORT)):
+            if given and not view:
+                raise typer.BadParameter("belongs to --view", param_hint=f"'{option}'")
+        return cls(address, port, token) if view else None
+
+    def check(self) -> tuple[str, int, str]:
+        """Address, port and token to use. Raises ConfigurationError."""
+        from tactile_lab.view.gate import is_loopback, new_token
+
+        token = new_token() if self.token == "new" else self.token
+        if not token and not is_loopback(self.address):
+            hint = "Give --token new, or listen on 127.0.0.1"
+            raise ConfigurationError(
+                "whoever reaches this address could press the buttons", where=self.address, hint=hint
+            )
+        if token and (
+            len(token) < LEAST_TOKEN or not all(c.isalnum() or c in "-_" for c in token) or not token.isascii()
+        ):
+            text = f"a token has at least {LEAST_TOKEN} letters, digits, - or _"
+            raise ConfigurationError(text, where="--token", hint="Give --token new to have one made")
+        return self.address, self.port, token

@@ -1,0 +1,155 @@
+"""``tactile-lab run``: the main job."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from tactile_lab.cli.options import METHOD_HELP, AllowUncalibrated, Json, Method, NoInput, RigName
+from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
+
+_GUIDED, _EXPLORATION = "Guided sessions", "Choice of the grasps"
+
+
+class Mode(StrEnum):
+    """Who decides in a session."""
+
+    AUTONOMOUS = "autonomous"
+    GUIDED = "guided"
+
+
+class LedBy(StrEnum):
+    """How the hand is moved in a guided session."""
+
+    KEYS = "keys"
+    HAND = "hand"
+
+
+def run(
+    rig: RigName = "sim",
+    object_name: Annotated[
+        str, typer.Option("--object", help="Object of the simulated rig's catalogue, or mesh:FILE (metres).")
+    ] = "box-10x6x4",
+    grasps: Annotated[
+        int | None, typer.Option(min=1, help="Number of grasps.", show_default="the rig's, 16 on sim")
+    ] = None,
+    dimension: Annotated[int, typer.Option(min=2, max=3, help="2: horizontal contour; 3: surface.")] = 2,
+    method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
+    out: Annotated[Path, typer.Option(help="Folder in which the session's folder is made.")] = Path("runs"),
+    notes: Annotated[str, typer.Option(help="The operator's notes, kept with the session.")] = "",
+    mode: Annotated[Mode, typer.Option(help="autonomous: the program decides; guided: a person.")] = Mode.AUTONOMOUS,
+    led_by: Annotated[
+        LedBy | None,
+        typer.Option(
+            help="The hand is moved by keys, or by hands.",
+            show_default="the rig's, keys on sim",
+            rich_help_panel=_GUIDED,
+        ),
+    ] = None,
+    automatic_capture: Annotated[
+        bool,
+        typer.Option(
+            "--automatic-capture", help="Capture as soon as the contacts are steady.", rich_help_panel=_GUIDED
+        ),
+    ] = False,
+    pedal: Annotated[
+        str, typer.Option(help="A further key that captures, as a foot pedal sends it.", rich_help_panel=_GUIDED)
+    ] = "",
+    pace: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            help="Simulated rig: its seconds for a real one; 0: as fast as it goes.",
+            show_default="1",
+            rich_help_panel=_GUIDED,
+        ),
+    ] = None,
+    view: View = False,
+    view_port: Port = PORT,
+    listen: Listen = "127.0.0.1",
+    token: Token = "",
+    policy: Annotated[
+        str | None,
+        typer.Option(
+            help="Exploration policy that chooses the grasps: information, or one to compare with it "
+            "(docs/exploration.md).",
+            show_default="the rig's",
+            rich_help_panel=_EXPLORATION,
+        ),
+    ] = None,
+    bounding_box: Annotated[
+        bool,
+        typer.Option(
+            "--bounding-box",
+            help="Feel the object's bounding box before the first grasp.",
+            rich_help_panel=_EXPLORATION,
+        ),
+    ] = False,
+    confirm: Annotated[
+        bool,
+        typer.Option(
+            "--confirm", help="Ask before every grasp; a veto takes the next best.", rich_help_panel=_EXPLORATION
+        ),
+    ] = False,
+    allow_uncalibrated: AllowUncalibrated = False,
+    as_json: Json = False,
+    no_input: NoInput = False,
+) -> None:
+    """Run a session: grasp, estimate, choose the next grasp, and judge the result.
+
+    A guided session (docs/guided-sessions.md) says what to do, shows what the sensors see, and captures on a key; with
+    --no-input a simulated operator does what it says.
+
+    Ctrl+C once finishes the step in hand and closes the session; twice ends at once. Both leave a readable session.
+    """
+    from tactile_lab.cli.running.approval import TerminalApproval
+    from tactile_lab.cli.running.attending import GuidedWay, attendance
+    from tactile_lab.cli.running.progress import LiveProgress
+    from tactile_lab.cli.running.results import conclude
+    from tactile_lab.cli.sessions.tables import tell_left_open
+    from tactile_lab.workflow.running import SessionRequest, run_session
+
+    guided = mode is Mode.GUIDED
+    if confirm and (no_input or guided):
+        raise typer.BadParameter("asks before every grasp of an autonomous session", param_hint="'--confirm'")
+    if not guided:
+        _refuse_guided_options(
+            {
+                "--led-by": led_by is not None,
+                "--automatic-capture": automatic_capture,
+                "--pedal": bool(pedal),
+                "--pace": pace is not None,
+            }
+        )
+    page = PageAddress.if_wanted(view, listen, view_port, token)
+    way = GuidedWay(_leader(led_by), automatic_capture or None, pedal, 1.0 if pace is None else pace, no_input)
+    tell_left_open(out)
+    request = SessionRequest(
+        rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy, bounding_box
+    )
+    title = f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}"
+    with (
+        LiveProgress(title, live=not (guided or confirm), reasons=policy is not None) as progress,
+        attendance(way if guided else None, page, title) as present,
+    ):
+        finished = run_session(request, progress, replace(present, approve=TerminalApproval()) if confirm else present)
+    conclude(finished, as_json)
+
+
+def _refuse_guided_options(given: Mapping[str, bool]) -> None:
+    """Whoever means to lead the hand must not meet one that moves by itself. Raises BadParameter."""
+    for option, is_given in given.items():
+        if is_given:
+            raise typer.BadParameter("belongs to --mode guided", param_hint=f"'{option}'")
+
+
+def _leader(chosen: LedBy | None) -> Literal["keys", "hand"] | None:
+    if chosen is None:
+        return None
+    return "keys" if chosen is LedBy.KEYS else "hand"

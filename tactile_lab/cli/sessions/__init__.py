@@ -1,0 +1,1 @@
+"""Recorded sessions at the command line."""

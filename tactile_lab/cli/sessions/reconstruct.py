@@ -1,0 +1,61 @@
+"""``tactile-lab reconstruct``: recorded contacts through any method."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tactile_lab.cli.options import LAST, METHOD_HELP, SHAPE_HELP, Json, Method, NoInput, Root
+
+
+def reconstruct(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="LOG.json|SESSION", help=f"A contact log, a session's folder, its name under --root, or {LAST}."
+        ),
+    ],
+    method: Annotated[Method | None, typer.Option(help=METHOD_HELP, show_default="joint, or the session's own")] = None,
+    shape: Annotated[str | None, typer.Option(metavar="MODEL", help=SHAPE_HELP, show_default="auto")] = None,
+    dimension: Annotated[
+        int | None, typer.Option(min=2, max=3, help="2: contour; 3: surface.", show_default="the data's")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the estimation.", show_default="0, or the session's")
+    ] = None,
+    settings: Annotated[
+        Path | None, typer.Option(help="YAML file with parameters of the estimation, by the names in slam.json.")
+    ] = None,
+    largest_sigma: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Write the parts of the shape that are known so well once more: known.ply."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the results.", show_default="beside the data, named by method")
+    ] = None,
+    root: Root = Path("runs"),
+    as_json: Json = False,
+    no_input: NoInput = False,
+) -> None:
+    """Estimate shape and trajectory from recorded contacts, and judge them where the truth is known.
+
+    The truth in a log or session is read by the evaluation alone; only known-pose is given its poses.
+    """
+    from tactile_lab.cli.running.progress import LiveProgress
+    from tactile_lab.cli.running.results import conclude
+    from tactile_lab.workflow.reconstructing import Wishes, reconstruct
+
+    del no_input
+    wishes = Wishes(
+        None if method is None else method.value,
+        dimension,
+        seed,
+        settings,
+        shape,
+        None if largest_sigma is None else largest_sigma / 1000,
+    )
+    with LiveProgress(f"reconstruction of {source}") as progress:
+        finished = reconstruct(source, root, wishes, out, progress)
+    conclude(finished, as_json)

@@ -1,0 +1,40 @@
+"""``tactile-lab view``: a session in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tactile_lab.cli.options import Root, SessionName
+from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token
+
+
+def view(
+    session: SessionName,
+    root: Root = Path("runs"),
+    speed: Annotated[float, typer.Option(min=0.0, help="Times the session's own pace; 0: its end, at once.")] = 0.0,
+    view_port: Port = PORT,
+    listen: Listen = "127.0.0.1",
+    token: Token = "",
+) -> None:
+    """Show a recorded session in the browser, or follow one that is running, until Ctrl+C.
+
+    Reading disturbs nobody: a running session does not know that it is watched. Its buttons are on the page of
+    ``tactile-lab run --view``.
+    """
+    from drivers.core.clock import MonotonicClock
+    from sessions.recording.listing import find_session
+    from tactile_lab.cli.console import say
+    from tactile_lab.view.page import Page
+    from tactile_lab.view.recorded import follow, play
+
+    address, port, token = PageAddress(listen, view_port, token).check()
+    found, clock = find_session(root, session), MonotonicClock()
+    with Page(address, port, token, found.folder.name) as page:
+        say(f"page: {page.url}   Ctrl+C ends")
+        seen = play(found, page.scene, page.draw, clock, speed)
+        follow(found, page.scene, page.draw, clock, seen)
+        while True:
+            clock.sleep_until_ns(clock.now_ns() + 200_000_000)

@@ -1,0 +1,124 @@
+"""What there is to judge: an estimate read back from its files, the truth, and what several figures need of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import trimesh
+from gtsam import Pose3
+
+from drivers.core.contacts import Array
+from drivers.core.errors import ShapeError
+from tactile_lab.evaluation.files.mesh_io import read_mesh
+from tactile_lab.evaluation.files.results import Results
+from tactile_lab.evaluation.files.tables import read_contour
+from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.evaluation.shape import (
+    ShapeComparison,
+    compare_contour,
+    compare_mesh,
+    contact_height_m,
+    horizontal_outline,
+)
+from tactile_lab.evaluation.trajectory import compared_grasps, estimate_T_truth
+from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, symmetry_turns
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What only evaluation may know.
+
+    Attributes:
+        world_T_object: the object's pose at each grasp by the marker camera, None where it was not seen.
+        mesh: the object's surface in the truth's object frame, or None.
+        outline_m: its horizontal outline in that frame, shape (n, 2), where that is what is known of it.
+    """
+
+    world_T_object: tuple[Pose3 | None, ...]
+    mesh: trimesh.Trimesh | None = None
+    outline_m: Array | None = None
+
+
+@dataclass(frozen=True)
+class Judged:
+    """An estimate beside the truth.
+
+    Attributes:
+        folder: of the results.
+        results: what is in it.
+        truth: what is known of the object, with one pose a grasp.
+    """
+
+    folder: Path
+    results: Results
+    truth: Truth
+
+    @property
+    def poses(self) -> tuple[Pose3 | None, ...]:
+        """The estimated ``world_T_object`` at each grasp, None where there is none."""
+        return self.results.trajectory.world_T_object
+
+    @cached_property
+    def symmetry_turns(self) -> int | None:
+        """Turns about its axis that leave the object as it is; None for none, and where its surface is not known."""
+        return None if self.truth.mesh is None else symmetry_turns(self.truth.mesh)
+
+    @cached_property
+    def registration_rms_mm(self) -> float | None:
+        """See :func:`tactile_lab.evaluation.registration.registration_rms_mm`; the object's own turns do not count."""
+        points = [rows.points_world_m for rows in self.results.contacts]
+        told = modulo_symmetry(self.poses, self.truth.world_T_object, self.symmetry_turns)
+        return registration_rms_mm(points, told, self.truth.world_T_object, self.results.dimension)
+
+    @cached_property
+    def shape(self) -> tuple[ShapeComparison | None, tuple[str, ...]]:
+        """The contour or mesh compared with the truth, None where one of them is missing; and why there is none.
+
+        Raises:
+            ShapeError: a true mesh or contour that cannot be compared.
+        """
+        name = "contour.csv" if self.results.dimension == 2 else "mesh.ply"
+        if not (self.folder / name).is_file():
+            return None, ()
+        alignment = estimate_T_truth(self.poses, self.truth.world_T_object)
+        truth_T_estimate = None if alignment is None else alignment.inverse()
+        if self.results.dimension == 3:
+            mesh = self.truth.mesh
+            return (None, ()) if mesh is None else _surface(self.folder / name, mesh, truth_T_estimate)
+        outline = true_outline(self.results, self.truth)
+        estimate = read_contour(self.folder / name)[:-1]
+        return None if outline is None else compare_contour(estimate, outline, truth_T_estimate), ()
+
+
+def _surface(
+    path: Path, truth: trimesh.Trimesh, truth_T_estimate: Pose3 | None
+) -> tuple[ShapeComparison | None, tuple[str, ...]]:
+    """A surface that is wildly wrong is a result too: no figures, and a word why."""
+    try:
+        mesh = read_mesh(path)
+    except ShapeError as error:
+        return None, (f"the estimated surface cannot be compared: it {error.what}",)
+    return compare_mesh(mesh, truth, truth_T_estimate), ()
+
+
+def true_outline(results: Results, truth: Truth) -> Array | None:
+    """The true outline, shape (n, 2), truth's object frame: as given, or the mesh's section at the contacts' height.
+
+    That is their mean height; half the mesh's where no true pose tells it.
+    """
+    if truth.outline_m is not None:
+        return truth.outline_m
+    if truth.mesh is None:
+        return None
+    points, poses = seen_contacts(results, truth)
+    known = any(len(found) for found in points)
+    height_m = contact_height_m(points, poses) if known else float(truth.mesh.bounds[:, 2].mean())
+    return horizontal_outline(truth.mesh, height_m)
+
+
+def seen_contacts(results: Results, truth: Truth) -> tuple[list[Array], list[Pose3]]:
+    """World contacts and true pose of every grasp that the camera saw."""
+    pairs = compared_grasps(truth.world_T_object, truth.world_T_object)
+    return [results.contacts[pair.index].points_world_m for pair in pairs], [pair.truth for pair in pairs]

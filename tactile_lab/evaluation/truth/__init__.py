@@ -1,0 +1,1 @@
+"""Where the object truly was, by the marker camera."""

@@ -1,0 +1,108 @@
+"""The truth of a recorded session: the marker camera's pictures of each grasp, and the object's mesh.
+
+Only evaluation reads these. The pictures are decoded again from their recorded bytes, so the truth can be
+recomputed with another detector or calibration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+
+import trimesh
+from gtsam import Pose3
+
+from drivers.camera.packet import picture_of
+from drivers.core.transports import Datagram
+from sessions.perception.interpreter import CAMERA_LINK
+from sessions.recording.session import Session
+from sessions.recording.session_events import EventKind, SessionEvent
+from sessions.recording.traffic.reader import TrafficMessage, TrafficReader
+from sessions.recording.traffic.schemas import SESSION_EVENTS_TOPIC, received_topic
+from tactile_lab.evaluation.files.mesh_io import read_mesh
+from tactile_lab.evaluation.judged import Truth
+
+TRUTH_TRAJECTORY = "truth.csv"
+"""The true poses in ``results/``, in the form of ``trajectory.csv``."""
+
+Look = Callable[[Datagram], Pose3 | None]
+"""Finds the object in one recorded camera datagram: ``world_T_object``, or None where it is not seen."""
+
+
+def session_truth(session: Session, grasp_count: int, look: Look | None, traffic: TrafficReader | None = None) -> Truth:
+    """The true pose of each grasp and the true mesh.
+
+    Args:
+        session: the recorded session.
+        grasp_count: number of grasps.
+        look: the marker detector; None for a rig without a camera.
+        traffic: reader of the session's traffic, for a caller who asks it afterwards what was lost.
+
+    Raises:
+        SessionError: the traffic file or a mark in it cannot be read.
+        ShapeError: the mesh cannot be used.
+    """
+    pictures = {} if look is None else marked_pictures((traffic or session.traffic()).messages())
+    poses = [look(pictures[index]) if look and index in pictures else None for index in range(grasp_count)]
+    return Truth(tuple(poses), read_truth_mesh(session))
+
+
+def read_truth_mesh(session: Session) -> trimesh.Trimesh | None:
+    """The object's own mesh, None where the session has none. Raises ShapeError."""
+    return None if session.truth_mesh is None else read_mesh(session.truth_mesh)
+
+
+def marked_pictures(messages: Iterable[TrafficMessage]) -> dict[int, Datagram]:
+    """The camera's datagram that was marked as truth for each grasp.
+
+    An event means the newest picture since the last mark, and the grasp whose capture is open, else the last one;
+    the first picture of a grasp counts.
+    """
+    found: dict[int, Datagram] = {}
+    picture: Datagram | None = None
+    counter = _GraspCounter()
+    for message in messages:
+        if message.topic == received_topic(CAMERA_LINK):
+            picture = _better(picture, Datagram(message.data, message.stamp_ns))
+        elif message.topic == SESSION_EVENTS_TOPIC:
+            event = SessionEvent.from_bytes(message.data)
+            counter.take(event.kind)
+            if event.kind is EventKind.UNDO:
+                found.pop(counter.finished, None)
+            if event.kind is EventKind.TRUTH_FRAME and picture is not None:
+                found.setdefault(counter.current, picture)
+                picture = None
+    found.pop(-1, None)
+    return found
+
+
+def _better(before: Datagram | None, now: Datagram) -> Datagram:
+    """The newest frame with a picture in it; without any, the newest with corners alone."""
+    return now if before is None or picture_of(now.payload) or not picture_of(before.payload) else before
+
+
+def camera_datagrams(messages: Iterable[TrafficMessage]) -> Iterator[Datagram]:
+    """Everything the camera sent."""
+    for message in messages:
+        if message.topic == received_topic(CAMERA_LINK):
+            yield Datagram(message.data, message.stamp_ns)
+
+
+class _GraspCounter:
+    """Numbers the grasps as perception does: one for every capture that was ended and not taken back."""
+
+    def __init__(self) -> None:
+        self.finished, self._is_open = 0, False
+
+    def take(self, kind: EventKind) -> None:
+        """Follow one mark."""
+        if kind is EventKind.CAPTURE_BEGIN:
+            self._is_open = True
+        elif kind is EventKind.CAPTURE_END:
+            self.finished, self._is_open = self.finished + 1, False
+        elif kind is EventKind.UNDO:
+            self.finished -= 1
+
+    @property
+    def current(self) -> int:
+        """The grasp that a picture taken now belongs to; -1 before the first."""
+        return self.finished if self._is_open else self.finished - 1

@@ -1,0 +1,1 @@
+"""Simulated contacts and hands."""

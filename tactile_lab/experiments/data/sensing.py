@@ -1,0 +1,80 @@
+"""What every simulated data set shares: the sensors' noise, the object's slip, and the shape of a session.
+
+Default noise: contacts 1 mm and 5 degrees, motion 10 mm per axis and 20 degrees a re-orientation at scale 1
+(thesis section 3.4; its "100 %").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from gtsam import Pose2, Pose3
+
+from drivers.core.contacts import ApproachPath, Array, Contact, Grasp
+from drivers.core.poses import rotate, transform_points
+
+POINT_SIGMA_m = 0.001
+NORMAL_SIGMA_rad = float(np.deg2rad(5.0))
+SLIP_SIGMA_m = 0.010
+SLIP_SIGMA_rad = float(np.deg2rad(20.0))
+OUTLIER_SIGMA_m = 0.010
+FORCE_N = 0.7
+
+IN_PLANE = np.array([1.0, 1.0, 0.0])
+IN_SPACE = np.ones(3)
+
+
+@dataclass(frozen=True)
+class SimulatedGrasps:
+    """A session's grasps and the truth.
+
+    Attributes:
+        shape: name of the object.
+        grasps: what the program may see.
+        world_T_body: true pose of the object at each grasp.
+    """
+
+    shape: str
+    grasps: tuple[Grasp, ...]
+    world_T_body: tuple[Pose3, ...]
+
+
+def measured_contact(
+    finger: str,
+    point_body_m: Array,
+    normal_body: Array,
+    world_T_body: Pose3,
+    rng: np.random.Generator,
+    *,
+    axes: Array = IN_SPACE,
+    outlier_share: float = 0.0,
+) -> Contact:
+    """A contact in the world with the sensors' noise.
+
+    Args:
+        finger: name of the finger.
+        point_body_m, normal_body: the true contact, each of shape (3,).
+        world_T_body: true pose of the object.
+        rng: source of the noise; every call draws at least seven numbers.
+        axes: which axes of the world are noisy, 1 or 0, shape (3,).
+        outlier_share: probability that the contact is off by 10 mm per axis, with a normal anywhere.
+    """
+    point = transform_points(world_T_body, point_body_m[None])[0] + axes * rng.normal(0.0, POINT_SIGMA_m, 3)
+    normal = rotate(world_T_body, normal_body[None])[0]
+    if rng.random() < outlier_share:
+        point, normal = point + axes * rng.normal(0.0, OUTLIER_SIGMA_m, 3), axes * rng.normal(size=3)
+        normal /= np.linalg.norm(normal)
+    noisy = normal + axes * np.tan(NORMAL_SIGMA_rad) * rng.normal(size=3)
+    covariance = np.eye(3) * POINT_SIGMA_m**2
+    return Contact(finger, point, noisy / np.linalg.norm(noisy), covariance, NORMAL_SIGMA_rad, FORCE_N)
+
+
+def line_to_contact(start_world_m: Array, contact: Contact) -> ApproachPath:
+    """The way of a finger that touched: to where its contact was measured, as a rig knows it."""
+    return ApproachPath(contact.finger, start_world_m, contact.point_world_m, touched=True)
+
+
+def planar_pose(place_m: Array, heading_rad: float = 0.0) -> Pose2:
+    """A pose in the plane from a place, of which x and y count, and a heading."""
+    return Pose2(float(place_m[0]), float(place_m[1]), heading_rad)

@@ -1,0 +1,147 @@
+"""Solids for the experiments: those of the simulated rig's catalogue, some of our own, and scanned objects.
+
+All meshes are watertight, in metres, in the object's own frame: z up as it stands, origin as its builder states.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from skimage.measure import marching_cubes
+
+from drivers.core.contacts import Array
+from drivers.core.errors import ConfigurationError
+from drivers.simulation.mesh_object import load_truth_mesh
+from drivers.simulation.objects import CATALOGUE, object_model
+from tactile_lab.experiments.data.ray_casting import first_hits
+from tactile_lab.slam.shape.surfaces.sampling import nearest_on_mesh
+
+DATA_VARIABLE = "TACTILE_LAB_DATA"
+"""Environment variable: the folder with recorded data, among them ``ycb_meshes``."""
+
+YCB_PREFIX = "ycb:"
+YCB_NAMES = ("cracker_box", "mug", "mustard_bottle", "tomato_soup_can")
+
+_MUG_GRID_m = 0.0015
+
+
+class Solid:
+    """A watertight mesh that rays can be cast at.
+
+    Attributes:
+        name: of the object.
+        mesh: its surface in its own frame.
+    """
+
+    def __init__(self, name: str, mesh: trimesh.Trimesh) -> None:
+        self.name, self.mesh = name, mesh
+        self._corners = np.ascontiguousarray(mesh.triangles, dtype=float)
+        self._normals = np.asarray(mesh.face_normals, dtype=float)
+
+    @property
+    def foot_m(self) -> float:
+        """Height of the lowest point in the object's frame, usually negative."""
+        return float(self.mesh.bounds[0, 2])
+
+    @property
+    def height_m(self) -> float:
+        """From the lowest to the highest point."""
+        return float(self.mesh.bounds[1, 2] - self.mesh.bounds[0, 2])
+
+    def touch(self, starts_m: Array, ways: Array, longest_m: float) -> list[tuple[Array, Array] | None]:
+        """For each ray (starts, unit directions: shape (n, 3)) the first point met and the outward normal there."""
+        distances_m, faces = first_hits(self._corners, starts_m, ways, longest_m)
+        return [
+            None if face < 0 else (start + distance * way, self._normals[face])
+            for start, way, distance, face in zip(starts_m, ways, distances_m, faces, strict=True)
+        ]
+
+    def nearest(self, points_m: Array) -> tuple[Array, Array]:
+        """For points of shape (n, 3): distance to the surface, shape (n,), and the place of it that is nearest."""
+        return nearest_on_mesh(points_m, self.mesh)
+
+
+@lru_cache(maxsize=32)
+def solid(name: str) -> Solid:
+    """The solid called ``name``: one of :data:`SOLIDS`, of the rig's catalogue, or ``ycb:<name>``.
+
+    Raises:
+        ConfigurationError: no such solid, or the scanned meshes are not on this machine.
+        ShapeError: the mesh file cannot be used.
+    """
+    if name.startswith(YCB_PREFIX):
+        return Solid(name, load_truth_mesh(str(ycb_path(name.removeprefix(YCB_PREFIX)))))
+    if name in SOLIDS:
+        return Solid(name, SOLIDS[name]())
+    if name in CATALOGUE:
+        return Solid(name, object_model(name).mesh)
+    known = ", ".join([*SOLIDS, *CATALOGUE, *(YCB_PREFIX + ycb for ycb in YCB_NAMES)])
+    raise ConfigurationError(f"no solid called {name!r}", where="shape", hint=f"Solids are {known}")
+
+
+def ycb_path(name: str) -> Path:
+    """The file of a scanned object.
+
+    Raises:
+        ConfigurationError: the folder is not set, or holds no such file.
+    """
+    folder = os.environ.get(DATA_VARIABLE)
+    if not folder:
+        hint = f"Set {DATA_VARIABLE} to the folder that holds ycb_meshes"
+        raise ConfigurationError(f"the mesh of {YCB_PREFIX}{name} is not known", where=DATA_VARIABLE, hint=hint)
+    path = Path(folder) / "ycb_meshes" / f"ycb_{name}.ply"
+    if not path.is_file():
+        raise ConfigurationError(f"no mesh {path.name}", where=str(path.parent), hint=f"Names: {', '.join(YCB_NAMES)}")
+    return path
+
+
+def _ellipsoid() -> trimesh.Trimesh:
+    """Semi-axes 60, 40 and 30 mm, lying."""
+    mesh: trimesh.Trimesh = trimesh.creation.icosphere(subdivisions=5)
+    mesh.apply_scale([0.060, 0.040, 0.030])  # type: ignore[no-untyped-call]
+    return mesh
+
+
+def _bottle() -> trimesh.Trimesh:
+    """A body of 70 mm with rounded shoulders and a neck of 28 mm, 130 mm high."""
+    radii_mm = [0, 32, 35, 35, 34, 30, 23, 17, 14, 14, 12, 0]
+    heights_mm = [-65, -65, -61, 12, 22, 32, 41, 47, 53, 63, 65, 65]
+    mesh: trimesh.Trimesh = trimesh.creation.revolve(np.column_stack([radii_mm, heights_mm]) / 1000, sections=96)
+    return mesh
+
+
+def _mug() -> trimesh.Trimesh:
+    """A filled mug: a cylinder of 76 mm and 96 mm height, and a ring of 16 mm thickness for a handle towards +x."""
+    axes = [np.arange(low, high, _MUG_GRID_m) for low, high in ((-0.042, 0.086), (-0.042, 0.043), (-0.052, 0.053))]
+    x, y, z = np.meshgrid(*axes, indexing="ij")
+    body = _capped_cylinder(np.hypot(x, y), z, radius_m=0.038, half_height_m=0.048)
+    handle = np.hypot(np.hypot(x - 0.044, z) - 0.028, y) - 0.008
+    distances_m = _blend(body, handle, 0.006)
+    vertices, faces, _, _ = marching_cubes(distances_m, 0.0, spacing=(_MUG_GRID_m,) * 3)  # type: ignore[no-untyped-call]
+    mesh = trimesh.Trimesh(vertices + [axis[0] for axis in axes], faces)
+    if mesh.volume < 0:
+        mesh.invert()
+    return mesh
+
+
+def _capped_cylinder(radial_m: Any, z_m: Any, *, radius_m: float, half_height_m: float) -> Any:
+    """Signed distance to a standing cylinder, negative inside."""
+    beside, above = radial_m - radius_m, np.abs(z_m) - half_height_m
+    outside = np.hypot(np.maximum(beside, 0.0), np.maximum(above, 0.0))
+    return np.minimum(np.maximum(beside, above), 0.0) + outside
+
+
+def _blend(one_m: Any, other_m: Any, width_m: float) -> Any:
+    """The union of two solids given by signed distances, their seam rounded over ``width_m``."""
+    near = np.maximum(width_m - np.abs(one_m - other_m), 0.0) / width_m
+    return np.minimum(one_m, other_m) - near**2 * width_m / 4
+
+
+SOLIDS: Mapping[str, Callable[[], trimesh.Trimesh]] = {"ellipsoid": _ellipsoid, "mug": _mug, "bottle": _bottle}
+"""Solids that the rig's catalogue does not have; origin in the middle of their height."""

@@ -1,0 +1,151 @@
+"""What a plot of an experiment shows, as plain numbers: a stored result keeps them, and a page is drawn from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Self
+
+CURVES_KEY = "mark: median; band: up to the 90th percentile"
+RANGES_KEY = "dot: median; thick line: up to the 90th percentile; thin line: up to the largest value"
+
+
+@dataclass(frozen=True)
+class Series:
+    """A line with a band: median, and ninetieth percentile above it.
+
+    Attributes:
+        name: in the legend.
+        x: where, ascending.
+        median, p90: as many, infinite where too many runs have no figure.
+    """
+
+    name: str
+    x: tuple[float, ...]
+    median: tuple[float, ...]
+    p90: tuple[float, ...]
+
+    @classmethod
+    def from_json(cls, found: Mapping[str, Any]) -> Self:
+        """The inverse of :func:`panel_json`. Raises KeyError, TypeError or ValueError."""
+        return cls(found["name"], *(tuple(map(float, found[name])) for name in ("x", "median", "p90")))
+
+
+@dataclass(frozen=True)
+class Range:
+    """A dot with a line to its right; infinite where too many runs have no figure.
+
+    Attributes:
+        name: on its left.
+        median, p90, largest: of all runs.
+        note: a word on its right, as how many failed.
+    """
+
+    name: str
+    median: float
+    p90: float
+    largest: float
+    note: str = ""
+
+    @classmethod
+    def from_json(cls, found: Mapping[str, Any]) -> Self:
+        """The inverse of :func:`panel_json`. Raises KeyError, TypeError or ValueError."""
+        median, p90, largest = (float(found[name]) for name in ("median", "p90", "largest"))
+        return cls(found["name"], median, p90, largest, found["note"])
+
+
+@dataclass(frozen=True)
+class CurvePanel:
+    """One chart of curves, with a logarithmic vertical axis.
+
+    Attributes:
+        title: above it.
+        x_label, y_label: of the axes.
+        lines: the curves.
+        log_x: the horizontal axis is logarithmic too.
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    lines: tuple[Series, ...]
+    log_x: bool = False
+
+
+@dataclass(frozen=True)
+class RangePanel:
+    """One chart of spreads.
+
+    Attributes:
+        title: above it.
+        label: of the horizontal, logarithmic axis.
+        lines: from the top.
+        asked: what is asked of the dots: a dashed upright line.
+    """
+
+    title: str
+    label: str
+    lines: tuple[Range, ...]
+    asked: float | None = None
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Charts of one kind, side by side.
+
+    Attributes:
+        panels: all of one kind.
+        columns: how many stand in a row.
+        key: what the marks mean, "" for the usual meaning.
+        width: of the sheet in pixels.
+    """
+
+    panels: tuple[CurvePanel | RangePanel, ...]
+    columns: int = 2
+    key: str = ""
+    width: float = 920.0
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain data; the inverse is :meth:`from_json`."""
+        kind = "curves" if isinstance(self.panels[0], CurvePanel) else "ranges"
+        return {
+            "kind": kind,
+            "columns": self.columns,
+            "key": self.key,
+            "panels": [panel_json(one) for one in self.panels],
+        }
+
+    @classmethod
+    def from_json(cls, found: Mapping[str, Any]) -> Self:
+        """Raises KeyError, TypeError or ValueError for what :meth:`as_json` did not write."""
+        panels = tuple(map(_panel_of[found["kind"]], found["panels"]))
+        return cls(panels, int(found["columns"]), found["key"])
+
+
+def _curve_panel(found: Mapping[str, Any]) -> CurvePanel:
+    return CurvePanel(**{**found, "lines": tuple(map(Series.from_json, found["lines"]))})
+
+
+def _range_panel(found: Mapping[str, Any]) -> RangePanel:
+    return RangePanel(**{**found, "lines": tuple(map(Range.from_json, found["lines"]))})
+
+
+_panel_of: Mapping[str, Any] = {"curves": _curve_panel, "ranges": _range_panel}
+
+
+def panel_json(panel: CurvePanel | RangePanel) -> dict[str, Any]:
+    """A panel as plain data: four digits a number, and infinite ones in words, as JSON has no number for them."""
+    return {field.name: _plain(getattr(panel, field.name)) for field in fields(panel)}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Series | Range):
+        return _plain(asdict(value))
+    if isinstance(value, Mapping):
+        return {name: _plain(part) for name, part in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(part) for part in value]
+    if isinstance(value, float):
+        return float(f"{value:.4g}") if math.isfinite(value) else "inf"
+    return value

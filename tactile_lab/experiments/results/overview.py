@@ -1,0 +1,81 @@
+"""The page of all claims: what was asked, what is reached, a plot for each, and links to the pages of the results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from textwrap import fill
+
+from drivers.core.configuration import load_model
+from tactile_lab.experiments.plots import draw
+from tactile_lab.experiments.results.claims import MET, Claim, Claims, Goal, judge_goal, plot
+from tactile_lab.experiments.results.pages import WIDTH
+from tactile_lab.experiments.results.stored_result import Part, StoredResult
+from tactile_lab.experiments.results.storing import PICTURES, RESULTS
+from tactile_lab.experiments.summary import markdown
+
+OVERVIEW, CLAIMS = "results.md", "claims.yaml"
+
+
+def overview(docs: Path, results: Mapping[str, StoredResult], sources: str) -> dict[str, str]:
+    """The page and the pictures of the claims, by their paths in the folder of documents.
+
+    Raises:
+        ConfigurationError: the claims are none, or name what no stored result has.
+    """
+    written = load_model(docs / RESULTS / CLAIMS, Claims)
+    texts = {_picture(claim): draw(claim.title, plot(claim, results)) for claim in written.claims}
+    sections = [_section(claim, results) for claim in written.claims]
+    pages = [written.intro.strip(), _glance(written, results, sources), *sections, written.outro.strip()]
+    texts[OVERVIEW] = "\n\n".join([*pages, _index(results)]) + "\n"
+    return texts
+
+
+def _picture(claim: Claim) -> str:
+    return f"{PICTURES}/claim-{claim.name}.svg"
+
+
+def _glance(claims: Claims, results: Mapping[str, StoredResult], sources: str) -> str:
+    """All goals in one table."""
+    rows = [["", "asked", "reached", "", "made by"]]
+    for claim in claims.claims:
+        for goal in claim.goals:
+            found = judge_goal(goal, results)
+            rows.append([goal.what, _limit(goal), found.text, found.verdict, _made_by(found.part, sources)])
+    return markdown(rows).rstrip("\n")
+
+
+def _made_by(part: Part, sources: str) -> str:
+    made = part.made_by
+    return "this version" if made.is_of(sources) else f"older: {made.commit or made.sources}"
+
+
+def _limit(goal: Goal) -> str:
+    if goal.asked is None:
+        return "–"
+    if goal.asked == 0.0 and not goal.at_least:
+        return "none"
+    return f"{'≥' if goal.at_least else '≤'} {goal.asked:g} {goal.unit}".strip()
+
+
+def _section(claim: Claim, results: Mapping[str, StoredResult]) -> str:
+    links = ", ".join(f"[{name}]({RESULTS}/{name}.md)" for name in claim.pages)
+    text = f"{_balance(claim, results)} {claim.text.strip()} More: {links}."
+    return f"## {claim.title}\n\n{_fill(text)}\n\n![{claim.title}]({_picture(claim)})"
+
+
+def _balance(claim: Claim, results: Mapping[str, StoredResult]) -> str:
+    """How many of the claim's goals are met."""
+    verdicts = [verdict for goal in claim.goals if (verdict := judge_goal(goal, results).verdict)]
+    missed = len(verdicts) - verdicts.count(MET)
+    if not verdicts:
+        return "*Nothing was asked.*"
+    return f"*Missed: {missed} of {len(verdicts)} goals.*" if missed else "*Every goal is met.*"
+
+
+def _index(results: Mapping[str, StoredResult]) -> str:
+    return _fill("All pages: " + ", ".join(f"[{name}]({RESULTS}/{name}.md)" for name in results) + ".")
+
+
+def _fill(text: str) -> str:
+    return fill(text, WIDTH, break_long_words=False, break_on_hyphens=False)

@@ -1,0 +1,88 @@
+"""The page of a stored result: what made it, what it means, its commands, its plot and its tables."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from textwrap import fill
+
+from tactile_lab.experiments.plot_data import CURVES_KEY, RANGES_KEY, CurvePanel, Plot, RangePanel
+from tactile_lab.experiments.plot_sheet import EARLIER
+from tactile_lab.experiments.results.stored_result import Part, StoredResult, Table
+from tactile_lab.experiments.summary import markdown
+
+SPREADS = "Where a heading says nothing else, three figures are median / p90 / maximum."
+WIDTH = 140
+"""Of the pages' lines, where they are prose."""
+_ABOUT = re.compile(r"<!-- about: (?P<version>.+?) -->\n+")
+
+
+def page(result: StoredResult, sources: str, notes: str = "", picture: str = "") -> str:
+    """The page in Markdown.
+
+    Args:
+        result: what it shows.
+        sources: hash of the sources as they are now: what others made says that it is older.
+        notes: by hand, in Markdown; a first line ``<!-- about: VERSION -->`` tells which version they speak of.
+        picture: of the plot, from the page; "" where there is none.
+    """
+    first, *earlier = result.parts
+    begin = [f"# {result.name}", fill(result.sentence, WIDTH), first.made_by.words(sources)]
+    begin += [_notes(notes, first)] if notes else []
+    begin += [f"![{result.sentence}]({picture})"] if picture else []
+    parts = [_part(first), *(f"## Made earlier\n\n{part.made_by.words(sources)}\n\n{_part(part)}" for part in earlier)]
+    return "\n\n".join([*begin, *parts]) + "\n"
+
+
+def _part(part: Part) -> str:
+    commands = "\n".join(part.commands)
+    about = " ".join(text for text in (part.about, SPREADS if _has_spreads(part) else "") if text)
+    pieces = [f"```\n{commands}\n```" if commands else "", fill(about, WIDTH), *map(_table, part.tables)]
+    return "\n\n".join(piece for piece in pieces if piece)
+
+
+def _has_spreads(part: Part) -> bool:
+    return any(text.count(" / ") == 2 for table in part.tables for row in table.rows for text in row)
+
+
+def _table(table: Table) -> str:
+    title = f"{table.title}:\n\n" if table.title else ""
+    return title + markdown([table.head, *table.rows]).rstrip("\n")
+
+
+def _notes(notes: str, newest: Part) -> str:
+    """What was written by hand; with a word about its version where the figures are of another."""
+    found, text = _ABOUT.match(notes), _ABOUT.sub("", notes, count=1).strip()
+    made = newest.made_by.sources or newest.made_by.commit
+    if found is None or found["version"] == made:
+        return text
+    return f"*Written about the results of {found['version']}:*\n\n{text}"
+
+
+def merge_plots(parts: Sequence[Part]) -> Plot | None:
+    """The newest part's plot, with the lines that only earlier ones have, marked by a star."""
+    shown: Plot | None = None
+    for plot in (part.plot for part in parts if part.plot is not None):
+        shown = plot if shown is None else _with_earlier(shown, plot)
+    return shown
+
+
+def _with_earlier(newer: Plot, older: Plot) -> Plot:
+    if type(newer.panels[0]) is not type(older.panels[0]):
+        return newer
+    panels = {panel.title: panel for panel in newer.panels}
+    for panel in older.panels:
+        panels[panel.title] = _with_lines(panels.get(panel.title), panel)
+    if not any(line.name.endswith(EARLIER) for panel in panels.values() for line in panel.lines):
+        return newer
+    usual = CURVES_KEY if isinstance(newer.panels[0], CurvePanel) else RANGES_KEY
+    return replace(newer, panels=tuple(panels.values()), key=f"{newer.key or usual}; *: by an earlier version")
+
+
+def _with_lines(newer: CurvePanel | RangePanel | None, older: CurvePanel | RangePanel) -> CurvePanel | RangePanel:
+    known = newer.lines if newer else ()
+    names = {line.name.removesuffix(EARLIER) for line in known}
+    missing = [line for line in older.lines if line.name.removesuffix(EARLIER) not in names]
+    more = [replace(line, name=line.name.removesuffix(EARLIER) + EARLIER) for line in missing]
+    return replace(newer or older, lines=(*known, *more))  # type: ignore[arg-type]  # lines of the panel's own kind

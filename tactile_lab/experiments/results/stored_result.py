@@ -1,0 +1,176 @@
+"""The stored outcome of an experiment: tables and a plot, the command, the seeds, and the version that made them.
+
+One file of JSON a result, a row of a table on one line, so that a change can be read. A result has several parts when
+only some of its rows were made again: what an earlier version made stays, and says so.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Self
+
+from drivers.core.atomic_files import write_whole
+from drivers.core.errors import SessionError
+from tactile_lab.experiments.plot_data import Plot
+
+FORMAT = "tactile-result/1"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of texts.
+
+    Attributes:
+        title: above it, "" for none.
+        head: titles of the columns.
+        rows: as many texts each.
+        keys: how many of the first columns tell which row it is.
+    """
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    keys: int = 1
+
+    def key(self, row: Sequence[str]) -> tuple[str, ...]:
+        """Which row it is."""
+        return tuple(row[: self.keys])
+
+    def without(self, other: Table) -> Table:
+        """The rows that the other table does not have; all of them where its columns are others."""
+        known = {other.key(row) for row in other.rows} if self.head == other.head else set()
+        return replace(self, rows=tuple(row for row in self.rows if self.key(row) not in known))
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain data."""
+        rows = [list(row) for row in self.rows]
+        return {"title": self.title, "keys": self.keys, "head": list(self.head), "rows": rows}
+
+    @classmethod
+    def from_json(cls, found: Mapping[str, Any]) -> Self:
+        """Raises KeyError, TypeError or ValueError for what :meth:`as_json` did not write."""
+        head, rows = tuple(found["head"]), tuple(tuple(row) for row in found["rows"])
+        if any(len(row) != len(head) for row in rows):
+            raise ValueError(f"a row of the table {found['title']!r} is not as long as its head")
+        return cls(found["title"], head, rows, int(found["keys"]))
+
+
+@dataclass(frozen=True)
+class MadeBy:
+    """What made a result.
+
+    Attributes:
+        program: version of the package.
+        sources: hash of the sources that results depend on; None where it was not kept.
+        commit: of the repository, where the sources were not kept; None otherwise.
+        date: day, ISO 8601.
+        machine: in words.
+    """
+
+    program: str
+    sources: str | None
+    commit: str | None
+    date: str
+    machine: str
+
+    def is_of(self, sources: str) -> bool:
+        """Whether these sources made it."""
+        return self.sources == sources
+
+    def words(self, sources: str) -> str:
+        """Which version, and whether it is older than the sources."""
+        by = f"commit {self.commit}" if self.sources is None else f"{self.program}, sources {self.sources}"
+        if self.is_of(sources):
+            return f"Made by this version of the code ({by}), {self.date}, {self.machine}."
+        return f"**Made by an older version of the code** ({by}), {self.date}, {self.machine}."
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one version of the program made.
+
+    Attributes:
+        made_by: that version.
+        commands: that made it.
+        about: seeds and numbers of runs in words, "" if the tables tell it.
+        tables: in the order of the page.
+        plot: None where there is none.
+    """
+
+    made_by: MadeBy
+    commands: tuple[str, ...]
+    about: str
+    tables: tuple[Table, ...]
+    plot: Plot | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "made_by": vars(self.made_by),
+            "commands": list(self.commands),
+            "about": self.about,
+            "tables": [table.as_json() for table in self.tables],
+            "plot": None if self.plot is None else self.plot.as_json(),
+        }
+
+    @classmethod
+    def from_json(cls, found: Mapping[str, Any]) -> Self:
+        """Raises KeyError, TypeError or ValueError for what :meth:`as_json` did not write."""
+        plot = None if found["plot"] is None else Plot.from_json(found["plot"])
+        tables = tuple(map(Table.from_json, found["tables"]))
+        return cls(MadeBy(**found["made_by"]), tuple(found["commands"]), found["about"], tables, plot)
+
+
+@dataclass(frozen=True)
+class StoredResult:
+    """A result of the repository.
+
+    Attributes:
+        name: of its file and of its page.
+        sentence: what it shows.
+        parts: what each version made, the newest first.
+    """
+
+    name: str
+    sentence: str
+    parts: tuple[Part, ...]
+
+    @classmethod
+    def read(cls, file: Path) -> Self:
+        """Read a file.
+
+        Raises:
+            SessionError: it cannot be read, or is no stored result.
+        """
+        try:
+            found = json.loads(file.read_text(encoding="utf-8"))
+            if found["format"] != FORMAT:
+                raise ValueError(f"format {found['format']!r}")
+            return cls(found["name"], found["sentence"], tuple(map(Part.from_json, found["parts"])))
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            hint = "Take it from the repository again, or store the result anew"
+            raise SessionError(f"is no stored result ({error!r})", where=str(file), hint=hint) from error
+
+    def write(self, folder: Path) -> Path:
+        """Write the file ``NAME.json`` into a folder and give its path. Raises WriteError."""
+        parts = [part.as_json() for part in self.parts]
+        content = {"format": FORMAT, "name": self.name, "sentence": self.sentence, "parts": parts}
+        file = folder / f"{self.name}.json"
+        write_whole(file, dump_json(content) + "\n")
+        return file
+
+
+def dump_json(content: Any, indent: str = "") -> str:
+    """JSON, in which what holds no further lists or objects stands on one line."""
+    inside = list(content.values() if isinstance(content, dict) else content if isinstance(content, list) else ())
+    if not any(isinstance(part, dict | list) for part in inside):
+        return json.dumps(content, ensure_ascii=False, allow_nan=False)
+    parts = [dump_json(part, indent + " ") for part in inside]
+    if isinstance(content, dict):
+        parts = [f"{json.dumps(name)}: {part}" for name, part in zip(content, parts, strict=True)]
+    begin, end = "{}" if isinstance(content, dict) else "[]"
+    lines = ",\n".join(f"{indent} {part}" for part in parts)
+    return f"{begin}\n{lines}\n{indent}{end}"

@@ -1,0 +1,86 @@
+"""Figures of merit of one run: how good the shape, the tracking and the stated uncertainty are, and how long it took.
+
+Shape: Hausdorff and mean distance (appendix C) after the best rigid alignment. Tracking: registration error; turns of a
+solid about its own axis that no contact can tell do not count. Uncertainty: share of the surface whose true error is
+within two stated standard deviations.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from drivers.core.contacts import Array
+from drivers.core.poses import spatial, transform_points
+from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.evaluation.trajectory import Poses
+from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, stands, symmetry_turns
+from tactile_lab.experiments.data.planar_data import PlanarGrasps
+from tactile_lab.experiments.data.sensing import SimulatedGrasps
+from tactile_lab.experiments.data.spatial_data import SpatialGrasps
+from tactile_lab.slam.result import SlamResult
+from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
+from tactile_lab.slam.shape.metrics.metrics import ShapeErrors, contour_errors, mesh_errors
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, distances_to_polygon
+from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
+
+NO_SHAPE: dict[str, Any] = {"hausdorff_mm": None, "mean_mm": None, "iou": None, "within_2_sigma": None}
+
+
+def contour_figures(contour: Contour | None, outline_m: Array) -> dict[str, Any]:
+    """Of an estimated outline against the true one, shape (n, 2)."""
+    if contour is None:
+        return dict(NO_SHAPE)
+    fit = align_contours(contour.points_m, outline_m)
+    moved = transform_points(spatial(fit), np.pad(contour.points_m, ((0, 0), (0, 1))))[:, :2]
+    covered = _within(distances_to_polygon(moved, outline_m), contour.sigma_m)
+    return _shape_figures(contour_errors(contour.points_m, outline_m, fit), covered, contour.is_closed)
+
+
+def mesh_figures(mesh: SurfaceMesh | None, truth: trimesh.Trimesh, *, upright: bool = True) -> dict[str, Any]:
+    """Of an estimated surface against the true one; upright turns about the vertical only to find the best fit."""
+    if mesh is None:
+        return dict(NO_SHAPE)
+    fit = align_meshes(mesh, truth, upright=upright)
+    covered = _within(distances_to_mesh(transform_points(fit, mesh.vertices), truth), mesh.sigma_m)
+    return _shape_figures(mesh_errors(mesh, truth, fit), covered, mesh.is_closed)
+
+
+def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
+    """Of a whole run."""
+    if isinstance(data, PlanarGrasps):
+        shape = contour_figures(result.contour, data.outline_m)
+    elif isinstance(data, SpatialGrasps):
+        shape = mesh_figures(result.mesh, data.mesh, upright=all(map(stands, data.world_T_body)))
+    return {
+        **shape,
+        "registration_mm": registration_mm(data, result.world_T_object, result.dimension),
+        "status": result.status,
+        "contacts": sum(len(grasp.contacts) for grasp in data.grasps),
+        "untracked": sum(step.verdict == "untracked" for step in result.steps),
+        "step_ms": [round(1e3 * seconds, 3) for seconds in result.step_seconds[1:]],
+    }
+
+
+def registration_mm(data: SimulatedGrasps, estimate: Poses, dimension: int) -> float | None:
+    """Of a trajectory; turns of a solid about its own axis that no contact can tell do not count."""
+    turns = symmetry_turns(data.mesh) if isinstance(data, SpatialGrasps) else None
+    poses = modulo_symmetry(estimate, data.world_T_body, turns)
+    contacts = [grasp.points_world_m for grasp in data.grasps]
+    return registration_rms_mm(contacts, poses, data.world_T_body, dimension)
+
+
+def _within(errors_m: Array, sigma_m: Array) -> float:
+    return float(np.mean(errors_m <= 2 * sigma_m))
+
+
+def _shape_figures(errors: ShapeErrors, covered: float, closed: bool) -> dict[str, Any]:
+    return {
+        "hausdorff_mm": 1e3 * errors.hausdorff_m,
+        "mean_mm": 1e3 * errors.mean_distance_m,
+        "iou": errors.iou,
+        "within_2_sigma": covered,
+        "closed": closed,
+    }

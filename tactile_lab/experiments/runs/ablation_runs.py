@@ -1,0 +1,178 @@
+"""Method "joint" with one mechanism left out at a time, on the same grasps.
+
+Some mechanisms say themselves whether they changed anything. Where such a one did not, a run without it is the same and
+is not made again, but for the seeds that check exactly that and time it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from functools import lru_cache, partial
+from types import MappingProxyType
+from typing import Any, TypeAlias, TypeVar
+
+from tactile_lab.experiments.cells import Cell, Row, Setting, grid
+from tactile_lab.experiments.data import planar_data, spatial_data
+from tactile_lab.experiments.data.sensing import SimulatedGrasps
+from tactile_lab.experiments.run_metrics import slam_figures
+from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+
+Overlay: TypeAlias = Mapping[str, Mapping[str, Any]]
+_Result = TypeVar("_Result")
+
+NOTHING = "nothing"
+PLANE, WRONG, LONG, SPACE = "in the plane", "wrong contacts", "long session", "in space"
+SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        PLANE: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
+        WRONG: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
+        LONG: ("L", "ellipse"),
+        SPACE: ("box-12x6x6", "triangular-prism", "ellipsoid", "cylinder", "hexagonal-prism", "l-block"),
+    }
+)
+GRASPS: Mapping[str, int] = MappingProxyType({PLANE: 12, WRONG: 12, LONG: 36, SPACE: 12})
+CHECK_EVERY = 5
+"""Seeds that are divisible by this are run again even where a mechanism changed nothing."""
+
+
+def _joint(*names: str) -> Overlay:
+    return {"joint": {"without": list(names)}}
+
+
+def _shape(*names: str) -> Overlay:
+    return {"shape": {"without": list(names)}}
+
+
+WITHOUT: Mapping[str, Overlay] = MappingProxyType(
+    {
+        NOTHING: {},
+        "backward reading": {"joint": {"backwards": False}},
+        "several trajectories": {"joint": {"hypotheses": 1}},
+        "aside branch": _joint("aside branch"),
+        "valleys": _joint("valleys"),
+        "stiff slips": {"motion": {"gripped": False}},
+        "free space": _joint("free space"),
+        "splicing": _joint("splicing"),
+        "relocation": _joint("relocation"),
+        "second look": _joint("second look"),
+        "deferred association": _joint("deferred association"),
+        "faces": _joint("faces"),
+        "doubts": _joint("doubts"),
+        "without one": _joint("without one"),
+        "released contacts": _joint("released contacts"),
+        "placing on the object": _joint("placing on the object"),
+        "placing from several": _joint("placing from several"),
+        "regular faces": _joint("regular faces"),
+        "right angles": _shape("right angles"),
+        "face extents": _shape("face extents"),
+        "corners": _shape("corners"),
+        "contradictions": _shape("contradictions"),
+        "field": _shape("field"),
+        "polygon": _shape("polygon"),
+        "polyhedron": _shape("polyhedron"),
+        "prism": _shape("prism"),
+        "standing field": _shape("standing field"),
+        "strays": _shape("strays"),
+        "pose uncertainty": _joint("pose uncertainty"),
+        "loops": {"back_end": {"enabled": False}},
+        "fixed lag": {"joint": {"window": 1000}},
+    }
+)
+"""What is left out, by name, as settings."""
+
+_IN_SPACE_ONLY = ("polyhedron", "prism", "standing field", "strays", "pose uncertainty")
+_IN_PLANE_ONLY = ("corners", "without one")
+_LONG_ONLY = ("fixed lag",)
+_LONG_TOO = (NOTHING, "fixed lag", "loops")
+_TELLING: Mapping[str, frozenset[str]] = MappingProxyType(
+    {
+        name: frozenset({name, *further})
+        for name, further in {
+            "splicing": (),
+            "relocation": ("deferred association",),
+            "second look": (),
+            "deferred association": (),
+            "doubts": (),
+            "without one": (),
+            "released contacts": (),
+            "placing on the object": (),
+            "placing from several": (),
+            "regular faces": (),
+        }.items()
+    }
+)
+"""Mechanisms without which a run is the same unless one of these changed something in the full run."""
+
+
+_COMPARED = ("registration_mm", "hausdorff_mm", "within_2_sigma")
+_SAME = 1e-3
+"""Millimetres, and a share: optimisers that start elsewhere end no farther apart."""
+
+
+def settings(grasps: int) -> list[Setting]:
+    """Every condition with every mechanism that it can have; 0 grasps for each condition's own number."""
+    return [
+        setting
+        for condition, shapes in SHAPES.items()
+        for setting in grid(
+            condition=[condition],
+            shape=shapes,
+            grasps=[min(grasps, GRASPS[condition]) or GRASPS[condition]],
+            without=_left_out_in(condition),
+        )
+    ]
+
+
+def _left_out_in(condition: str) -> list[str]:
+    if condition == LONG:
+        return list(_LONG_TOO)
+    impossible = (*_LONG_ONLY, *(_IN_PLANE_ONLY if condition == SPACE else _IN_SPACE_ONLY))
+    return [name for name in WITHOUT if name not in impossible]
+
+
+def track_without(cell: Cell) -> dict[str, Any]:
+    """The figures of a run, and whether the mechanism is idle in it. Cell: condition, shape, grasps, without."""
+    full, changed = _full(cell["condition"], cell["shape"], cell["grasps"], cell.seed)
+    name = cell["without"]
+    if name == NOTHING:
+        return {**full, "changed": sorted(changed)}
+    idle = name in _TELLING and not changed & _TELLING[name]
+    if idle and cell.seed % CHECK_EVERY:
+        return {**full, "same": True, "rerun": False}
+    found, _ = _tracked(_data(cell["condition"], cell["shape"], cell["grasps"], cell.seed), WITHOUT[name], cell)
+    return {**found, "same": all(_nearly(found[key], full[key]) for key in _COMPARED), "rerun": True}
+
+
+def _nearly(one: float | None, other: float | None) -> bool:
+    return one is other is None or (one is not None and other is not None and abs(one - other) < _SAME)
+
+
+@lru_cache(maxsize=2)
+def _full(condition: str, shape: str, grasps: int, seed: int) -> tuple[dict[str, Any], frozenset[str]]:
+    """Of the method with all its mechanisms, and those that changed something; asked for by all that are left out."""
+    cell = Cell((("condition", condition),), seed)
+    return _tracked(_data(condition, shape, grasps, seed), {}, cell)
+
+
+def _data(condition: str, shape: str, grasps: int, seed: int) -> SimulatedGrasps:
+    if condition == SPACE:
+        return spatial_data.simulate(shape, seed, count=grasps)
+    return planar_data.simulate(shape, seed, count=grasps, outlier_share=0.1 if condition == WRONG else 0.0)
+
+
+def _tracked(data: SimulatedGrasps, overlay: Overlay, cell: Cell) -> tuple[dict[str, Any], frozenset[str]]:
+    given = {"dimension": 3 if cell["condition"] == SPACE else 2, **overlay}
+    slam = TactileSlam(SlamSettings.model_validate(given), cell.seed)
+    steps_ms = [_processor_ms(partial(slam.add_grasp, grasp))[0] for grasp in data.grasps]
+    finish_ms, result = _processor_ms(slam.finish)
+    figures = {**slam_figures(data, result), "step_ms": steps_ms[1:], "finish_ms": finish_ms}
+    figures["failed"] = float(bool(Row(cell, figures).failure))
+    return figures, slam.mechanisms_that_acted
+
+
+def _processor_ms(work: Callable[[], _Result]) -> tuple[float, _Result]:
+    """Processor time and outcome: runs are compared that other programs may have slowed down by turns."""
+    started = time.process_time()
+    found = work()
+    return round(1e3 * (time.process_time() - started), 1), found

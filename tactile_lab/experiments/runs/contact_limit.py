@@ -1,0 +1,202 @@
+"""What grasps can tell of an object with flat sides at all: the Cramér-Rao bound of its sides and of its poses.
+
+The errors of an estimate that wastes nothing have the inverse of the contacts' information as their covariance. Unknown
+are the sides, whose number and neighbours are told, and the object's pose at every grasp but the first, which fixes the
+frame. Each contact lies on its side up to the sensors' noise and points along its normal; between grasps the object
+slips by the noise of the motion, in the plane or on a table. One error is drawn a run, and its shape and its poses are
+judged as estimates are. Nothing is estimated here; what does estimate can only do better by knowing more, for instance
+which sides tend to be parallel, or that contacts lie between the ends of their sides.
+
+Sides may also be *regular*: it is then told which are parallel or at right angles to which.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from gtsam import Pose3
+from numpy.typing import NDArray
+from scipy.optimize import approx_fprime
+
+from drivers.core.contacts import Array
+from drivers.core.poses import planar, spatial, transform_points
+from tactile_lab.experiments.data.sensing import (
+    NORMAL_SIGMA_rad,
+    POINT_SIGMA_m,
+    SimulatedGrasps,
+    SLIP_SIGMA_m,
+    SLIP_SIGMA_rad,
+    planar_pose,
+)
+from tactile_lab.experiments.summary import REFERENCE_METHOD
+from tactile_lab.slam.tracking.contacts.motion import (
+    MotionNoise,
+    compose,
+    deviation,
+    inverse,
+    planar_motion,
+    pose_row,
+    row_pose,
+)
+from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
+
+SIDES = ("free", "regular")
+METHODS = (REFERENCE_METHOD, "estimated-pose")
+
+_STEP = 1e-7
+_ALIKE_rad = 1e-9
+_REACH_m, _REACH_rad = 0.050, 1.0
+"""What is known of a side without contacts: it lies within the hand."""
+
+
+@dataclass(frozen=True)
+class FlatSides:
+    """Sides ``u . x = distance`` and how they may differ from that.
+
+    Attributes:
+        normals: outward unit normals u, shape (n, d).
+        distances_m: shape (n,).
+        turning: of the normals by each unknown angle, shape (n, d, a).
+        sliding: of the distances by each unknown displacement, shape (n, b).
+    """
+
+    normals: Array
+    distances_m: Array
+    turning: Array
+    sliding: Array
+
+    @property
+    def unknown(self) -> tuple[int, int]:
+        """How many angles and displacements."""
+        return self.turning.shape[2], self.sliding.shape[1]
+
+    def at(self, angles_rad: Array, displacements_m: Array) -> tuple[Array, Array]:
+        """Normals and distances that differ by so much."""
+        turned = self.normals + self.turning @ angles_rad
+        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+        return turned, self.distances_m + self.sliding @ displacements_m
+
+    def corners(self, corners_m: Array, meeting: NDArray[np.bool_], error: EstimateOffset) -> Array:
+        """Where corners of shape (k, d) are moved to by an error, ``meeting`` (k, n) sides each."""
+        normals, distances_m = self.at(error.angles_rad, error.displacements_m)
+        moved = corners_m.copy()
+        for corner, sides in zip(moved, meeting, strict=True):
+            corner += np.linalg.pinv(normals[sides]) @ (distances_m[sides] - normals[sides] @ corner)
+        return moved
+
+
+@dataclass(frozen=True)
+class EstimateOffset:
+    """What an estimate is off by.
+
+    Attributes:
+        angles_rad, displacements_m: of the sides, see :class:`FlatSides`.
+        rows: (x, y, heading) by which the contacts of each grasp are displaced, the first one's zero, shape (k, 3).
+    """
+
+    angles_rad: Array
+    displacements_m: Array
+    rows: Array
+
+
+@dataclass(frozen=True)
+class SeenSession:
+    """The truth in the frame that is tracked, whose origin the object slips about.
+
+    Attributes:
+        world_T_frame: rows (x, y, heading), shape (k, 3).
+        slips: of the object between grasps, rows, shape (k - 1, 3).
+        sigmas: of the slips along x, y (m) and of the heading (rad).
+        grasps: of each contact, shape (n,).
+        contacts_m, normals: shape (n, 3), as measured.
+    """
+
+    world_T_frame: Array
+    slips: Array
+    sigmas: Array
+    grasps: NDArray[np.int64]
+    contacts_m: Array
+    normals: Array
+
+    @classmethod
+    def of(cls, data: SimulatedGrasps, scale: float) -> SeenSession:
+        """Of simulated grasps with slips of ``scale`` times the full motion noise; heights as in the world."""
+        bodies = [planar(pose) for pose in data.world_T_body]
+        body_T_frame = bodies[0].between(planar_pose(data.grasps[0].points_world_m.mean(axis=0)))
+        rows = np.array([pose_row(body.compose(body_T_frame)) for body in bodies])
+        index = np.repeat(np.arange(len(rows)), [len(grasp.contacts) for grasp in data.grasps]).astype(np.int64)
+        motions = np.array([planar_motion(grasp.hand_motion_world) for grasp in data.grasps[1:]]).reshape(-1, 3)
+        slips = compose(inverse(compose(motions, rows[:-1])), rows[1:])
+        sigmas = MotionNoise(translation_m=scale * SLIP_SIGMA_m, rotation_rad=scale * SLIP_SIGMA_rad).sigmas
+        points = np.concatenate([grasp.points_world_m for grasp in data.grasps])
+        normals = np.concatenate([[each.normal_world for each in grasp.contacts] for grasp in data.grasps])
+        return cls(rows, slips, sigmas, index, *PLANAR.to_object(rows[index], points, normals))
+
+    def in_frame(self, world_T_body: Pose3, points_body_m: Array) -> Array:
+        """Points (n, 3) of the object's model in the tracked frame, from its first pose."""
+        placed = transform_points(world_T_body, points_body_m)
+        return PLANAR.to_object(self.world_T_frame[0], placed, placed)[0]
+
+    def estimate(self, error: EstimateOffset) -> list[Pose3]:
+        """``world_T_frame`` of somebody with this error."""
+        return [spatial(row_pose(row)) for row in compose(self.world_T_frame, inverse(error.rows))]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What is seen of flat sides in a session.
+
+    Attributes:
+        session: in whose frame the sides are.
+        sides: of the object.
+        touched: side of each contact, shape (n,).
+    """
+
+    session: SeenSession
+    sides: FlatSides
+    touched: NDArray[np.int64]
+
+    def drawn_error(self, rng: np.random.Generator, *, known_poses: bool) -> EstimateOffset:
+        """One error of an estimate that wastes nothing.
+
+        Drawn by Cholesky's factor: axes of equal variance, which symmetric objects have, are any in a spectral one, so
+        that rounding would choose the error.
+        """
+        covariance = np.linalg.inv(self._information(known_poses=known_poses))
+        return self._error(rng.multivariate_normal(np.zeros(len(covariance)), covariance, method="cholesky"))
+
+    def _information(self, *, known_poses: bool) -> Array:
+        """In everything that is seen, about all unknowns or the sides' alone: square."""
+        angles, displacements = self.sides.unknown
+        poses = 0 if known_poses else self.session.slips.size
+        change = approx_fprime(np.zeros(angles + displacements + poses), self._misfit, _STEP)
+        weak = np.repeat([_REACH_rad**-2, _REACH_m**-2, 0.0], [angles, displacements, poses])
+        return np.asarray(change.T @ change + np.diag(weak))
+
+    def _error(self, unknowns: Array) -> EstimateOffset:
+        """From one row; what is left out of it is zero."""
+        angles, displacements = self.sides.unknown
+        given = np.zeros(angles + displacements + self.session.slips.size)
+        given[: len(unknowns)] = unknowns
+        first, second, rows = np.split(given, [angles, angles + displacements])
+        return EstimateOffset(first, second, np.vstack([np.zeros(3), rows.reshape(-1, 3)]))
+
+    def _misfit(self, unknowns: Array) -> Array:
+        """Of places, of normals and of slips, in standard deviations of their noise; the contacts where they touch."""
+        error, seen, dimension = self._error(unknowns), self.session, self.sides.normals.shape[1]
+        normals, distances_m = self.sides.at(error.angles_rad, error.displacements_m)
+        contacts_m, true = seen.contacts_m[:, :dimension], self.sides.normals[self.touched]
+        placed, turned = PLANAR.to_object(inverse(error.rows[seen.grasps]), contacts_m, true)
+        beside_m = np.sum(normals[self.touched] * placed, axis=1) - distances_m[self.touched]
+        tilted = normals[self.touched] - turned
+        slipped = compose(error.rows[:-1], compose(seen.slips, inverse(error.rows[1:])))
+        away = deviation(slipped, seen.slips) / seen.sigmas
+        return np.concatenate([beside_m / POINT_SIGMA_m, tilted.ravel() / np.tan(NORMAL_SIGMA_rad), away.ravel()])
+
+
+def together(angles_rad: Array) -> Array:
+    """1 where a side with its normal at this angle is parallel or at right angles to others, shape (n, groups)."""
+    away = angles_rad[:, None] - angles_rad
+    alike = np.abs((away + np.pi / 4) % (np.pi / 2) - np.pi / 4) < _ALIKE_rad
+    return np.asarray(np.unique(alike, axis=0).T, dtype=float)

@@ -1,0 +1,262 @@
+"""One accident of a recording under full load, from a cell to its figures.
+
+The load runs in a process of its own and is killed, or loses its disk; what it had handed to the recorder is known
+from a shared file, what came back is read from the recovered session, message by message.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from drivers.core.errors import SessionError
+from sessions.recording.recovery import recover
+from sessions.recording.session import Session
+from tactile_lab.experiments.cells import Cell
+from tactile_lab.experiments.data.recorder_load import (
+    STREAMS,
+    LoadSettings,
+    LoadStatus,
+    TICK_ns,
+    number_of,
+    read_status,
+    tick_of,
+)
+
+KILL, FULL, READ_ONLY, STALL, AHEAD, BACK = (
+    "kill -9",
+    "full disk",
+    "read-only folder",
+    "disk stalled for 3 s",
+    "clock 1 s ahead",
+    "clock 1 s back",
+)
+FAULTS = (KILL, FULL, READ_ONLY, STALL, AHEAD, BACK)
+ALLOWED_LOSS_ms = 100.0
+
+_LONGEST_s = 60.0
+_TMPFS_BYTES = 3_000_000
+_JUMP_ns = 1_000_000_000
+
+
+def needs_root() -> str:
+    """What an ordinary user cannot try."""
+    return "" if os.geteuid() == 0 else "a full disk and a read-only one, which only root can mount"
+
+
+def faults_here() -> list[str]:
+    """The faults that can be tried on this machine."""
+    return [fault for fault in FAULTS if not needs_root() or fault not in (FULL, READ_ONLY)]
+
+
+def crash_and_recover(cell: Cell) -> dict[str, Any]:
+    """An accident at an instant that follows from the seed. Cell: fault, one of :data:`FAULTS`.
+
+    Raises:
+        SessionError: the recording could not be recovered, lost something from before the last flush, or more than
+            a tenth of a second after it.
+    """
+    fault, instant_s = cell["fault"], random.Random(cell.seed).uniform(0.3, 2.0)
+    with tempfile.TemporaryDirectory() as folder:
+        return _TRIALS[fault](Path(folder), instant_s)
+
+
+# --- the accidents -------------------------------------------------------------------------------------------------
+
+
+def _kill(folder: Path, instant_s: float) -> dict[str, Any]:
+    load = _Load(folder, LoadSettings(seconds=_LONGEST_s))
+    try:
+        load.wait_for_tick(round(1000 * instant_s))
+        load.process.send_signal(signal.SIGKILL)
+    finally:
+        load.end()
+    return _figures(load)
+
+
+def _full_disk(folder: Path, instant_s: float) -> dict[str, Any]:
+    with _tmpfs(folder / "disk", f"size={_TMPFS_BYTES}"):
+        load = _Load(folder, LoadSettings(seconds=_LONGEST_s))
+        load.wait()
+        _expect(load.told, "the disk is full")
+        (session,) = load.sessions()
+        status = Session.open(session).manifest.status if (session / "session.yaml").is_file() else "open"
+        return {**_figures(load, recover_into=folder), "closed": float(status == "failed")}
+
+
+def _read_only(folder: Path, instant_s: float) -> dict[str, Any]:
+    with _tmpfs(folder / "disk", "size=1m,ro"):
+        load = _Load(folder, LoadSettings(seconds=_LONGEST_s))
+        load.wait()
+        _expect(load.told, "Read-only file system")
+    return dict.fromkeys(("recovered", "lost", "lost_ms", "hand_ms", "ft_ms", "camera_ms", "write_ms", "late"), 0)
+
+
+def _stall(folder: Path, instant_s: float) -> dict[str, Any]:
+    settings = LoadSettings(seconds=instant_s + 4.0, stall_tick=round(1000 * instant_s), stall_s=3.0)
+    load = _Load(folder, settings)
+    load.wait()
+    return _figures(load)
+
+
+def _jump(folder: Path, instant_s: float, jump_ns: int) -> dict[str, Any]:
+    settings = LoadSettings(seconds=instant_s + 2.0, jump_tick=round(1000 * instant_s), jump_ns=jump_ns)
+    load = _Load(folder, settings)
+    load.wait()
+    return _figures(load)
+
+
+_TRIALS: dict[str, Callable[[Path, float], dict[str, Any]]] = {
+    KILL: _kill,
+    FULL: _full_disk,
+    READ_ONLY: _read_only,
+    STALL: _stall,
+    AHEAD: lambda folder, instant_s: _jump(folder, instant_s, _JUMP_ns),
+    BACK: lambda folder, instant_s: _jump(folder, instant_s, -_JUMP_ns),
+}
+
+
+# --- the load ------------------------------------------------------------------------------------------------------
+
+
+class _Load:
+    """The load's process; its sessions are made in ``disk`` under the folder."""
+
+    def __init__(self, folder: Path, settings: LoadSettings) -> None:
+        self.settings, self.told = settings, ""
+        self._root, self._status = folder / "disk", folder / "status"
+        self._root.mkdir(exist_ok=True)
+        words = [
+            sys.executable,
+            "-m",
+            "tactile_lab.experiments.data.recorder_load",
+            self._root,
+            self._status,
+            json.dumps(asdict(settings)),
+        ]
+        self.process = subprocess.Popen(list(map(str, words)), stderr=subprocess.PIPE, text=True)
+
+    def wait_for_tick(self, tick: int) -> None:
+        """Return once so many milliseconds of load are recorded. Raises SessionError."""
+        give_up = time.monotonic() + _LONGEST_s
+        while self.status().ticks < tick:
+            if self.process.poll() is not None or time.monotonic() > give_up:
+                raise SessionError(f"the load did not get under way: {self.end()}", where="full load")
+            time.sleep(0.0005)
+
+    def wait(self) -> None:
+        """Until it ends by itself."""
+        try:
+            self.told = self.process.communicate(timeout=2 * _LONGEST_s)[1]
+        finally:
+            self.end()
+
+    def end(self) -> str:
+        """Make sure that it has ended; what it said."""
+        if self.process.poll() is None:
+            self.process.kill()
+        self.told = self.told or self.process.communicate()[1] or ""
+        return self.told
+
+    def status(self) -> LoadStatus:
+        """How far it has come."""
+        return read_status(self._status) if self._status.is_file() else LoadStatus(0, 0, 0, False, {})
+
+    def sessions(self) -> list[Path]:
+        """The folders of its sessions."""
+        return sorted(self._root.iterdir())
+
+
+@contextmanager
+def _tmpfs(folder: Path, options: str) -> Iterator[None]:
+    """A small file system. Raises SessionError where it cannot be mounted."""
+    folder.mkdir()
+    words = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SessionError(f"cannot be mounted ({done.stderr.strip()})", where=str(folder))
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def _expect(told: str, words: str) -> None:
+    if words not in told:
+        raise SessionError(f"the load said {told!r}, not {words!r}", where="full load")
+
+
+# --- what came back ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What a recording holds of the load.
+
+    Attributes:
+        counts: messages by stream; they are the first ones of the stream, in order and unchanged.
+        drops, late: messages that the recorder says it dropped, and that came late.
+    """
+
+    counts: Counter[str]
+    drops: int
+    late: int
+
+
+def _figures(load: _Load, recover_into: Path | None = None) -> dict[str, Any]:
+    """Recover the only session of a load and compare, message by message. Raises SessionError."""
+    (session,) = load.sessions()
+    recovery = recover(session, recover_into)
+    found, status = _read(recovery.folder or session), load.status()
+    losses = {stream: _lost_ms(load, status, stream, found.counts[stream]) for stream in STREAMS}
+    worst = max(losses.values())
+    full = "full" in load.told  # then the last moments are what did not fit, and what came while that was noticed
+    if worst > ALLOWED_LOSS_ms and not full:
+        raise SessionError(f"{worst:.0f} ms lost at the end", where=str(session))
+    return {
+        "recovered": sum(found.counts.values()),
+        "lost": sum(status.counts[stream] - found.counts[stream] for stream in STREAMS),
+        "lost_ms": worst,
+        "hand_ms": max(losses["hand/rx"], losses["hand/tx"]),
+        "ft_ms": max(ms for stream, ms in losses.items() if stream.startswith("ft/")),
+        "camera_ms": losses["camera/rx"],
+        "write_ms": status.longest_write_us / 1000,
+        "drops": found.drops,
+        "late": found.late,
+    }
+
+
+def _read(folder: Path) -> _Found:
+    """Raises SessionError when a message is missing between others, or is not what was sent."""
+    session = Session.open(folder)
+    counts: Counter[str] = Counter()
+    for message in session.traffic().messages():
+        stream = message.topic.removeprefix("/link/")
+        if stream not in STREAMS:
+            continue
+        if number_of(stream, message.data) != counts[stream]:
+            raise SessionError(f"message {counts[stream]} of {stream} is missing or changed", where=str(folder))
+        counts[stream] += 1
+    streams = session.manifest.streams.values()
+    return _Found(counts, sum(one["dropped"] for one in streams), sum(one["late"] for one in streams))
+
+
+def _lost_ms(load: _Load, status: LoadStatus, stream: str, recovered: int) -> float:
+    """From the first message of a stream that is lost to the end of the load; 0 when none is lost."""
+    if recovered >= status.counts[stream]:
+        return 0.0
+    plain = replace(load.settings, jump_ns=0)
+    newest = max(tick_of(other, number - 1) for other, number in status.counts.items() if number)
+    return (plain.stamp_ns(newest) - plain.stamp_ns(tick_of(stream, recovered)) + TICK_ns) / 1e6

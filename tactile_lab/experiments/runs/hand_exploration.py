@@ -1,0 +1,100 @@
+"""Exploration by the simulated hand: policies over the hand's own candidates, whole sessions, truth for judging only.
+
+Hand, sensors, contacts and friction are the simulated rig's; see
+:mod:`tactile_lab.experiments.runs.kinematic_exploration` for the same without physics. What counts as explored stands
+in :mod:`tactile_lab.experiments.runs.hand_judge`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from drivers.core.clock import NANOSECONDS
+from drivers.simulation.world import SimulatedWorld
+from sessions.conductor.conductor import Conductor
+from sessions.conductor.progress import GraspReport, NullProgress
+from sessions.recording.recorder import NullRecorder
+from tactile_lab.autonomy.autonomous_roles import autonomous_roles
+from tactile_lab.autonomy.settings import SessionSettings
+from tactile_lab.autonomy.slam_service import SlamService
+from tactile_lab.experiments.cells import Cell, Setting, grid
+from tactile_lab.experiments.runs.hand_judge import Judge, UntilExplored
+from tactile_lab.rigs.build import build_runtime, simulated_world
+from tactile_lab.rigs.description import Rig, load_rig
+from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+
+OBJECTS = (
+    "box-10x6x4",
+    "box-12x6x6",
+    "cube-6",
+    "triangular-prism",
+    "hexagonal-prism",
+    "elliptic-cylinder",
+    "l-block",
+    "cylinder",
+)
+POLICIES = ("random", "variance", "clusters", "information")
+ACTIONS = 24
+RIG = "sim"
+
+
+def settings(actions: int) -> list[Setting]:
+    """Every object with every policy, in the plane and in space, with a budget of actions."""
+    return grid(object=list(OBJECTS), dimension=[2, 3], policy=list(POLICIES), actions=[actions])
+
+
+def explore_by_hand(cell: Cell) -> dict[str, Any]:
+    """One session. Cell: object, dimension, policy, actions."""
+    rig, dimension = load_rig(RIG), int(cell["dimension"])
+    world = simulated_world(rig, cell.seed, cell["object"])
+    runtime = build_runtime(rig, world, NullRecorder())
+    slam, conductor = estimation(rig, cell), conductor_settings(rig, cell)
+    runtime.connect()
+    try:
+        roles = autonomous_roles(runtime, slam, conductor, seed=cell.seed, dimension=dimension)
+        shape = partial(roles.estimator.ask, SlamService.known_shape)
+        judge = Judge(world.object_model.mesh, slam, shape, dimension, int(cell["actions"]))
+        roles = replace(roles, decisions=UntilExplored(roles.estimator, judge))
+        outcome = Conductor(runtime, conductor, roles, Watch(world, judge)).run()
+    finally:
+        runtime.close()
+    return {**judge.figures(slam.finish()), "status": judge.status(str(outcome.ending))}
+
+
+def estimation(rig: Rig, cell: Cell) -> TactileSlam:
+    """The best method, told how the rig's objects move."""
+    wanted = {"method": "joint", "dimension": cell["dimension"], "motion": rig.description.motion.model_dump()}
+    return TactileSlam(SlamSettings.model_validate(wanted), cell.seed)
+
+
+def conductor_settings(rig: Rig, cell: Cell) -> SessionSettings:
+    """Those of the rig, with the cell's policy; every grasp is an action at least."""
+    own = rig.description.conductor
+    exploration = own.exploration.model_copy(update={"policy": cell["policy"]})
+    return own.model_copy(update={"exploration": exploration, "grasps": int(cell["actions"])})
+
+
+class Watch(NullProgress):
+    """Shows a running session on the simulated rig to its judge.
+
+    Args:
+        world: the truth.
+        judge: of the session.
+    """
+
+    def __init__(self, world: SimulatedWorld, judge: Judge) -> None:
+        self._world, self._judge = world, judge
+        self._captured = False
+        self._begun_ns = world.clock.now_ns()
+
+    def phase(self, number: int, name: str) -> None:
+        """The first step after a capture: the object is still as it was measured."""
+        if self._captured:
+            self._judge.truth.append(self._world.truth().world_T_object)
+        self._captured = name == "capture"
+
+    def grasp_done(self, report: GraspReport) -> None:
+        """See what is explored now."""
+        self._judge.look((self._world.clock.now_ns() - self._begun_ns) / NANOSECONDS / 60)

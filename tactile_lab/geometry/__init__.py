@@ -1,1 +1,0 @@
-"""Frames, transforms, contacts and grasps: the words the rest of the program speaks in."""

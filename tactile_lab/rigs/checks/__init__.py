@@ -1,0 +1,1 @@
+"""Is a rig fit to work? Nothing moves."""

@@ -1,0 +1,162 @@
+"""Is a real hand fit to work? Connect it, listen for a moment with zero demands, and tell. Nothing moves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivers.core.clock import NANOSECONDS, Clock
+from drivers.core.errors import DeviceError
+from drivers.shadow.device.cycle_pace import CyclePace
+from drivers.shadow.device.cycle_statistics import CycleStatistics
+from drivers.shadow.device.first_move import check_motor_map
+from drivers.shadow.device.hand import ShadowHand
+from drivers.shadow.device.hand_samples import HandSample
+from drivers.shadow.device.hand_setup import HandSetup
+from drivers.shadow.device.motor_polling import PollingRates
+from drivers.shadow.device.real_time import PRIORITY, prefer
+from drivers.shadow.ethercat.hand_transport import EthercatTransport
+from drivers.shadow.ethercat.pysoem_transport import PysoemTransport
+from drivers.shadow.model.motors import MotorMap
+from drivers.shadow.protocol.motor_data import SlowData
+from drivers.shadow.protocol.palm_codec import SENSORS
+from tactile_lab.rigs.checks.findings import LOSSY, TOLERATED_LOSS, Finding
+from tactile_lab.rigs.checks.tactile import TactileLook
+from tactile_lab.rigs.hand_rig import HandRig
+
+LISTEN_ns = 1_500_000_000
+_ONCE = -2.0  # in the words of motor_data_polling.yaml
+_COUNTS = range(1, 4095)
+_JOINT_CHANNELS = 26
+_HALTED = "halted, no demand for 20 ms"  # the hand goes on: it knows that it made a pause
+_PAUSED = "the cycle paused until motors halted: close other programs, or permit real-time scheduling (limits.conf)"
+
+
+def check_hand(rig: HandRig, clock: Clock, *, move: bool = False) -> list[Finding]:
+    """Findings of ring, cycle, motors and joint sensors; a hand that does not connect ends the list.
+
+    Args:
+        rig: of a hand alone.
+        clock: the monotonic one.
+        move: nudge every motor as well, to see whether it moves the joint its map says.
+
+    Raises:
+        ConfigurationError: a file the rig names, or a master that is not installed.
+    """
+    setup = _asking_who(rig.setup)
+    setup.check_files()
+    try:
+        return _findings(setup.with_known_palm(clock), clock, move=move)
+    except DeviceError as error:
+        return [Finding("hand", False, str(error))]
+
+
+def _findings(setup: HandSetup, clock: Clock, *, move: bool) -> list[Finding]:
+    transport = setup.transport(clock)
+    hand = setup.device(transport, clock, set_up_boards=False)
+    try:
+        hand.connect()
+        with prefer(PRIORITY):
+            return _hear(setup, transport, hand, clock, move=move)
+    finally:
+        _close(hand)
+
+
+def _hear(
+    setup: HandSetup, transport: EthercatTransport | PysoemTransport, hand: ShadowHand, clock: Clock, *, move: bool
+) -> list[Finding]:
+    tips, motors = TactileLook(setup.hand.tactile), setup.motor_map()
+    sample, statistics = _listen(hand, tips, clock, round(setup.hand.cycle_s * NANOSECONDS))
+    found = [_ring(transport), _cycle(hand, transport, statistics), _motors(hand, sample, motors), _joints(sample)]
+    found += tips.findings()
+    return [*found, _motor_map(hand, motors, clock, setup.hand.cycle_s)] if move else found
+
+
+def _asking_who(setup: HandSetup) -> HandSetup:
+    """The same hand, whose motors and fingertips are also asked once for what never changes: firmware, names."""
+    settings = setup.settings()
+    asking = settings.model_copy(update={"polling": ask_once(settings.polling), "tactile_names": True})
+    return setup.model_copy(update={"hand": asking, "rates": None})
+
+
+def ask_once(rates: PollingRates) -> PollingRates:
+    """The same rates, with the motors' slow data asked for once, after connecting."""
+    return rates.model_copy(update={"slow_data": _ONCE})
+
+
+def _motor_map(hand: ShadowHand, motors: MotorMap, clock: Clock, cycle_s: float) -> Finding:
+    def cycle() -> HandSample:
+        clock.sleep_until_ns(clock.now_ns() + round(cycle_s * NANOSECONDS))
+        return hand.exchange()
+
+    moved = check_motor_map(hand, motors, cycle)
+    wrong = [str(finding) for finding in moved if not finding.ok]
+    return Finding("motor map", not wrong, "; ".join(wrong) or f"each of {len(moved)} motors moves its own joint")
+
+
+def _close(hand: ShadowHand) -> None:
+    try:
+        hand.close()
+    except DeviceError:
+        return  # it failed while it was listened to, which has been told
+
+
+def _listen(hand: ShadowHand, tips: TactileLook, clock: Clock, cycle_ns: int) -> tuple[HandSample, CycleStatistics]:
+    """As many cycles as fit the time, however long a busy computer takes for them."""
+    statistics, pace = CycleStatistics(), CyclePace(clock, cycle_ns)
+    for _ in range(LISTEN_ns // cycle_ns):
+        statistics.add(*pace.wait())
+        sample = hand.exchange()
+        tips.take(sample)
+    return sample, statistics
+
+
+def _ring(transport: EthercatTransport | PysoemTransport) -> Finding:
+    found = transport.hand
+    watchdog = "no watchdog" if found.watchdog_s is None else f"watchdog {1000 * found.watchdog_s:.0f} ms"
+    words = f"hand {found.serial}, palm {found.image.name} revision {found.palm.revision}, in operation, {watchdog}"
+    return Finding("ring", True, words)
+
+
+def _cycle(hand: ShadowHand, transport: EthercatTransport | PysoemTransport, statistics: CycleStatistics) -> Finding:
+    counters, remarks = hand.counters, transport.health()
+    share = counters.lost / max(counters.cycles, 1)
+    words = f"{statistics.summary()}; {counters.lost} of {counters.cycles} without a status"
+    punctual = statistics.summary()
+    figures = {"start_late_p50_us": punctual.median_us, "start_late_p99_us": punctual.p99_us, "lost_share": share}
+    advice: tuple[str, ...] = () if share < TOLERATED_LOSS else (LOSSY,)
+    advice += (_PAUSED,) if any(words.endswith(_HALTED) for words in hand.health()) else ()
+    return Finding("cycle", not advice, "; ".join((*advice, words, *remarks)), figures)
+
+
+def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
+    problems = [words for words in hand.health() if "cycles lost" not in words and not words.endswith(_HALTED)]
+    temperature, supply = sample.motor.temperature_C, sample.motor.voltage_V
+    heard = np.isfinite(temperature)
+    if not heard.any():
+        return Finding("motors", False, "; ".join((*problems, "none has told its temperature")))
+    hottest = int(np.nanargmax(temperature))
+    figures = f"{int(heard.sum())} of 20 answer, warmest {motors.names[hottest]} {temperature[hottest]:.0f} C"
+    if np.isfinite(supply).any():
+        figures += f", supply {np.nanmin(supply):.1f} V"
+    revisions = firmware(sample)
+    figures += f", firmware revision {revisions}" if revisions else ""
+    told: dict[str, float | str] = {
+        "firmware": revisions,
+        "warmest_C": float(temperature[hottest]),
+        "answering": float(heard.sum()),
+        "spare_us": float(sample.idle_us),
+    }
+    return Finding("motors", not problems and bool(heard.all()), "; ".join((*problems, figures)), told)
+
+
+def firmware(sample: HandSample) -> str:
+    """Revisions of the motors' firmware, which should be one; empty while none has told."""
+    revisions = sample.motor.slow[SlowData.SVN_REVISION]
+    return ", ".join(f"{revision:.0f}" for revision in np.unique(revisions[np.isfinite(revisions)]))
+
+
+def _joints(sample: HandSample) -> Finding:
+    """A joint sensor at the end of its range has lost its magnet or its cable."""
+    counts = sample.status.sensors[:_JOINT_CHANNELS].tolist()
+    dead = [f"{name} reads {count}" for name, count in zip(SENSORS, counts, strict=False) if count not in _COUNTS]
+    return Finding("joint sensors", not dead, "; ".join(dead) or "all 26 within their range")

@@ -1,0 +1,49 @@
+"""Do the fingertips that send through the palm send, and who are they? For ``rig check`` of a hand alone."""
+
+from __future__ import annotations
+
+from drivers.core.contacts import FINGERS
+from drivers.fingertips.kind import PalmFingertip
+from drivers.fingertips.kinds import as_palm_kind, palm_kind
+from drivers.shadow.device.hand_samples import HandSample
+from drivers.shadow.device.tactile_requests import TactileKind, TactileProtocol
+from drivers.shadow.protocol.tactile_names import TactileNames
+from tactile_lab.rigs.checks.findings import Finding
+
+_UNREAD = "not read: set hand.tactile to biotac in the rig file"
+
+
+class TactileLook:
+    """Fingertips of a hand alone, whose calibration nobody has named.
+
+    Args:
+        tactile: what the palm asks them for, as the rig file says.
+    """
+
+    def __init__(self, tactile: TactileKind) -> None:
+        self._names, self._tips = TactileNames(), dict[str, PalmFingertip]()
+        self._kind = None if (name := palm_kind(tactile)) is None else as_palm_kind(name)
+        if self._kind is not None and (usual := self._kind.usual()) is not None:
+            settings = self._kind.settings()
+            self._tips = {finger: self._kind.sensor(finger, usual, settings) for finger in FINGERS}
+
+    def take(self, sample: HandSample) -> None:
+        """Listen to one sample of the hand."""
+        self._names.take(sample)
+        for tip in self._tips.values():
+            tip.update(sample)
+
+    def findings(self) -> list[Finding]:
+        """One for each finger that has to send, or that says who it is."""
+        named = [finger for finger in FINGERS if self._names.kind(finger) not in (None, TactileProtocol.NONE)]
+        return [self._finding(finger) for finger in (self._tips or named)]
+
+    def _finding(self, finger: str) -> Finding:
+        device, words = f"fingertip {finger}", self._names.words(finger)
+        if self._kind is None or (tip := self._tips.get(finger)) is None:
+            readable = self._names.kind(finger) == TactileProtocol.BIOTAC
+            return Finding(device, True, f"{words}; {_UNREAD if readable else 'not read: there is no driver for it'}")
+        report = self._kind.report(tip, self._names, "")
+        problems = [*report.problems, *(text for text in tip.health() if text != "not tared")]
+        told = filter(None, [*problems, *report.words])
+        return Finding(device, not problems, "; ".join(told), report.figures)

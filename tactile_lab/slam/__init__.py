@@ -1,0 +1,1 @@
+"""Tactile SLAM, pure science: no device, no session, no file."""

@@ -1,0 +1,90 @@
+"""The object's shape as an estimation has it now: the most probable model of the contacts at their present poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.selection.models import SHAPE_MODELS, ShapeName, fit_shape
+from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
+from tactile_lab.slam.tracking.joint.pose_uncertainty import propagate_pose_uncertainty
+from tactile_lab.slam.tracking.trackers import TrackingSettings
+
+
+@dataclass(frozen=True)
+class PresentShape:
+    """What a shape model makes of the contacts.
+
+    Attributes:
+        extracted: the outline (dimension 2) or the surface, object frame, with its standard deviation; None where the
+            contacts enclose nothing, or the model fails: the trajectory is still a result.
+        warning: why the model fails, with its file; empty when it does not.
+    """
+
+    extracted: Contour | SurfaceMesh | None
+    warning: str = ""
+
+
+def present_shape(
+    field: Gpis,
+    contact_map: ContactMap,
+    settings: TrackingSettings,
+    model: ShapeName,
+    origin_height_m: float,
+    resolution_m: float,
+) -> PresentShape:
+    """The shape of the contacts by one model; never raises for what is wrong with the model.
+
+    Args:
+        field: of the contacts.
+        contact_map: the contacts at their poses.
+        settings: of the estimation; an object that moves on the table stands on it. Of method "joint" the surface's
+            sigma includes what the poses leave open.
+        model: of the shape.
+        origin_height_m: height of the object frame's origin over the table.
+        resolution_m: of the outline or surface.
+    """
+    try:
+        extracted = _extract(field, contact_map, settings, model, origin_height_m, resolution_m)
+    except ShapeError:
+        return PresentShape(None)
+    except Exception as error:
+        return PresentShape(None, _warning(model, f"raises {SHAPE_MODELS.explain(model, error)}"))
+    problem = _problem(extracted, Contour if settings.dimension == 2 else SurfaceMesh)
+    return PresentShape(None, _warning(model, problem)) if problem else PresentShape(extracted)
+
+
+def _extract(
+    field: Gpis,
+    contact_map: ContactMap,
+    settings: TrackingSettings,
+    model: ShapeName,
+    origin_height_m: float,
+    resolution_m: float,
+) -> Contour | SurfaceMesh:
+    stands = settings.dimension == 3 and settings.freedom == "table"
+    floor_m = -origin_height_m if stands else None
+    shape = fit_shape(model, field, contact_map.free_points_m, floor_m)
+    if settings.dimension == 2:
+        return shape.contour(resolution_m)
+    mesh = shape.mesh(resolution_m, floor_m)
+    uncertain = settings.method == "joint" and "pose uncertainty" not in settings.joint.without
+    return propagate_pose_uncertainty(mesh, shape, contact_map, settings.motion) if uncertain else mesh
+
+
+def _problem(extracted: object, wanted: type[Contour | SurfaceMesh]) -> str:
+    """Why an outline or surface is none, in words; empty when it is one."""
+    if not isinstance(extracted, wanted):
+        return f"gives a {type(extracted).__name__} where a {wanted.__name__} belongs"
+    points_m = extracted.points_m if isinstance(extracted, Contour) else extracted.vertices
+    if not np.isfinite(points_m).all() or np.isnan(extracted.sigma_m).any():
+        return "gives points or standard deviations that are not finite"
+    return ""
+
+
+def _warning(model: str, problem: str) -> str:
+    return f"no shape, as the shape model {model} of {SHAPE_MODELS.file(model)} {problem}"

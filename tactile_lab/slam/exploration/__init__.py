@@ -1,0 +1,1 @@
+"""Which grasp would tell most (thesis chapter 4)."""

@@ -1,0 +1,29 @@
+"""How well a Gaussian process knows the surface (thesis section 4.4.4)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivers.core.contacts import Array
+
+POINT_SIGMA_m = 0.001
+"""Of a contact along its normal, where nothing else is said."""
+
+_JITTER = 1e-9
+
+
+def log_determinant(covariance: Array) -> float:
+    """Of a covariance, shape (q, q); entries that rounding made singular count as very small, not as minus infinity."""
+    size = max(float(np.trace(covariance)) / max(len(covariance), 1), np.finfo(float).tiny)
+    return float(np.linalg.slogdet(covariance + _JITTER * size * np.eye(len(covariance)))[1])
+
+
+def contact_entropy(covariance: Array, point_sigma_m: float = POINT_SIGMA_m) -> float:
+    """Equations 4.9 and 4.10 for contacts that are expected where the field has this posterior covariance, nats.
+
+    ``log det K*`` with the expected contacts bordering the present ones is ``log det K`` plus the logarithm of the
+    determinant of their posterior covariance, shape (q, q). The first is the same for all candidates and left out, so
+    that a grasp without contacts has 0. The measurement's noise is part of the covariance: without it a second touch
+    of the same place would count as minus infinity. Relative to the noise, so that the value is a pure number.
+    """
+    return log_determinant(covariance / point_sigma_m**2 + np.eye(len(covariance))) if len(covariance) else 0.0

@@ -1,0 +1,116 @@
+"""Ours: the grasp that is expected to tell most about shape and pose together, per second.
+
+What a grasp tells stands in :mod:`tactile_lab.slam.exploration.expected_information`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from tactile_lab.slam.exploration.candidates import Candidate
+from tactile_lab.slam.exploration.expected_information import (
+    InformationSettings,
+    Promise,
+    predict_promise,
+    unexplored_vertices,
+)
+from tactile_lab.slam.exploration.policy import Belief, Decision, Surface, best_of, surface_to_foresee
+
+_AHEAD = 3
+"""Grasps that a place of the object is judged by before it is carried there."""
+
+
+@dataclass(frozen=True)
+class InformationPolicy:
+    """Expected information per second; see the module's text."""
+
+    settings: InformationSettings = field(default_factory=InformationSettings)
+    name: str = "information"
+
+    def choose(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Decision:
+        surface = surface_to_foresee(self.name, candidates, belief, rng)
+        if isinstance(surface, Decision):
+            return surface
+        promise = predict_promise(candidates, belief, surface, self.settings, rng)
+        return self._decide(candidates, surface, belief, promise, rng)
+
+    def best_rate(
+        self,
+        candidates: Sequence[Candidate],
+        belief: Belief,
+        rng: np.random.Generator,
+        lost_nats: float = 0.0,
+        seconds: float = 0.0,
+    ) -> float:
+        """The largest expected information per second over the next few grasps, 1/s; 0 where nothing can be foreseen.
+
+        Knowledge of the pose is lost and won back once; sides that only these candidates reach are there for several
+        grasps, as far as there is so much to be seen of them.
+
+        Args:
+            candidates, belief, rng: as for a choice.
+            lost_nats: knowledge of the pose that is lost on the way to these candidates.
+            seconds: that the way takes, beside the candidates' own times.
+        """
+        if not candidates or belief.surface is None:
+            return 0.0
+        promise = predict_promise(candidates, belief, belief.surface, self.settings, rng)
+        times = seconds + _AHEAD * np.array([candidate.time_s for candidate in candidates])
+        shape = np.minimum(_AHEAD * promise.shape, promise.together)
+        told = self.settings.pose_weight * promise.pose + shape
+        rates = (self._worth(candidates, belief) * told - self.settings.pose_weight * lost_nats) / times
+        return float(np.max(rates[promise.touching > 0], initial=0.0))
+
+    def _decide(
+        self,
+        candidates: Sequence[Candidate],
+        surface: Surface,
+        belief: Belief,
+        promise: Promise,
+        rng: np.random.Generator,
+    ) -> Decision:
+        times = np.array([candidate.time_s for candidate in candidates])
+        nats = self.settings.pose_weight * promise.pose + promise.shape
+        rates = np.where(promise.touching > 0, self._worth(candidates, belief) * nats / times, -np.inf)
+        decision = best_of(self.name, rates, "", rng)
+        if decision.chosen is None:
+            return decision
+        if why := self._stops(surface, belief, nats):
+            return Decision(self.name, "stop", None, decision.scores, why)
+        best = decision.chosen
+        reason = _reason(promise, best, candidates[best].pushes) + decision.reason
+        return Decision(self.name, "grasp", best, decision.scores, reason, float(promise.new_share[best]))
+
+    def _worth(self, candidates: Sequence[Candidate], belief: Belief) -> Array:
+        """Share of what each candidate promises that counts."""
+        pushing = self.settings.worth_of_push(belief.dimension)
+        return np.where([candidate.pushes for candidate in candidates], pushing, 1.0)
+
+    def _stops(self, surface: Surface, belief: Belief, nats: Array) -> str:
+        """Why to end here, or ""."""
+        if nats.max() < self.settings.least_gain:
+            return (
+                f"no grasp promises more than {nats.max():.2g} nats, less than the {self.settings.least_gain:g} asked"
+            )
+        limit = self.settings.known_sigma_m
+        if limit is None or float(np.quantile(surface.sigma_m, self.settings.enough)) > limit:
+            return ""
+        fresh = unexplored_vertices(surface, belief, self.settings.reach(belief.dimension))
+        sizes = surface.sizes * surface.touchable(belief.origin_height_m)
+        share = float(sizes[~fresh].sum() / sizes.sum())
+        if share < self.settings.enough:
+            return ""
+        return f"{100 * share:.0f} % of the surface has been touched and it is known to {1e3 * limit:.3g} mm"
+
+
+def _reason(promise: Promise, best: int, pushes: bool) -> str:
+    push = ", though it may push the object" if pushes else ""
+    pose = f" and {promise.pose[best]:.1f} nats about the pose" if promise.pose[best] > 0.05 else ""
+    return (
+        f"{promise.touching[best]:.1f} contacts are expected to tell {promise.shape[best]:.1f} nats about the shape"
+        f"{pose}, {100 * promise.new_share[best]:.1f} % of the surface new{push}"
+    )

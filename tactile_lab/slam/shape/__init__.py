@@ -1,0 +1,1 @@
+"""The object's shape from contacts at known poses (thesis chapter 2)."""

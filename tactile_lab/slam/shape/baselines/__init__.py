@@ -1,0 +1,1 @@
+"""Shape models to compare with (thesis section 2.1)."""

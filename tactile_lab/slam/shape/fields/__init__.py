@@ -1,0 +1,1 @@
+"""Smooth fields: Gaussian process implicit surfaces."""

@@ -1,0 +1,37 @@
+"""What every shape model can do, whatever it is made of."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
+
+
+class FittedShape(Protocol):
+    """A shape made from contacts, in the frame of the contacts.
+
+    Attributes:
+        name: of the model, as a person writes it.
+        log_evidence: logarithm of how probable the model makes the contacts (values and normals), comparable among
+            models that have one; None for those without a likelihood.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def log_evidence(self) -> float | None: ...
+
+    def contour(self, resolution_m: float = 0.001) -> Contour:
+        """The outline, for contacts in the plane.
+
+        Raises:
+            ShapeError: the contacts were in space, or enclose nothing.
+        """
+
+    def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
+        """The surface, for contacts in space, ending in a flat foot at the table if its height is given.
+
+        Raises:
+            ShapeError: the contacts were in the plane, or enclose nothing.
+        """

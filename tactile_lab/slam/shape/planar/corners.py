@@ -1,0 +1,89 @@
+"""Contacts at the corners of an outline.
+
+A fingertip that straddles a corner touches it with a normal anywhere between those of the two faces. Taken for faces of
+their own such contacts cut corners off, taken for errors they are lost; taken for what they are they pin the corner
+down. Concave corners are never touched so: there the fingertip rests on both faces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.core.contacts import Array
+from tactile_lab.slam.shape.planar.segmentation import Faces, PlanarContacts, PRIOR_REACH_m, price_of_face
+
+CORNER_SHARE = 0.1
+"""Share of contacts expected at corners, before any was seen."""
+
+_LEAST_ON_FACE = 3
+"""Faces of fewer contacts may be no faces at all, but corners between larger ones."""
+
+_LEAST_TURN_rad = float(np.deg2rad(20.0))
+_CLEARLY = 4.0
+"""Chi-square by which a corner has to explain a contact better than a face."""
+
+
+@dataclass(frozen=True)
+class Corners:
+    """Convex corners between successive faces.
+
+    Attributes:
+        places_m: shape (c, 2).
+        directions_rad: angle of the outward normal of the face before each corner, counter-clockwise, shape (c,).
+        turns_rad: angle from there to the normal of the face behind, above zero, shape (c,).
+    """
+
+    places_m: Array
+    directions_rad: Array
+    turns_rad: Array
+
+    @classmethod
+    def between(cls, faces: Faces, pairs: NDArray[np.int64]) -> Self:
+        """The convex corners among the given pairs of successive faces, shape (k, 2)."""
+        before, after = faces.directions_rad[pairs].T
+        turns = np.mod(after - before + np.pi, 2 * np.pi) - np.pi
+        convex = (turns > _LEAST_TURN_rad) & (turns < np.pi - _LEAST_TURN_rad)
+        chosen = pairs[convex]
+        places = np.linalg.solve(faces.normals[chosen], faces.offsets_m[chosen][..., None])[..., 0]
+        return cls(places, before[convex], turns[convex])
+
+    def chi_squares(self, contacts: PlanarContacts) -> Array:
+        """Of each contact at the corner that explains it best, shape (n,), comparable with that on a face.
+
+        The point is at the corner, the normal anywhere in between. That the place along the face and the direction are
+        not free, but the one given and the other spread out, counts, and so does how rare such contacts are.
+        """
+        if len(self.places_m) == 0:
+            return np.full(len(contacts), np.inf)
+        away = np.linalg.norm(contacts.points_m[:, None] - self.places_m, axis=2) / contacts.point_sigma_m[:, None]
+        angles = np.arctan2(contacts.normals[:, 1], contacts.normals[:, 0])
+        middles = self.directions_rad + self.turns_rad / 2
+        off_middle = np.abs(np.mod(angles[:, None] - middles + np.pi, 2 * np.pi) - np.pi)
+        beyond = np.maximum(off_middle - self.turns_rad / 2, 0.0) / contacts.normal_sigma_rad[:, None]
+        given = PRIOR_REACH_m / contacts.point_sigma_m[:, None]
+        spread = contacts.normal_sigma_rad[:, None] / self.turns_rad
+        return np.asarray((away**2 + beyond**2 - 2 * np.log(CORNER_SHARE * given * spread)).min(axis=1))
+
+
+def at_corners(contacts: PlanarContacts, faces: Faces) -> NDArray[np.bool_]:
+    """Contacts that corners between the larger faces explain clearly better than the faces they are on, shape (n,)."""
+    sizes = np.bincount(faces.labels, minlength=faces.count)
+    larger = np.flatnonzero(sizes >= _LEAST_ON_FACE)
+    if len(larger) < 2:
+        return np.zeros(len(contacts), dtype=bool)
+    corners = Corners.between(faces, np.column_stack([larger, np.roll(larger, -1)]))
+    price = np.where(sizes < _LEAST_ON_FACE, price_of_face(contacts.point_sigma_m, contacts.normal_sigma_rad), 0.0)
+    on_face = _chi_squares_on_faces(contacts, faces) + (price / sizes)[faces.labels]
+    return np.asarray(corners.chi_squares(contacts) < on_face - _CLEARLY)
+
+
+def _chi_squares_on_faces(contacts: PlanarContacts, faces: Faces) -> Array:
+    """Of each contact on its own face, shape (n,)."""
+    outward = faces.normals[faces.labels]
+    away = np.sum(contacts.points_m * outward, axis=1) - faces.offsets_m[faces.labels]
+    tilt = 2 * (1 - np.sum(contacts.normals * outward, axis=1))
+    return np.asarray((away / contacts.point_sigma_m) ** 2 + tilt / contacts.normal_sigma_rad**2)

@@ -1,0 +1,167 @@
+"""Right angles, parallel faces, upright and level ones, where the contacts allow them.
+
+Made things are full of regularities. One is taken where it is the likelier explanation: any angle within a quarter turn
+costs more than the misfit that the regularity adds (Bayes factor, both as likely before). The directions of all faces
+are one Gaussian state; a regularity is an exact measurement of it, with the usual gate, so that what one wall knows
+helps all walls tied to it. After each one the state is conditioned anew on all of them, linearised where they hold
+exactly: elsewhere a regularity that follows from others would seem to tell something, and freeze what is still open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.core.contacts import Array
+
+Kind: TypeAlias = Literal["level", "upright", "parallel", "right angle"]
+
+_LARGEST_TURN_rad = np.deg2rad(15.0)
+_IMPLIED = 1e-6
+"""Share of a variance that is left where a regularity follows from others: rounding."""
+_ANY_ANGLE_rad = np.pi / 2
+_MOST_STEPS, _EXACT_rad = 8, 1e-9
+
+
+class Stated(NamedTuple):
+    """``gap = rows . directions`` is to vanish, with directions all normals one after the other: (r,) and (r, s d)."""
+
+    gap: Array
+    rows: Array
+
+
+class Regularity(NamedTuple):
+    """What two faces are to each other; the vertical is the other of a level or an upright one.
+
+    Attributes:
+        kind: of regularity.
+        face, other: numbers of the faces, the same one twice where the vertical is the other.
+    """
+
+    kind: Kind
+    face: int
+    other: int
+
+    def state(self, normals: Array) -> Stated:
+        """At unit normals of shape (s, d), nearly regular."""
+        count, dimension = normals.shape
+        rows = np.zeros((dimension - 1, count, dimension))
+        one, other = normals[self.face], normals[self.other]
+        if self.kind == "upright":
+            rows[0, self.face, 2] = 1.0
+            return Stated(one[2:], rows[:1].reshape(1, -1))
+        if self.kind == "level":
+            rows[0, self.face, 0] = rows[1, self.face, 1] = 1.0
+            return Stated(one[:2], rows.reshape(2, -1))
+        if self.kind == "right angle":
+            rows[0, self.face], rows[0, self.other] = other, one
+            return Stated(np.array([one @ other]), rows[:1].reshape(1, -1))
+        across = np.linalg.svd(one[None])[2][1:]
+        rows[:, self.other], rows[:, self.face] = across, -np.sign(one @ other) * across
+        return Stated(across @ other, rows.reshape(dimension - 1, -1))
+
+
+@dataclass(frozen=True)
+class RegularNormals:
+    """Normals that meet regularities.
+
+    Attributes:
+        normals: shape (s, d).
+        covariance: of all their components, shape (s d, s d), square radians.
+        regularities: those that were taken.
+        saved: parameters that they make unnecessary.
+    """
+
+    normals: Array
+    covariance: Array
+    regularities: tuple[Regularity, ...]
+    saved: int
+
+
+def offsets_of_faces(points_m: Array, sigma_m: Array, labels: NDArray[np.int64], normals: Array) -> Array:
+    """Where faces of given normals (s, d) lie by their contacts: means weighted by their sigmas, shape (s,)."""
+    weights = sigma_m**-2.0
+    heights_m = np.einsum("nd,nd->n", normals[labels], points_m)
+    totals = np.bincount(labels, weights, len(normals))
+    return np.asarray(np.bincount(labels, weights * heights_m, len(normals)) / totals)
+
+
+def regular_normals(normals: Array, covariance: Array, *, upright: bool) -> RegularNormals:
+    """Turn normals until they are as regular as what is known of them allows.
+
+    Args:
+        normals: unit normals of faces, shape (s, d).
+        covariance: of all their components, shape (s d, s d), square radians.
+        upright: the third axis is vertical, and level and upright faces are likely.
+    """
+    turned, known, taken = normals, covariance, tuple[Regularity, ...]()
+    for regularity in _promising_first(normals, covariance, upright=upright):
+        stated = regularity.state(turned)
+        if np.abs(stated.gap).max() > np.sin(_LARGEST_TURN_rad):
+            continue
+        if _advantage(stated, known, covariance) > 0:
+            taken = (*taken, regularity)
+            turned, known = _condition(normals, covariance, taken, turned)
+    return RegularNormals(turned, known, taken, _rank(taken, turned))
+
+
+def _rank(taken: tuple[Regularity, ...], normals: Array) -> int:
+    """How many angles the regularities fix; one that was taken early may follow from those that came later."""
+    rows = [np.empty((0, normals.size)), *(regularity.state(normals).rows for regularity in taken)]
+    return int(np.linalg.matrix_rank(np.vstack(rows), tol=_IMPLIED))
+
+
+def _promising_first(normals: Array, covariance: Array, *, upright: bool) -> list[Regularity]:
+    candidates = list(_candidates(len(normals), upright=upright))
+    stated = [candidate.state(normals) for candidate in candidates]
+    order = np.argsort([-_advantage(each, covariance, covariance) / len(each.gap) for each in stated])
+    return [candidates[i] for i in order]
+
+
+def _candidates(count: int, *, upright: bool) -> Iterator[Regularity]:
+    for face in range(count):
+        if upright:
+            yield Regularity("level", face, face)
+            yield Regularity("upright", face, face)
+        for other in range(face):
+            yield Regularity("parallel", face, other)
+            yield Regularity("right angle", face, other)
+
+
+def _advantage(stated: Stated, covariance: Array, before: Array) -> float:
+    """Twice the log Bayes factor of a regularity against any angle; 0 if it follows from those that were taken.
+
+    Args:
+        stated: the regularity.
+        covariance: of the normals, given the regularities so far.
+        before: the same without any.
+    """
+    variances, axes = np.linalg.eigh(stated.rows @ covariance @ stated.rows.T)
+    still_open = variances > _IMPLIED * np.trace(stated.rows @ before @ stated.rows.T)
+    variances, gaps = variances[still_open], axes.T[still_open] @ stated.gap
+    return float(np.sum(2 * np.log(_ANY_ANGLE_rad) - np.log(2 * np.pi * variances) - gaps**2 / variances))
+
+
+def _condition(normals: Array, covariance: Array, taken: tuple[Regularity, ...], start: Array) -> tuple[Array, Array]:
+    """The likeliest normals that meet all regularities, shape (s, d), and their covariance (Gauss-Newton).
+
+    Args:
+        normals, covariance: as known without them.
+        taken: the regularities.
+        start: normals near the solution, shape (s, d).
+    """
+    found = start
+    for _ in range(_MOST_STEPS):
+        stated = [regularity.state(found) for regularity in taken]
+        gap, rows = np.concatenate([each.gap for each in stated]), np.vstack([each.rows for each in stated])
+        spread = rows @ covariance
+        gain = np.linalg.pinv(spread @ rows.T, rcond=_IMPLIED, hermitian=True) @ spread
+        if np.abs(gap).max() < _EXACT_rad:
+            break
+        moved = normals + ((rows @ (found - normals).ravel() - gap) @ gain).reshape(normals.shape)
+        found = moved / np.linalg.norm(moved, axis=1, keepdims=True)
+    return found, covariance - spread.T @ gain

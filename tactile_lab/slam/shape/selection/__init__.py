@@ -1,0 +1,1 @@
+"""Which model describes an object best, by evidence."""

@@ -1,0 +1,146 @@
+"""Which model describes a solid best, by what the contacts say: smooth field, flat faces, or upright walls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.standing_field import StandingField
+from tactile_lab.slam.shape.model import FittedShape
+from tactile_lab.slam.shape.solids.planes import divide
+from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
+from tactile_lab.slam.shape.solids.prism import Prism
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, mesh_arrays
+from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
+
+_COARSE_m = 0.006
+_FREE_SIGMA_m = 0.003
+_ON_SURFACE_m = 0.006
+_NOISE_SIGMAS = 2.0
+_LARGEST_SHARE_OFF, _LARGEST_SHARE_FILLED = 0.15, 0.05
+_KERNEL_STEPS = 10
+_LEFT_OUT_nats = 12.0
+"""A contact that is off the surface by centimetres is as improbable as an outlier among twenty good contacts."""
+
+OutlineChoice = Callable[[Gpis, "Array | None"], FittedShape]
+
+
+def best_spatial_shape(
+    field: FittedShape,
+    gpis: Gpis,
+    best_outline: OutlineChoice,
+    free_points_m: Array | None = None,
+    floor_m: float | None = None,
+) -> FittedShape:
+    """The field itself, or a solid with flat faces or upright walls if that is the more probable one.
+
+    A sharp solid is only taken if it holds what is known: its contacts lie on its surface, and it does not fill
+    places that fingers went through.
+
+    Args:
+        field: the field as a shape, taken unless another model is more probable; without a table it keeps all contacts.
+        gpis: the field, with its kernel at a maximum of the marginal likelihood.
+        best_outline: chooses the model of an outline.
+        free_points_m: places that a finger went through, shape (k, 3), or None.
+        floor_m: height of the table if the object stands on one; upright walls are considered only then, and the
+            field ends there as :class:`StandingField` does.
+    """
+    if field.log_evidence is None:
+        return field
+    without = gpis.settings.without
+    gpis = gpis if "strays" in without else _without_strays(gpis)
+    if floor_m is not None and "standing field" not in without:
+        field = _try_make(lambda: StandingField.fit(gpis, floor_m)) or field
+    best, most = field, -np.inf if "field" in without else field.log_evidence or -np.inf
+    for shape in _candidates(gpis, best_outline, free_points_m, floor_m):
+        evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=most)
+        if evidence > most:
+            best, most = shape, evidence
+    return best
+
+
+def _without_strays(gpis: Gpis) -> Gpis:
+    """The field without contacts that share a plane with no other, where it explains the rest so much better.
+
+    Every contact left out costs :data:`_LEFT_OUT_nats`, so that good contacts on curved parts stay.
+    """
+    contacts = contacts_of(gpis)
+    planes = divide(contacts)
+    kept = planes.sizes[planes.labels] > 1
+    if kept.all() or np.count_nonzero(~kept) > _LARGEST_SHARE_OFF * len(contacts):
+        return gpis
+    seen = gpis.observations
+    rest = gpis.contacts_m[kept], gpis.normals[kept]
+    trimmed = Gpis.fit(*rest, seen.value_sigma_m[kept], seen.gradient_sigma[kept], gpis.settings)
+    trimmed = trimmed.optimise(max_iterations=_KERNEL_STEPS)
+    peaks = 0.5 * np.log(contacts.point_weights) + 1.5 * np.log(contacts.normal_weights) - 2 * np.log(2 * np.pi)
+    without = trimmed.log_marginal_likelihood() + float(np.sum(peaks[~kept] - _LEFT_OUT_nats))
+    return trimmed if without > gpis.log_marginal_likelihood() + _LEFT_OUT_nats else gpis
+
+
+def _candidates(
+    gpis: Gpis, best_outline: OutlineChoice, free_points_m: Array | None, floor_m: float | None
+) -> list[FittedShape]:
+    upright, without = floor_m is not None, gpis.settings.without
+    makers: list[Callable[[], FittedShape]] = []
+    if "polyhedron" not in without:
+        makers.append(lambda: Polyhedron.fit(gpis, free_points_m, upright=upright))
+    if upright and "prism" not in without:
+        makers.append(lambda: Prism.fit(gpis, best_outline, free_points_m))
+    return [shape for shape in map(_try_make, makers) if shape is not None]
+
+
+def _try_make(maker: Callable[[], FittedShape]) -> FittedShape | None:
+    try:
+        return maker()
+    except ShapeError:  # the contacts do not allow this model: the others remain
+        return None
+
+
+def _checked_evidence(
+    shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_m: float | None, *, at_least: float
+) -> float:
+    """The evidence of a sharp solid, less for contacts that its planes explain but its surface leaves out.
+
+    Minus infinity where it has no surface, leaves out many contacts, or fills places that are free; its surface is
+    only made if the evidence can reach ``at_least``.
+    """
+    if shape.log_evidence is None or shape.log_evidence <= at_least:
+        return -np.inf
+    try:
+        mesh = shape.mesh(_COARSE_m, floor_m)
+    except ShapeError:  # its faces enclose nothing
+        return -np.inf
+    away_m = distances_to_mesh(gpis.contacts_m, mesh)
+    free = np.empty((0, 3)) if free_points_m is None or "contradictions" in gpis.settings.without else free_points_m
+    if np.mean(away_m > _ON_SURFACE_m) > _LARGEST_SHARE_OFF or _filled_share(mesh, free) > _LARGEST_SHARE_FILLED:
+        return -np.inf
+    return shape.log_evidence - stray_cost(away_m, contacts_of(gpis).point_weights)
+
+
+def stray_cost(away_m: Array, weights: Array) -> float:
+    """What contacts cost that a solid's planes explain but its surface leaves out, nats; at most a wrong contact each.
+
+    Args:
+        away_m: distances of the contacts from the surface, shape (n,).
+        weights: inverse variances of their noise, which the planes account for, shape (n,), 1/m^2.
+    """
+    beyond = np.maximum(away_m * np.sqrt(weights) - _NOISE_SIGMAS, 0.0)
+    return float(np.minimum(0.5 * beyond**2, _LEFT_OUT_nats).sum())
+
+
+def _filled_share(mesh: SurfaceMesh, free_points_m: Array) -> float:
+    """Share of free places that lie inside a mesh by more than the contacts' noise."""
+    if len(free_points_m) == 0:
+        return 0.0
+    import igl  # here, so that importing this module stays quick
+
+    inside = np.asarray(igl.fast_winding_number(*mesh_arrays(mesh), np.ascontiguousarray(free_points_m))) > 0.5
+    if not inside.any():
+        return 0.0
+    deep = distances_to_mesh(free_points_m[inside], mesh) > _FREE_SIGMA_m
+    return float(deep.sum() / len(free_points_m))

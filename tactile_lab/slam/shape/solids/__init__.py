@@ -1,0 +1,1 @@
+"""Solids of flat faces, and prisms."""

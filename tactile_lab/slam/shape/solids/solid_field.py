@@ -1,0 +1,63 @@
+"""The signed distance from a solid as a field that grasps can be matched with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from tactile_lab.slam.shape.fields.field_grid import FieldGrid
+from tactile_lab.slam.shape.fields.posterior import Prediction
+from tactile_lab.slam.shape.surfaces.sampling import TriangleMesh, mesh_arrays
+
+_MARGIN_m, _FINEST_m, _NODES = 0.015, 0.002, 150_000
+
+
+class SolidField:
+    """Predicts as a :class:`Gpis` does: the distance from a closed surface, negative inside.
+
+    Args:
+        mesh: watertight, its triangles counter-clockwise seen from outside.
+        sigma_m: standard deviation of the surface along its normal, the same everywhere.
+    """
+
+    def __init__(self, mesh: TriangleMesh, sigma_m: float) -> None:
+        self._vertices, self._faces = mesh_arrays(mesh)
+        self._sigma_m = sigma_m
+
+    def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
+        """Distances, and as gradients the normals at the nearest places, at points of shape (q, 3)."""
+        import igl  # here, so that importing this module stays quick
+
+        kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
+        found = igl.signed_distance(np.ascontiguousarray(points_m), self._vertices, self._faces, kind)
+        variance_m2 = self.variance(points_m) if variance else np.empty(0)
+        return Prediction(np.asarray(found[0]), np.asarray(found[3]) if gradient else np.empty((0, 3)), variance_m2)
+
+    def variance(self, points_m: Array, *, rough: bool = False) -> Array:
+        """The surface's variance at points of shape (q, 3), shape (q,); nothing is saved by a rough one."""
+        return np.full(len(points_m), self._sigma_m**2)
+
+
+class TabulatedSolid:
+    """A solid's field on a grid around it: twenty times faster to ask at some hundred places, a moment to make.
+
+    Edges are rounded by the spacing of the nodes: 2 mm for what a hand spans, more for larger objects.
+
+    Args:
+        mesh, sigma_m: as of a :class:`SolidField`.
+    """
+
+    def __init__(self, mesh: TriangleMesh, sigma_m: float) -> None:
+        self._solid, vertices = SolidField(mesh, sigma_m), np.asarray(mesh.vertices)
+        lower_m, upper_m = vertices.min(axis=0) - _MARGIN_m, vertices.max(axis=0) + _MARGIN_m
+        spacing_m = max(_FINEST_m, float(np.cbrt(np.prod(upper_m - lower_m) / _NODES)))
+        self._grid = FieldGrid.tabulate(self._solid, lower_m, upper_m, spacing_m, gradient=True)
+
+    def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
+        """As :meth:`SolidField.predict`; beyond the grid it goes on as if straight away from it."""
+        found = self._grid.predict(points_m, gradient=gradient)
+        return Prediction(found.mean_m, found.gradient, self.variance(points_m) if variance else np.empty(0))
+
+    def variance(self, points_m: Array, *, rough: bool = False) -> Array:
+        """As :meth:`SolidField.variance`."""
+        return self._solid.variance(points_m, rough=rough)

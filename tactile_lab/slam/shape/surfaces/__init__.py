@@ -1,0 +1,1 @@
+"""Contours and meshes: extraction, sampling, support."""

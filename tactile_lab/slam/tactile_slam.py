@@ -1,0 +1,308 @@
+"""Tactile SLAM: follow an object through successive grasps and build its shape at the same time.
+
+:meth:`TactileSlam.step` is algorithm 3.1 of the thesis for one grasp, followed by the pose graph of its
+section 3.3.3. Frames: the object frame is born at the first grasp, its origin at the contacts' centre, its x
+axis along the palm's horizontal axis, z up (section 3.4). The object stays on the table: its pose is
+``(x, y, yaw)`` and its origin keeps the height it was born at, so that in the object frame a contact's z is its
+height over the table minus that height, in every grasp.
+
+What happens to grasps that cannot be placed:
+
+- No particle explains the contacts (with the thesis's gate: fewer than four close and observable ones): the
+  predicted pose stays, with its grown covariance, the contacts are kept aside: "untracked".
+- The pose is corrected, but remains so uncertain that it moves the contacts along their normals by more than
+  ``placement_limit_m`` (few contacts, or a direction not observed): "uncertain". A particle filter keeps the
+  contacts aside, because its only map could not take them back; joint hypotheses use them and stay revisable.
+
+A session is lost when the last ``lost_after`` grasps were untracked, or more than half of all.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from gtsam import Pose3
+from numpy.typing import NDArray
+from pydantic import Field
+
+from drivers.core.contacts import Array, Grasp
+from drivers.core.errors import TrackingError
+from drivers.core.observability import observability, planar_observability
+from drivers.core.one_thread import on_one_thread
+from tactile_lab.slam.current_shape import PresentShape, present_shape
+from tactile_lab.slam.graph.back_end import BackEnd, BackEndSettings
+from tactile_lab.slam.graph.relocation import relocated_rows
+from tactile_lab.slam.result import SlamResult, SlamStep, Verdict
+from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.selection.models import ShapeName
+from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.slam.tracking.contacts.contact_set import ContactSet, placement_sigma_m
+from tactile_lab.slam.tracking.contacts.first_pose import first_row
+from tactile_lab.slam.tracking.filter.particle_filter import CERTAIN_VARIANCE, PoseEstimate
+from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
+from tactile_lab.slam.tracking.joint.mechanisms import Mechanism
+from tactile_lab.slam.tracking.trackers import (
+    GRAPH_METHODS,
+    THESIS_METHODS,
+    Tracker,
+    TrackingSettings,
+    make_tracker,
+    poses_to_be_told,
+)
+
+
+class SlamSettings(TrackingSettings):
+    """All parameters of the method.
+
+    Attributes:
+        back_end: the pose graph.
+        least_first_contacts: the object frame is born at the first grasp with so many contacts.
+        placement_limit_m: see the module's text.
+        shape_model: of the final outline or surface; "auto" is chosen by evidence.
+        lost_after: successive untracked grasps after which the object counts as lost.
+        contour_resolution_m, mesh_resolution_m: of the final shape.
+        largest_sigma_m: the parts of the shape that are known so well are written once more, apart; None for not.
+    """
+
+    back_end: BackEndSettings = BackEndSettings()
+    least_first_contacts: int = Field(default=3, ge=1)
+    placement_limit_m: float = Field(default=0.010, gt=0)
+    lost_after: int = Field(default=4, ge=1)
+    shape_model: ShapeName = "auto"
+    contour_resolution_m: float = Field(default=0.001, gt=0)
+    mesh_resolution_m: float = Field(default=0.003, gt=0)
+    largest_sigma_m: float | None = Field(default=None, gt=0)
+
+
+class TactileSlam:
+    """The method, grasp by grasp. The same settings, seed and grasps give the same result."""
+
+    def __init__(
+        self,
+        settings: SlamSettings | None = None,
+        seed: int = 0,
+        known_poses: Sequence[Pose3 | None] | None = None,
+    ) -> None:
+        """
+        Args:
+            settings: see there.
+            seed: of all that is left to chance.
+            known_poses: true ``world_T_object`` of every grasp, in order, for method "known-pose" and no other.
+
+        Raises:
+            ConfigurationError: the method needs poses and has none, or is given poses that it must not know.
+        """
+        self._settings = settings or SlamSettings()
+        self._known_poses = poses_to_be_told(self._settings.method, known_poses)
+        self._seed = seed
+        self._rng = np.random.default_rng(seed)
+        back_end = self._settings.back_end
+        if self._settings.method not in GRAPH_METHODS or self._settings.freedom == "space":
+            back_end = back_end.model_copy(update={"enabled": False})
+        self._back_end = BackEnd(
+            back_end,
+            each_grasp=self._settings.method != "joint",
+            as_printed=self._settings.method in THESIS_METHODS,
+            noise=self._settings.motion,
+        )
+        self._space = self._settings.space
+        self._tracker: Tracker | None = None
+        self._origin_height_m = 0.0
+        self._steps: list[SlamStep] = []
+        self._surface: tuple[ContactMap, Gpis] | None = None
+        self._shape: tuple[ContactMap, float, PresentShape] | None = None
+
+    @property
+    def settings(self) -> SlamSettings:
+        """What was asked for."""
+        return self._settings
+
+    @property
+    def step_count(self) -> int:
+        """Grasps taken into account so far."""
+        return len(self._steps)
+
+    @on_one_thread
+    def step(self, grasp: Grasp) -> SlamStep:
+        """Take one grasp into account (algorithm 3.1, then the graph).
+
+        Raises:
+            TrackingError: the grasp has entries that are not finite, or wrong units; nothing was changed.
+        """
+        started = time.perf_counter()
+        contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
+        if self._tracker is None:
+            return self._begin(grasp, contacts, started)
+        self._tracker.predict(self._space.motion(grasp.hand_motion_world))
+        explained = self._tracker.weigh(contacts)
+        estimate = self._tracker.estimate()
+        verdict, reason = self._judge(contacts, estimate, explained)
+        self._tracker.update_shape(contacts, verdict == "tracked")
+        self._tracker.resample()
+        self._tracker.adopt(self._back_end.close_loops(self._tracker.map))
+        return self._record(grasp, contacts, verdict, reason, started)
+
+    def add_grasp(self, grasp: Grasp) -> SlamStep:
+        """As :meth:`step`, but a grasp that is refused counts as one without contacts; its step says why."""
+        try:
+            return self.step(grasp)
+        except TrackingError as error:
+            step = self.step(replace(grasp, contacts=()))
+            self._steps[-1] = replace(step, reason=str(error))
+            return self._steps[-1]
+
+    @on_one_thread
+    def finish(self) -> SlamResult:
+        """Correct all poses a last time, and build the final shape with the best kernel parameters."""
+        if self._tracker is not None:
+            self._tracker.finish()
+            self._tracker.adopt(self._back_end.close_all_loops(self._tracker.map))
+            self._tracker.adopt(self._tracker.map.with_best_kernel(max_iterations=30, longest_m=0.300))
+        wanted = self._settings
+        shape = self.shape(wanted.contour_resolution_m if wanted.dimension == 2 else wanted.mesh_resolution_m)
+        return SlamResult(
+            method=self._settings.method,
+            seed=self._seed,
+            dimension=self._settings.dimension,
+            world_T_object=self._trajectory(),
+            covariances=self._covariances(),
+            steps=tuple(self._steps),
+            loops=self._back_end.reports,
+            surface=self.surface,
+            contour=shape if isinstance(shape, Contour) else None,
+            mesh=shape if isinstance(shape, SurfaceMesh) else None,
+            status="lost" if self.is_lost else "ok",
+            warnings=self._warnings,
+        )
+
+    @property
+    def world_T_object(self) -> Pose3 | None:
+        """The present pose; None before the object frame is born."""
+        return self._trajectory()[-1] if self._steps else None
+
+    @property
+    def trajectory(self) -> tuple[Pose3 | None, ...]:
+        """The pose at every grasp so far, as the present knowledge has it; None where it is not known."""
+        return self._trajectory()
+
+    @property
+    def pose_covariance(self) -> Array | None:
+        """Covariance of the present (x m, y m, yaw rad) in the world, shape (3, 3)."""
+        return self._covariances()[-1] if self._steps else None
+
+    @property
+    def origin_height_m(self) -> float:
+        """Height of the object frame's origin over the table."""
+        return self._origin_height_m
+
+    @property
+    @on_one_thread
+    def surface(self) -> Gpis | None:
+        """The present field in the object frame; None before there are contacts."""
+        if self._tracker is None:
+            return None
+        contact_map = self._tracker.refined
+        if self._surface is None or self._surface[0] is not contact_map:
+            self._surface = (contact_map, contact_map.fit())
+        return self._surface[1]
+
+    @on_one_thread
+    def shape(self, resolution_m: float) -> Contour | SurfaceMesh | None:
+        """The present outline or surface by the model of the settings; None where the contacts enclose nothing yet.
+
+        See :func:`tactile_lab.slam.current_shape.present_shape`.
+        """
+        if self._tracker is None or self.surface is None:
+            return None
+        contact_map, height_m = self._tracker.refined, self._origin_height_m
+        if self._shape is None or self._shape[0] is not contact_map or self._shape[1] != resolution_m:
+            model = self._settings.shape_model
+            made = present_shape(self.surface, contact_map, self._settings, model, height_m, resolution_m)
+            self._shape = (contact_map, resolution_m, made)
+        return self._shape[2].extracted
+
+    @property
+    def _warnings(self) -> tuple[str, ...]:
+        return (self._shape[2].warning,) if self._shape is not None and self._shape[2].warning else ()
+
+    @property
+    def surface_grasps(self) -> NDArray[np.intp]:
+        """Which grasp each contact of :attr:`surface` comes from, counted from the object frame's birth, shape (n,)."""
+        return np.empty(0, dtype=np.intp) if self._tracker is None else self._tracker.refined.grasp_indices
+
+    @property
+    def mechanisms_that_acted(self) -> frozenset[Mechanism]:
+        """Of method "joint", those that say whether they changed anything and did; the others are not among them."""
+        tracker = self._tracker
+        return frozenset(tracker.mechanisms.changed) if isinstance(tracker, JointTracker) else frozenset()
+
+    @property
+    def is_lost(self) -> bool:
+        """The rule is in the module's text; a session without any object frame is lost as well."""
+        untracked = [step.verdict == "untracked" for step in self._steps]
+        recent = untracked[-self._settings.lost_after :]
+        all_recent = len(recent) == self._settings.lost_after and all(recent)
+        return self._tracker is None or all_recent or 2 * sum(untracked) > len(untracked)
+
+    def _begin(self, grasp: Grasp, contacts: ContactSet, started: float) -> SlamStep:
+        """The object frame is born: origin at the contacts' centre, x axis along the palm's (section 3.4)."""
+        least = self._settings.least_first_contacts
+        if len(contacts) < least:
+            reason = f"{len(contacts)} contacts, the object frame needs {least}"
+            return self._record(grasp, contacts, "untracked", reason, started)
+        following = None if self._known_poses is None else self._known_poses[len(self._steps) :]
+        if following is not None and (not following or following[0] is None):
+            return self._record(grasp, contacts, "untracked", "its true pose is not known", started)
+        on_table = self._settings.freedom == "table"
+        self._origin_height_m = float(grasp.points_world_m[:, 2].mean()) if on_table else 0.0
+        contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
+        row = first_row(grasp, contacts, on_table=on_table)
+        first = PlacedGrasp(contacts, row, CERTAIN_VARIANCE * np.eye(self._space.size), np.zeros(self._space.size))
+        relocate = relocated_rows if on_table else None
+        self._tracker = make_tracker(self._settings, first, self._rng, following, relocate)
+        return self._record(grasp, contacts, "first", "object frame born", started)
+
+    def _judge(self, contacts: ContactSet, estimate: PoseEstimate, explained: bool) -> tuple[Verdict, str]:
+        if not explained:
+            return "untracked", "no pose explains the contacts" if len(contacts) else "no contacts"
+        spread_m = placement_sigma_m(contacts, estimate.row, estimate.covariance, self._space)
+        if spread_m > self._settings.placement_limit_m:
+            return "uncertain", f"contacts uncertain to {1e3 * spread_m:.0f} mm"
+        return "tracked", f"contacts placed to {1e3 * spread_m:.1f} mm"
+
+    def _record(self, grasp: Grasp, contacts: ContactSet, verdict: Verdict, reason: str, started: float) -> SlamStep:
+        placed = self._tracker.map.placed[-1] if self._tracker else None
+        seen_by = planar_observability if self._settings.freedom == "table" else observability
+        seen = seen_by(contacts.points_m, contacts.normals).smallest if len(contacts) else 0.0
+        step = SlamStep(
+            index=grasp.index,
+            stamp_ns=grasp.stamp_ns,
+            world_T_object=self._space.pose(placed.row, self._origin_height_m) if placed else None,
+            covariance=placed.covariance if placed else None,
+            effective_count=self._tracker.effective_count if self._tracker else 0.0,
+            observability=seen,
+            verdict=verdict,
+            reason=reason,
+            contacts=len(contacts),
+            contacts_used=len(placed.kept) if placed else 0,
+            seconds=time.perf_counter() - started,
+        )
+        self._steps.append(step)
+        return step
+
+    def _placed_grasps(self) -> list[PlacedGrasp | None]:
+        """One entry a grasp; grasps before the object frame was born have none."""
+        placed = list(self._tracker.refined.placed) if self._tracker else []
+        return [None] * (len(self._steps) - len(placed)) + placed
+
+    def _trajectory(self) -> tuple[Pose3 | None, ...]:
+        return tuple(
+            self._space.pose(grasp.row, self._origin_height_m) if grasp else None for grasp in self._placed_grasps()
+        )
+
+    def _covariances(self) -> tuple[Array | None, ...]:
+        return tuple(grasp.covariance if grasp else None for grasp in self._placed_grasps())

@@ -1,0 +1,1 @@
+"""The object's pose through successive grasps (thesis chapter 3)."""

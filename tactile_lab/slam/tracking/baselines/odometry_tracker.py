@@ -1,0 +1,127 @@
+"""Trackers that take a pose as it comes: from the hand's motion alone, or from outside.
+
+They are the two ends that every method is measured between: odometry is what the hand's motion is worth without any
+touch, and known poses show what the shape model makes of perfect tracking.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from gtsam import Pose3
+
+from drivers.core.contacts import Array
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
+from tactile_lab.slam.tracking.filter.particle_filter import CERTAIN_VARIANCE, PoseEstimate
+from tactile_lab.slam.tracking.joint.hypotheses import HypothesisScorer
+from tactile_lab.slam.tracking.joint.proposals import UNEXPLAINED_COST
+
+_STEP = 1e-6
+_LOOKS = 3
+_KERNEL_EVERY = 4
+"""Kernel parameters are estimated anew after so many grasps."""
+
+
+class OdometryTracker:
+    """Eq. 3.8 and nothing else: the object moved as the hand did, and the uncertainty adds up."""
+
+    effective_count = 1.0
+
+    def __init__(self, first: ContactMap, noise: MotionNoise) -> None:
+        self._map, self._noise = first, noise
+        self._motion, self._trusted = np.zeros(first.space.size), True
+        self._now = PoseEstimate(first.placed[-1].row, first.placed[-1].covariance)
+
+    @property
+    def map(self) -> ContactMap:
+        return self._map
+
+    @property
+    def refined(self) -> ContactMap:
+        return self._map
+
+    def predict(self, motion: Array) -> None:
+        """Carry the pose along; its covariance goes with it, and the noise is added."""
+        space, row = self._map.space, self._now.row
+        moved = space.compose(motion, row)
+        by_row = space.deviation(space.compose(motion, row + _STEP * np.eye(space.size)), moved).T / _STEP
+        covariance = by_row @ self._now.covariance @ by_row.T + np.diag(space.sigmas(self._noise) ** 2)
+        self._motion, self._now = motion, PoseEstimate(moved, covariance)
+
+    def weigh(self, contacts: ContactSet) -> bool:
+        self._trusted = len(contacts) > 0
+        return self._trusted
+
+    def estimate(self) -> PoseEstimate:
+        return self._now
+
+    def update_shape(self, contacts: ContactSet, certain: bool) -> None:
+        """Contacts enter the shape where the pose puts them, however uncertain: a baseline judges nothing."""
+        placed = PlacedGrasp(contacts, self._now.row, self._now.covariance, self._motion)
+        self._map = self._map.with_grasp(placed if self._trusted else placed.put_aside())
+
+    def resample(self) -> None:
+        """There is one belief only."""
+
+    def adopt(self, corrected: ContactMap) -> None:
+        self._map = corrected
+        self._now = PoseEstimate(corrected.placed[-1].row, corrected.placed[-1].covariance)
+
+    def finish(self) -> None:
+        """Nothing is estimated, so nothing is left to improve."""
+
+
+class KnownPoseTracker(OdometryTracker):
+    """Places every grasp at a pose that is given: the floor that tracking cannot go below."""
+
+    def __init__(self, first: ContactMap, noise: MotionNoise, poses: Sequence[Pose3 | None]) -> None:
+        """
+        Args:
+            first: map of the first grasp.
+            noise: how the uncertainty grows over grasps whose pose is not known.
+            poses: true ``world_T_object`` of the first grasp, which is known, and of all that follow; in the truth's
+                own object frame, which the first grasp ties to the map's.
+        """
+        super().__init__(first, noise)
+        space, start = first.space, poses[0]
+        assert start is not None
+        truth_T_map = start.inverse() * space.pose(first.placed[-1].row, 0.0)
+        self._ahead = [None if pose is None else space.motion(pose * truth_T_map) for pose in poses[1:]]
+        self._given: Array | None = None
+        self._judge = HypothesisScorer(noise, UNEXPLAINED_COST)
+
+    def predict(self, motion: Array) -> None:
+        super().predict(motion)
+        self._given = self._ahead.pop(0) if self._ahead else None
+        if self._given is not None:
+            self._now = PoseEstimate(self._given, CERTAIN_VARIANCE * np.eye(len(self._given)))
+
+    def weigh(self, contacts: ContactSet) -> bool:
+        """Grasps whose pose is not known stay out of the shape."""
+        self._trusted = self._given is not None and len(contacts) > 0
+        return self._trusted
+
+    def update_shape(self, contacts: ContactSet, certain: bool) -> None:
+        """Contacts that fit nothing are left out: at known poses they are wrong themselves."""
+        super().update_shape(contacts, certain)
+        self._map, _ = self._judge.clean(self._map, len(self._map.placed) - 1)
+        if len(self._map.placed) % _KERNEL_EVERY == 0:
+            self._map = self._map.with_best_kernel()
+
+    def finish(self) -> None:
+        """Look at all contacts anew, now that the shape is known best; what is left out changes the kernel.
+
+        The kernel to begin with is that of the contacts that were trusted: wrong ones would shorten it to explain all.
+        """
+        kernel = self._map.with_best_kernel().settings
+        self._map, _ = self._judge.clean(replace(self._map.with_all_contacts(), settings=kernel))
+        for _ in range(_LOOKS):
+            seen = self._map.left_out_count
+            self._map = FacetedScorer(self._judge, self._noise).without_errors(self._map.with_best_kernel())
+            if self._map.left_out_count == seen:
+                break

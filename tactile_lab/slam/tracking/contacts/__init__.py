@@ -1,0 +1,1 @@
+"""Contacts, poses and motion as the trackers see them."""

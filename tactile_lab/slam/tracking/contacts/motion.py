@@ -1,0 +1,116 @@
+"""Motion of the object on the table while the hand carries it (eq. 3.7 and 3.8).
+
+Inside the tracker a planar pose ``world_T_object`` is a row ``(x_m, y_m, yaw_rad)``, so that thousands of
+them are one array of shape (n, 3). At module borders poses are gtsam ``Pose2`` and ``Pose3``.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from gtsam import Pose2, Pose3
+from pydantic import Field
+
+from drivers.core.configuration import StrictModel
+from drivers.core.contacts import Array
+from drivers.core.poses import planar, spatial, wrap_angle_rad
+
+
+class MotionNoise(StrictModel):
+    """Standard deviations of what the object does beside the hand's motion, per re-orientation.
+
+    The defaults are the thesis's 100 % (section 3.4.1): 10 mm per axis and 20 degrees.
+
+    Attributes:
+        translation_m, rotation_rad: per axis, and about the vertical.
+        unheld: share of these that remains where the hand did not carry the object between two grasps and the
+            closing hand alone may have pushed it. 1 where objects are moved by others than the hand as well.
+        gripped: the hand's grip bounds slips, so that large ones are less likely than a normal distribution has them.
+    """
+
+    renamed: ClassVar = {"left_lying": "unheld"}
+
+    translation_m: float = Field(default=0.010, gt=0)
+    rotation_rad: float = Field(default=float(np.deg2rad(20.0)), gt=0)
+    unheld: float = Field(default=1.0, gt=0, le=1)
+    gripped: bool = True
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviations of x, y (m) and yaw (rad)."""
+        return np.array([self.translation_m, self.translation_m, self.rotation_rad])
+
+    def after(self, motions: Array) -> MotionNoise:
+        """The noise of one step after the hand's motions, rows or one row: less where it did not move the object."""
+        if np.any(motions):
+            return self
+        factor = self.unheld
+        scaled = {"translation_m": factor * self.translation_m, "rotation_rad": factor * self.rotation_rad}
+        return self.model_copy(update=scaled)
+
+    def accumulate(self, steps: int) -> MotionNoise:
+        """The noise of several re-orientations without a measurement between them."""
+        factor = float(np.sqrt(steps))
+        translation_m, rotation_rad = factor * self.translation_m, factor * self.rotation_rad
+        return self.model_copy(update={"translation_m": translation_m, "rotation_rad": rotation_rad})
+
+
+def pose_row(world_T_object: Pose2) -> Array:
+    """A planar pose as the row (x_m, y_m, yaw_rad)."""
+    return np.array([world_T_object.x(), world_T_object.y(), world_T_object.theta()])
+
+
+def row_pose(row: Array) -> Pose2:
+    """The planar pose of a row (x_m, y_m, yaw_rad)."""
+    return Pose2(float(row[0]), float(row[1]), float(row[2]))
+
+
+def row_pose_in_space(row: Array, height_m: float) -> Pose3:
+    """The pose of a row in space, its origin at the given height over the table."""
+    return spatial(row_pose(row), height_m)
+
+
+def planar_motion(hand_motion_world: Pose3) -> Array:
+    """The hand's motion in the table plane as a row: the object rests on the table, so no tilt is passed on."""
+    return pose_row(planar(hand_motion_world))
+
+
+def compose(motion: Array, rows: Array) -> Array:
+    """``motion * pose`` for each row: eq. 3.8, the motion being expressed in the world frame.
+
+    Args:
+        motion: one row, or as many as ``rows``.
+        rows: shape (3,) or (n, 3).
+    """
+    cosine, sine = np.cos(motion[..., 2]), np.sin(motion[..., 2])
+    x, y = rows[..., 0], rows[..., 1]
+    return np.stack(
+        [
+            cosine * x - sine * y + motion[..., 0],
+            sine * x + cosine * y + motion[..., 1],
+            wrap_angle_rad(rows[..., 2] + motion[..., 2]),
+        ],
+        axis=-1,
+    )
+
+
+def inverse(rows: Array) -> Array:
+    """The inverse of each planar pose, shape (3,) or (n, 3)."""
+    cosine, sine = np.cos(rows[..., 2]), np.sin(rows[..., 2])
+    x, y = rows[..., 0], rows[..., 1]
+    return np.stack([-cosine * x - sine * y, sine * x - cosine * y, -rows[..., 2]], axis=-1)
+
+
+def deviation(rows: Array, reference: Array) -> Array:
+    """``rows - reference`` with the angle wrapped: the noise v of eq. 3.7."""
+    difference = np.asarray(rows - reference)
+    difference[..., 2] = wrap_angle_rad(difference[..., 2])
+    return difference
+
+
+def sample_motion(rows: Array, motion: Array, noise: MotionNoise, rng: np.random.Generator) -> Array:
+    """Draw the poses after a motion from ``P(x_k | x_{k-1}, u_k)`` (eq. 3.7), one for each row of shape (n, 3)."""
+    moved = compose(motion, rows) + rng.normal(size=rows.shape) * noise.sigmas
+    moved[:, 2] = wrap_angle_rad(moved[:, 2])
+    return moved

@@ -1,0 +1,1 @@
+"""Trajectories smoothed together with flat faces."""

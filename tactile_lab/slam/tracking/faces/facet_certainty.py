@@ -1,0 +1,64 @@
+"""How well flat faces tie the poses of a trajectory together, and how faces follow poses that are off.
+
+Right angles and parallels count: what holds one wall holds all walls tied to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother
+from tactile_lab.slam.tracking.faces.flat_faces import FlatFaces, flat_faces, tangents
+from tactile_lab.slam.tracking.faces.regular_faces import made_regular
+
+_TURN_LIKE_m = 0.05
+"""A place belongs to the face that is near and faces its way; a radian counts like so many metres."""
+
+
+@dataclass(frozen=True)
+class FacetCertainty:
+    """Poses and faces at the solution, linearised.
+
+    Attributes:
+        faces: in the object frame.
+        information_of_poses: inverse of the joint covariance of all poses but the first, the faces known no better
+            than contacts tell, shape (p, p).
+        faces_by_poses: derivatives of each face's tilt and offset by those poses, shape (s d, p).
+    """
+
+    faces: FlatFaces
+    information_of_poses: Array
+    faces_by_poses: Array
+
+    @classmethod
+    def of(cls, contact_map: ContactMap, noise: MotionNoise) -> Self:
+        """From poses of largest evidence, contacts in the plane or in space.
+
+        Raises:
+            ShapeError: contacts in the plane whose faces enclose nothing.
+        """
+        smoother, rows = FacetSmoother(contact_map, noise), contact_map.rows
+        faces, _ = flat_faces(contact_map)
+        faces = made_regular(contact_map, faces, smoother.information(rows, faces))
+        information = smoother.information(rows, faces)
+        free = (len(rows) - 1) * contact_map.space.size
+        by_poses = -np.linalg.solve(information[free:, free:], information[free:, :free])
+        of_poses = information[:free, :free] + information[:free, free:] @ by_poses
+        return cls(faces, np.asarray((of_poses + of_poses.T) / 2), np.asarray(by_poses))
+
+    def surface_change(self, places_m: Array, normals: Array) -> Array:
+        """How places on the faces, shape (q, d), move along their normals with the poses, shape (q, p)."""
+        count, dimension = self.faces.normals.shape
+        away_m = np.abs(places_m @ self.faces.normals.T - self.faces.offsets_m)
+        turned_rad = np.arccos(np.clip(normals @ self.faces.normals.T, -1.0, 1.0))
+        face = (away_m + _TURN_LIKE_m * turned_rad).argmin(axis=1)
+        levers = np.einsum("qdt,qd->qt", tangents(self.faces.normals)[face], places_m)
+        by_faces = np.zeros((len(places_m), count, dimension))
+        by_faces[np.arange(len(places_m)), face] = np.column_stack([-levers, np.ones(len(places_m))])
+        return np.asarray(by_faces.reshape(len(places_m), -1) @ self.faces_by_poses)

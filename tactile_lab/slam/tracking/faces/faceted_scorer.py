@@ -1,0 +1,291 @@
+"""Hypotheses in the light of flat faces: other poses, and another opinion on which contacts to leave out.
+
+A smooth field takes the only contact on a small face for an error, and a wrong contact for a bulge. Faces tell these
+apart: a contact that only a face of its own explains has to be worth that face, and one that was left out may be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.selection.planar_choice import best_shape, free_evidence, polygon_of
+from tactile_lab.slam.shape.selection.spatial_choice import stray_cost
+from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
+from tactile_lab.slam.shape.solids.prism import Prism
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
+from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh, extract_contour
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
+from tactile_lab.slam.tracking.contacts.free_space import free_space_costs
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
+from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
+from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother, smoothed_with_faces
+from tactile_lab.slam.tracking.faces.flat_faces import flat_faces
+from tactile_lab.slam.tracking.faces.regular_faces import made_regular
+from tactile_lab.slam.tracking.faces.solid_face_extents import solid_ends
+from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost
+from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
+
+_ORDERING_RESOLUTION_m = 0.002
+"""Of outlines that only order contacts and are compared with free places."""
+
+_COARSE_m = 0.006
+"""Of solids that contacts are measured against."""
+
+_SMALL_FACE = 2
+_DOUBTFUL_CHI_SQUARE = 16.0
+_MOST_DOUBTS = 12
+"""Contacts that are looked at once more: on faces of so few, or so far from theirs, and at most so many."""
+
+_HOPELESS_nats = 100.0
+"""Flat faces that are less likely than the field by more than this stay so, whichever contacts are left out."""
+
+
+_LEAST_PULL_nats = 4.0
+_MOST_PULLS = 4
+"""Contacts that are left out on trial: so many at a time, and none that can hardly pay for it."""
+
+_SAME_nats = 1e-6
+_SETTLING_STEPS = 15
+_FIELD_STEPS = 10
+
+
+class FacetedScorer:
+    """Rates hypotheses whose object has flat faces."""
+
+    def __init__(self, judge: HypothesisScorer, noise: MotionNoise, mechanisms: Mechanisms | None = None) -> None:
+        """
+        Args:
+            judge: for smooth objects, with the price of contacts that are left out.
+            noise: of the motion model.
+            mechanisms: which are on; None for all.
+        """
+        self._judge, self._noise, self._mechanisms = judge, noise, mechanisms or Mechanisms()
+
+    def better(self, contact_map: ContactMap) -> Hypothesis:
+        """The map, or the one with poses smoothed together with flat faces if those explain its contacts better."""
+        smooth = self._judge.score(contact_map)
+        sharp = self.smooth_with_facets(contact_map) or self._sharp(contact_map) or self._sharp_without_one(contact_map)
+        if sharp is None or sharp.cost > smooth.cost + _HOPELESS_nats:
+            return smooth
+        settled = self._mechanisms.improve("doubts", sharp, self._reconsider)
+        if settled.map is not sharp.map:
+            settled = _likelier(settled, self.smooth_with_facets(settled.map))
+        return _likelier(smooth, settled)
+
+    def release(self, best: Hypothesis) -> Hypothesis:
+        """A faceted hypothesis without the contacts that it is better off without once poses and faces yield.
+
+        A wrong contact that a pose hangs on is explained by turning the whole grasp, or by a face bent for it, and then
+        fits: looked at where it is, nothing tells it from the others.
+        """
+        while found := [each for each in map(self.smooth_with_facets, self._without_pulls(best)) if each is not None]:
+            freed = min(found, key=cost)
+            if freed.cost >= best.cost:
+                break
+            best = _likelier(freed, self.smooth_with_facets(self._restore(freed).map))
+        return best
+
+    def without_errors(self, contact_map: ContactMap) -> ContactMap:
+        """The map at its poses, without the contacts that neither a field nor flat faces explain."""
+        cleaned, _ = self._judge.clean(contact_map)
+        sharp = self._sharp(cleaned) or self._sharp_without_one(cleaned)
+        if sharp is None:
+            return cleaned
+        return _likelier(self._judge.score(cleaned), self._mechanisms.improve("doubts", sharp, self._reconsider)).map
+
+    def _without_pulls(self, best: Hypothesis) -> list[ContactMap]:
+        """The map without each of the contacts that pull the most; nothing for an object without flat faces."""
+        if not self._is_sharp(best):
+            return []
+        faces, _ = flat_faces(best.map)
+        pulls = 0.5 * FacetSmoother(best.map, self._noise).pulls(best.map.rows, faces)
+        strongest = [int(each) for each in np.argsort(-pulls)[:_MOST_PULLS] if pulls[each] > _LEAST_PULL_nats]
+        return [best.map.without_contact(*best.map.origins[each]) for each in strongest]
+
+    def solid(self, best: Hypothesis) -> SurfaceMesh | None:
+        """The surface of a hypothesis in space that is sharp; None for others."""
+        if not self._mechanisms.has("faces"):
+            return None
+        try:
+            evidence, mesh = _best_solid(best.map, best.map.fit())
+        except ShapeError:
+            return None
+        sharp = self._score_explained(best.map, evidence, _intrusion(best.map))
+        return None if sharp.cost > best.cost + _SAME_nats else mesh
+
+    def settle(self, contact_map: ContactMap) -> Hypothesis | None:
+        """Poses and faces in space smoothed together, contacts staying between the ends of their faces; else None."""
+        try:
+            faces, _ = flat_faces(contact_map)
+            ends = solid_ends(contact_map, faces)
+        except ShapeError:
+            return None
+        found = FacetSmoother(contact_map, self._noise, ends).fit(contact_map.rows, faces, _SETTLING_STEPS)
+        return self._sharp(contact_map.with_rows(found.rows))
+
+    def regular(self, best: Hypothesis) -> Hypothesis:
+        """A faceted hypothesis with faces as regular as contacts and motion allow, poses giving way, if likelier."""
+        if not self._is_sharp(best):
+            return best
+        try:
+            faces, _ = flat_faces(best.map)
+            ends = solid_ends(best.map, faces) if best.map.dimension == 3 else None
+        except ShapeError:
+            return best
+        smoother = FacetSmoother(best.map, self._noise, ends)
+        at = smoother.fit(best.map.rows, faces, _SETTLING_STEPS)
+        settled = best.map.with_rows(at.rows)
+        faces = made_regular(settled, at.faces, smoother.information(at.rows, at.faces))
+        found = smoother.fit(at.rows, faces, _SETTLING_STEPS)
+        return _likelier(best, self._sharp(best.map.with_rows(found.rows)))
+
+    def smooth(self, contact_map: ContactMap) -> Hypothesis:
+        """As :meth:`better`, after the poses were smoothed with the field, and contacts left out that do not fit it."""
+        return self.better(self._judge.smooth(contact_map, _FIELD_STEPS).map)
+
+    def smooth_with_facets(self, contact_map: ContactMap) -> Hypothesis | None:
+        """Poses and faces smoothed together; None if there are no faces that enclose anything."""
+        faceted = smoothed_with_faces(contact_map, self._noise) if self._mechanisms.has("faces") else None
+        return self._sharp(contact_map.with_rows(faceted.rows)) if faceted else None
+
+    def _is_sharp(self, best: Hypothesis) -> bool:
+        """Whether it is flat faces that explain a hypothesis best."""
+        sharp = self._sharp(best.map)
+        return sharp is not None and sharp.cost <= best.cost + _SAME_nats
+
+    def _sharp(self, contact_map: ContactMap) -> Hypothesis | None:
+        """The map as it is, its contacts explained by a sharp shape; None if there is none."""
+        if not self._mechanisms.has("faces"):
+            return None
+        try:
+            return self._score_explained(contact_map, *_explain(contact_map, contact_map.fit()))
+        except ShapeError:  # nothing enclosed, or no faces in it
+            return None
+
+    def _score_explained(self, contact_map: ContactMap, explained: float, intrusion: float) -> Hypothesis:
+        """The map as it is, given the log evidence of its sharp shape and the cost of the free places that fills."""
+        contacts = contact_map.contacts
+        constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
+        motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
+        misfit = motion - explained - float(constant)
+        return Hypothesis(contact_map, misfit, intrusion, self._judge.price(contact_map))
+
+    def _sharp_without_one(self, contact_map: ContactMap) -> Hypothesis | None:
+        """The likeliest sharp outline of all contacts but one, of those that the field explains worst.
+
+        One wrong contact can be enough for faces that enclose nothing. In space that is how round bodies are told.
+        """
+        if contact_map.dimension == 3 or not self._mechanisms.has("without one"):
+            return None
+        costs = contact_map.fit().leave_one_out_costs(np.arange(len(contact_map.contacts)))
+        worst = [contact_map.origins[each] for each in np.argsort(-costs)[:_MOST_DOUBTS]]
+        found = [self._sharp(contact_map.without_contact(*each)) for each in worst]
+        best = min((each for each in found if each is not None), key=cost, default=None)
+        if best is not None:
+            self._mechanisms.changed.add("without one")
+        return best
+
+    def _reconsider(self, sharp: Hypothesis) -> Hypothesis:
+        """Contacts left out that a sharp shape explains by themselves only, and those back that it explains better."""
+        asked: set[tuple[int, int]] = set()
+        while doubts := [each for each in _doubtful(sharp.map) if each not in asked]:
+            for each in doubts:
+                sharp = _likelier(sharp, self._sharp(sharp.map.without_contact(*each)))
+            asked.update(doubts)
+        return self._restore(sharp)
+
+    def _restore(self, sharp: Hypothesis) -> Hypothesis:
+        """With those contacts back that are better explained than left out: all at once, or one after the other."""
+        left_out = [(i, each) for i, grasp in enumerate(sharp.map.placed) if grasp.used for each in grasp.left_out]
+        whole = sharp.map
+        for index, contact in left_out:
+            whole = whole.with_contact(index, contact)
+        fuller = _likelier(sharp, self._sharp(whole)) if left_out else sharp
+        if fuller.map is whole:
+            return fuller
+        for index, contact in sorted(left_out)[:_MOST_DOUBTS]:
+            sharp = _likelier(sharp, self._sharp(sharp.map.with_contact(index, contact)))
+        return sharp
+
+
+def _explain(contact_map: ContactMap, fitted: Gpis) -> tuple[float, float]:
+    """Log evidence of the best sharp shape, and the cost of the free places it fills. Raises ShapeError."""
+    free = contact_map.free_points_m
+    if contact_map.dimension == 2:
+        polygon = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
+        return polygon.log_evidence, -free_evidence(polygon.contour(_ORDERING_RESOLUTION_m), free, fitted)
+    return _best_solid(contact_map, fitted)[0], _intrusion(contact_map)
+
+
+def _intrusion(contact_map: ContactMap) -> float:
+    """The cost of the free places in space that the field fills."""
+    return float(free_space_costs(contact_map.fit(), contact_map.free_points_m[None])[0])
+
+
+def _best_solid(contact_map: ContactMap, fitted: Gpis) -> tuple[float, SurfaceMesh]:
+    """Log evidence and surface of the likeliest solid with flat faces or upright walls. Raises ShapeError."""
+    on_table, free = contact_map.space is PLANAR, contact_map.free_points_m
+    makers: list[Callable[[], Polyhedron | Prism]] = []
+    without = fitted.settings.without
+    if "polyhedron" not in without:
+        makers.append(lambda: Polyhedron.fit(fitted, free, upright=on_table))
+    if on_table and "prism" not in without:
+        makers.append(lambda: Prism.fit(fitted, best_shape))
+    solids = [solid for solid in map(_try_make, makers) if solid is not None]
+    best: tuple[float, SurfaceMesh] | None = None
+    for solid in sorted(solids, key=lambda one: -one.log_evidence):  # surfaces are dear: the likelier one's comes first
+        best = _on_surface(solid, fitted, best) or best
+    if best is None:
+        raise ShapeError("the contacts enclose no solid with flat faces or upright walls")
+    return best
+
+
+def _try_make(maker: Callable[[], Polyhedron | Prism]) -> Polyhedron | Prism | None:
+    try:
+        return maker()
+    except ShapeError:  # too few contacts on walls, or on too many planes
+        return None
+
+
+def _on_surface(
+    solid: Polyhedron | Prism, fitted: Gpis, known: tuple[float, SurfaceMesh] | None
+) -> tuple[float, SurfaceMesh] | None:
+    """A solid's log evidence, less for contacts that its surface leaves out, and its surface; None if not likelier."""
+    least = -np.inf if known is None else known[0]
+    if solid.log_evidence <= least:
+        return None
+    try:
+        mesh = solid.mesh(_COARSE_m)
+    except ShapeError:  # its faces enclose nothing
+        return None
+    evidence = solid.log_evidence - stray_cost(
+        distances_to_mesh(fitted.contacts_m, mesh), contacts_of(fitted).point_weights
+    )
+    return (evidence, mesh) if evidence > least else None
+
+
+def _doubtful(contact_map: ContactMap) -> list[tuple[int, int]]:
+    """Origins of contacts on faces of one or two, and those that do not fit their face, the worst first."""
+    seen = contact_map.contacts
+    try:
+        faces, _ = flat_faces(contact_map)
+    except ShapeError:
+        return []
+    outward = faces.normals[faces.labels]
+    away = np.einsum("nd,nd->n", outward, seen.points_m) - faces.offsets_m[faces.labels]
+    misfit = (away / seen.point_sigma_m) ** 2
+    misfit += ~faces.leaning * np.sum((seen.normals - outward) ** 2, axis=1) / seen.normal_sigma_rad**2
+    lonely = np.bincount(faces.labels, minlength=faces.count)[faces.labels] <= _SMALL_FACE
+    doubts = np.flatnonzero(lonely | (misfit > _DOUBTFUL_CHI_SQUARE))
+    worst_first = doubts[np.argsort(-misfit[doubts], kind="stable")][:_MOST_DOUBTS]
+    origins = contact_map.origins
+    return [origins[i] for i in worst_first]
+
+
+def _likelier(one: Hypothesis, other: Hypothesis | None) -> Hypothesis:
+    return one if other is None or one.cost <= other.cost else other

@@ -1,0 +1,224 @@
+"""Grasps looked at again once the object is known: where else on it could each one lie?
+
+While an object is explored its field is round and vague, and a grasp that closes on a corner the wrong way round, or a
+width further along, fits about as well as the right one. Flat faces tell such places apart, but moving poses and faces
+together from the wrong place does not lead to the right one: it has to be proposed. Each grasp is driven onto the
+object from many samples of the motion model, and the most promising other places are tried, one at a time.
+
+A trajectory that took a wrong turn goes on from there: the grasps that follow fit each other, and none of them can go
+back alone. So in space those after a grasp are driven onto the object from its other place too, and tried with it.
+
+In space grasps are driven onto the solid that the faces make. An outline tells its grasps apart as it grows; only those
+are asked again there that it explains badly or that say little, and they are driven onto the field of all others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.core.contacts import Array
+from tactile_lab.slam.shape.solids.solid_field import TabulatedSolid
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved, PlacedGrasp
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
+from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
+from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, cost
+from tactile_lab.slam.tracking.joint.proposals import GraspMatch, Matched, ProposalSettings, elsewhere, propose
+
+_OF_A_GRASP = 2
+_SAMPLES = 48
+"""Enough on a solid, which pulls from farther away than a field that is vague between contacts."""
+
+_SURFACE_SIGMA_m = 0.0005
+_LITTLE = 2
+"""So few contacts fit many places."""
+
+
+@dataclass(frozen=True)
+class _Search:
+    """How far to look.
+
+    Attributes:
+        rounds: at most so many places are taken, one after the other.
+        tried: so many places in a round, each with the best place of the round before.
+        hopeless_nats: a place that is foreseen to cost so much more is not tried; neighbours and faces that yield bring
+            a few nats, and wrong contacts that turn out to be right some more.
+        least_gain_nats: what a place has to bring. A grasp that has wrong contacts fits elsewhere nearly as well.
+        longest_run: so many successive grasps are placed elsewhere together.
+    """
+
+    rounds: int
+    tried: int
+    hopeless_nats: float
+    least_gain_nats: float
+    longest_run: int
+
+
+_IN_SPACE = _Search(rounds=12, tried=4, hopeless_nats=6.0, least_gain_nats=0.5, longest_run=6)
+_IN_PLANE = _Search(rounds=3, tried=6, hopeless_nats=15.0, least_gain_nats=3.0, longest_run=1)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A grasp at another place, or a few successive ones.
+
+    Attributes:
+        index: of the first grasp.
+        rows: their poses there, shape (k, size).
+        change: foreseen in the cost, the rest staying where it is.
+    """
+
+    index: int
+    rows: Array
+    change: float
+
+
+def relocalize(best: Hypothesis, sharp: FacetedScorer, noise: MotionNoise, settings: ProposalSettings) -> Hypothesis:
+    """The hypothesis with grasps at other places of its object, as long as that makes it likelier.
+
+    Args:
+        best: a hypothesis; one in space without flat faces or upright walls stays as it is.
+        sharp: rates it in the light of flat faces.
+        noise: of the motion model.
+        settings: of the search.
+    """
+    search = _search(best.map)
+    for _ in range(search.rounds):
+        tried = [_try(best.map, place, sharp) for place in _places(best, sharp, noise, settings)]
+        found = min((each for each in tried if each is not None), key=cost, default=best)
+        if found.cost > best.cost - search.least_gain_nats:
+            break
+        best = found
+    return best
+
+
+def _search(contact_map: ContactMap) -> _Search:
+    return _IN_SPACE if contact_map.dimension == 3 else _IN_PLANE
+
+
+def _try(contact_map: ContactMap, place: _Place, sharp: FacetedScorer) -> Hypothesis | None:
+    """The map with grasps at another place, smoothed; None where its faces enclose nothing."""
+    moved = contact_map
+    for index, row in enumerate(place.rows, start=place.index):
+        whole = replace(moved.placed[index], row=row, left_out=frozenset(), moved=Moved.AS_MEANT)
+        moved = moved.with_placed(index, whole)
+    return sharp.settle(moved) if contact_map.dimension == 3 else sharp.smooth(moved)
+
+
+def _places(best: Hypothesis, sharp: FacetedScorer, noise: MotionNoise, settings: ProposalSettings) -> list[_Place]:
+    """The most promising other places of all grasps but the first, the best first."""
+    search, known = _search(best.map), best.map
+    if known.dimension == 3:
+        onto, settings = _onto_solid(best, sharp), settings.model_copy(update={"samples": _SAMPLES})
+    else:
+        onto = {i: known.without_grasp(i).fit() for i, grasp in enumerate(known.placed) if i and _fits_poorly(grasp)}
+    outlook = _Outlook(known, onto, noise, settings)
+    found = [place for index in onto for place in outlook.places(index)]
+    return sorted(found, key=lambda place: place.change)[: search.tried]
+
+
+def _onto_solid(best: Hypothesis, sharp: FacetedScorer) -> dict[int, Matched]:
+    """What each grasp but the first is driven onto, by its number: the solid of all contacts; nothing without one."""
+    mesh = sharp.solid(best)
+    if mesh is None:
+        return {}
+    solid = TabulatedSolid(mesh, _SURFACE_SIGMA_m)
+    return {i: solid for i, grasp in enumerate(best.map.placed) if i and len(grasp.contacts_world)}
+
+
+def _fits_poorly(grasp: PlacedGrasp) -> bool:
+    """Whether a grasp has contacts that do not fit where it is, or hardly any that do."""
+    return len(grasp.contacts_world) >= _LITTLE and (bool(grasp.left_out) or len(grasp.kept) <= _LITTLE)
+
+
+class _Outlook:
+    """Other places of a trajectory's grasps, and what they would cost.
+
+    Args:
+        contact_map: the trajectory.
+        onto: what grasps are driven onto, by their number; the others stay where they are.
+        noise: of the motion model.
+        settings: of the proposals.
+    """
+
+    def __init__(
+        self, contact_map: ContactMap, onto: dict[int, Matched], noise: MotionNoise, settings: ProposalSettings
+    ) -> None:
+        self._map, self._onto, self._settings = contact_map, onto, settings
+        self._rows, self._search = contact_map.rows, _search(contact_map)
+        self._wide, self._motion = noise.accumulate(2), MotionCost.of(contact_map, noise)
+        self._now = self._motion.steps(self._rows)
+        self._known: dict[int, tuple[Array, Array]] = {}
+
+    def places(self, index: int) -> list[_Place]:
+        """Of one grasp, and of those that follow it as far as a wrong turn may reach."""
+        rows, told = self._elsewhere(index, *self._drive_now(index))
+        alone = [self._place(index, row[None], each) for row, each in zip(rows, told, strict=True)]
+        paid = told + [self._step_changes(index, row[None])[index - 1] for row in rows]
+        first = [i for i in np.argsort(paid)[:_OF_A_GRASP] if paid[i] < self._search.hopeless_nats]
+        together = [place for i in first for place in self._runs(index, rows[i], float(told[i]), float(paid[i]))]
+        return self._best(alone) + self._best(together)
+
+    def _best(self, places: list[_Place]) -> list[_Place]:
+        hopeful = [place for place in places if place.change < self._search.hopeless_nats]
+        return sorted(hopeful, key=lambda place: place.change)[:_OF_A_GRASP]
+
+    def _runs(self, index: int, row: Array, told: float, paid: float) -> list[_Place]:
+        """A grasp elsewhere, with one and more of those after it where they then belong.
+
+        Args:
+            index: of the grasp.
+            row: its pose there.
+            told: change of its contacts' cost there.
+            paid: the same with that of the step to it.
+        """
+        found, run = [], row[None]
+        for following in range(index + 1, min(index + self._search.longest_run, len(self._rows))):
+            if following not in self._onto or paid > self._search.hopeless_nats:
+                break
+            rows, changes = self._elsewhere(following, *self._drive(following, run[-1]))
+            if len(rows) == 0:
+                break
+            longer = [np.vstack([run, each]) for each in rows]
+            prices = changes + [self._step_changes(index, each)[following - 1] for each in longer]
+            best = int(np.argmin(prices))
+            run, told, paid = longer[best], told + float(changes[best]), paid + float(prices[best])
+            found.append(self._place(index, run, told))
+        return found
+
+    def _elsewhere(self, index: int, rows: Array, costs: Array) -> tuple[Array, Array]:
+        """Those of the poses of a grasp that are other places, and its contacts' costs there over those where it is."""
+        now, costs_now = self._drive_now(index)
+        other, here = self._is_elsewhere(index, rows), ~self._is_elsewhere(index, now)
+        return rows[other], costs[other] - np.min(costs_now[here])
+
+    def _is_elsewhere(self, index: int, rows: Array) -> NDArray[np.bool_]:
+        return elsewhere(rows, self._rows[index], self._settings, self._map.space)
+
+    def _drive_now(self, index: int) -> tuple[Array, Array]:
+        """As :meth:`_driven`, the grasp before it staying where it is; asked for once."""
+        if index not in self._known:
+            self._known[index] = self._drive(index, self._rows[index - 1])
+        return self._known[index]
+
+    def _drive(self, index: int, before: Array) -> tuple[Array, Array]:
+        """Where a grasp is, and where it is driven onto the object after the one before, with its contacts' costs."""
+        space, grasp, field = self._map.space, self._map.placed[index], self._onto[index]
+        predicted = space.compose(grasp.motion, before)
+        proposed, _ = propose(predicted, grasp.contacts_world, field, self._wide, self._settings, space)
+        match = GraspMatch(predicted, grasp.contacts_world, field, self._wide, self._settings, space)
+        rows = np.vstack([self._rows[index], proposed])
+        away = space.deviation(rows, predicted) / space.sigmas(self._wide)
+        return rows, match.fit(rows, match.variance(rows)).cost - 0.5 * np.sum(away**2, axis=1)
+
+    def _place(self, index: int, rows: Array, told: float) -> _Place:
+        return _Place(index, rows, told + float(np.sum(self._step_changes(index, rows))))
+
+    def _step_changes(self, index: int, rows: Array) -> Array:
+        """How the cost of each step changes with a run of grasps, from one on, at other poses, shape (k - 1,)."""
+        moved = self._rows.copy()
+        moved[index : index + len(rows)] = rows
+        return self._motion.steps(moved) - self._now

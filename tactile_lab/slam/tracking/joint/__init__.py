@@ -1,0 +1,1 @@
+"""The default method: several trajectories, smoothed together with the shape."""

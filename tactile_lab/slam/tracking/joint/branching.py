@@ -1,0 +1,94 @@
+"""How a trajectory goes on: the places that a new grasp's contacts could have on what is known of the object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from tactile_lab.slam.tracking.contacts.contact_map import PlacedGrasp
+from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
+from tactile_lab.slam.tracking.contacts.free_space import free_space_costs
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.pose_vectors import PoseVectors
+from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, likeliest
+from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
+from tactile_lab.slam.tracking.joint.proposals import propose
+from tactile_lab.slam.tracking.joint.settings import JointSettings
+
+
+@dataclass(frozen=True)
+class Branching:
+    """A grasp that hypotheses are continued by.
+
+    Attributes:
+        contacts: of the grasp, world frame.
+        motion: of the hand before it, a row.
+        noise: of the motion model.
+        judge: rates what comes of it.
+        settings: of the search.
+        space: what rows mean.
+        mechanisms: which are on.
+    """
+
+    contacts: ContactSet
+    motion: Array
+    noise: MotionNoise
+    judge: HypothesisScorer
+    settings: JointSettings
+    space: PoseVectors
+    mechanisms: Mechanisms
+
+    def branches(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """All hypotheses with the grasp aside, and the likeliest with the grasp placed."""
+        placed = self._place(hypotheses)
+        if placed and not self.mechanisms.has("aside branch"):
+            return placed
+        return [self._leave_unplaced(hypothesis) for hypothesis in hypotheses] + placed
+
+    def _leave_unplaced(self, hypothesis: Hypothesis) -> Hypothesis:
+        """All contacts of the grasp left out: the motion model alone says where the object is."""
+        last = hypothesis.map.placed[-1]
+        row = self.space.compose(self.motion, last.row)
+        covariance = last.covariance + np.diag(self.space.sigmas(self.noise.after(self.motion)) ** 2)
+        grasp = PlacedGrasp(self.contacts, row, covariance, self.motion).put_aside()
+        longer = hypothesis.map.with_grasp(grasp)
+        return replace(hypothesis, map=longer, left_out=self.judge.price(longer))
+
+    def _place(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The likeliest continuations of all hypotheses, contacts that do not fit them left out.
+
+        A grasp is only placed if most of its contacts fit: the rest could be anywhere by chance.
+        """
+        if len(self.contacts) == 0:
+            return []
+        proposed = [each for hypothesis in hypotheses for each in self._propose(hypothesis)]
+        promising = likeliest(proposed, 2 * self.settings.smoothed, self.settings.evidence_gap)
+        cleaned = [self._clean(branch) for branch in promising]
+        return [each for each in cleaned if 2 * len(each.map.placed[-1].kept) > len(self.contacts)]
+
+    def _clean(self, branch: Hypothesis) -> Hypothesis:
+        """The branch without contacts of the last grasp that do not fit."""
+        cleaned, misfit = self.judge.clean(branch.map, len(branch.map.placed) - 1)
+        return Hypothesis(cleaned, misfit, branch.intrusion, self.judge.price(cleaned))
+
+    def _propose(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Continuations of a hypothesis, rated contact by contact only."""
+        unplaced, placed = hypothesis.map.trailing_unplaced, hypothesis.map.placed
+        motions = np.array([self.motion, *(grasp.motion for grasp in placed[len(placed) - unplaced :])])
+        noise = self.noise.after(motions).accumulate(1 + unplaced)
+        predicted = self.space.compose(self.motion, hypothesis.map.placed[-1].row)
+        fitted = hypothesis.map.fit()
+        rows, fit = propose(predicted, self.contacts, fitted, noise, self.settings.proposals, self.space)
+        places, _ = self.space.to_object(rows[:, None], self.contacts.free_m, self.contacts.free_m)
+        intrusions = hypothesis.intrusion + free_space_costs(fitted, places)
+        found = zip(rows, np.linalg.inv(fit.information), fit.cost, intrusions, strict=True)
+        proposed = []
+        for row, covariance, misfit, intrusion in found:
+            longer = hypothesis.map.with_grasp(PlacedGrasp(self.contacts, row, covariance, self.motion))
+            proposed.append(
+                Hypothesis(longer, hypothesis.misfit + float(misfit), float(intrusion), hypothesis.left_out)
+            )
+        return proposed

@@ -1,0 +1,157 @@
+"""Grasps that could not be placed when they came, or not well: where they belong is looked for with more known.
+
+Three ways lead there: the motion model from the neighbouring grasps; if the object was to be left lying, a push of the
+closing hand; and, if the object was lost, poses anywhere on the known object, which need no motion at all (relocation).
+Nothing is forced: a grasp stays where it is or aside unless the evidence for all contacts gets better.
+
+While the object is explored, and anywhere on it, a grasp needs most of its contacts to be placed. On a known object
+near where the motion leads, two of them with their normals can be enough: fingers with two or three wrong contacts of
+five else stayed aside, a centimetre off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved, PlacedGrasp
+from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost
+from tactile_lab.slam.tracking.joint.proposals import ProposalSettings, propose
+
+Relocate: TypeAlias = Callable[[ContactMap, ContactSet], Array]
+"""Poses of a grasp's contacts anywhere on the object that a map describes, the best first, shape (m, size)."""
+
+_TRIED = 3
+_TRIED_NEAR = 8
+_SMOOTHED = 2
+_LEAST_CONTACTS = 3
+_LEAST_FITTING = 2
+_DOUBTFUL = 2
+"""So many contacts of a grasp have to be left out for its place to be looked for again."""
+
+
+def relocate_last(hypothesis: Hypothesis, relocate: Relocate, judge: HypothesisScorer) -> list[Hypothesis]:
+    """The hypothesis with its last grasp at other places on the object.
+
+    Args:
+        hypothesis: whose last grasp is aside, or on ground that nothing else supports.
+        relocate: proposes places.
+        judge: rates them.
+    """
+    last = len(hypothesis.map.placed) - 1
+    contacts = hypothesis.map.placed[last].contacts_world
+    anywhere = relocate(hypothesis.map.without_grasp(last), contacts)[:_TRIED]
+    return _place_at(hypothesis, last, anywhere, judge, _most(contacts), Moved.FREELY)
+
+
+def propose_pushes(
+    hypothesis: Hypothesis, noise: MotionNoise, settings: ProposalSettings, judge: HypothesisScorer
+) -> list[Hypothesis]:
+    """The hypothesis with its last grasp where a push brought the object, if it was to be left and fits badly so.
+
+    Args:
+        hypothesis: to improve.
+        noise: of the motion model.
+        settings: of the search.
+        judge: rates them.
+    """
+    last = len(hypothesis.map.placed) - 1
+    grasp = hypothesis.map.placed[last]
+    if not _is_doubtful(grasp) or not _was_left(grasp, noise):
+        return []
+    near = _near(hypothesis, last, noise, settings)
+    return _place_at(hypothesis, last, near, judge, _most(grasp.contacts_world), Moved.PUSHED)
+
+
+def associate_deferred(
+    hypothesis: Hypothesis,
+    noise: MotionNoise,
+    settings: ProposalSettings,
+    relocate: Relocate | None,
+    judge: HypothesisScorer,
+    *,
+    pushes: bool = True,
+) -> Hypothesis:
+    """The hypothesis with grasps that are aside or fit badly placed anew, one after the other, where that is likelier.
+
+    Args:
+        hypothesis: to improve.
+        noise: of the motion model.
+        settings: of the search near the predicted pose.
+        relocate: proposes places anywhere for grasps that are aside; None for none.
+        judge: rates them.
+        pushes: the closing hand may have pushed an object that was to be left.
+    """
+    for index, grasp in enumerate(hypothesis.map.placed[1:], start=1):
+        if not _is_doubtful(grasp):
+            continue
+        near, contacts = _near(hypothesis, index, noise.accumulate(2), settings), grasp.contacts_world
+        fitting = max(_LEAST_FITTING, len(grasp.kept) + 1)
+        candidates = _place_at(hypothesis, index, near, judge, fitting, Moved.AS_MEANT)
+        if pushes and _was_left(grasp, noise):
+            candidates += _place_at(hypothesis, index, near, judge, fitting, Moved.PUSHED)
+        if relocate is not None and not grasp.used:
+            anywhere = relocate(hypothesis.map.without_grasp(index), contacts)[:_TRIED]
+            candidates += _place_at(hypothesis, index, anywhere, judge, _most(contacts), Moved.FREELY)
+        hypothesis = min([hypothesis, *candidates], key=cost)
+    return hypothesis
+
+
+def _is_doubtful(grasp: PlacedGrasp) -> bool:
+    return len(grasp.left_out) >= _DOUBTFUL and len(grasp.contacts_world) >= _LEAST_CONTACTS
+
+
+def _was_left(grasp: PlacedGrasp, noise: MotionNoise) -> bool:
+    """Whether the hand was to leave the object where it was before a grasp, and it is expected to lie stiller so."""
+    return noise.after(grasp.motion) != noise
+
+
+def _near(hypothesis: Hypothesis, index: int, noise: MotionNoise, settings: ProposalSettings) -> Array:
+    """Poses of a grasp on the object of all others, near where the motion leads, the best first."""
+    space, grasp = hypothesis.map.space, hypothesis.map.placed[index]
+    predicted = space.compose(grasp.motion, hypothesis.map.placed[index - 1].row)
+    field = hypothesis.map.without_grasp(index).fit()
+    return propose(predicted, grasp.contacts_world, field, noise, settings, space)[0][:_TRIED_NEAR]
+
+
+def _most(contacts: ContactSet) -> int:
+    return len(contacts) // 2 + 1
+
+
+def _place_at(
+    hypothesis: Hypothesis, index: int, rows: Array, judge: HypothesisScorer, fitting: int, moved: Moved
+) -> list[Hypothesis]:
+    """The hypothesis with one grasp at the likeliest poses that enough contacts fit, smoothed."""
+    found = []
+    for row in rows:
+        grasp = replace(hypothesis.map.placed[index], row=row, left_out=frozenset(), moved=moved)
+        cleaned, _ = judge.clean(_with(hypothesis.map, index, grasp), index)
+        if len(cleaned.placed[index].kept) >= fitting:
+            found.append(judge.score(cleaned))
+    likeliest = sorted(found, key=cost)[:_SMOOTHED]
+    return [_following(judge.smooth(one.map, 15), index, judge) for one in likeliest]
+
+
+def _following(hypothesis: Hypothesis, index: int, judge: HypothesisScorer) -> Hypothesis:
+    """The hypothesis with one grasp as the motion model has it after all, if that is no less likely."""
+    bound = replace(hypothesis.map.placed[index], moved=Moved.AS_MEANT)
+    return min(judge.score(hypothesis.map.with_placed(index, bound)), hypothesis, key=cost)
+
+
+def _with(contact_map: ContactMap, index: int, grasp: PlacedGrasp) -> ContactMap:
+    placed = list(contact_map.placed)
+    placed[index] = grasp
+    following = np.flatnonzero(~np.array([one.used for one in placed]))
+    for after in [int(i) for i in following if i > index]:  # grasps aside go where the motion leads them from here
+        if any(one.used for one in placed[index + 1 : after]):
+            break
+        placed[after] = replace(
+            placed[after], row=contact_map.space.compose(placed[after].motion, placed[after - 1].row)
+        )
+    return replace(contact_map, placed=tuple(placed))

@@ -1,0 +1,225 @@
+"""Hypotheses about the whole trajectory, and what they are judged by.
+
+The cost of a hypothesis is the negative logarithm of its evidence: the likelihood of all contacts for these poses,
+the shape integrated out (:mod:`pose_evidence`), the motion model, free space, and a price for every contact that is
+left out because a contact explained by nothing costs less than this one does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from drivers.core.contacts import Array
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved
+from tactile_lab.slam.tracking.contacts.free_space import free_space_costs
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.pose_vectors import PoseVectors
+from tactile_lab.slam.tracking.evidence.fixed_lag import condense
+from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost, pushed_nats
+from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
+from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
+
+_EXPECTED_RIGHT = 99.0
+"""Contacts that are right for one that is wrong, before any was seen."""
+
+_BREAK_COST = 20.0
+"""Negative log probability that the object moves otherwise than with the hand, wherever it then lies."""
+
+_REMEMBERED = 8
+"""Maps whose information is kept: trajectories are compared each with each."""
+
+_SAME_TRANSLATION_m = 0.001
+_SAME_ROTATION_rad = 0.03
+_SAME_VALLEY = 0.5
+"""Trajectories are one whose squared distance, in what the data say about all poses together, is less than this for
+each number: places that the data do not tell apart differ by two on average."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A trajectory and the map it makes.
+
+    Attributes:
+        map: poses and contacts.
+        misfit: negative log posterior of the poses and the contacts that are part of the shape.
+        intrusion: negative log probability that free places are free.
+        left_out: what the contacts that are left out cost.
+    """
+
+    map: ContactMap
+    misfit: float
+    intrusion: float
+    left_out: float
+
+    @property
+    def cost(self) -> float:
+        """Negative log evidence."""
+        return self.misfit + self.intrusion + self.left_out + self.map.settled_cost
+
+
+class HypothesisScorer:
+    """Rates, smooths and cleans hypotheses."""
+
+    def __init__(self, noise: MotionNoise, unexplained_cost: float, mechanisms: Mechanisms | None = None) -> None:
+        """
+        Args:
+            noise: of the motion model.
+            unexplained_cost: negative log likelihood of a contact that nothing explains.
+            mechanisms: which are on; None for all.
+        """
+        self._noise, self._unexplained_cost = noise, unexplained_cost
+        self._mechanisms = mechanisms or Mechanisms()
+        self._informed: dict[int, tuple[ContactMap, Array]] = {}
+
+    def score(self, contact_map: ContactMap) -> Hypothesis:
+        """A map as it is."""
+        return self._hypothesis(contact_map, self._misfit(contact_map))
+
+    def smooth(self, contact_map: ContactMap, iterations: int) -> Hypothesis:
+        """The poses of largest evidence nearby; once more if contacts turn out not to fit them."""
+        rows, _ = PoseEvidence(contact_map, self._noise).maximise(contact_map.rows, iterations)
+        cleaned, value = self.clean(contact_map.with_rows(rows))
+        if cleaned.left_out_count > contact_map.left_out_count:
+            rows, value = PoseEvidence(cleaned, self._noise).maximise(cleaned.rows, iterations)
+            cleaned = cleaned.with_rows(rows)
+        return self._hypothesis(cleaned, value)
+
+    def condense(self, hypothesis: Hypothesis, window: int, remembered: int) -> Hypothesis:
+        """The hypothesis with only the last grasps open, at the same cost."""
+        short = self.score(condense(hypothesis.map, window, remembered))
+        settled = hypothesis.cost - short.cost + hypothesis.map.settled_cost
+        return replace(short, map=replace(short.map, settled_cost=settled))
+
+    def clean(self, contact_map: ContactMap, grasp: int | None = None) -> tuple[ContactMap, float]:
+        """Leave out contacts, the worst first, while they cost more than being explained by nothing.
+
+        Args:
+            contact_map: with its present poses.
+            grasp: whose contacts may be left out; None for all.
+
+        Returns:
+            The map, and the negative log posterior of its poses.
+        """
+        while True:
+            asked = _asked_contacts(contact_map, grasp)
+            costs = contact_map.fit().leave_one_out_costs(asked)
+            if len(asked) == 0 or costs.max() <= self._unexplained_cost or len(contact_map.grasp_indices) == 1:
+                return contact_map, self._misfit(contact_map)
+            contact_map = contact_map.without_contact(*contact_map.origins[asked[costs.argmax()]])
+
+    def with_covariances(self, contact_map: ContactMap) -> ContactMap:
+        """The map with the covariance that all contacts and motions leave to each pose."""
+        size, count = contact_map.space.size, len(contact_map.placed)
+        joint = np.linalg.inv(self._information(contact_map))
+        blocks = joint.reshape(count - 1, size, count - 1, size)[np.arange(count - 1), :, np.arange(count - 1)]
+        later = [replace(one, covariance=block) for one, block in zip(contact_map.placed[1:], blocks, strict=True)]
+        return replace(contact_map, placed=(contact_map.placed[0], *later))
+
+    def different(self, hypotheses: list[Hypothesis], *, by_contacts: bool = True) -> list[Hypothesis]:
+        """The likeliest of those that ended at the same trajectory.
+
+        Args:
+            hypotheses: to choose from.
+            by_contacts: those that leave out other contacts are different, even if they are close.
+        """
+        return self.unlike(hypotheses, [], by_contacts=by_contacts)
+
+    def unlike(
+        self, hypotheses: list[Hypothesis], known: list[Hypothesis], *, by_contacts: bool = True
+    ) -> list[Hypothesis]:
+        """As :meth:`different`, of those that ended at none of the known trajectories."""
+        kept: list[Hypothesis] = []
+        for one in sorted(hypotheses, key=cost):
+            if not any(self._same(one.map, other.map, by_contacts) for other in (*known, *kept)):
+                kept.append(one)
+        return kept
+
+    def _same(self, one: ContactMap, other: ContactMap, by_contacts: bool) -> bool:
+        """Whether two trajectories are one: near everywhere, or off only where the contacts leave the poses open.
+
+        An optimiser that stops where little is to be gained ends at many places of one valley; kept apart, they would
+        take the places of true alternatives.
+        """
+        gaps = one.space.deviation(one.rows, other.rows)
+        if _near(gaps, one.space):
+            return True
+        if not self._mechanisms.has("valleys"):
+            return False
+        if not _near(gaps[0], one.space) or _left_out_contacts(one, by_contacts) != _left_out_contacts(
+            other, by_contacts
+        ):
+            return False
+        steps = gaps[1:].ravel()
+        return bool(steps @ self._information(other) @ steps < _SAME_VALLEY * len(steps))
+
+    def _information(self, contact_map: ContactMap) -> Array:
+        """Of all poses but the first; the last maps' are remembered."""
+        if id(contact_map) not in self._informed:
+            while len(self._informed) >= _REMEMBERED:
+                del self._informed[next(iter(self._informed))]
+            found = PoseEvidence(contact_map, self._noise).information(contact_map.rows)
+            self._informed[id(contact_map)] = contact_map, found
+        return self._informed[id(contact_map)][1]
+
+    def price(self, contact_map: ContactMap) -> float:
+        """What the contacts cost that are left out, and the steps in which the object moved otherwise than meant.
+
+        The more contacts are wrong, the less surprising is one more (Beta-binomial: the share of wrong contacts is
+        one in a hundred until the contacts say otherwise).
+        """
+        wrong = contact_map.left_out_count
+        right = len(contact_map.contacts) + _EXPECTED_RIGHT
+        share = float(gammaln(wrong + 1.0) + gammaln(right) - gammaln(wrong + right + 1.0))
+        anywhere = self._unexplained_cost - float(np.log(_EXPECTED_RIGHT + 1.0))
+        breaks, pushes = contact_map.moved.count(Moved.FREELY), contact_map.moved.count(Moved.PUSHED)
+        moves = _BREAK_COST * breaks + pushed_nats(self._noise, contact_map.space) * pushes
+        return wrong * anywhere - share + moves
+
+    def _misfit(self, contact_map: ContactMap) -> float:
+        """As :meth:`PoseEvidence.value`, by the field, which is needed anyway."""
+        contacts = contact_map.contacts
+        constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
+        motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
+        return motion - contact_map.fit().log_marginal_likelihood() - float(constant)
+
+    def _hypothesis(self, contact_map: ContactMap, misfit: float) -> Hypothesis:
+        intrusion = free_space_costs(contact_map.fit(), contact_map.free_points_m[None])[0]
+        return Hypothesis(contact_map, misfit, float(intrusion), self.price(contact_map))
+
+
+def cost(hypothesis: Hypothesis) -> float:
+    """What hypotheses are sorted by."""
+    return hypothesis.cost
+
+
+def likeliest(hypotheses: list[Hypothesis], count: int, gap: float) -> list[Hypothesis]:
+    """The best ones, but none that is less likely than the best by more than ``gap`` (natural logarithm)."""
+    ranked = sorted(hypotheses, key=cost)[:count]
+    return [one for one in ranked if one.cost < ranked[0].cost + gap]
+
+
+def weights(hypotheses: list[Hypothesis]) -> Array:
+    """Their probabilities, if one of them is true, shape (n,)."""
+    costs = np.array([hypothesis.cost for hypothesis in hypotheses])
+    relative = np.exp(costs.min() - costs)
+    return np.asarray(relative / relative.sum())
+
+
+def _left_out_contacts(contact_map: ContactMap, by_contacts: bool) -> list[frozenset[int] | bool]:
+    """What of each grasp is aside; or only whether all of it is."""
+    return [grasp.left_out if by_contacts else grasp.used for grasp in contact_map.placed]
+
+
+def _near(gaps: Array, space: PoseVectors) -> bool:
+    """Whether poses differ by less than is worth telling apart."""
+    limits = np.where(np.arange(space.size) < space.translations, _SAME_TRANSLATION_m, _SAME_ROTATION_rad)
+    return bool((np.abs(gaps) <= limits).all())
+
+
+def _asked_contacts(contact_map: ContactMap, grasp: int | None) -> NDArray[np.intp]:
+    indices = contact_map.grasp_indices
+    return np.arange(len(indices)) if grasp is None else np.flatnonzero(indices == grasp)

@@ -1,0 +1,65 @@
+"""The mechanisms of method "joint" by name, so that each can be left out to see what it is worth.
+
+What each one does and what it is worth is in docs/estimator.md; the figures are made by experiment "ablation".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, TypeAlias, TypeVar
+
+Mechanism: TypeAlias = Literal[
+    "splicing",
+    "relocation",
+    "pushes",
+    "aside branch",
+    "valleys",
+    "free space",
+    "second look",
+    "deferred association",
+    "faces",
+    "doubts",
+    "without one",
+    "released contacts",
+    "placing on the object",
+    "placing from several",
+    "regular faces",
+    "pose uncertainty",
+]
+"""Backward reading, the beam, the fixed lag and the loops have settings of their own, shape models theirs."""
+
+_Value = TypeVar("_Value")
+
+
+class Mechanisms:
+    """Which mechanisms are on, and which of those changed anything.
+
+    Attributes:
+        changed: names of mechanisms that gave another hypothesis than they were given.
+    """
+
+    def __init__(self, without: frozenset[Mechanism] = frozenset()) -> None:
+        """
+        Args:
+            without: those that are left out.
+        """
+        self._without = without
+        self.changed: set[Mechanism] = set()
+
+    def has(self, name: Mechanism) -> bool:
+        """Whether a mechanism is on."""
+        return name not in self._without
+
+    def improve(self, name: Mechanism, given: _Value, improved: Callable[[_Value], _Value]) -> _Value:
+        """What a mechanism makes of something; the same where it is left out."""
+        found = improved(given) if self.has(name) else given
+        if found is not given:
+            self.changed.add(name)
+        return found
+
+    def add(self, name: Mechanism, further: Callable[[], list[_Value]]) -> list[_Value]:
+        """What a mechanism proposes beside what there is; nothing where it is left out."""
+        found = further() if self.has(name) else []
+        if found:
+            self.changed.add(name)
+        return found

@@ -1,0 +1,119 @@
+"""Draws random mutations of the packages and says which of them the nearest tests notice.
+
+    python -m tests.mutants --count 60 --seed 1
+
+See docs/results/mutants.md for what came of it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import queue
+import sys
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import asdict
+from pathlib import Path
+
+from tests.mutants.mutations import AREAS, Mutation, draw
+from tests.mutants.nearest import Nearest
+from tests.mutants.trial import Copy, Verdict
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def main() -> int:
+    """Try mutations, print each verdict, the survivors with their lines and the score by area."""
+    options = _options()
+    mutations = _survivors_of(options.again) if options.again else draw(ROOT, options.count, options.seed)
+    mutations = [mutation for mutation in mutations if mutation.path.startswith(options.only)]
+    verdicts = []
+    for verdict in tried(mutations, options.processes, options.files, options.limit):
+        verdicts.append(verdict)
+        print(f"{len(verdicts):4d}/{len(mutations)} {_line(verdict)}", flush=True)
+        if options.out:
+            _store(options.out, verdicts)
+    print("\nSurvivors")
+    for verdict in verdicts:
+        if not verdict.dead:
+            print(f"{_line(verdict)}\n{verdict.mutation.diff}")
+    print("\n".join(_score(verdicts)))
+    return 0
+
+
+def tried(mutations: list[Mutation], processes: int, files: int, limit_s: float) -> Iterator[Verdict]:
+    """Verdicts as they come, from as many copies of the tree as there are processes."""
+    nearest = Nearest(ROOT)
+    with tempfile.TemporaryDirectory(prefix="mutants-") as folder, ThreadPoolExecutor(processes) as threads:
+        copies: queue.Queue[Copy] = queue.Queue()
+        for number in range(processes):
+            copies.put(Copy(ROOT, Path(folder) / str(number)))
+
+        def verdict(mutation: Mutation) -> Verdict:
+            copy = copies.get()
+            try:
+                return copy.verdict(mutation, nearest.tests(mutation.path)[:files], limit_s)
+            finally:
+                copies.put(copy)
+
+        for done in as_completed([threads.submit(verdict, mutation) for mutation in mutations]):
+            yield done.result()
+        while not copies.empty():
+            copies.get().close()
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__.partition("\n")[0])
+    parser.add_argument("--count", type=int, default=60, help="mutations to draw, evenly over the areas")
+    parser.add_argument("--seed", type=int, default=1, help="which mutations are drawn")
+    parser.add_argument("--processes", type=int, default=1, help="mutations tried at the same time")
+    parser.add_argument("--files", type=int, default=4, help="test files a mutation has to survive, the nearest ones")
+    parser.add_argument(
+        "--limit", type=float, default=60.0, help="seconds of processor time for the tests of one mutation"
+    )
+    parser.add_argument("--only", default="", help="only files whose path begins with this")
+    parser.add_argument("--out", type=Path, help="JSON file that keeps the verdicts")
+    parser.add_argument("--again", type=Path, help="try the survivors kept in this file instead of drawing")
+    return parser.parse_args()
+
+
+def _survivors_of(file: Path) -> list[Mutation]:
+    kept = [Mutation(**entry["mutation"]) for entry in json.loads(file.read_text()) if entry["outcome"] == "survived"]
+    there = [mutation for mutation in kept if _still_there(mutation)]
+    for mutation in set(kept) - set(there):
+        print(f"gone since: {mutation.path}:{mutation.line}", file=sys.stderr)
+    return there
+
+
+def _still_there(mutation: Mutation) -> bool:
+    file = ROOT / mutation.path
+    return file.is_file() and mutation.before in file.read_text(encoding="utf-8")
+
+
+def _store(file: Path, verdicts: list[Verdict]) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps([asdict(verdict) for verdict in verdicts], indent=1), encoding="utf-8")
+
+
+def _line(verdict: Verdict) -> str:
+    mutation = verdict.mutation
+    told = verdict.by or f"{verdict.tests} files"
+    return f"{verdict.outcome:8} {mutation.path}:{mutation.line} ({mutation.kind}) {told}, {verdict.seconds:.0f} s"
+
+
+def _score(verdicts: list[Verdict]) -> Iterator[str]:
+    yield f"{'':12} tried  killed  timeout  survived  dead"
+    for area in [*AREAS, "all"]:
+        of_area = [verdict for verdict in verdicts if area in (verdict.mutation.area, "all")]
+        if of_area:
+            killed, ended, left = (
+                sum(v.outcome == name for v in of_area) for name in ("killed", "timeout", "survived")
+            )
+            share = 100 * (killed + ended) / len(of_area)
+            yield f"{area:12} {len(of_area):5d}  {killed:6d}  {ended:7d}  {left:8d}  {share:3.0f} %"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

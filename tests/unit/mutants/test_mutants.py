@@ -1,0 +1,153 @@
+"""Mutations of a small tree: which there are, which tests are near, and what becomes of each."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.mutants.mutations import AREAS, Mutation, draw, means_something_else, mutations_of
+from tests.mutants.nearest import Nearest
+from tests.mutants.trial import Copy
+
+SOURCE = '''"""A module of 3 lines."""
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Reading:
+    value: float = 2.5
+
+
+def clamp(value: float, low: int = 0) -> float:
+    """At least 0."""
+    if value is None:
+        return low
+    if not value > low:
+        return low
+    return min(value, 1000) * 2
+
+
+def count_up(limit: int) -> int:
+    number = 0
+    while number < limit:
+        number += 1
+    return number
+'''
+TESTS = """import pytest
+from drivers.clamping import clamp, count_up
+
+def test_of_its_own_that_is_broken():
+    assert False
+
+def test_high():
+    assert clamp(5.0) == 10.0
+
+def test_missing():
+    assert clamp(None) == 0
+
+def test_counts():
+    assert count_up(3) == 3
+"""
+
+
+def after(kind: str, source: str = SOURCE) -> set[str]:
+    return {mutation.after.strip() for mutation in mutations_of("drivers/clamping.py", source) if mutation.kind == kind}
+
+
+def mutation(before: str, changed: str) -> Mutation:
+    return Mutation("drivers/clamping.py", 1, "by hand", before + "\n", changed + "\n")
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    """A repository with one module that does something in each area, and tests at different distances."""
+    root = tmp_path / "tree"
+    files = {f"{folder}/clamping.py": SOURCE for folder in AREAS.values()} | {
+        "drivers/user.py": "import importlib\n\nimportlib.import_module(f'drivers.{chr(99)}lamping')\n",
+        "tests/unit/test_clamping.py": TESTS,
+        "tests/unit/test_a_user.py": "import drivers.user\n\ndef test_it(): pass\n",
+        "tests/unit/test_direct.py": "def test_it():\n    import drivers.clamping\n",
+        "tests/system/test_clamping_at_length.py": "from drivers import clamping\n\ndef test_it(): pass\n",
+        "tests/unit/test_other.py": "import json\n\ndef test_it(): pass\n",
+    }
+    for path, text in files.items():
+        (root / path).parent.mkdir(parents=True, exist_ok=True)
+        (root / path).write_text(text)
+    subprocess.run(["git", "init", "--quiet", str(root)], check=True)
+    return root
+
+
+@pytest.fixture
+def copy(tree: Path, tmp_path: Path) -> Iterator[Copy]:
+    copy = Copy(tree, tmp_path / "copy", patience_s=1.0, libraries=("hypothesis",))
+    yield copy
+    copy.close()
+
+
+def test_each_kind_of_mutation_is_found() -> None:
+    assert after("is None") == {"if value is not None:"}
+    assert after("comparison") == {
+        "if not value >= low:", "if not value <= low:", "while number <= limit:", "while number >= limit:"
+    }  # fmt: skip
+    assert after("arithmetic") == {"return min(value, 1000) / 2", "number -= 1"}
+    assert after("unit factor") == {"return min(value, 1) * 2"}
+    assert after("min and max") == {"return max(value, 1000) * 2"}
+    assert after("not") == {"if value > low:"}
+    assert after("constant") == {"value: float = 5.0"}
+    assert after("early return") == {"pass"}
+    assert after("removed statement") == {"pass"}
+    assert {"def clamp(value: float, low: int = 1) -> float:", "number += 2"} <= after("off by one")
+
+
+def test_what_is_no_behaviour_is_left_alone() -> None:
+    text = "from typing import TYPE_CHECKING\n\nif TYPE_CHECKING:\n    N = 3\n\npairs = zip('a', 'b', strict=True)\n"
+    assert list(mutations_of("x.py", text)) == []
+    assert not any(
+        "dataclass" in changed or "A module" in changed for kind in ("boolean", "constant") for changed in after(kind)
+    )
+
+
+def test_a_mutation_finds_its_lines_after_they_moved_and_says_when_they_are_gone() -> None:
+    change = mutation("    number = 0", "    number = 1")
+    assert change.applied("\n\n" + SOURCE) == "\n\n" + SOURCE.replace("number = 0", "number = 1")
+    with pytest.raises(ValueError, match="no such lines"):
+        change.applied("x = 1\n")
+
+
+def test_a_draw_is_even_over_the_areas_and_the_same_for_the_same_seed(tree: Path) -> None:
+    drawn = draw(tree, 12, seed=3)
+    assert [change.area for change in drawn] == [*AREAS] * 2
+    assert drawn == draw(tree, 12, seed=3)
+    assert drawn != draw(tree, 12, seed=4)
+    assert all(means_something_else(tree, change) for change in drawn)
+    assert len({(change.path, change.line) for change in drawn}) == 12
+
+
+def test_the_nearest_tests_come_first(tree: Path) -> None:
+    assert Nearest(tree).tests("drivers/clamping.py") == [
+        "tests/unit/test_clamping.py",
+        "tests/unit/test_direct.py",
+        "tests/unit/test_a_user.py",
+        "tests/system/test_clamping_at_length.py",
+    ]
+
+
+def test_mutations_are_killed_survive_or_never_end_and_the_tree_stays_as_it_is(tree: Path, copy: Copy) -> None:
+    tests = Nearest(tree).tests("drivers/clamping.py")
+    killed = copy.verdict(mutation("    return min(value, 1000) * 2", "    return min(value, 1000) / 2"), tests, 60.0)
+    assert (killed.outcome, killed.by) == ("killed", "tests/unit/test_clamping.py::test_high")
+    assert copy.distrusted == {"tests/unit/test_clamping.py::test_of_its_own_that_is_broken"}
+    survived = copy.verdict(mutation("    if not value > low:", "    if not value >= low:"), tests, 60.0)
+    assert (survived.outcome, survived.dead) == ("survived", False)
+    endless = copy.verdict(mutation("        number += 1", "        number += 0"), tests, 2.0)
+    assert (endless.outcome, endless.dead) == ("timeout", True)
+    broken = copy.verdict(mutation("def count_up(limit: int) -> int:", "def counted(limit: int) -> int:"), tests, 60.0)
+    assert (broken.outcome, broken.by) == ("killed", "tests/unit/test_clamping.py")
+    assert (tree / "drivers/clamping.py").read_text() == (copy.folder / "drivers/clamping.py").read_text() == SOURCE
+
+
+def test_a_mutation_that_no_test_reaches_survives(copy: Copy) -> None:
+    assert copy.verdict(mutation("    number = 0", "    number = 1"), [], 60.0).outcome == "survived"

@@ -1,0 +1,122 @@
+"""Archives from elsewhere: what they hold comes out, or nothing does."""
+
+from __future__ import annotations
+
+import stat
+import zipfile
+
+import pytest
+
+from drivers.core.errors import SessionError
+from sessions.exchange.archives import ArchiveLimits, export_archive, import_archive
+from sessions.recording.session import create_session
+
+
+@pytest.fixture
+def session(tmp_path):
+    joints = tmp_path / "joints.yaml"
+    joints.write_text("a: 1\n")
+    arguments = {"rig": "sim", "rig_description": {}, "object_name": "box", "calibration_files": {"joints": joints}}
+    with create_session(tmp_path / "runs", **arguments) as session:
+        session.recorder.on_received("hand", b"bytes", 1)
+    return session
+
+
+def archive_of(path, files):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return path
+
+
+def repacked(session, path, changes):
+    files = {
+        f"s/{item.relative_to(session.folder).as_posix()}": item.read_bytes()
+        for item in session.folder.rglob("*")
+        if item.is_file()
+    }
+    return archive_of(path, {**files, **changes})
+
+
+def test_a_session_comes_back_out_of_its_archive(session, tmp_path):
+    files = export_archive(session, tmp_path / "s.zip")
+    found = import_archive(tmp_path / "s.zip", tmp_path / "elsewhere")
+    assert found.folder == tmp_path / "elsewhere" / session.folder.name
+    assert sum(item.is_file() for item in found.folder.rglob("*")) == files
+    assert next(found.traffic().messages()).data == b"bytes"
+    with pytest.raises(SessionError, match="is there already"):
+        import_archive(tmp_path / "s.zip", tmp_path / "elsewhere")
+    renamed = import_archive(tmp_path / "s.zip", tmp_path / "elsewhere", "mine-2")
+    assert renamed.manifest.name == "mine-2"
+    with pytest.raises(SessionError, match="exists already"):
+        export_archive(session, tmp_path / "s.zip")
+
+
+@pytest.mark.parametrize(
+    "name", ["../evil.txt", "s/../../evil.txt", "/etc/evil", "C:/evil", "s\\..\\evil", "s/a/b/c/d/e/f/evil", "evil"]
+)
+def test_unsafe_names_are_refused_and_nothing_is_left(session, tmp_path, name):
+    path = repacked(session, tmp_path / "bad.zip", {name: "evil"})
+    with pytest.raises(SessionError, match="unsafe name"):
+        import_archive(path, tmp_path / "in")
+    assert not (tmp_path / "in").exists()
+    assert not list(tmp_path.rglob("evil*"))
+
+
+def test_links_are_refused(session, tmp_path):
+    path = repacked(session, tmp_path / "bad.zip", {})
+    link = zipfile.ZipInfo("s/notes.txt")
+    link.external_attr = (stat.S_IFLNK | 0o777) << 16
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(link, "/etc/passwd")
+    with pytest.raises(SessionError, match="no plain file but a link"):
+        import_archive(path, tmp_path / "in")
+
+
+def test_sizes_are_bounded(session, tmp_path):
+    bomb = repacked(session, tmp_path / "bomb.zip", {"s/zeros": bytes(20_000_000)})
+    with pytest.raises(SessionError, match="out of all proportion"):
+        import_archive(bomb, tmp_path / "in")
+    small = repacked(session, tmp_path / "small.zip", {})
+    with pytest.raises(SessionError, match="more than 100"):
+        import_archive(small, tmp_path / "in", limits=ArchiveLimits(total_bytes=100))
+    with pytest.raises(SessionError, match="files, more than 2"):
+        import_archive(small, tmp_path / "in", limits=ArchiveLimits(files=2))
+    assert not (tmp_path / "in").exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"other/session.yaml": ""}, "2 folders"),
+        ({"s/session.yaml": "colour: red\n"}, "unknown key"),
+        ({"s/calibration/joints.yaml": "a: 2\n"}, "changed since it was recorded"),
+        ({"s/traffic.mcap": b"hello"}, "not an MCAP file"),
+    ],
+)
+def test_an_archive_that_is_no_whole_session_is_refused_and_nothing_is_left(session, tmp_path, changes, words):
+    path = repacked(session, tmp_path / "bad.zip", changes)
+    with pytest.raises(SessionError, match=words):
+        import_archive(path, tmp_path / "in")
+    assert not (tmp_path / "in").exists() or not list((tmp_path / "in").iterdir())
+
+
+@pytest.mark.parametrize("name", ["Big", "a b", "x" * 65, "", "../up", "ä"])
+def test_names_that_are_no_ids_are_refused(session, tmp_path, name):
+    export_archive(session, tmp_path / "s.zip")
+    archive = zipfile.ZipFile(tmp_path / "s.zip")
+    archive.close()
+    if name:
+        with pytest.raises(SessionError, match="cannot be the name of a session"):
+            import_archive(tmp_path / "s.zip", tmp_path / "in", name)
+    assert not (tmp_path / "in").exists()
+
+
+def test_what_is_no_archive_is_told(tmp_path):
+    (tmp_path / "a.zip").write_bytes(b"hello")
+    with pytest.raises(SessionError, match="not a ZIP archive"):
+        import_archive(tmp_path / "a.zip", tmp_path)
+    with pytest.raises(SessionError, match="No such file"):
+        import_archive(tmp_path / "none.zip", tmp_path)
+    with pytest.raises(SessionError, match="holds 0 folders"):
+        import_archive(archive_of(tmp_path / "empty.zip", {}), tmp_path)

@@ -1,0 +1,181 @@
+"""Taps on the top: on a world without physics, and what Perception makes of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivers.core.contacts import FINGERS, Array, Grasp
+from drivers.shadow.closing.closing import closing
+from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.tip_motion import motor_rates
+from drivers.shadow.model.kinematics import joint_vector, palm_T_distal_matrices
+from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.grasp_cycle import GraspCycle
+from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.motion import GraspFrame, Motion
+from sessions.motion.safety import SafetySettings, SafetySupervisor
+from sessions.motion.touching import TAP, TAP_HEIGHT_m, Toucher
+from sessions.recording.session_events import EventKind
+from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
+from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
+from tests.support.disc_world import Disc, DiscWorld, TIP_CENTRE_m
+
+TIP = TipEllipsoid((0.0085, 0.0085, 0.0085), tuple(TIP_CENTRE_m))
+QUICK = CycleSettings(finger_rad_s=20.0, travel_m_s=1.0, turn_rad_s=5.0)
+LONG_FINGERS = ("FF", "MF", "RF", "LF")
+
+
+def disc(height_m: float = 0.04, radius_m: float = 0.05) -> Disc:
+    return Disc(np.zeros(2), radius_m=radius_m, height_m=height_m)
+
+
+def motion_on(world: DiscWorld) -> Motion:
+    supervisor = SafetySupervisor(world, SafetySettings(), world.cycle_ns)
+    supervisor.on_approach()
+    return Motion(world, supervisor)  # type: ignore[arg-type]
+
+
+def grasp_with_tap(world: DiscWorld) -> Grasp:
+    """One grasp that begins with a tap."""
+    cycle = GraspCycle(motion_on(world), QUICK, TIP)
+    assert cycle.descend(GraspPlan(GraspFrame(0.0, 0.0, 0.3), "pinch", 0.022, tap=True))
+    cycle.close()
+    cycle.settle()
+    return cycle.capture()
+
+
+@pytest.mark.parametrize("height_m", [0.03, 0.05, 0.07])
+def test_a_tap_finds_the_top_with_several_fingers(height_m: float) -> None:
+    world = DiscWorld(disc(height_m))
+    felt = Toucher(motion_on(world), QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0))
+    assert len(felt) >= 4
+    np.testing.assert_allclose(felt[:, 2], height_m, atol=3e-3)
+    grasp = grasp_with_tap(world)
+    probed = [contact for contact in grasp.contacts if contact.probed]
+    assert {contact.finger for contact in probed} >= {"FF", "MF", "RF", "LF"}
+    for contact in probed:
+        assert contact.point_world_m[2] == pytest.approx(height_m, abs=2e-3)
+        assert contact.normal_world[2] > 0.99
+
+
+def test_probed_contacts_stand_behind_those_of_the_closing() -> None:
+    grasp = grasp_with_tap(DiscWorld(disc(radius_m=0.035)))
+    flags = [contact.probed for contact in grasp.contacts]
+    assert flags == sorted(flags)
+    assert grasp.touching == frozenset(contact.finger for contact in grasp.contacts if not contact.probed)
+    assert len(grasp.touching) >= 4
+    assert sum(flags) >= 1
+
+
+def test_a_tap_beside_the_object_meets_nothing_and_the_hand_rises_again() -> None:
+    world = DiscWorld(None)
+    motion = motion_on(world)
+    assert len(Toucher(motion, QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0))) == 0
+    table = closing(TAP.closing, TAP_HEIGHT_m, TIP)
+    above = motion.base_joints(GraspFrame(0.0, 0.0, 0.0), table, QUICK.lift_m)
+    np.testing.assert_allclose(world.base_q, above, atol=1e-6)
+
+
+def test_taps_are_gentle() -> None:
+    most = 0.0
+
+    def listen(world: DiscWorld) -> None:
+        nonlocal most
+        if world.session_events:
+            most = max(most, max(world.load_N(finger) for finger in FINGERS))
+
+    world = DiscWorld(disc(), before_cycle=listen)
+    Toucher(motion_on(world), QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0))
+    assert 0.2 < most < 1.5
+
+
+def test_a_hand_that_waited_for_a_pressed_finger_goes_on_from_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A target that had gone on meanwhile would be a jump onto the stiff thumb, by millimetres in one cycle."""
+    heights: list[float] = []
+    pressed = [5.0] * 8 + [0.0] * 1000
+    world = DiscWorld(disc())
+    motion = motion_on(world)
+    toucher = Toucher(motion, QUICK, TIP)
+
+    def loads_N() -> dict[str, float]:
+        return dict.fromkeys(FINGERS, pressed[min(len(heights) // 2, len(pressed) - 1)])
+
+    def set_base(q: Array) -> None:
+        heights.append(float(q[2]))
+
+    table, frame = closing(TAP.closing, TAP_HEIGHT_m, TIP), GraspFrame(0.0, 0.0, 0.0)
+    start = float(motion.runtime.perception.base_q[2])
+    monkeypatch.setattr(motion, "set_base", set_base)
+    monkeypatch.setattr(motion, "loads_N", loads_N)
+    monkeypatch.setattr(motion, "tick", lambda: heights.append(heights[-1] if heights else start))
+    toucher._lay_on(table, TAP, np.array([0.0, 0.0, -1.0]), frame, 0.35, 0.004)
+    steps_m = np.abs(np.diff([start, *heights]))
+    usual_m = 2 * 0.004 / motion.cycles(QUICK.touch.press_s)
+    assert steps_m.max() < 1.01 * usual_m
+    assert abs(heights[-1] - start) > 0.003
+
+
+def test_contacts_probed_before_the_object_was_carried_are_forgotten() -> None:
+    world = DiscWorld(disc(radius_m=0.035))
+    Toucher(motion_on(world), QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0))
+    world.begin_hold()
+    world.end_hold()
+    world.begin_capture()
+    world.cycle()
+    assert not any(contact.probed for contact in world.end_capture().contacts)
+
+
+def test_ways_of_a_tap_are_free_space_in_the_estimation_of_a_surface_only() -> None:
+    grasp = grasp_with_tap(DiscWorld(disc()))
+    points = [contact.point_world_m for contact in grasp.contacts if contact.probed]
+    assert len(ContactSet.of_grasp(grasp, 3, 0.0)) == len(grasp.contacts)
+    flat = ContactSet.of_grasp(grasp, 2, 0.0)
+    assert len(flat) == len(grasp.contacts) - len(points)
+    assert len(flat.free_m) == 0 or np.linalg.norm(flat.free_m, axis=1).min() > 0.04  # none over the object
+
+
+def test_middle_of_the_object_is_told_by_the_closing_alone() -> None:
+    world = DiscWorld(disc(radius_m=0.035))
+    plan = GraspPlan(GraspFrame(0.0, 0.0, 0.3), "pinch", 0.022, tap=True)
+    grasp = grasp_with_tap(world)
+    np.testing.assert_allclose(contact_centre(grasp, plan), [0.0, 0.0], atol=8e-3)
+
+
+def test_every_second_grasp_taps_where_a_surface_is_wanted() -> None:
+    rng = np.random.default_rng(0)
+    assert [HeuristicPlanner(PlanSettings(), rng, 3).taps(index) for index in range(4)] == [True, False, True, False]
+    assert not any(HeuristicPlanner(PlanSettings(), rng, 2).taps(index) for index in range(4))
+    assert not any(HeuristicPlanner(PlanSettings(tap_every=0), rng, 3).taps(index) for index in range(4))
+
+
+def tips_m(angles_rad: dict[str, float]) -> Array:
+    """Tip centres in the grasp frame of the tap's closing, shape (5, 3)."""
+    table = closing(TAP.closing, TAP_HEIGHT_m)
+    frames = table.grasp_T_palm.matrix() @ palm_T_distal_matrices(joint_vector(angles_rad))
+    return np.asarray((frames @ np.append(TipEllipsoid().centre_distal_m, 1.0))[:, :3])
+
+
+def test_fingertips_move_where_the_rates_say() -> None:
+    table, down = closing(TAP.closing, TAP_HEIGHT_m), np.array([0.0, 0.0, -1.0])
+    angles = {name: a for finger in FINGERS for name, a in table.angles_rad(finger, TAP.progress[finger]).items()}
+    moved, way_m = dict(angles), 0.004
+    for motors in motor_rates(table, TAP.progress, down, TipEllipsoid()).values():
+        for motor, rate in motors.items():
+            pair = {f"{motor[:2]}J1": 0.375, f"{motor[:2]}J2": 0.625} if motor.endswith("J0") else {motor: 1.0}
+            for joint, share in pair.items():
+                moved[joint] += share * rate * way_m
+    gone_m = (tips_m(moved) - tips_m(angles))[:4]
+    np.testing.assert_allclose(gone_m, np.tile(way_m * down, (4, 1)), atol=1e-3)
+
+
+def test_thumb_is_not_moved_up_and_down() -> None:
+    rates = motor_rates(closing(TAP.closing, TAP_HEIGHT_m), TAP.progress, np.array([0.0, 0.0, -1.0]), TipEllipsoid())
+    assert rates["TH"] == {}
+    assert all(rates[finger] for finger in LONG_FINGERS)
+
+
+def test_marks_of_a_tap() -> None:
+    world = DiscWorld(disc())
+    Toucher(motion_on(world), QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0))
+    assert world.session_events == [EventKind.TARE, EventKind.CLOSE_BEGIN, EventKind.CAPTURE_BEGIN, EventKind.TOUCH_END]

@@ -1,0 +1,203 @@
+"""Choosing grasps: candidates around an estimate, landings, doubt, and the rule that stands in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from gtsam import Pose2, Pose3, Rot3
+
+from drivers.core.contacts import FINGERS, Array, Contact, Grasp
+from drivers.shadow.closing.closing import Closing, closing
+from drivers.shadow.closing.posture import TipEllipsoid
+from sessions.motion.grasp_plan import GraspPlan
+from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
+from tactile_lab.autonomy.planner import Planner
+from tactile_lab.autonomy.variance_planner import (
+    ExplorationSettings,
+    KnownShape,
+    choose_grasp,
+    closing_rays,
+    known_shape,
+)
+from tactile_lab.slam.exploration.candidates import Candidate, ModelledObject, predict_contacts
+from tactile_lab.slam.shape.fields.gpis import Gpis
+
+WINDOW_rad = (-1.3, 1.3)
+SETTINGS = ExplorationSettings()
+
+
+def box_field(sides: str = "nesw") -> Gpis:
+    """A field of a 100 x 60 mm box, touched on the given sides only."""
+    along = np.linspace(-0.045, 0.045, 7)
+    across = np.linspace(-0.025, 0.025, 5)
+    walls = {
+        "n": (np.column_stack([along, np.full(7, 0.03)]), (0.0, 1.0)),
+        "s": (np.column_stack([along, np.full(7, -0.03)]), (0.0, -1.0)),
+        "e": (np.column_stack([np.full(5, 0.05), across]), (1.0, 0.0)),
+        "w": (np.column_stack([np.full(5, -0.05), across]), (-1.0, 0.0)),
+    }
+    points = np.vstack([walls[side][0] for side in sides])
+    normals = np.vstack([np.tile(walls[side][1], (len(walls[side][0]), 1)) for side in sides])
+    return Gpis.fit(points, normals, 0.001, 0.05)
+
+
+def shape_of(field: Gpis) -> KnownShape:
+    return known_shape(field, 2, 0.022, SETTINGS)
+
+
+def table(name: str) -> Closing:
+    return closing(name, 0.022)
+
+
+def choose(
+    shape: KnownShape,
+    pose: Pose2 | None = None,
+    has_room: Callable[[GraspPlan], bool] = lambda plan: True,
+    settings: ExplorationSettings = SETTINGS,
+) -> GraspPlan | None:
+    return choose_grasp(shape, pose or Pose2(), ("pinch", "radial"), table, WINDOW_rad, settings, has_room)
+
+
+def test_explored_share_grows_with_the_sides_touched() -> None:
+    shares = [shape_of(box_field(sides)).explored for sides in ("ns", "nse", "nsew")]
+    assert shares[0] < shares[1] < shares[2]
+    assert shares[2] > 0.7
+
+
+def test_middle_of_the_shape() -> None:
+    np.testing.assert_allclose(shape_of(box_field()).centre_m, [0, 0], atol=2e-3)
+
+
+def test_grasp_stands_around_the_object_where_it_is_now() -> None:
+    pose = Pose2(0.05, -0.03, 0.7)
+    plan = choose(shape_of(box_field()), pose)
+    assert plan is not None
+    assert np.hypot(plan.frame.x_m - 0.05, plan.frame.y_m + 0.03) < 0.02
+    assert WINDOW_rad[0] <= plan.frame.yaw_rad <= WINDOW_rad[1]
+
+
+def test_fingers_go_where_the_surface_is_not_known() -> None:
+    """With both long sides known, the reward is in the short ones: fingers close around an end."""
+    shape = shape_of(box_field("ns"))
+    plan = choose(shape)
+    assert plan is not None
+    assert "contacts expected" in plan.reason
+    place = Pose2(plan.frame.x_m, plan.frame.y_m, plan.frame.yaw_rad)
+    candidate = Candidate(place, plan.closing, closing_rays(table(plan.closing)))
+    expected = predict_contacts(candidate, ModelledObject(shape.field, 2, Pose2(), shape.origin_height_m))
+    assert np.count_nonzero(np.abs(expected.points_object_m[:, 0]) > 0.048) >= 2
+
+
+def test_open_fingertips_keep_clear_of_the_object() -> None:
+    plan = choose(shape_of(box_field()))
+    assert plan is not None
+    paths = table(plan.closing).paths
+    for finger in FINGERS:
+        start_m = np.asarray(plan.frame.pose.transformFrom(paths[finger].centre_m(paths[finger].valid[0])))
+        outside = np.maximum(np.abs(start_m[:2]) - [0.05, 0.03], 0.0)
+        assert np.linalg.norm(outside) > 0.008
+
+
+def test_no_candidate_without_room() -> None:
+    assert choose(shape_of(box_field()), has_room=lambda plan: False) is None
+    assert choose(shape_of(box_field()), settings=ExplorationSettings(clearance_m=0.5)) is None
+
+
+def test_most_contacts_win_when_none_promises_enough() -> None:
+    plan = choose(shape_of(box_field()), settings=ExplorationSettings(least_contacts=9))
+    assert plan is not None
+    assert plan.reason.startswith("5 contacts")
+
+
+# --- the planner -------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class KnownSlam:
+    """An estimation that knows a box."""
+
+    surface: Gpis | None
+    world_T_object: Pose3 | None = None
+    is_lost: bool = False
+    origin_height_m: float = 0.022
+
+
+def planner(slam: KnownSlam, fixed_grasps: int = 1) -> Planner:
+    rule = HeuristicPlanner(PlanSettings(), np.random.default_rng(0))
+    return Planner(slam, rule, SETTINGS, fixed_grasps, TipEllipsoid(), dimension=2)  # type: ignore[arg-type]
+
+
+def known_slam(x: float = 0.0, y: float = 0.0) -> KnownSlam:
+    return KnownSlam(box_field(), Pose3(Rot3(), np.array([x, y, 0.022])))
+
+
+def grasp_at(*fingers: str, x: float = 0.03) -> Grasp:
+    contacts = tuple(
+        Contact(f, np.array([-x if f == "TH" else x, 0.0, 0.02]), np.array([1.0, 0, 0]), 1e-6 * np.eye(3), 0.05, 0.5)
+        for f in fingers
+    )
+    return Grasp(0, 0, contacts, Pose3())
+
+
+def open_tips_m(plan: GraspPlan) -> Array:
+    paths = table(plan.closing).paths
+    starts = [plan.frame.pose.transformFrom(paths[f].centre_m(paths[f].valid[0])) for f in FINGERS]
+    return np.array(starts)
+
+
+def test_first_grasps_follow_the_rule_then_the_estimate_chooses() -> None:
+    chooser = planner(known_slam())
+    assert chooser.plan(0).reason == "alternating yaw"
+    assert "contacts expected" in chooser.plan(1).reason
+
+
+@pytest.mark.parametrize("slam", [KnownSlam(None), KnownSlam(box_field()), KnownSlam(box_field(), Pose3(), True)])
+def test_rule_stands_in_where_nothing_is_known_or_all_is_lost(slam: KnownSlam) -> None:
+    assert planner(slam).plan(5).reason == "alternating yaw"
+
+
+def test_estimate_is_carried_with_the_hand() -> None:
+    chooser = planner(known_slam())
+    chooser.on_carry(Pose3(Rot3(), np.array([0.1, 0.0, 0.0])))
+    chooser.on_estimate(3, True)
+    np.testing.assert_allclose(chooser.centre_m, [0.1, 0.0], atol=3e-3)
+    assert abs(chooser.plan(4).frame.x_m - 0.1) < 0.03
+
+
+def test_no_fingertip_comes_down_again_where_one_has_landed() -> None:
+    chooser = planner(known_slam())
+    first = chooser.plan(1)
+    landed = [open_tips_m(first)[0]]
+    chooser.on_landings(landed)
+    for index in (0, 1):  # by the rule and by the estimate
+        apart_m = np.linalg.norm(open_tips_m(chooser.plan(index))[:, :2] - landed[0][:2], axis=1)
+        assert apart_m.min() >= 0.020
+
+
+def test_landings_are_forgotten_when_the_object_was_moved_and_no_sooner() -> None:
+    chooser = planner(known_slam())
+    first = chooser.plan(1)
+    chooser.on_landings([open_tips_m(first)[0]])
+    chooser.on_carry(Pose3())
+    assert np.linalg.norm(open_tips_m(chooser.plan(1)) - open_tips_m(first), axis=1).max() > 0.01
+    chooser.on_carry(Pose3(Rot3(), np.array([1e-6, 0.0, 0.0])))
+    np.testing.assert_allclose(open_tips_m(chooser.plan(1)), open_tips_m(first), atol=1e-5)
+
+
+def test_estimate_that_missed_the_object_is_doubted_for_one_grasp() -> None:
+    chooser = planner(known_slam())
+    plan = chooser.plan(1)
+    chooser.on_grasp(grasp_at("FF", "MF", "TH"), plan)
+    assert chooser.plan(2).reason == "alternating yaw"
+    chooser.on_grasp(grasp_at("FF", "MF", "TH"), plan)
+    assert "contacts expected" in chooser.plan(3).reason
+
+
+def test_reorientation_keeps_the_window_and_brings_the_object_back() -> None:
+    chooser = planner(known_slam())
+    wanted = chooser.on_grasp(grasp_at("MF", "TH", x=0.03), GraspPlan(chooser.plan(0).frame, "pinch", 0.022))
+    assert 0.2 <= abs(wanted.turn_rad) <= 0.8
+    assert np.linalg.norm(wanted.shift_world_m) <= 0.03

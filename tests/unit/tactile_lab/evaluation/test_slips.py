@@ -1,0 +1,74 @@
+"""How far objects slip, and the motion of a rig that fits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gtsam import Pose2, Pose3
+
+from drivers.core.contacts import Grasp
+from drivers.core.poses import spatial
+from tactile_lab.evaluation.slips import LEAST_STEPS, Slips
+
+
+def grasp(index: int, hand_motion: Pose2) -> Grasp:
+    return Grasp(index, index, (), Pose3(), spatial(hand_motion, 0.0))
+
+
+def session(slips: list[tuple[Pose2, Pose2]]) -> tuple[list[Grasp], list[Pose3]]:
+    """Grasps and true poses, from the hand's motion before each grasp but the first, and the slip in the world."""
+    grasps, where = [grasp(0, Pose2())], [Pose2(0.02, -0.01, 0.4)]
+    for index, (motion, slip) in enumerate(slips, start=1):
+        grasps.append(grasp(index, motion))
+        moved = motion.compose(where[-1])
+        where.append(Pose2(moved.x() + slip.x(), moved.y() + slip.y(), moved.theta() + slip.theta()))
+    return grasps, [spatial(each, 0.03) for each in where]
+
+
+def drawn(rng: np.random.Generator, count: int, sigma_m: float, sigma_rad: float) -> list[Pose2]:
+    return [Pose2(*row) for row in rng.normal(size=(count, 3)) * [sigma_m, sigma_m, sigma_rad]]
+
+
+def test_a_slip_is_what_the_object_moved_beside_the_hand() -> None:
+    carry, slip = Pose2(0.05, 0.02, 1.0), Pose2(0.003, -0.004, 0.1)
+    found = Slips.between(*session([(carry, slip), (Pose2(), Pose2(0.001, 0.0, 0.0)), (carry, Pose2())]))
+    np.testing.assert_allclose(found.carried, [[0.003, -0.004, 0.1], [0, 0, 0]], atol=1e-12)
+    np.testing.assert_allclose(found.left, [[0.001, 0, 0]], atol=1e-12)
+
+
+def test_grasps_that_the_camera_did_not_see_tell_no_slip() -> None:
+    grasps, poses = session([(Pose2(), Pose2(0.001 * n, 0, 0)) for n in range(1, 5)])
+    assert len(Slips.between(grasps, [*poses[:2], None, *poses[3:]]).left) == 2
+    assert len(Slips.between(grasps, [None] * 5).left) == 0
+    assert len(Slips.between([], []).carried) == 0
+
+
+def test_the_motion_that_fits_is_the_one_that_slips_were_drawn_with() -> None:
+    rng = np.random.default_rng(5)
+    carried = [(Pose2(0.03, 0.0, 0.5), slip) for slip in drawn(rng, 300, 0.006, 0.15)]
+    lying = [(Pose2(), slip) for slip in drawn(rng, 240, 0.0006, 0.015)]
+    pushed = [(Pose2(), slip) for slip in drawn(rng, 30, 0.008, 0.1)]
+    slips = Slips.join([Slips.between(*session(carried)), Slips.between(*session(lying + pushed))])
+    motion = slips.motion
+    assert motion is not None
+    assert motion.translation_m == pytest.approx(0.006, rel=0.1)
+    assert motion.rotation_rad == pytest.approx(0.15, rel=0.1)
+    assert motion.unheld == pytest.approx(0.12, abs=0.02)  # pushes widen it a little
+    assert 24 <= slips.pushed_count(motion) <= 33
+
+
+def test_too_few_steps_tell_nothing_and_an_object_seldom_left_is_not_said_to_lie_still() -> None:
+    rng = np.random.default_rng(6)
+    carried = [(Pose2(0.03, 0.0, 0.5), slip) for slip in drawn(rng, LEAST_STEPS, 0.006, 0.15)]
+    assert Slips.between(*session(carried[1:])).motion is None
+    found = Slips.between(*session([*carried, (Pose2(), Pose2())])).motion
+    assert found is not None
+    assert found.unheld == 1.0
+
+
+def test_an_object_that_never_moves_is_not_said_to_lie_as_still_as_a_rock() -> None:
+    rng = np.random.default_rng(7)
+    carried = [(Pose2(0.03, 0.0, 0.5), slip) for slip in drawn(rng, 20, 0.006, 0.15)]
+    found = Slips.between(*session(carried + [(Pose2(), Pose2())] * 20)).motion
+    assert found is not None
+    assert found.unheld == 0.02

@@ -1,0 +1,78 @@
+"""Turns of an object about its own axis: which it has, and that they do not count in the registration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gtsam import Pose2, Pose3, Rot3
+
+from drivers.core.poses import spatial
+from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.evaluation.truth.rotational_symmetry import ANY_TURN, modulo_symmetry, symmetry_turns
+from tactile_lab.experiments.data.sensing import planar_pose
+from tactile_lab.experiments.data.solids import DATA_VARIABLE, solid
+from tactile_lab.experiments.data.spatial_data import simulate
+
+
+@pytest.mark.parametrize(
+    ("name", "turns"),
+    [
+        ("cylinder", ANY_TURN),
+        ("sphere", ANY_TURN),
+        ("bottle", ANY_TURN),
+        ("hexagonal-prism", 6),
+        ("cube-6", None),
+        ("triangular-prism", None),
+        ("elliptic-cylinder", None),
+        ("mug", None),
+        ("l-block", None),
+    ],
+)
+def test_what_turns_leave_an_object_as_it_is(name: str, turns: int | None) -> None:
+    assert symmetry_turns(solid(name).mesh) == turns
+
+
+def test_a_dented_can_is_round(lab_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(DATA_VARIABLE, str(lab_data))
+    assert symmetry_turns(solid("ycb:tomato_soup_can").mesh) == ANY_TURN
+    assert symmetry_turns(solid("ycb:mustard_bottle").mesh) is None
+
+
+def test_turns_about_the_own_axis_do_not_count_but_shifts_do() -> None:
+    data, rng = simulate("cylinder", 0, count=8), np.random.default_rng(0)
+    contacts = [grasp.points_world_m for grasp in data.grasps]
+    born = spatial(Pose2(0.01, -0.02, 0.7))
+
+    def registration(shift_m: float) -> tuple[float, float]:
+        slips = [planar_pose(shift_m * rng.normal(size=2), rng.normal(0.0, 1.0)) for _ in contacts]
+        estimate = [pose * spatial(slip) * born for pose, slip in zip(data.world_T_body, slips, strict=True)]
+        plain = registration_rms_mm(contacts, estimate, data.world_T_body, 3)
+        told = modulo_symmetry(estimate, data.world_T_body, ANY_TURN)
+        turned = registration_rms_mm(contacts, told, data.world_T_body, 3)
+        assert plain is not None
+        assert turned is not None
+        return plain, turned
+
+    plain, turned = registration(0.0)
+    assert plain > 10.0
+    assert turned < 1e-6
+    _, turned = registration(0.004)
+    assert 2.0 < turned < 8.0
+
+
+def test_sixths_of_a_turn_do_not_count_but_what_is_left_of_a_turn_does() -> None:
+    truth = [spatial(Pose2(0.0, 0.0, yaw_rad)) for yaw_rad in (0.0, 0.5, 1.0)]
+    off_rad = (0.0, np.pi / 3 + 0.1, -2 * np.pi / 3 + 0.2)
+    estimate = [pose * spatial(Pose2(0.0, 0.0, turn_rad)) for pose, turn_rad in zip(truth, off_rad, strict=True)]
+    found = modulo_symmetry(estimate, truth, 6)
+    left_rad = [(pose.inverse() * told).rotation().yaw() for pose, told in zip(truth, found, strict=True) if told]
+    np.testing.assert_allclose(left_rad, (0.0, 0.1, 0.2), atol=1e-9)
+
+
+def test_poses_that_are_not_known_or_do_not_stand_stay_as_they_are() -> None:
+    lying = Pose3(Rot3.Rx(0.5), np.zeros(3))
+    turned = Pose3(Rot3.Rz(1.0), np.zeros(3))
+    assert modulo_symmetry([None, turned], [turned, None], ANY_TURN) == (None, turned)
+    assert modulo_symmetry([turned, turned], [lying, turned], ANY_TURN) == (turned, turned)

@@ -1,0 +1,112 @@
+"""Every experiment in a tiny configuration, and what can be asked of the catalogue."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from drivers.core.errors import ConfigurationError
+from tactile_lab.experiments.catalogue import EXPERIMENTS, experiment
+from tactile_lab.experiments.cells import Row
+from tactile_lab.experiments.experiment import REPORTED_SEEDS, Experiment
+from tactile_lab.experiments.reporting import write_report
+from tactile_lab.experiments.runner import execute
+from tactile_lab.experiments.studies.planar import METHODS
+
+TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
+    "methods-2d": ({"shape": ["rectangle"], "noise": ["50"], "method": ["known-pose", "odometry", "joint"]}, 4),
+    "contour-limit": ({"shape": ["L"], "noise": ["50"]}, 4),
+    "methods-3d": ({"shape": ["l-block"], "method": ["known-pose", "odometry"]}, 4),
+    "solid-limit": ({"shape": ["triangular-prism"]}, 4),
+    "known-shape": ({"shape": ["cylinder"]}, 3),
+    "methods-6dof": ({"shape": ["ellipsoid"], "method": ["known-pose", "icp"]}, 4),
+    "ablation": ({"shape": ["ellipse"], "condition": ["in the plane"], "without": ["nothing", "faces", "splicing"]}, 4),
+    "random-contacts": ({"shape": ["L"], "contacts": ["20"], "model": ["TP, normals", "chosen by evidence"]}, None),
+    "figure-2.7": ({"shape": ["ellipse"], "contacts": ["5", "10"], "model": ["SE, normals"]}, None),
+    "figure-2.12": ({"contacts": ["20"], "model": ["Matérn, normals"]}, None),
+    "figure-3.12": ({"shape": ["ellipse"], "noise": ["0", "100"], "method": ["known-pose"]}, 4),
+    "figure-3.14": ({"shape": ["ellipse"], "noise": ["25"], "particles": ["500", "1000"]}, 4),
+    "figure-3.15": ({"shape": ["rectangle"], "constraints": ["0", "4"]}, 6),
+    "figure-3.16": ({"shape": ["rectangle"], "noise": ["50"], "method": ["thesis-pf", "particle, no graph"]}, 3),
+    "table-4.2": ({"candidates": ["10"], "policy": ["information", "clairvoyant"]}, 12),
+    "table-4.3": ({"tracking": ["joint"], "policy": ["det"]}, 5),
+    "exploration-hand": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
+    "exploration-kinematic": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
+    "camera-truth": ({"condition": ["sharp"]}, None),
+    "calibrate-forearm": ({"method": ["touch"], "poses": ["20"]}, None),
+    "forearm-on-rig": ({"method": ["marker"], "poses": ["10"]}, None),
+    "calibrate-fingertip": ({"presses": ["6"]}, None),
+    "crash-recovery": ({"fault": ["kill -9"]}, None),
+    "graph-stress": ({"solver": ["Cauchy", "ours"]}, None),
+}
+
+
+@cache
+def tiny_rows(name: str) -> list[Row]:
+    """An experiment's tiny configuration with one seed, run once for all tests here."""
+    study, (only, grasps) = EXPERIMENTS[name], TINY[name]
+    return [execute(cell, study.work) for cell in study.cells([0], only, grasps)]
+
+
+@pytest.mark.parametrize("study", EXPERIMENTS.values(), ids=lambda study: study.name)
+def test_every_experiment_runs_and_is_reported(study: Experiment, tmp_path: Path) -> None:
+    rows = tiny_rows(study.name)
+    assert 0 < len(rows) <= 6
+    assert [row.problem for row in rows] == [""] * len(rows)
+    for column in study.columns:
+        assert any(column.key in (row.figures or {}) for row in rows)
+    write_report(study, rows, tmp_path, jobs=1)
+    ElementTree.fromstring((tmp_path / "plot.svg").read_text())
+    assert (tmp_path / "results.md").read_text().count("| --- ") >= 1
+
+
+def test_the_forearms_wizard_finds_a_displaced_mount_through_the_physics() -> None:
+    (row,) = tiny_rows("forearm-on-rig")
+    assert row.figures is not None
+    assert row.figures["left_out"] == 0
+    assert row.figures["error_mm"] < 1.0
+    assert row.figures["errors_deg"][0] < 0.3
+    assert row.figures["inside"] == 1.0
+    assert 0.5 < row.figures["noise"] < 1.5
+
+
+def test_the_same_cell_gives_the_same_figures() -> None:
+    study = experiment("methods-2d")
+    cell = study.cells([1], {"shape": ["ellipse"], "noise": ["100"], "outliers": ["10"], "method": ["particle"]}, 4)[0]
+    first, second = execute(cell, study.work).figures, execute(cell, study.work).figures
+    assert first is not None
+    assert second is not None
+    times = {"step_ms", "finish_ms"}
+    assert {k: v for k, v in first.items() if k not in times} == {k: v for k, v in second.items() if k not in times}
+
+
+def test_all_methods_see_the_same_number_of_runs_with_the_reported_seeds() -> None:
+    cells = experiment("methods-2d").cells()
+    assert len(cells) == 3 * 8 * len(METHODS) * 30
+    assert {cell.seed for cell in cells} == set(REPORTED_SEEDS) == set(range(1000, 1030))
+    assert {cell["grasps"] for cell in cells} == {16}
+
+
+def test_scanned_solids_are_left_out_with_the_reason_where_they_are_absent(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, lab_data: Path
+) -> None:
+    study = experiment("methods-3d")
+    monkeypatch.setenv("TACTILE_LAB_DATA", str(tmp_path))
+    assert "ycb_cracker_box.ply" in study.left_out()
+    without = study.cells([0])
+    monkeypatch.setenv("TACTILE_LAB_DATA", str(lab_data))
+    assert study.left_out() == ""
+    assert len(study.cells([0])) == len(without) + 4 * len(METHODS)
+
+
+def test_unknown_names_are_refused_with_those_there_are() -> None:
+    with pytest.raises(ConfigurationError, match=r"figure-9\.9") as caught:
+        experiment("figure-9.9")
+    assert "methods-2d" in str(caught.value.hint)
+    with pytest.raises(ConfigurationError, match="colour"):
+        experiment("methods-2d").cells(only={"colour": ["red"]})
+    with pytest.raises(ConfigurationError, match="octagon"):
+        experiment("methods-2d").cells(only={"shape": ["octagon"]})

@@ -1,0 +1,171 @@
+"""Poses and flat faces smoothed together, and what faces say about contacts that do not fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivers.core.contacts import Array
+from tactile_lab.experiments.data import planar_data
+from tactile_lab.experiments.run_metrics import slam_figures
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_polygon
+from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
+from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother, smoothed_with_faces
+from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
+from tactile_lab.slam.tracking.faces.flat_faces import FlatFaces, flat_faces
+from tactile_lab.slam.tracking.joint.hypotheses import HypothesisScorer
+from tests.support.simulated_contacts import true_map
+
+NOISE = MotionNoise()
+
+
+def shaken(contact_map: ContactMap, scale: float) -> Array:
+    shake = np.random.default_rng(0).normal(size=contact_map.rows.shape) * [0.002, 0.002, 0.03] * scale
+    shake[0] = 0.0
+    return np.asarray(contact_map.rows + shake)
+
+
+@pytest.mark.parametrize(("shape", "dimension"), [("rectangle", 2), ("L", 2), ("box-12x6x6", 3)])
+def test_shaken_poses_settle_on_the_faces_to_within_the_noise(shape: str, dimension: int) -> None:
+    contact_map = true_map(shape, dimension=dimension)
+    smoother, faces = FacetSmoother(contact_map, NOISE), flat_faces(contact_map)[0]
+    start = smoother.fit(shaken(contact_map, 4.0), faces, 0)
+    found = smoother.fit(start.rows, faces, 20)
+    observed = len(contact_map.contacts) * dimension
+    assert start.chi_square > 5 * observed
+    assert found.chi_square < 1.3 * observed
+
+
+def test_a_rectangle_has_four_faces_at_right_angles() -> None:
+    contact_map = true_map("rectangle", count=16)
+    found = smoothed_with_faces(contact_map.with_rows(shaken(contact_map, 0.4)), NOISE)
+    assert found is not None
+    assert found.faces.count == 4
+    products = np.abs(found.faces.normals @ found.faces.normals.T)
+    assert np.all((products < 0.1) | (products > 0.99))
+
+
+def test_smoothing_never_raises_the_cost_and_keeps_the_first_pose() -> None:
+    contact_map = true_map("hexagon")
+    smoother, rows = FacetSmoother(contact_map, NOISE), shaken(contact_map, 1.0)
+    angles = np.arctan2(*contact_map.contacts.normals.T[::-1])
+    labels = np.digitize(angles, np.linspace(-np.pi, np.pi, 7)[1:-1])
+    normals = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(-np.pi, np.pi, 13)[1::2]])
+    none = np.zeros(len(labels), dtype=bool)
+    faces = FlatFaces(labels, normals, np.full(6, 0.035), none, none)
+    few, many = smoother.fit(rows, faces, 1), smoother.fit(rows, faces, 10)
+    assert many.cost <= few.cost
+    assert np.array_equal(many.rows[0], rows[0])
+
+
+def test_merged_faces_hold_the_contacts_of_both() -> None:
+    normals, none = np.eye(3)[:, :2] + [[0, 0], [0, 0], [1, 0]], np.zeros(5, dtype=bool)
+    faces = FlatFaces(np.array([0, 1, 2, 2, 1]), normals, np.arange(3.0), none, none)
+    merged = faces.merge(0, 1)
+    assert merged.labels.tolist() == [0, 0, 1, 1, 0]
+    assert merged.offsets_m.tolist() == [pytest.approx(2 / 3), 2.0]
+    assert np.linalg.norm(merged.normals[0]) == pytest.approx(1.0)
+
+
+def sharp_judge(contact_map: ContactMap) -> FacetedScorer:
+    return FacetedScorer(HypothesisScorer(NOISE, 5.0), NOISE)
+
+
+@pytest.mark.parametrize("shape", ["ellipse", "trapezoid", "stadium"])
+def test_wrong_contacts_are_left_out_and_hardly_any_right_one(shape: str) -> None:
+    data = planar_data.simulate(shape, 4, count=14, outlier_share=0.1)
+    slam = TactileSlam(SlamSettings(method="known-pose"), 0, known_poses=data.world_T_body)
+    wrong = used = 0
+    for grasp, pose in zip(data.grasps, data.world_T_body, strict=True):
+        used += slam.add_grasp(grasp).contacts_used
+        bodies = np.array([pose.transformTo(contact.point_world_m)[:2] for contact in grasp.contacts])
+        wrong += int(np.sum(distances_to_polygon(bodies, data.outline_m) > 0.005))
+    left_out = sum(len(grasp.contacts) for grasp in data.grasps) - used
+    assert wrong >= 2
+    assert wrong <= left_out <= wrong + 9
+
+
+def test_one_wrong_contact_does_not_hide_all_faces() -> None:
+    data = planar_data.simulate("L", 7, outlier_share=0.1)  # 23 mm off, where the smooth field lets it pass
+    slam = TactileSlam(SlamSettings(method="known-pose"), 0, known_poses=data.world_T_body)
+    for grasp in data.grasps:
+        slam.add_grasp(grasp)
+    assert slam_figures(data, slam.finish())["hausdorff_mm"] < 2
+
+
+def test_contacts_left_out_by_mistake_come_back() -> None:
+    contact_map = true_map("rectangle", count=14)
+    thinner = contact_map.without_contact(1, 2).without_contact(4, 1)
+    assert thinner.left_out_count == 2
+    assert sharp_judge(thinner).better(thinner).map.left_out_count == 0
+
+
+def test_the_way_to_a_contact_that_is_left_out_is_no_evidence() -> None:
+    grasp = true_map("rectangle", count=3).placed[1]
+    assert len(grasp.free_world_m) == len(grasp.contacts_world.free_m) > 0
+    fewer = replace(grasp, left_out=frozenset({0}))
+    dropped = len(grasp.free_world_m) - len(fewer.free_world_m)
+    assert dropped == np.sum(grasp.contacts_world.free_of == 0) > 0
+
+
+def test_covariances_of_all_poses_hold_their_errors() -> None:
+    contact_map = true_map("ellipse", count=10)
+    rows, _ = PoseEvidence(contact_map, NOISE).maximise(contact_map.rows, 60)
+    rated = HypothesisScorer(NOISE, 5.0).with_covariances(contact_map.with_rows(rows))
+    errors = [
+        contact_map.space.deviation(grasp.row, true.row) @ np.linalg.solve(grasp.covariance, grasp.row - true.row)
+        for grasp, true in zip(rated.placed[1:], contact_map.placed[1:], strict=True)
+    ]
+    assert np.median(errors) < 7.8
+
+
+def with_wrong_contact(contact_map: ContactMap, grasp: int, contact: int, off_m: float) -> ContactMap:
+    """The map with one contact moved outward along its normal."""
+    world = contact_map.placed[grasp].contacts_world
+    points = world.points_m.copy()
+    points[contact] += off_m * world.normals[contact]
+    placed = list(contact_map.placed)
+    placed[grasp] = replace(placed[grasp], contacts_world=replace(world, points_m=points))
+    return replace(contact_map, placed=tuple(placed))
+
+
+def test_pulls_are_what_leaving_out_each_contact_saves() -> None:
+    # farther off its lone face and its neighbours enclose a region or none, by rounding
+    contact_map = with_wrong_contact(true_map("rectangle", count=10), 3, 1, 0.008)
+    smoother, faces = FacetSmoother(contact_map, NOISE), flat_faces(contact_map)[0]
+    settled = smoother.fit(contact_map.rows, faces, 30)
+    pulls = smoother.pulls(settled.rows, settled.faces)
+    strongest = np.argsort(-pulls)[:3]
+    assert pulls[strongest[0]] > 4 * np.median(pulls)
+    for left_out in strongest:
+        others = np.delete(np.arange(len(pulls)), left_out)
+        fewer = contact_map.without_contact(*contact_map.origins[left_out])
+        kept = replace(
+            settled.faces,
+            labels=settled.faces.labels[others],
+            leaning=settled.faces.leaning[others],
+            bounded=settled.faces.bounded[others],
+        )
+        refitted = FacetSmoother(fewer, NOISE).fit(settled.rows, kept, 30)
+        assert pulls[left_out] == pytest.approx(2 * (settled.cost - refitted.cost), rel=0.15, abs=0.3)
+
+
+def test_a_wrong_contact_that_a_pose_hangs_on_is_released() -> None:
+    wrong = with_wrong_contact(true_map("rectangle", count=10), 7, 1, 0.010)
+    settled = sharp_judge(wrong).better(HypothesisScorer(NOISE, 5.0).smooth(wrong, 15).map)
+    released = sharp_judge(wrong).release(settled)
+    assert settled.map.left_out_count == 0
+    assert released.cost < settled.cost - 10
+    assert [grasp.left_out for grasp in released.map.placed if grasp.left_out] == [{1}]
+    assert released.map.placed[7].left_out == {1}
+
+
+def test_where_no_contact_is_wrong_none_is_released() -> None:
+    right = true_map("rectangle", count=10)
+    settled = sharp_judge(right).better(HypothesisScorer(NOISE, 5.0).smooth(right, 15).map)
+    assert sharp_judge(right).release(settled) is settled

@@ -1,0 +1,156 @@
+"""Where the faces of a solid end, and grasps that belong elsewhere on them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
+from tactile_lab.slam.shape.solids.solid_field import SolidField, TabulatedSolid
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother
+from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
+from tactile_lab.slam.tracking.faces.flat_faces import flat_faces
+from tactile_lab.slam.tracking.faces.relocalization import relocalize
+from tactile_lab.slam.tracking.faces.solid_face_extents import solid_ends
+from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer
+from tactile_lab.slam.tracking.joint.proposals import ProposalSettings
+from tests.support.simulated_contacts import true_map
+
+NOISE = MotionNoise()
+COUNT = 12
+
+
+@pytest.fixture(scope="module")
+def l_block() -> ContactMap:
+    return true_map("l-block", count=COUNT, dimension=3)
+
+
+def moved(contact_map: ContactMap, index: int, step: list[float]) -> ContactMap:
+    rows = contact_map.rows
+    rows[index] = contact_map.space.move(rows[index], np.array(step))
+    return contact_map.with_rows(rows)
+
+
+def judge_of(contact_map: ContactMap) -> FacetedScorer:
+    return FacetedScorer(HypothesisScorer(NOISE, 2.0), NOISE)
+
+
+def rated(contact_map: ContactMap) -> Hypothesis:
+    found = judge_of(contact_map).settle(contact_map)
+    assert found is not None
+    return found
+
+
+def test_contacts_lie_before_the_ends_of_their_faces(l_block: ContactMap) -> None:
+    faces, _ = flat_faces(l_block)
+    ends = solid_ends(l_block, faces)
+    beyond = ends.beyond(l_block.contacts.points_m, faces.normals, faces.offsets_m)
+    assert len(beyond) > 2 * len(l_block.contacts)  # ridges on both sides and above
+    assert beyond.max() < 3
+    assert np.any(ends.strengths < 0)  # the notch
+    assert np.median(beyond) < -5
+
+
+def test_ends_hold_what_would_slide_off(l_block: ContactMap) -> None:
+    faces, _ = flat_faces(l_block)
+    ends = solid_ends(l_block, faces)
+    beyond, off_m = [], []
+    for given in (None, ends):
+        found = FacetSmoother(l_block, NOISE, given).fit(moved(l_block, 7, [0.03, 0.0, 0.0]).rows, faces, 30)
+        points = l_block.with_rows(found.rows).contacts.points_m
+        beyond.append(ends.beyond(points, found.faces.normals, found.faces.offsets_m).max())
+        off_m.append(np.linalg.norm(found.rows[:, :2] - l_block.rows[:, :2], axis=1).max())
+    assert beyond[0] > 3 > 1 > beyond[1]
+    assert off_m[1] < off_m[0] + 0.001
+
+
+def test_smoothing_between_ends_takes_the_steepest_way(l_block: ContactMap) -> None:
+    """Derivatives that were wrong would make the optimiser stop early or not at all."""
+    faces, _ = flat_faces(l_block)
+    ends = solid_ends(l_block, faces)
+    smoother = FacetSmoother(l_block, NOISE, ends)
+    loose = FacetSmoother(l_block, NOISE).fit(l_block.rows, faces, 30)
+    settled = smoother.fit(loose.rows, loose.faces, 6)
+    assert settled.cost == pytest.approx(smoother.fit(loose.rows, loose.faces, 60).cost, abs=0.05)
+
+
+def test_the_distance_from_a_solid_is_signed(l_block: ContactMap) -> None:
+    mesh = Polyhedron.fit(l_block.fit(), l_block.free_points_m).mesh(0.006)
+    field = SolidField(mesh, 0.001)
+    centre, outside = mesh.vertices.mean(axis=0), mesh.vertices.max(axis=0) + np.array([0.0, 0.0, 0.01])
+    found = field.predict(np.vstack([l_block.contacts.points_m, centre, outside]), gradient=True, variance=True)
+    assert np.median(np.abs(found.mean_m[:-2])) < 0.002
+    assert found.mean_m[-1] > 0.009
+    assert np.median(np.einsum("nd,nd->n", found.gradient[:-2], l_block.contacts.normals)) > 0.95
+    assert found.variance_m2 == pytest.approx(1e-6)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_a_tabulated_solid_is_like_the_solid(l_block: ContactMap, scale: float) -> None:
+    given = Polyhedron.fit(l_block.fit(), l_block.free_points_m).mesh(0.006)
+    mesh = replace(given, vertices=scale * given.vertices)
+    exact, tabulated = SolidField(mesh, 0.001), TabulatedSolid(mesh, 0.001)
+    spread = np.random.default_rng(0).normal(0.0, 0.008 * scale, l_block.contacts.points_m.shape)
+    places = scale * l_block.contacts.points_m + spread
+    one, other = (field.predict(places, gradient=True, variance=True) for field in (exact, tabulated))
+    assert np.abs(one.mean_m - other.mean_m).max() < 0.001 * scale
+    assert np.mean(np.abs(one.mean_m - other.mean_m) < 1e-4 * scale) > 0.8
+    assert np.median(np.sum(one.gradient * other.gradient, axis=1)) > 0.99
+    assert np.array_equal(one.variance_m2, other.variance_m2)
+
+
+def test_a_grasp_that_closed_on_the_wrong_faces_is_found_its_place(l_block: ContactMap) -> None:
+    wrong = rated(moved(l_block, 9, [0.012, -0.02, np.deg2rad(90.0)]))
+    right = rated(l_block)
+    found = relocalize(wrong, judge_of(l_block), NOISE, ProposalSettings())
+    assert wrong.cost > right.cost + 5
+    assert found.cost < wrong.cost - 5
+    gap = l_block.space.deviation(found.map.rows[9:10], l_block.rows[9])[0]
+    assert np.linalg.norm(gap[:2]) < 0.006
+    assert abs(gap[2]) < 0.15
+
+
+def test_grasps_that_took_a_wrong_turn_together_are_turned_back_together() -> None:
+    """A third of a turn of a prism with three equal sides: only the motion tells, and only at both ends of the run."""
+    prism = true_map("triangular-prism", count=COUNT, dimension=3)
+    turned = prism
+    for index in (5, 6, 7, 8):
+        turned = moved(turned, index, [0.0, 0.0, 2 * np.pi / 3])
+    wrong, right = rated(turned), rated(prism)
+    found = relocalize(wrong, judge_of(prism), NOISE, ProposalSettings())
+    assert wrong.cost > right.cost + 5
+    assert found.cost < right.cost + 0.5
+    gaps = prism.space.deviation(found.map.rows[5:9], right.map.rows[5:9])
+    assert np.abs(gaps[:, 2]).max() < 0.15
+
+
+def test_what_is_round_has_no_other_places() -> None:
+    contact_map = true_map("ellipsoid", count=12, dimension=3)
+    smooth = HypothesisScorer(NOISE, 2.0).score(contact_map)
+    assert relocalize(smooth, judge_of(contact_map), NOISE, ProposalSettings()) is smooth
+
+
+@pytest.fixture(scope="module")
+def outline() -> ContactMap:
+    return true_map("rectangle", count=COUNT, dimension=2)
+
+
+def test_a_grasp_whose_contacts_fit_badly_is_found_its_place_on_an_outline(outline: ContactMap) -> None:
+    """Driven onto the others' field: two of its contacts are left out where it is, none where it belongs."""
+    elsewhere = moved(outline, 7, [0.02, -0.015, np.deg2rad(60.0)])
+    wrong = judge_of(outline).better(elsewhere.without_contact(7, 0).without_contact(7, 1))
+    found = relocalize(wrong, judge_of(outline), NOISE, ProposalSettings())
+    assert found.cost < wrong.cost - 10
+    gap = outline.space.deviation(found.map.rows[7:8], outline.rows[7])[0]
+    assert np.linalg.norm(gap[:2]) < 0.006
+    assert abs(gap[2]) < 0.15
+    assert not found.map.placed[7].left_out
+
+
+def test_grasps_that_fit_an_outline_stay(outline: ContactMap) -> None:
+    right = judge_of(outline).better(outline)
+    assert relocalize(right, judge_of(outline), NOISE, ProposalSettings()) is right

@@ -1,0 +1,369 @@
+"""The page: what it shows, who may see it, and that nothing it does holds up a session."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gtsam import Pose3, Rot3
+from typer import BadParameter
+
+from drivers.core.contacts import Contact, Grasp
+from drivers.core.errors import ConfigurationError, DeviceError
+from drivers.shadow.model.kinematics import joint_vector, palm_T_distal
+from sessions.guided.operator import Ask
+from sessions.recording.recorder import Level, Recorder
+from sessions.recording.session import create_session
+from sessions.recording.traffic import schemas
+from tactile_lab.cli.running.page_address import PageAddress
+from tactile_lab.view import page_transport
+from tactile_lab.view.controls import history_html, status_html
+from tactile_lab.view.drawing import patches
+from tactile_lab.view.feed import ViewFeed
+from tactile_lab.view.gate import Gate, Head, inner_address, is_loopback, new_token, parse_head
+from tactile_lab.view.page import Page
+from tactile_lab.view.page_transport import QUEUE_LENGTH
+from tactile_lab.view.scene import Scene, ellipse
+from tactile_lab.view.skeleton import bones
+from tests.support.repository import REPOSITORY
+
+SQUARE = [[-0.02, -0.02, 0.0], [0.02, -0.02, 0.0], [0.02, 0.02, 0.0], [-0.02, 0.02, 0.0]]
+
+
+class SceneSink:
+    """A recording that only feeds a scene."""
+
+    def __init__(self) -> None:
+        self.scene = Scene()
+
+    def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
+        self.scene.take(topic, data, stamp_ns)
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A page takes some seconds of processor time to start, of which a busy machine gives it little."""
+    monkeypatch.setattr(page_transport, "START_TIMEOUT_s", 600.0)
+
+
+def contact(finger: str, x: float) -> Contact:
+    return Contact(finger, np.array([x, 0.0, 0.02]), np.array([1.0, 0.0, 0.0]), 1e-6 * np.eye(3), 0.05, 0.5)
+
+
+def recorded(grasps: int = 2) -> Scene:
+    sink = SceneSink()
+    recorder = Recorder(sink)
+    palm = Pose3(Rot3.Yaw(0.3), np.array([0.0, 0.0, 0.2]))
+    recorder.frames(1, {"palm": palm, "FF": Pose3(Rot3(), np.array([0.04, 0.0, 0.05]))})
+    recorder.loads(2, {"FF": 0.4, "TH": float("inf")})
+    for index in range(grasps):
+        recorder.grasp(3, Grasp(index, 3, (contact("FF", 0.03), contact("TH", -0.03)), palm), {})
+        pose = Pose3(Rot3.Yaw(0.1), np.array([0.01, 0.0, 0.02]))
+        state = {"index": index, "verdict": "tracked", "reason": "contacts placed to 1 mm"}
+        recorder.slam(4, pose, state, np.diag([1e-6, 4e-6, 1e-4]))
+    surface = {"dimension": 2, "vertices_m": SQUARE, "faces": [], "sigma_m": [0.001] * 4, "explored": 0.5}
+    recorder.surface(5, {**surface, "origin_height_m": 0.02})
+    plan = {"index": 2, "closing": "radial", "x_m": 0.0, "y_m": 0.0, "yaw_rad": 0.2, "height_m": 0.022, "reason": "new"}
+    recorder.plan(6, plan)
+    recorder.guide(7, {"grasp": 3, "stage": "guide", "prompt": "Guide <the> hand", "paused": "coffee", "view": {}})
+    recorder.log(8, Level.INFO, "guide", "note: hello")
+    return sink.scene
+
+
+def test_scene_is_put_together_from_what_is_recorded() -> None:
+    scene = recorded()
+    assert scene.world_T_palm is not None
+    assert scene.world_T_palm.z() == pytest.approx(0.2)
+    assert scene.loads_N == {"FF": 0.4, "TH": None}
+    assert [grasp.index for grasp in scene.grasps] == [0, 1]
+    points_m = scene.grasps[1].points_object_m
+    assert points_m is not None
+    assert points_m.shape == (2, 3)
+    assert scene.surface is not None
+    assert scene.surface.explored == 0.5
+    assert scene.changed == {"hand", "grasps", "object", "plan", "guide"}
+
+
+def test_grasp_taken_back_is_shown_no_longer() -> None:
+    scene = recorded(grasps=3)
+    scene.take(schemas.SLAM_STATE_TOPIC, b'{"index": 0, "verdict": "first", "reason": "again"}', 9)
+    assert [grasp.index for grasp in scene.grasps] == [0]
+    assert list(scene.steps) == [0]
+
+
+@pytest.mark.parametrize("content", [b"not json", b"{}", b'{"transforms": [{"child_frame_id": "palm"}]}', b"[]"])
+def test_messages_of_another_form_are_refused(content: bytes) -> None:
+    with pytest.raises(ValueError, match=r"."):
+        Scene().take(schemas.TRANSFORMS_TOPIC, content, 1)
+
+
+def test_topics_that_are_not_shown_change_nothing() -> None:
+    scene = Scene()
+    scene.take("/link/hand/rx", b"\x00\x01", 5)
+    assert not scene.changed
+
+
+def test_panel_tells_prompt_pause_pose_and_grasps_and_shows_no_foreign_markup() -> None:
+    scene = recorded()
+    text = status_html(scene)
+    assert "Guide &lt;the&gt; hand" in text
+    assert "Paused: coffee" in text
+    assert "10, 0 mm, 6°" in text
+    assert "TH silent" in text
+    assert history_html(scene).count("tracked: contacts placed to 1 mm") == 2
+
+
+def test_outline_is_shown_as_a_wall_coloured_by_its_uncertainty() -> None:
+    scene = recorded()
+    assert scene.surface is not None
+    (wall,) = patches(scene.surface)
+    assert len(wall.faces) == 8
+    assert wall.vertices_m[:, 2].min() == pytest.approx(-0.02)
+    assert wall.vertices_m[:, 2].max() == pytest.approx(0.02)
+    scene.surface.sigma_m[:] = [0.0, 0.0, 0.02, 0.02]
+    known, between, unknown = patches(scene.surface)
+    assert sum(len(patch.faces) for patch in (known, between, unknown)) == 8
+    assert known.colour[0] < unknown.colour[0]  # from dark violet to yellow
+
+
+def test_ellipse_has_the_axes_of_the_covariance() -> None:
+    outline_m = ellipse(np.diag([1e-6, 4e-6, 1.0]))
+    np.testing.assert_allclose(np.abs(outline_m).max(axis=0), [0.002, 0.004], rtol=1e-2)
+
+
+def test_plan_is_shown_until_its_grasp_is_measured() -> None:
+    assert recorded(grasps=2).next_plan["closing"] == "radial"
+    assert recorded(grasps=3).next_plan == {}
+
+
+def test_fingers_bend_where_their_bones_meet() -> None:
+    joints_rad = joint_vector({"FFJ3": 0.4, "FFJ2": 0.7, "FFJ1": 0.3, "MFJ2": 0.2})
+    lines_m = bones(Pose3(), palm_T_distal(joints_rad))
+    assert lines_m.shape == (15, 2, 3)
+    knuckle_m, elbow_m = lines_m[0]
+    np.testing.assert_allclose(elbow_m - knuckle_m, [0.0, -0.045 * np.sin(0.4), 0.045 * np.cos(0.4)], atol=1e-6)
+    assert bones(Pose3(), {}).shape == (0, 2, 3)
+
+
+# --- the door ------------------------------------------------------------------------------------------------------
+
+TOKEN = "0123456789abcdef"
+
+
+def head(path: str = "/", **headers: str) -> Head:
+    return Head(path, {"host": "127.0.0.1:8090", **headers})
+
+
+def gate(token: str = "") -> Gate:
+    return Gate(frozenset({"127.0.0.1", "localhost"}), token)
+
+
+def test_visitor_of_the_own_page_passes() -> None:
+    assert gate().verdict(head(origin="http://127.0.0.1:8090"))[0] is HTTPStatus.OK
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        head(origin="http://evil.example"),
+        Head("/", {"host": "evil.example:8090"}),
+        Head("/", {}),
+        head(origin="null"),
+    ],
+)
+def test_other_web_sites_in_the_same_browser_are_refused(asked: Head) -> None:
+    assert gate().verdict(asked)[0] is HTTPStatus.FORBIDDEN
+
+
+def test_token_is_asked_for_once_and_then_in_the_cookie() -> None:
+    door = gate(TOKEN)
+    assert door.verdict(head())[0] is HTTPStatus.FORBIDDEN
+    assert door.verdict(head("/?token=wrong"))[0] is HTTPStatus.FORBIDDEN
+    status, cookie = door.verdict(head(f"/?token={TOKEN}"))
+    assert status is HTTPStatus.SEE_OTHER
+    assert "HttpOnly" in cookie
+    assert door.verdict(head(cookie=f"a=b; {cookie.partition(';')[0]}"))[0] is HTTPStatus.OK
+    assert door.verdict(head(cookie="tactile_lab_token=wrong"))[0] is HTTPStatus.FORBIDDEN
+
+
+@pytest.mark.parametrize("data", [b"", b"\x00\xff\r\n\r\n", b"POST / HTTP/1.1\r\n\r\n", b"GET /\r\n\r\n"])
+def test_what_is_no_page_request_is_none(data: bytes) -> None:
+    assert parse_head(data) is None
+
+
+def test_loopback_is_told_from_the_rest() -> None:
+    assert [is_loopback(name) for name in ("127.0.0.1", "::1", "localhost", "0.0.0.0", "lab.example")] == [
+        *(True, True, True, False, False)
+    ]
+    assert is_loopback(inner_address())
+    assert inner_address() != inner_address()
+
+
+def test_other_addresses_need_a_token() -> None:
+    with pytest.raises(ConfigurationError, match="press the buttons"):
+        PageAddress("0.0.0.0", 8090, "").check()
+    with pytest.raises(ConfigurationError, match="at least 16"):
+        PageAddress("0.0.0.0", 8090, "short").check()
+    assert PageAddress("0.0.0.0", 8090, "new").check()[2] != ""
+    with pytest.raises(BadParameter, match="belongs to --view"):
+        PageAddress.if_wanted(False, "0.0.0.0", 8090, "")
+    with pytest.raises(DeviceError, match="a token is needed"):
+        Page("0.0.0.0", 0, "", "test")
+
+
+# --- the page itself ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[ViewFeed]:
+    with ViewFeed("127.0.0.1", 0, TOKEN, "test") as opened:
+        yield opened
+
+
+def fetch(url: str, **headers: str) -> tuple[int, bytes]:
+    try:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=20) as answer:
+            return answer.status, answer.read()
+    except urllib.error.HTTPError as error:
+        return error.code, error.read()
+
+
+def test_page_is_served_to_whoever_has_the_token(page: ViewFeed) -> None:
+    bare = page.url.partition("?")[0]
+    assert fetch(bare)[0] == 403
+    assert fetch(bare, Cookie="tactile_lab_token=no")[0] == 403
+    status, body = fetch(bare, Cookie=f"tactile_lab_token={TOKEN}")
+    assert status == 200
+    assert b"<html" in body.lower()
+
+
+def test_page_makes_no_public_tunnel_and_is_reached_through_its_door_only() -> None:
+    """In a process of its own: viser leaves its event loop unclosed."""
+    code = """
+from viser import _messages
+from tactile_lab.view.page import Page
+with Page("127.0.0.1", 0, "", "test") as page:
+    inner = page._inner
+    print(_messages.ShareUrlRequest in inner._websock_server._incoming_handlers, inner.get_host(), page.url)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True)
+    tunnels, inner, url = done.stdout.split()[-3:]
+    assert tunnels == "False"
+    assert inner.startswith("127.")
+    assert inner not in url
+
+
+def test_page_is_drawn_again_and_again_without_a_complaint() -> None:
+    """In a process of its own, as above; what viser warns of counts as an error."""
+    code = """
+from tactile_lab.view.page import Page
+from tests.unit.tactile_lab.view.test_view import recorded
+with Page("127.0.0.1", 0, "", "test") as page:
+    for grasps in (1, 2, 1):
+        page.scene = recorded(grasps)
+        page.draw()
+        page.scene.surface.sigma_m[:] = 0.001 * grasps
+        page.scene.changed.add("object")
+        page.draw()
+"""
+    words = [sys.executable, "-W", "error::UserWarning", "-c", code]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False, cwd=REPOSITORY)
+    assert done.returncode == 0, done.stderr
+
+
+# --- the feed ------------------------------------------------------------------------------------------------------
+
+
+def flood(feed: ViewFeed, count: int) -> None:
+    loads = json.dumps({"load_N": {"FF": 0.1}, "padding": "x" * 2000}).encode()
+    for stamp in range(count):
+        feed.write(schemas.LOADS_TOPIC, loads, stamp)
+
+
+def alive(pid: int | None) -> bool:
+    try:
+        os.kill(pid or 0, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_stopped_page_costs_messages_and_nothing_else() -> None:
+    with ViewFeed("127.0.0.1", 0, "", "test") as feed:
+        pid = feed.pid
+        assert pid is not None
+        os.kill(pid, signal.SIGSTOP)
+        flood(feed, 3 * QUEUE_LENGTH)  # returns: nothing waits for the page
+        assert feed.dropped > QUEUE_LENGTH
+    assert not alive(pid)
+
+
+def test_killed_page_costs_messages_and_nothing_else() -> None:
+    with ViewFeed("127.0.0.1", 0, "", "test") as feed:
+        pid = feed.pid
+        assert pid is not None
+        os.kill(pid, signal.SIGKILL)
+        flood(feed, 3 * QUEUE_LENGTH)
+        assert feed.requests() == []
+        assert feed.dropped > 0
+    assert not alive(pid)
+
+
+@pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGSTOP])
+def test_recording_is_whole_when_its_page_is_killed_or_hangs(tmp_path: Path, way: signal.Signals) -> None:
+    session = create_session(tmp_path, rig="sim", rig_description={}, object_name="box")
+    with session, ViewFeed("127.0.0.1", 0, "", "test") as feed:
+        session.recorder.add_onlooker(feed)
+        for stamp in range(3 * QUEUE_LENGTH):
+            if stamp == 5:
+                assert feed.pid is not None
+                os.kill(feed.pid, way)
+            session.recorder.log(stamp, Level.INFO, "test", "x" * 2000)
+        assert feed.dropped > 0
+    assert session.manifest.status == "closed"
+    traffic = session.traffic()
+    assert sum(message.topic == schemas.LOG_TOPIC for message in traffic.messages()) == 3 * QUEUE_LENGTH
+    assert not traffic.loss
+
+
+def test_page_says_what_is_pressed_and_nothing_that_it_must_not() -> None:
+    feed = ViewFeed("127.0.0.1", 0, "", "test")
+    pressed: list[dict[str, Any]] = [
+        {"ask": "capture", "text": ""},
+        {"ask": "note", "text": "hello"},
+        {"ask": "attach", "text": "/etc/passwd"},
+        {"ask": "move"},
+        {"ask": "fly"},
+        {"nothing": 1},
+    ]
+    for content in pressed:
+        feed._on_line(json.dumps(content).encode())
+    feed._on_line(b"\xff not json")
+    feed._on_line(b"[1]")
+    assert [(request.ask, request.text) for request in feed.requests()] == [(Ask.CAPTURE, ""), (Ask.NOTE, "hello")]
+
+
+def test_page_that_can_not_open_is_told() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(DeviceError, match="cannot listen"), ViewFeed("127.0.0.1", port, "", "test"):
+            pass
+
+
+def test_tokens_can_not_be_guessed() -> None:
+    assert len({new_token() for _ in range(10)}) == 10
+    assert len(new_token()) >= 32
