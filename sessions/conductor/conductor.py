@@ -105,8 +105,8 @@ class Conductor:
                 self._one_grasp(plan)
             case UndoGrasp(reason):
                 self._undo(reason)
-            case End(reason):
-                return Ending.COMPLETE, reason
+            case End(reason, partial):
+                return Ending.PARTIAL if partial else Ending.COMPLETE, reason
             case Wait() | Pause():
                 self._cycle.idle()
         return None

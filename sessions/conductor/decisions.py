@@ -49,9 +49,15 @@ class Pause:
 
 @dataclass(frozen=True)
 class End:
-    """The session is done."""
+    """The session is done.
+
+    Attributes:
+        reason: why, in words.
+        partial: less was done than asked for, as nothing is left that can be.
+    """
 
     reason: str
+    partial: bool = False
 
 
 Decision: TypeAlias = DoGrasp | UndoGrasp | Wait | Pause | End
@@ -175,6 +181,8 @@ class AutonomousDecisions:
         self._planned = self.estimator.ask(EstimatorService.plan, index)
 
     def decide(self, index: int) -> Decision:
+        if self._planned is not None and self._planned.exhausted:
+            return End(self._planned.exhausted, partial=True)
         return Wait() if self._planned is None else DoGrasp(self._planned.plan)
 
     def on_bounding_box(self, box: BoundingBox) -> None:

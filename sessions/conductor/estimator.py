@@ -125,10 +125,12 @@ class PlannedGrasp:
     Attributes:
         plan: it.
         choice: the policy's decision about it; None where no policy was asked.
+        exhausted: why nothing is left to do, in words: the plan is none then. Empty while there is something.
     """
 
     plan: GraspPlan
     choice: PolicyChoice | None
+    exhausted: str = ""
 
 
 class GraspPlanner(Protocol):

@@ -13,6 +13,8 @@ class Ending(StrEnum):
     """How a session ended."""
 
     COMPLETE = "complete"
+    PARTIAL = "partial"
+    """Less than asked for: nothing is left that the hand can reach."""
     OBJECT_LOST = "object lost"
     INTERRUPTED = "interrupted"
     LIMIT = "limit reached"

@@ -12,6 +12,7 @@ class TouchSettings(StrictModel):
 
     Attributes:
         tap_m_s: speed of the hand coming down on the top.
+        near_m: from so far above a top that is known on it comes down at that speed.
         met_N: force on a fingertip that ends the approach.
         force_N: force that every fingertip is then brought to.
         most_N: force on any fingertip at which the hand itself moves on no more.
@@ -26,9 +27,13 @@ class TouchSettings(StrictModel):
         row_m: x of the fingertips in the row's own grasp frame.
         beyond_m: how far beyond the middle a rake goes.
         lowest_m: height of the fingertips over the table where a tap has missed the object.
+        side_m_s: speed toward an object's side, palm upright; a stiff fingertip reaches 0.45 N at 20 mm/s.
+        side_heights_m: height of the lowest fingertip in such a touch, by where the palm stands. The forearm lets it
+            come no lower; from higher up it would tip objects over.
     """
 
-    tap_m_s: float = Field(default=0.06, gt=0.0)
+    tap_m_s: float = Field(default=0.04, gt=0.0)
+    near_m: float = Field(default=0.02, ge=0.0)
     met_N: float = Field(default=0.20, gt=0.0)
     force_N: float = Field(default=0.35, gt=0.0)
     most_N: float = Field(default=0.8, gt=0.0)
@@ -43,6 +48,8 @@ class TouchSettings(StrictModel):
     row_m: float = Field(default=0.012, ge=0.0)
     beyond_m: float = Field(default=0.030, ge=0.0)
     lowest_m: float = Field(default=0.012, ge=0.0)
+    side_m_s: float = Field(default=0.015, gt=0.0)
+    side_heights_m: dict[str, float] = {"left": 0.020, "right": 0.032}
 
 
 class CycleSettings(StrictModel):
@@ -51,7 +58,11 @@ class CycleSettings(StrictModel):
     Attributes:
         lift_m: how far above a grasp the hand travels.
         travel_m_s, turn_rad_s: speeds above the object.
+        clearance_m: how far the hand stays above the tallest thing on the table while it travels.
+        standoff_m: how far before a grasp from the side the hand comes down.
         descent_m_s: speed of the guarded descent.
+        beside_m_s: the same where nothing is expected below.
+        approach_m_s: speed of the guarded approach from the side.
         landing_force_N: a fingertip force during the descent that means the object is under it.
         landing_shift_m: how far the grasp moves toward the finger that landed.
         landing_tries: descents before the grasp is given up.
@@ -78,7 +89,11 @@ class CycleSettings(StrictModel):
     lift_m: float = Field(default=0.10, gt=0.0)
     travel_m_s: float = Field(default=0.25, gt=0.0)
     turn_rad_s: float = Field(default=1.5, gt=0.0)
-    descent_m_s: float = Field(default=0.08, gt=0.0)
+    clearance_m: float = Field(default=0.03, ge=0.0)
+    standoff_m: float = Field(default=0.13, gt=0.0)
+    descent_m_s: float = Field(default=0.05, gt=0.0)
+    beside_m_s: float = Field(default=0.08, gt=0.0)
+    approach_m_s: float = Field(default=0.05, gt=0.0)
     landing_force_N: float = Field(default=0.25, gt=0.0)
     landing_shift_m: float = Field(default=0.018, gt=0.0)
     landing_tries: int = Field(default=4, ge=1)

@@ -8,12 +8,13 @@ import numpy as np
 from gtsam import Pose3
 
 from drivers.core.contacts import FINGERS, Array, Grasp
-from drivers.shadow.closing.closing import Closing, closing
+from drivers.shadow.closing.closing import SIDES, Closing, closing
 from drivers.shadow.closing.posture import TipEllipsoid
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_plan import GraspPlan, evade
+from sessions.motion.guard import Guard
 from sessions.motion.motion import GraspFrame, Motion
-from sessions.motion.touching import Toucher
+from sessions.motion.touching import Toucher, travel_height_m
 
 _HASTE_N, _FLIGHT_N = 1.0, 3.0
 """Largest force errors that count in force control: toward the object, and away from it."""
@@ -38,6 +39,7 @@ class GraspCycle:
     ) -> None:
         self._motion, self.settings = motion, settings
         self._toucher = Toucher(motion, settings, tip or TipEllipsoid())
+        self._guard = Guard(motion, settings.touch.met_N, settings.held_up_rad)
         self._tip, self._yaw_window_rad = tip or TipEllipsoid(), yaw_window_rad
         self._plan: GraspPlan | None = None
         self._progress = dict.fromkeys(FINGERS, 0.0)
@@ -66,6 +68,8 @@ class GraspCycle:
             Whether the hand is down around the object, fingers open.
         """
         self._plan, self.landings_world_m = plan, []
+        if self._table().is_sideways:
+            return self._come_from_the_side()
         landed: set[str] = set()
         if plan.tap:
             self._toucher.tap(plan.frame)
@@ -84,10 +88,59 @@ class GraspCycle:
     def _move_above(self) -> None:
         table, s = self._table(), self.settings
         self._progress = self._open_progress()
+        self._motion.climb(self._above(), s.travel_m_s)
         self._motion.blend_fingers(table, self._progress, s.finger_rad_s)
-        above = self._motion.base_joints(self.plan.frame, table, s.lift_m)
-        self._motion.move_base(above, s.travel_m_s, s.turn_rad_s)
+        self._motion.move_base(self._above(), s.travel_m_s, s.turn_rad_s)
         self._motion.tare(s.rest_s)
+
+    def _above(self) -> Array:
+        """Where the hand may travel, above the grasp or, from the side, above where it comes down beside the object."""
+        table = self._table()
+        above_m = travel_height_m(table, self._motion, self.settings, self._tip)
+        return self._motion.base_joints(self.plan.frame, table, above_m, self._away_m)
+
+    @property
+    def _away_m(self) -> float:
+        """How far back along the approach the hand comes down and goes up."""
+        return self.settings.standoff_m if self._table().is_sideways else 0.0
+
+    def _come_from_the_side(self) -> bool:
+        """Down beside the object, then toward it with care; back and up again where the hand meets something.
+
+        What a fingertip has met on the way in is captured as a touch.
+        """
+        s, motion, table = self.settings, self._motion, self._table()
+        if self.plan.tap:
+            side = next(side for side in SIDES if table.name.endswith(side))
+            self._toucher.touch_side(self.plan.frame, side, s.standoff_m, table.height_m)
+        self._move_above()
+        self._guard.restart()
+        beside = motion.base_joints(self.plan.frame, table, 0.0, self._away_m)
+        if not motion.probe_base(beside, s.beside_m_s, self._guard.is_met):
+            self._note_landing()
+            motion.climb(self._above(), s.travel_m_s)
+            return False
+        motion.tare(s.rest_s)
+        self._guard.restart()
+        motion.runtime.begin_closing()
+        for q in motion.line(motion.base_joints(self.plan.frame, table), s.approach_m_s):
+            motion.set_base(q)
+            motion.tick()
+            if self._guard.is_met():
+                motion.set_base(motion.runtime.perception.base_q)
+                self._note_landing()
+                self._toucher.capture()
+                self.lift()
+                return False
+        motion.supervisor.on_approach()
+        return True
+
+    def _note_landing(self) -> None:
+        """Remember where the hand met something: at the fingertip that did, or, not knowing better, at the foremost."""
+        fingers = [finger for finger in self._guard.met if finger in FINGERS] or list(FINGERS)
+        ahead = np.asarray(self.plan.frame.pose.rotation().rotate(np.array(self._table().approach)))
+        places = [self._motion.tip_centre_world_m(finger, self._tip) for finger in fingers]
+        self.landings_world_m.append(max(places, key=lambda place: float(place @ ahead)))
 
     def _come_down(self) -> list[str]:
         """Guarded descent; the fingers that landed on something, by their tips or, which bends them, by other links."""
@@ -257,10 +310,11 @@ class GraspCycle:
             self._motion.tick()
 
     def lift(self) -> None:
-        """Straight up."""
-        s = self.settings
-        above = self._motion.base_joints(self.plan.frame, self._table(), s.lift_m)
-        self._motion.move_base(above, s.travel_m_s, s.turn_rad_s)
+        """Back along the approach, where the hand came from the side, then straight up."""
+        s, motion = self.settings, self._motion
+        if self._away_m:
+            motion.move_base(motion.base_joints(self.plan.frame, self._table(), 0.0, self._away_m), s.travel_m_s, 1.0)
+        motion.move_base(self._above(), s.travel_m_s, s.turn_rad_s)
 
     def idle(self) -> None:
         """One cycle without motion."""

@@ -25,6 +25,7 @@ from sessions.rig_runtime.rig_runtime import RigRuntime
 _STRAIGHT_WRIST = forearm_T_palm(np.zeros(len(JOINTS)))
 _TARES = 5  # a fingertip that still swings is given so many rests
 _WITHDRAW_s = 0.15  # a positioner follows its targets late: back by more than it is behind
+_LEVEL_m = 0.001
 _HOLD_WRIST = {"WRJ1": 0.0, "WRJ2": 0.0}
 
 
@@ -65,6 +66,10 @@ class Motion:
         self._targets_rad: dict[str, float] = {}
         self._loads_N: dict[str, float] = {}
         self._resting_N: dict[str, float] = {}
+        self.motor_torques: Array | None = None
+        """Strain-gauge counts of the motors in the last cycle, shape (20,); None where the hand tells none."""
+        self.tallest_m = 0.0
+        """Height over the table of whatever may stand there, as far as it is known: the hand travels above it."""
 
     @cached_property
     def _base_q(self) -> Array:
@@ -87,7 +92,7 @@ class Motion:
         """
         self.runtime.cycle()
         snapshot = self.runtime.snapshot()
-        self._loads_N = dict(snapshot.loads_N)
+        self._loads_N, self.motor_torques = dict(snapshot.loads_N), snapshot.motor_torques
         self.supervisor.check(snapshot)
 
     def wait(self, duration_s: float) -> None:
@@ -131,10 +136,21 @@ class Motion:
 
     # --- the positioner ----------------------------------------------------------------------------------------
 
-    def base_joints(self, grasp: GraspFrame, closing: Closing, above_m: float = 0.0) -> Array:
-        """Positioner joints that put the palm over a grasp frame, wrist straight, near the present yaw."""
+    def base_joints(self, grasp: GraspFrame, closing: Closing, above_m: float = 0.0, away_m: float = 0.0) -> Array:
+        """Positioner joints that put the palm where a closing at a grasp frame has it, wrist straight.
+
+        Args:
+            grasp: the grasp frame.
+            closing: how the hand stands there.
+            above_m: so far above it.
+            away_m: so far back along the closing's approach.
+
+        Returns:
+            Shape (6,), metres and radians, near the present yaw.
+        """
         raised = Pose3(Rot3(), np.array([0.0, 0.0, above_m]))
-        world_T_palm = raised * grasp.pose * closing.grasp_T_palm
+        back = Pose3(Rot3(), -away_m * np.array(closing.approach))
+        world_T_palm = raised * grasp.pose * back * closing.grasp_T_palm
         mount_T_forearm = self.runtime.world_T_mount.inverse() * world_T_palm * _STRAIGHT_WRIST.inverse()
         return np.asarray(mount_joints(mount_T_forearm, float(self._base_q[3])))
 
@@ -155,6 +171,13 @@ class Motion:
         q = self._base_q.copy()
         q[:3] += self.runtime.world_T_mount.rotation().unrotate(np.array([0.0, 0.0, height_m]))
         self.move_base(q, speed_m_s, np.inf)
+
+    def climb(self, q: Array, speed_m_s: float) -> None:
+        """Straight up to the height of ``q``, shape (6,), if the positioner is lower: up, before it goes over."""
+        up_m = self.runtime.world_T_mount.rotation().unrotate(np.array([0.0, 0.0, 1.0]))
+        missing_m = float(up_m @ (q[:3] - self._base_q[:3]))
+        if missing_m > _LEVEL_m:
+            self.rise(missing_m, speed_m_s)
 
     def probe_base(self, q: Array, speed_m_s: float, met: Callable[[], bool]) -> bool:
         """Even move toward ``q`` that turns back where something is met.

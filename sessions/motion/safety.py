@@ -56,7 +56,7 @@ class SafetySettings(StrictModel):
     tip_stale_s: float = Field(default=0.2, gt=0.0)
     warm_C: float = Field(default=50.0, gt=0.0)
     warm_scale: float = Field(default=0.5, gt=0.0, le=1.0)
-    palm_minimum_height_m: float = Field(default=0.08, ge=0.0)
+    palm_minimum_height_m: float = Field(default=0.05, ge=0.0)
     workspace_radius_m: float = Field(default=0.45, gt=0.0)
     workspace_centre_m: tuple[float, float] = (0.0, 0.0)
     object_radius_m: float = Field(default=0.25, gt=0.0)

@@ -14,12 +14,28 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivers.core.contacts import FINGERS, Array
-from drivers.shadow.closing.closing import Closing, closing
+from drivers.shadow.closing.closing import Closing, closing, sideways
+from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import TipEllipsoid
 from drivers.shadow.closing.tip_motion import motor_rates
 from sessions.motion.cycle_settings import CycleSettings, TouchSettings
+from sessions.motion.guard import Guard
 from sessions.motion.motion import GraspFrame, Motion
 from sessions.perception.approach_paths import TipSurface
+
+
+@dataclass(frozen=True)
+class SideTouch:
+    """What a touch from the side has met: places and outward normals, shape (n, 3) each, world frame.
+
+    Where an object gave way before a contact was captured, the fingertips' foremost places stand for it.
+    """
+
+    points_m: Array
+    normals: Array
+
+    def __len__(self) -> int:
+        return len(self.points_m)
 
 
 @dataclass(frozen=True)
@@ -53,10 +69,27 @@ ROW = Pattern(
 )
 """The four fingers in a row, the thumb beside them 100 mm above the table."""
 
+COLUMN = Pattern("pinch", {"FF": 0.75, "MF": 0.75, "RF": 0.75, "LF": 0.75, "TH": 0.0})
+"""The four fingers in a row; with the palm upright one above the other, the open thumb beside them."""
+
 _DOWN, _BACK = np.array([0.0, 0.0, -1.0]), np.array([-1.0, 0.0, 0.0])
+
+_FINGERS_HANG_m = 0.125
+"""Below the palm's origin, when the palm faces down."""
 
 TAP_HEIGHT_m = 0.022
 """Of the closing's table; the positioner does the rest of the height."""
+
+
+def travel_height_m(table: Closing, motion: Motion, cycle: CycleSettings, tip: TipEllipsoid) -> float:
+    """How far above a grasp the hand travels, all of it above the tallest thing that may stand on the table.
+
+    A palm that is upright turns over on its way to other grasps: the fingers then hang below it.
+    """
+    lowest_m = open_hand(table.name, table.height_m, tip).lowest_m
+    if table.is_sideways:
+        lowest_m = min(lowest_m, float(table.grasp_T_palm.z()) - _FINGERS_HANG_m)
+    return max(cycle.lift_m, motion.tallest_m + cycle.clearance_m - lowest_m)
 
 
 class Toucher:
@@ -70,29 +103,93 @@ class Toucher:
 
     def __init__(self, motion: Motion, cycle: CycleSettings, tip: TipEllipsoid) -> None:
         self._motion, self._cycle, self._tip = motion, cycle, tip
+        self._guard = Guard(motion, cycle.touch.met_N, cycle.held_up_rad)
 
     @property
     def settings(self) -> TouchSettings:
         """Speeds and forces of touching."""
         return self._cycle.touch
 
+    def expect_tallest(self, height_m: float) -> None:
+        """From here on the hand travels above this height: nothing on the table is taller, as far as is known."""
+        self._motion.tallest_m = height_m
+
+    def on_top(self, height_m: float) -> None:
+        """The top was looked for, and nothing taller found: the first approach has ended well."""
+        self.expect_tallest(height_m)
+        self._motion.supervisor.on_approach()
+
     def tap(self, frame: GraspFrame) -> Array:
         """Come down on what stands under a grasp frame, lay the fingertips on it, and rise again.
+
+        Slowly from a little above the tallest thing that is known.
 
         Returns:
             Where fingertips met something, shape (n, 3), world frame.
         """
         s, table, motion = self.settings, closing(TAP.closing, TAP_HEIGHT_m, self._tip), self._motion
         self._poise(table, TAP, frame)
-        lowest_m = s.lowest_m + self._tip.semi_axes_m[2] - TAP_HEIGHT_m
+        touching_m = self._tip.semi_axes_m[2] - TAP_HEIGHT_m
+        near_m = max(s.lowest_m, motion.tallest_m + s.near_m)
         motion.runtime.begin_closing()
         found = np.empty((0, 3))
-        if self._approach(motion.base_joints(frame, table, lowest_m), s.tap_m_s):
+        near, lowest = (motion.base_joints(frame, table, m + touching_m) for m in (near_m, s.lowest_m))
+        if self._approach(near, self._cycle.descent_m_s) or self._approach(lowest, s.tap_m_s):
             self._lay_on(table, TAP, _DOWN, frame, s.force_N, s.sink_m)
             found = self._landing_points(_DOWN, frame)
-        self._capture()
-        motion.move_base(motion.base_joints(frame, table, self._cycle.lift_m), *self._travel)
+        self.capture()
+        motion.move_base(motion.base_joints(frame, table, self._above_m(table)), *self._travel)
         return found
+
+    def touch_side(
+        self, frame: GraspFrame, side: str, from_m: float, height_m: float | None = None, all_up_to_m: float = 0.0
+    ) -> SideTouch | None:
+        """Come toward the middle of a grasp frame from its left or right, palm upright, fingers one above the other.
+
+        Args:
+            frame: fingers move along its y axis, over its origin and a little beyond.
+            side: where the palm stands, one of :data:`~drivers.shadow.closing.closing.SIDES`.
+            from_m: where the fingertips begin, counted from its origin.
+            height_m: of the lowest fingertip; as low as the side allows unless given.
+            all_up_to_m: fingertips up to this height are all laid against the side; above it only the one that met it:
+                several push an object over that one leaves standing.
+
+        Returns:
+            What was touched, perhaps nothing; None where the hand could not come down.
+        """
+        s, motion = self.settings, self._motion
+        table = closing(sideways(COLUMN.closing, side), height_m or s.side_heights_m[side], self._tip)
+        lane = frame.shifted_inside(np.array([-s.row_m, 0.0]))
+        known = len(motion.runtime.perception.probed)
+        self._poise(table, COLUMN, lane, from_m)
+        begin, end = (motion.base_joints(lane, table, 0.0, away_m) for away_m in (from_m, -s.beyond_m))
+        self._guard.restart()
+        if not motion.probe_base(begin, self._cycle.beside_m_s, self._guard.is_met):
+            self._rise_over(lane, table, from_m)
+            return None
+        motion.tare(self._cycle.rest_s)
+        motion.runtime.begin_closing()
+        landed = np.empty((0, 3))
+        if self._approach(end, s.side_m_s):
+            landed = self._landing_points(np.array(table.approach), lane)
+            self._lay_on(table, COLUMN, np.array(table.approach), lane, s.rake_N, 0.0, all_up_to_m)
+            self.capture()
+        motion.move_base(begin, *self._travel)
+        self._rise_over(lane, table, from_m)
+        if contacts := motion.runtime.perception.probed[known:]:
+            points_m, normals = ([getattr(c, of) for c in contacts] for of in ("point_world_m", "normal_world"))
+            return SideTouch(np.array(points_m), np.array(normals))
+        against = -np.asarray(lane.pose.rotation().rotate(np.array(table.approach)))
+        return SideTouch(landed, np.tile(against, (len(landed), 1)))
+
+    def _rise_over(self, frame: GraspFrame, table: Closing, away_m: float) -> None:
+        """Up to where the hand may travel."""
+        above = self._motion.base_joints(frame, table, self._above_m(table), away_m)
+        self._motion.climb(above, self._cycle.travel_m_s)
+
+    def _above_m(self, table: Closing) -> float:
+        """How far above its touch the hand may travel."""
+        return travel_height_m(table, self._motion, self._cycle, self._tip)
 
     def rake(self, frame: GraspFrame, from_m: float) -> Array | None:
         """Come toward the middle of a grasp frame from its +x side, fingers in a row, until they meet something.
@@ -117,7 +214,7 @@ class Toucher:
         if self._approach(motion.base_joints(end, table), s.rake_m_s):
             self._lay_on(table, ROW, _BACK, frame, s.rake_N, 0.0)
             found = self._landing_points(_BACK, frame)
-            self._capture()
+            self.capture()
             motion.move_base(motion.base_joints(begin, table), *self._travel)
         self._rise()
         return found
@@ -153,7 +250,7 @@ class Toucher:
         if self._motion.loads_N().get("TH", 0.0) > s.met_N:
             motion.wait(self._cycle.rest_s)
             found = self._landing_points(path.direction, frame)
-            self._capture()
+            self.capture()
         progress["TH"] = path.valid[0]
         motion.blend_fingers(table, progress, self._cycle.finger_rad_s)
         self._rise()
@@ -178,20 +275,23 @@ class Toucher:
     def _travel(self) -> tuple[float, float]:
         return self._cycle.travel_m_s, self._cycle.turn_rad_s
 
-    def _poise(self, table: Closing, pattern: Pattern, frame: GraspFrame) -> None:
+    def _poise(self, table: Closing, pattern: Pattern, frame: GraspFrame, away_m: float = 0.0) -> None:
         """The hand above a grasp frame, fingers as they should touch, its sensors tared."""
         motion, cycle = self._motion, self._cycle
+        above = motion.base_joints(frame, table, self._above_m(table), away_m)
+        motion.climb(above, cycle.travel_m_s)
         motion.blend_fingers(table, pattern.progress, cycle.finger_rad_s, pattern.aside(table))
-        motion.move_base(motion.base_joints(frame, table, cycle.lift_m), *self._travel)
+        motion.move_base(above, *self._travel)
         motion.tare(cycle.rest_s)
 
     def _approach(self, goal: Array, speed_m_s: float) -> bool:
-        """Toward ``goal`` until a fingertip meets something; the positioner then stands where it is."""
+        """Toward ``goal`` until the hand meets something; the positioner then stands where it is."""
         motion = self._motion
+        self._guard.restart()
         for q in motion.line(goal, speed_m_s):
             motion.set_base(q)
             motion.tick()
-            if self._is_met():
+            if self._guard.is_met():
                 motion.set_base(motion.runtime.perception.base_q)
                 return True
         return False
@@ -204,6 +304,7 @@ class Toucher:
         frame: GraspFrame,
         force_N: float,
         sink_m: float,
+        up_to_m: float = np.inf,
     ) -> None:
         """Every fingertip moves along a direction until it touches as it should, or has gone as far as it may.
 
@@ -212,12 +313,13 @@ class Toucher:
         """
         s, motion = self.settings, self._motion
         rates = motor_rates(table, pattern.progress, direction_grasp, self._tip)
+        rates = {f: motors for f, motors in rates.items() if f in self._guard.met or self._height_m(f) <= up_to_m}
         gone_m = dict.fromkeys(rates, 0.0)
         sinking = self._sinking(direction_grasp, frame, sink_m)
         for _ in motion.shares(s.press_s):
             if max(self._motion.loads_N().values(), default=0.0) < s.most_N:
                 motion.set_base(next(sinking))
-            for finger, load_N in self._motion.loads_N().items():
+            for finger, load_N in ((f, load_N) for f, load_N in self._motion.loads_N().items() if f in rates):
                 step_m = s.gain * float(np.clip(force_N - load_N, -1.0, 1.0)) * motion.cycle_s
                 gone_m[finger] = float(np.clip(gone_m[finger] + step_m, -s.reach_m, s.reach_m))
             aside = pattern.aside(table)
@@ -225,6 +327,9 @@ class Toucher:
                 aside |= {motor: rate * gone_m[finger] for motor, rate in rates[finger].items()}
             motion.set_fingers(table, pattern.progress, aside)
             motion.tick()
+
+    def _height_m(self, finger: str) -> float:
+        return float(self._motion.tip_centre_world_m(finger, self._tip)[2])
 
     def _sinking(self, direction_grasp: Array, frame: GraspFrame, sink_m: float) -> Iterator[Array]:
         """Positioner targets while the fingertips are laid on, one for each cycle in which the hand may move."""
@@ -234,7 +339,8 @@ class Toucher:
         for share in motion.shares(self.settings.press_s):
             yield start + min(1.0, 2.0 * share) * sink_m * way
 
-    def _capture(self) -> None:
+    def capture(self) -> None:
+        """Keep what the fingertips feel now for the next grasp."""
         motion = self._motion
         motion.runtime.begin_capture()
         motion.wait(self.settings.capture_s)

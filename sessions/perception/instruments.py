@@ -45,6 +45,12 @@ def warmest_C(reading: object) -> float | None:
     return float(motors.temperature_C[known].max())
 
 
+def motor_torques(reading: object) -> Array | None:
+    """Strain-gauge counts of the motors in a sample of the hand, shape (20,); None before all have told theirs."""
+    torques = getattr(getattr(reading, "motor", None), "torque", None)
+    return torques if isinstance(torques, np.ndarray) and np.isfinite(torques).all() else None
+
+
 class BaseReading(Protocol):
     """Joint positions of the positioner, shape (6,), metres and radians."""
 

@@ -184,6 +184,11 @@ class Perception:
         return {finger: self.fingertips[finger].void() or "its load is no number" for finger in void}
 
     @property
+    def probed(self) -> tuple[Contact, ...]:
+        """Contacts of touches without a grasp; they wait for the next grasp, and are forgotten with the next hold."""
+        return tuple(self._probed.contacts)
+
+    @property
     def dropped(self) -> dict[str, str]:
         """Fingers without a contact in the last grasp, and why; what a sensor says of itself is in problems()."""
         return self._selection.dropped

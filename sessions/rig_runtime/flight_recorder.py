@@ -27,6 +27,7 @@ class CycleSnapshot:
         force_ranges_N: calibrated range of the fingertips' sensors, smallest axis.
         warmest_C: temperature of the hand's warmest motor; None while none is known.
         void_tips: why fingertips tell no force, in words, by finger.
+        motor_torques: what the strain gauges of the motors show, counts, shape (20,); None where a hand tells none.
     """
 
     stamp_ns: int
@@ -37,6 +38,7 @@ class CycleSnapshot:
     force_ranges_N: Mapping[str, float] = field(default_factory=dict)
     warmest_C: float | None = None
     void_tips: Mapping[str, str] = field(default_factory=dict)
+    motor_torques: Array | None = None
 
     def plain(self) -> dict[str, Any]:
         """As plain data; ages in milliseconds."""

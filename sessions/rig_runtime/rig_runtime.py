@@ -26,6 +26,7 @@ from sessions.perception.instruments import (
     HandInstrument,
     PolledInstrument,
     WatchingCamera,
+    motor_torques,
     warmest_C,
 )
 from sessions.perception.interpreter import HAND_LINK, Observer, fingertip_link
@@ -199,6 +200,7 @@ class RigRuntime:
             force_ranges_N=self._force_ranges_N,
             warmest_C=None if hand is None else warmest_C(hand.sample),
             void_tips=seen.void_tips(),
+            motor_torques=None if hand is None else motor_torques(hand.sample),
         )
 
     def run(self, duration_ns: int) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from drivers.shadow.closing.posture import TipEllipsoid
 from sessions.conductor.decisions import SessionRoles
 from sessions.conductor.policy_decisions import Approve, PolicyDecisions, approve_everything, record_choices
-from sessions.motion.bounding_box import BoxProber
+from sessions.motion.box_prober import BoxProber
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_cycle import GraspCycle
 from sessions.motion.motion import Motion
@@ -21,6 +21,7 @@ from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSetting
 from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.policy_choice import PolicyChooser
 from tactile_lab.autonomy.settings import SessionSettings
+from tactile_lab.autonomy.side_planner import SideReach
 from tactile_lab.autonomy.slam_service import SlamService
 from tactile_lab.autonomy.variance_planner import ExplorationSettings
 from tactile_lab.slam.exploration.policies import make_policy
@@ -57,8 +58,6 @@ def autonomous_roles(
     client = client_for(runtime.clock, SlamService(slam, planner), cycle.idle)
     guard = InterruptGuard()
     decisions = PolicyDecisions(client, record_choices(runtime), approve, guard)
-    if not settings.probing.enabled:
-        return SessionRoles(supervisor, cycle, decisions, client, guard=guard)
     prober = BoxProber(Toucher(motion, settings.cycle, tip), settings.probing, window, settings.plan.start_m)
     return SessionRoles(supervisor, cycle, decisions, client, prober.feel, guard)
 
@@ -74,7 +73,17 @@ def planner_for(slam: TactileSlam, settings: SessionSettings, tip: TipEllipsoid,
     if policy := settings.exploration.policy:
         limits = settings.plan, settings.exploration, settings.cycle, settings.safety
         chooser = chooser_for(policy, limits, tip, dimension, slam.settings.motion, seed)
-    return Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension, chooser, settings.grasps)
+    return Planner(
+        slam,
+        rule,
+        settings.exploration,
+        settings.fixed_grasps,
+        tip,
+        dimension,
+        chooser,
+        settings.grasps,
+        SideReach(settings.safety.workspace_radius_m, settings.safety.workspace_centre_m, settings.cycle.standoff_m),
+    )
 
 
 def tip_shape(runtime: RigRuntime) -> TipEllipsoid:

@@ -142,7 +142,8 @@ class HeuristicPlanner:
 
     def taps(self, index: int) -> bool:
         """Whether the grasp begins with a tap on the top."""
-        return self._wants_top and self.settings.tap_every > 0 and index % self.settings.tap_every == 0
+        felt = index == 0 and self.top_m is not None
+        return self._wants_top and not felt and self.settings.tap_every > 0 and index % self.settings.tap_every == 0
 
     def height_m(self, index: int) -> float:
         """The contact height whose turn it is, among those at which the hand has room over the object."""

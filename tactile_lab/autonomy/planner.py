@@ -17,6 +17,7 @@ from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import GraspFrame
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.autonomy.policy_choice import Choice, Knowledge, PolicyChooser
+from tactile_lab.autonomy.side_planner import SidePlanner, SideReach
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, choose_grasp, known_shape
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
@@ -32,6 +33,10 @@ _LEAST_BY_POLICY = 2
 """A policy may be after few contacts; with fewer than that the object is not where it was expected."""
 
 
+HIGHEST_FROM_ABOVE_m = 0.08
+"""What is taller is grasped from the side: the knuckles would come down on it."""
+
+
 class Planner:
     """Where to grasp, and how to carry the object then.
 
@@ -44,6 +49,7 @@ class Planner:
         dimension: the estimation's, 2 or 3.
         chooser: the policy that chooses where there is an estimate; None for the reward of equation 4.20 alone.
         grasps: how many the session may make, for the policy.
+        reach: of the palm, for grasps from the side.
     """
 
     def __init__(
@@ -56,6 +62,7 @@ class Planner:
         dimension: int,
         chooser: PolicyChooser | None = None,
         grasps: int | None = None,
+        reach: SideReach | None = None,
     ) -> None:
         self._slam, self._rule, self._exploration = slam, rule, exploration
         self._fixed_grasps, self._tip, self._dimension = fixed_grasps, tip, dimension
@@ -68,6 +75,11 @@ class Planner:
         self._here: GraspFrame | None = None
         self._carried = False
         self._box: BoundingBox | None = None
+        self._reach = reach or SideReach()
+        self._beside: SidePlanner | None = None
+        """Plans where the object is too tall for the palm to pass over."""
+        self.exhausted = ""
+        """Why nothing is left to do, in words; empty while there is something."""
         self.choice: Choice | None = None
         """The policy's decision about the grasp that comes next; None where the policy was not asked."""
 
@@ -89,6 +101,8 @@ class Planner:
         After a grasp that the estimate had chosen and that missed the object with some fingers, the contacts' own
         word counts for one grasp.
         """
+        if self._beside is not None:
+            return self._from_the_side(index, self._beside)
         trusted, self.choice = index >= self._fixed_grasps and not self._doubted, None
         if trusted and self._chooser is not None:
             return self._by_policy(index, self._chooser)
@@ -96,8 +110,16 @@ class Planner:
         self._by_estimate = chosen is not None
         return replace(chosen or self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
 
+    def _from_the_side(self, index: int, beside: SidePlanner) -> GraspPlan:
+        plan = beside.plan()
+        self.exhausted = "" if plan is not None else beside.exhausted
+        return plan or self._rule.plan(index)
+
     def replan(self, index: int) -> GraspPlan:
         """Another plan for the same grasp, after a person has refused the last one."""
+        if self._beside is not None:
+            self._beside.on_blocked()
+            return self._from_the_side(index, self._beside)
         if self.choice is None or self.choice.decision.chosen is None:
             plan = replace(self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
             return replace(plan, reason=f"{plan.reason}, as the last was vetoed")
@@ -135,13 +157,21 @@ class Planner:
 
         It counts until the estimate takes over: every time the object is carried it slips within the box.
         """
+        if box.top_m is not None:
+            self._rule.top_m = box.top_m
+        if not box.has_sides:
+            return
         self._box = box
         if box.is_found:
             self._rule.centre_m = box.centre_world_m
+        if box.top_m is not None and box.top_m > HIGHEST_FROM_ABOVE_m:
+            self._beside = SidePlanner(box, self._tip, self._rule.settings.yaw_window_rad, self._reach)
 
     def on_landings(self, points_world_m: list[Array]) -> None:
         """Take note of where fingertips stood on the object; it counts until the object has been moved."""
         self._landings_m += points_world_m
+        if self._beside is not None and points_world_m:
+            self._beside.on_blocked()
 
     def _best_by_estimate(self, index: int) -> GraspPlan | None:
         known, expected = self.known_shape(), self._expected_pose()
@@ -175,6 +205,11 @@ class Planner:
 
     def on_grasp(self, grasp: Grasp, plan: GraspPlan) -> Reorientation:
         """Take note of a captured grasp; how the object should be carried from there."""
+        if self._beside is not None:
+            self._beside.on_grasp(grasp)
+            self._rule.centre_m = self._beside.middle_m
+            self._hand_motion, self._here = Pose3(), plan.frame
+            return Reorientation(0.0, np.zeros(2))
         least = self._exploration.least_contacts if self._chooser is None else _LEAST_BY_POLICY
         self._doubted = self._by_estimate and len(grasp.touching) < least
         if grasp.touching and (self._doubted or not self._by_estimate):
@@ -225,7 +260,7 @@ class Planner:
         if self._chooser is not None and not is_placed:
             self._chooser.on_unplaced_grasp()
         known, expected = self.known_shape(), self._expected_pose()
-        trusted = index + 1 >= self._fixed_grasps and not self._doubted
+        trusted = index + 1 >= self._fixed_grasps and not self._doubted and self._beside is None
         if trusted and known is not None and expected is not None:
             self._box = None
             self._rule.centre_m = np.asarray(expected.transformFrom(known.centre_m))

@@ -42,11 +42,14 @@ class SlamService:
 
     def plan(self, index: int) -> PlannedGrasp:
         """As :meth:`Planner.plan`."""
-        return PlannedGrasp(self.planner.plan(index), self.planner.choice)
+        return self._planned(self.planner.plan(index))
 
     def replan(self, index: int) -> PlannedGrasp:
         """As :meth:`Planner.replan`."""
-        return PlannedGrasp(self.planner.replan(index), self.planner.choice)
+        return self._planned(self.planner.replan(index))
+
+    def _planned(self, plan: GraspPlan) -> PlannedGrasp:
+        return PlannedGrasp(plan, self.planner.choice, self.planner.exhausted)
 
     def centre_m(self) -> Array:
         """As :attr:`Planner.centre_m`."""

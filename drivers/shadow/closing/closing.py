@@ -13,7 +13,7 @@ and kept in memory.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -26,7 +26,10 @@ from drivers.shadow.closing.posture import LONG_FINGERS, NODES, TipEllipsoid, fi
 Point = tuple[float, float]
 
 LOWEST_m, HIGHEST_m = 0.015, 0.12
-"""Heights of the fingertips' centres above the table at which the hand can work."""
+"""Heights of the fingertips' centres above the table at which the hand can work from above."""
+
+HIGHEST_SIDEWAYS_m = 0.25
+"""The same where the palm is upright: as tall as objects may be."""
 
 
 @dataclass(frozen=True)
@@ -63,13 +66,14 @@ class Closing:
     """One way to close the hand at one height.
 
     Attributes:
-        name: a key of :data:`PRESHAPES` or :data:`LEANING`.
+        name: one of :data:`CLOSINGS`.
         height_m: height of the fingertip centres above the table; where the hand leans, of the lowest one.
         radius_m: of the fingertips, across the finger.
         grasp_T_palm: the palm in the grasp frame, wrist straight.
         paths: each finger's line.
         tables: each finger's joint angles along its line, shape (NODES, joints of the finger), radians, in the order
             of :func:`finger_joints`.
+        approach: unit direction in which the open hand comes to the grasp, grasp frame.
     """
 
     name: str
@@ -78,6 +82,12 @@ class Closing:
     grasp_T_palm: Pose3
     paths: Mapping[str, TipPath]
     tables: Mapping[str, Array]
+    approach: tuple[float, float, float] = (0.0, 0.0, -1.0)
+
+    @property
+    def is_sideways(self) -> bool:
+        """Whether the hand comes from the side, its palm upright."""
+        return self.approach[2] == 0.0
 
     def path(self, finger: str) -> TipPath:
         """The line of one finger's tip centre in the grasp frame, with its valid range."""
@@ -160,11 +170,29 @@ class Leaning:
 
 LEANING: Mapping[str, Leaning] = {"aside": Leaning("pinch", 0.028, float(np.deg2rad(25.0)))}
 """Closings with the fingers one above the other. A lean of 40 degrees brings the fingers so far above the thumb that
-they tip a box over by 6 degrees on the simulated rig, one of 25 degrees leaves it standing; a palm that stood upright
-could come no lower than 56 mm, as the forearm is 100 mm thick."""
+they tip a box over by 6 degrees where the hand comes straight down, one of 25 degrees leaves it standing."""
 
-CLOSINGS = frozenset({*PRESHAPES, *LEANING})
+_LOW_m = {"pinch": 0.028, "radial": 0.022}  # postures of low grasps: the palm is as far from the fingertips in all
+
+SIDEWAYS: Mapping[str, Leaning] = {
+    f"{upright}-from-{side}": Leaning(upright, height_m, lean_rad)
+    for upright, height_m in _LOW_m.items()
+    for side, lean_rad in (("left", np.pi / 2), ("right", -np.pi / 2))
+}
+"""Closings with the palm upright, the fingertips one above the other. The hand comes along the grasp frame's -y axis
+from its left, first finger down, or along +y from its right, first finger up (decision 42). The forearm, 100 mm thick,
+keeps the lowest fingertip at 18 mm from the left and at 30 mm from the right."""
+
+SIDES = ("left", "right")
+"""Where the palm may stand in a closing of :data:`SIDEWAYS`, seen along the grasp frame's x axis."""
+
+CLOSINGS = frozenset({*PRESHAPES, *LEANING, *SIDEWAYS})
 """Names of all closings."""
+
+
+def sideways(upright: str, side: str) -> str:
+    """The name of an upright closing taken from the left or the right."""
+    return f"{upright}-from-{side}"
 
 
 @lru_cache(maxsize=64)
@@ -178,13 +206,17 @@ def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Clos
     """
     if name not in CLOSINGS:
         raise ConfigurationError(f"no closing called {name!r}", hint=f"Choose from {', '.join(sorted(CLOSINGS))}")
-    if not LOWEST_m <= height_m <= HIGHEST_m:
-        allowed = f"{LOWEST_m * 1e3:.0f} to {HIGHEST_m * 1e3:.0f} mm"
+    highest_m = HIGHEST_SIDEWAYS_m if name in SIDEWAYS else HIGHEST_m
+    if not LOWEST_m <= height_m <= highest_m:
+        allowed = f"{LOWEST_m * 1e3:.0f} to {highest_m * 1e3:.0f} mm"
         raise ConfigurationError(
             f"contact height {height_m * 1e3:.0f} mm is outside {allowed}", hint="Choose a height in that range"
         )
     if name in LEANING:
-        return _leaning(name, height_m, tip)
+        return _leaning(name, LEANING[name], height_m, tip)
+    if name in SIDEWAYS:
+        side = 1.0 if SIDEWAYS[name].lean_rad > 0.0 else -1.0
+        return replace(_leaning(name, SIDEWAYS[name], height_m, tip), approach=(0.0, -side, 0.0))
     starts_m, ends_m = (
         np.array([(*points[finger], height_m) for finger in FINGERS])
         for points in (PRESHAPES[name].starts_m, PRESHAPES[name].ends_m)
@@ -197,9 +229,9 @@ def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Clos
     return Closing(name, height_m, tip.radius_m, postures.grasp_T_palm, paths, postures.tables_rad)
 
 
-def _leaning(name: str, height_m: float, tip: TipEllipsoid | None) -> Closing:
-    upright = closing(LEANING[name].upright, LEANING[name].height_m, tip)
-    turn, middle_m = Rot3.Rx(-LEANING[name].lean_rad), np.array([0.0, 0.0, upright.height_m])
+def _leaning(name: str, leaning: Leaning, height_m: float, tip: TipEllipsoid | None) -> Closing:
+    upright = closing(leaning.upright, leaning.height_m, tip)
+    turn, middle_m = Rot3.Rx(-leaning.lean_rad), np.array([0.0, 0.0, upright.height_m])
     lowest_m = min(float(turn.rotate(path.start_m - middle_m)[2]) for path in upright.paths.values())
     lean = Pose3(turn, np.array([0.0, 0.0, height_m - lowest_m]) - turn.rotate(middle_m))
     paths = {

@@ -1,0 +1,39 @@
+"""What ends a guarded motion: a fingertip that feels, a joint that is held up, a motor that works against something."""
+
+from __future__ import annotations
+
+from sessions.motion.link_watch import LinkWatch
+from sessions.motion.motion import Motion
+
+LINKS = "links"
+"""Stands for whatever link it was, where no finger tells."""
+
+
+class Guard:
+    """Watches one even motion after the other.
+
+    Args:
+        motion: whose last cycle is looked at.
+        force_N: on a fingertip.
+        held_up_rad: angle by which a joint falls behind.
+    """
+
+    def __init__(self, motion: Motion, force_N: float, held_up_rad: float) -> None:
+        self._motion, self._force_N, self._held_up_rad = motion, force_N, held_up_rad
+        self._links = LinkWatch()
+        self.met: tuple[str, ...] = ()
+        """What met something in the last motion: fingers, or :data:`LINKS`."""
+
+    def restart(self) -> None:
+        """A new motion begins."""
+        self._links.restart()
+        self.met = ()
+
+    def is_met(self) -> bool:
+        """Look at the last cycle; whether the hand has met anything since the motion began."""
+        tips = [finger for finger, load_N in self._motion.loads_N().items() if load_N > self._force_N]
+        found = (*tips, *self._motion.bent(self._held_up_rad))
+        if self._links.is_touched(self._motion.motor_torques):
+            found = (*found, LINKS)
+        self.met = tuple(dict.fromkeys((*self.met, *found)))
+        return bool(self.met)

@@ -1,0 +1,104 @@
+"""Whether a hand with its palm upright comes to a standing box, and which fingertips would meet it there.
+
+All that is known of the object is the box that was felt. The open hand, palm and forearm included, has to come along
+its approach clear of box and table; then each finger closes, and its tip has to meet the box before a link of it does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivers.core.contacts import FINGERS, Array
+from drivers.shadow.closing.closing import closing
+from drivers.shadow.closing.collision_spheres import link_balls
+from drivers.shadow.closing.hand_envelope import open_hand
+from drivers.shadow.closing.posture import PROGRESS, TipEllipsoid
+from sessions.motion.grasp_plan import GraspPlan
+
+_APPROACH_m = (0.0, 0.02, 0.05, 0.09, 0.13)
+"""Places of the approach that are looked at, before its end."""
+
+_CLEAR_m, _CLEAR_CLOSING_m = 0.004, 0.002
+_LEAST_FINGERS = 3
+
+
+@dataclass(frozen=True)
+class StandingBox:
+    """An upright box on the table.
+
+    Attributes:
+        x_m, y_m, yaw_rad: of its middle, world.
+        size_m: full sizes along its own axes and up.
+    """
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    size_m: tuple[float, float, float]
+
+    def grow(self, side_m: float, top_m: float) -> StandingBox:
+        """With every side farther out, and the top higher; less where that is negative."""
+        x, y, z = self.size_m
+        sizes = (max(x + 2 * side_m, 0.004), max(y + 2 * side_m, 0.004), max(z + top_m, 0.004))
+        return replace(self, size_m=sizes)
+
+    def half_along_m(self, direction: Array) -> float:
+        """From its middle to where it ends along a horizontal unit vector, shape (2,), world."""
+        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        return float(abs(direction @ [c, s]) * self.size_m[0] + abs(direction @ [-s, c]) * self.size_m[1]) / 2
+
+    def distances_m(self, places_m: Array) -> Array:
+        """Of world places (..., 3) to its surface, negative inside, shape (...)."""
+        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        x, y, z = np.moveaxis(places_m - [self.x_m, self.y_m, self.size_m[2] / 2], -1, 0)
+        beyond = np.abs(np.stack([c * x + s * y, -s * x + c * y, z], axis=-1)) - np.array(self.size_m) / 2
+        return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(axis=-1), 0.0))
+
+
+def is_way_clear(plan: GraspPlan, tip: TipEllipsoid, box: StandingBox) -> bool:
+    """Whether the open hand comes along its approach with nothing of it in the box or the table."""
+    hand, table = open_hand(plan.closing, plan.height_m, tip), closing(plan.closing, plan.height_m, tip)
+    if hand.lowest_m < _CLEAR_m:
+        return False
+    offsets_m = -np.array(_APPROACH_m)[:, None, None] * np.array(table.approach)
+    return bool((box.distances_m(_to_world(plan, hand.centres_m + offsets_m)) - hand.radii_m).min() >= _CLEAR_m)
+
+
+def expected_touches(plan: GraspPlan, tip: TipEllipsoid, box: StandingBox, surely: StandingBox) -> dict[str, Array]:
+    """Where fingertips would meet the box, world, shape (3,), by finger; none where a link would meet it first.
+
+    Args:
+        plan: of the grasp.
+        tip: shape of the fingertips.
+        box: nothing but fingertips may meet it.
+        surely: a fingertip counts only if it meets this smaller box too.
+    """
+    table, links = closing(plan.closing, plan.height_m, tip), link_balls(plan.closing, plan.height_m, tip)
+    tips_m = np.array([[table.path(finger).centre_m(u) for finger in FINGERS] for u in PROGRESS])
+    tips_world_m = _to_world(plan, tips_m)
+    meets = (box.distances_m(tips_world_m) < tip.radius_m) & links.usable
+    surely_meets = (surely.distances_m(tips_world_m) < tip.radius_m) & links.usable
+    link_places_m = _to_world(plan, links.centres_m)
+    in_something = box.distances_m(link_places_m) < links.radii_m + _CLEAR_CLOSING_m
+    in_something |= link_places_m[..., 2] < links.radii_m + _CLEAR_CLOSING_m
+    found = {}
+    for index, finger in enumerate(FINGERS):
+        stops = int(np.argmax(meets[:, index])) if meets[:, index].any() else len(PROGRESS) - 1
+        passed = links.usable[: stops + 1, index]
+        if in_something[: stops + 1][:, links.fingers == index][passed].any():
+            return {}
+        if surely_meets[:, index].any():
+            found[finger] = tips_world_m[stops, index] + tip.radius_m * _direction_world(plan, table.path(finger).direction)
+    return found if "TH" in found and len(found) >= _LEAST_FINGERS else {}
+
+
+def _direction_world(plan: GraspPlan, direction_grasp: Array) -> Array:
+    return np.asarray(plan.frame.pose.rotation().rotate(direction_grasp))
+
+
+def _to_world(plan: GraspPlan, places_m: Array) -> Array:
+    """Places (..., 3) of the grasp frame in the world."""
+    pose = plan.frame.pose.matrix()
+    return np.asarray(places_m @ pose[:3, :3].T + pose[:3, 3])
