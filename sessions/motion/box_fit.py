@@ -31,7 +31,7 @@ def fit_box(points_m: Array, normals: Array) -> tuple[Pose2, Array, Array]:
     """
     turns = np.arange(_TURNS) * (np.pi / 2 / _TURNS) - np.pi / 4
     turn = float(turns[np.argmin([_misfit(points_m[:, :2], normals[:, :2], float(t)) for t in turns])])
-    world_T_box = Pose2(*np.mean(points_m[:, :2], axis=0), turn)
+    world_T_box = Pose2(float(points_m[:, 0].mean()), float(points_m[:, 1].mean()), turn)
     places = np.array([world_T_box.transformTo(point) for point in points_m[:, :2]])
     return world_T_box, places.min(axis=0), places.max(axis=0)
 

@@ -46,7 +46,9 @@ class ProbingSettings(StrictModel):
     """How the bounding box is felt.
 
     Attributes:
-        enabled: feel the sides of what the palm passes over too; else only the top, and the sides of what is taller.
+        top: feel how tall the object is before anything else, and the sides of what the palm does not pass over. Only
+            where nothing tall is ever put on the table can that be left out.
+        enabled: feel the sides of what the palm passes over too.
         highest_m: as tall an object may be; the hand travels above that until it has felt the top.
         search_m: how far from where the object is expected the search begins on every side.
         lanes_m: offsets of the lanes across the direction of a rake; two lie no farther apart than the row is wide.
@@ -56,6 +58,7 @@ class ProbingSettings(StrictModel):
         around_m: how far beside its place the object's top is looked for where nothing was met.
     """
 
+    top: bool = True
     enabled: bool = False
     highest_m: float = Field(default=0.25, gt=0.0)
     search_m: float = Field(default=0.13, gt=0.0)
@@ -64,6 +67,11 @@ class ProbingSettings(StrictModel):
     margin_m: float = Field(default=0.008, ge=0.0)
     tallest_m: float = Field(default=0.08, gt=0.0)
     around_m: float = Field(default=0.05, gt=0.0)
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether anything is felt before the first grasp."""
+        return self.top or self.enabled
 
 
 class BoxProber:

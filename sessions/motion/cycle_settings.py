@@ -28,8 +28,8 @@ class TouchSettings(StrictModel):
         beyond_m: how far beyond the middle a rake goes.
         lowest_m: height of the fingertips over the table where a tap has missed the object.
         side_m_s: speed toward an object's side, palm upright; a stiff fingertip reaches 0.45 N at 20 mm/s.
-        side_heights_m: height of the lowest fingertip in such a touch, by where the palm stands. The forearm lets it
-            come no lower; from higher up it would tip objects over.
+        side_heights_m: height of the lowest fingertip in such a touch, the palm on the left and on the right. The
+            forearm lets it come no lower; from higher up it would tip objects over.
     """
 
     tap_m_s: float = Field(default=0.04, gt=0.0)
@@ -49,7 +49,7 @@ class TouchSettings(StrictModel):
     beyond_m: float = Field(default=0.030, ge=0.0)
     lowest_m: float = Field(default=0.012, ge=0.0)
     side_m_s: float = Field(default=0.015, gt=0.0)
-    side_heights_m: dict[str, float] = {"left": 0.020, "right": 0.032}
+    side_heights_m: tuple[float, float] = (0.020, 0.032)
 
 
 class CycleSettings(StrictModel):

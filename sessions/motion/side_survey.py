@@ -6,7 +6,7 @@ as nearly as the arm's yaw window allows; the normals of what is touched tell ho
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -57,15 +57,24 @@ class SideSurvey:
             top_m: height of the top.
             stop: asked before each side whether to leave the rest out.
         """
-        found: list[SideTouch] = []
+        found: dict[str, SideTouch] = {}
         missing: dict[str, str] = {}
         for name, yaw_rad, side in self._directions():
             felt = "interrupted" if stop() else self._feel_side(centre_m, yaw_rad, side)
             if isinstance(felt, str):
                 missing[name] = felt
             else:
-                found.append(felt)
-        return self._box(found, centre_m, top_m, missing)
+                found[name] = felt
+            if set(found) == set(SIDES):
+                centre_m = self._between(found, centre_m)
+        return self._box(list(found.values()), centre_m, top_m, missing)
+
+    def _between(self, found: Mapping[str, SideTouch], centre_m: Array) -> Array:
+        """The middle between left and right: fingers of a tap often meet one part of a top only."""
+        yaw = float(np.mean(self._window_rad))
+        across = np.array([-np.sin(yaw), np.cos(yaw)])
+        middle_m = np.mean([(touch.points_m[:, :2] @ across).mean() for touch in found.values()])
+        return np.asarray(centre_m + (middle_m - centre_m @ across) * across)
 
     def _directions(self) -> list[tuple[str, float, str]]:
         """Where the object is touched, the yaw of the hand for that, and the side of its palm."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivers.core.contacts import FINGERS, Array
-from drivers.shadow.closing.closing import Closing, closing, sideways
+from drivers.shadow.closing.closing import SIDES, Closing, closing, sideways
 from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import TipEllipsoid
 from drivers.shadow.closing.tip_motion import motor_rates
@@ -158,7 +158,7 @@ class Toucher:
             What was touched, perhaps nothing; None where the hand could not come down.
         """
         s, motion = self.settings, self._motion
-        table = closing(sideways(COLUMN.closing, side), height_m or s.side_heights_m[side], self._tip)
+        table = closing(sideways(COLUMN.closing, side), height_m or s.side_heights_m[SIDES.index(side)], self._tip)
         lane = frame.shifted_inside(np.array([-s.row_m, 0.0]))
         known = len(motion.runtime.perception.probed)
         self._poise(table, COLUMN, lane, from_m)

@@ -58,6 +58,8 @@ def autonomous_roles(
     client = client_for(runtime.clock, SlamService(slam, planner), cycle.idle)
     guard = InterruptGuard()
     decisions = PolicyDecisions(client, record_choices(runtime), approve, guard)
+    if not settings.probing.is_wanted:
+        return SessionRoles(supervisor, cycle, decisions, client, guard=guard)
     prober = BoxProber(Toucher(motion, settings.cycle, tip), settings.probing, window, settings.plan.start_m)
     return SessionRoles(supervisor, cycle, decisions, client, prober.feel, guard)
 

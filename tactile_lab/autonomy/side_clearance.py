@@ -90,12 +90,9 @@ def expected_touches(plan: GraspPlan, tip: TipEllipsoid, box: StandingBox, surel
         if in_something[: stops + 1][:, links.fingers == index][passed].any():
             return {}
         if surely_meets[:, index].any():
-            found[finger] = tips_world_m[stops, index] + tip.radius_m * _direction_world(plan, table.path(finger).direction)
+            way = plan.frame.pose.rotation().rotate(table.path(finger).direction)
+            found[finger] = tips_world_m[stops, index] + tip.radius_m * np.asarray(way)
     return found if "TH" in found and len(found) >= _LEAST_FINGERS else {}
-
-
-def _direction_world(plan: GraspPlan, direction_grasp: Array) -> Array:
-    return np.asarray(plan.frame.pose.rotation().rotate(direction_grasp))
 
 
 def _to_world(plan: GraspPlan, places_m: Array) -> Array:

@@ -9,14 +9,13 @@ scanned objects put on at least three fingertips (decision 42).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from gtsam import Pose2
 
 from drivers.core.contacts import Array, Grasp
-from drivers.shadow.closing.closing import LOWEST_m, SIDES, closing, sideways
+from drivers.shadow.closing.closing import SIDES, LOWEST_m, closing, sideways
 from drivers.shadow.closing.posture import TipEllipsoid
 from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.box_fit import fit_box, on_sides
@@ -26,6 +25,9 @@ from tactile_lab.autonomy.side_clearance import StandingBox, expected_touches, i
 
 _MARGIN_m = 0.003
 """Of the box that the hand keeps out of, beyond what was touched."""
+
+_ASIDE_rad = (0.0, np.radians(30.0), np.radians(-30.0))
+"""Yaws beside those across the sides of the box: what is round has no sides."""
 
 _SURELY_m, _BELOW_TOP_m = 0.008, 0.012
 """A fingertip counts that meets a box so much smaller on its sides and at its top."""
@@ -64,11 +66,16 @@ class SideReach:
 
 @dataclass(frozen=True)
 class SideCandidate:
-    """A grasp from the side, how deep it is, and where it is expected to touch, shape (n, 3), world."""
+    """A grasp from the side, how deep it is, and where each finger is expected to touch, shape (3,), world."""
 
     plan: GraspPlan
     depth_m: float
-    touches_m: Array
+    touches: Mapping[str, Array]
+
+    @property
+    def touches_m(self) -> Array:
+        """All of these places, shape (n, 3)."""
+        return np.array(list(self.touches.values()))
 
 
 @dataclass
@@ -88,6 +95,7 @@ class SidePlanner:
     reach: SideReach
     _points_m: list[Array] = field(default_factory=list)
     _normals: list[Array] = field(default_factory=list)
+    _missed_m: list[Array] = field(default_factory=list)
     _blocked: list[tuple[GraspPlan, float]] = field(default_factory=list)
     _current: SideCandidate | None = None
     _grasps: int = 0
@@ -131,9 +139,8 @@ class SidePlanner:
         self._normals += [contact.normal_world for contact in grasp.contacts]
         points_m, normals = np.array(self._points_m).reshape(-1, 3), np.array(self._normals).reshape(-1, 3)
         beside = on_sides(normals)
-        closed = [contact for contact in grasp.contacts if not contact.probed]
-        if not closed and self._current is not None:
-            self._blocked.append((self._current.plan, self._current.depth_m))
+        if self._current is not None:
+            self._missed_m += [place for f, place in self._current.touches.items() if f not in grasp.touching]
         if np.count_nonzero(beside) >= _LEAST_FOR_BOX:
             pose, low_m, high_m = fit_box(points_m[beside], normals[beside])
             top_m = max(self.box.top_m or 0.0, float(points_m[:, 2].max()))
@@ -148,9 +155,8 @@ class SidePlanner:
 
     def _standing_box(self) -> StandingBox:
         low, high = self.box.low_m, self.box.high_m
-        middle = self.box.world_T_box.transformFrom((low + high) / 2)
-        size = (*(high - low), self.box.top_m or 0.0)
-        return StandingBox(*middle, self.box.world_T_box.theta(), (float(size[0]), float(size[1]), float(size[2])))
+        (x, y), (length_m, width_m) = self.middle_m.tolist(), (high - low).tolist()
+        return StandingBox(x, y, self.box.world_T_box.theta(), (length_m, width_m, self.box.top_m or 0.0))
 
     def _candidates(self) -> Iterator[SideCandidate]:
         """The deepest clear grasp across each side of the box, from both sides of the arm, at each height."""
@@ -166,7 +172,8 @@ class SidePlanner:
     def _yaws(self) -> list[float]:
         """Across the sides of the box, as far as the arm turns."""
         low, high = self.yaw_window_rad
-        yaws = [self.box.world_T_box.theta() + quarter * np.pi / 2 for quarter in range(-3, 4)]
+        theta = self.box.world_T_box.theta()
+        yaws = [theta + quarter * np.pi / 2 + aside for quarter in range(-3, 4) for aside in _ASIDE_rad]
         return [float(yaw) for yaw in yaws if low <= yaw <= high]
 
     def _deepest(
@@ -184,7 +191,7 @@ class SidePlanner:
             if not is_way_clear(plan, self.tip, box):
                 continue
             if touches := expected_touches(plan, self.tip, box, surely):
-                return SideCandidate(plan, float(depth_m), np.array(list(touches.values())))
+                return SideCandidate(plan, float(depth_m), touches)
         return None
 
     def _is_in_reach(self, plan: GraspPlan, way: Array) -> bool:
@@ -206,10 +213,11 @@ class SidePlanner:
     # --- what it would tell ------------------------------------------------------------------------------------
 
     def _distances_m(self, places_m: Array) -> Array:
-        """Of places (n, 3) to the nearest contact, shape (n,)."""
-        if not self._points_m:
+        """Of places (n, 3) to the nearest where a contact was, or was looked for in vain, shape (n,)."""
+        looked_m = np.array([*self._points_m, *self._missed_m]).reshape(-1, 3)
+        if not len(looked_m):
             return np.full(len(places_m), _FAR_m)
-        apart_m = np.linalg.norm(places_m[:, None] - np.array(self._points_m)[None], axis=-1)
+        apart_m = np.linalg.norm(places_m[:, None] - looked_m[None], axis=-1)
         return np.asarray(np.minimum(apart_m.min(axis=1), _FAR_m))
 
     def _novelty_m(self, touches_m: Array) -> float:

@@ -18,6 +18,7 @@ from drivers.simulation.world import SimulatedWorld
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import GraspReport, NullProgress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
+from sessions.motion.box_prober import ProbingSettings
 from sessions.motion.safety import SafetySettings
 from sessions.recording.recorder import Recorder
 from sessions.recording.session_events import EventKind, SessionEvent
@@ -91,7 +92,8 @@ def run(
     runtime = build_runtime(rig, world, Recorder(sink))
     watcher, truth = Watcher(lambda number, name: act(world, number, name)), watch_truth(runtime, world)
     carrying = ExplorationSettings(policy=None)
-    settings = SessionSettings(grasps=grasps, safety=safety or SafetySettings(), exploration=carrying)
+    at_once = ProbingSettings(top=False)
+    settings = SessionSettings(grasps=grasps, safety=safety or SafetySettings(), exploration=carrying, probing=at_once)
     runtime.connect()
     try:
         slam = TactileSlam(SlamSettings(), SEED)

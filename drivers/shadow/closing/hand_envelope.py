@@ -11,14 +11,14 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
-from gtsam import Pose3, Rot3
+from gtsam import Pose3
 
 from drivers.core.contacts import FINGERS, Array
 from drivers.core.poses import transform_points
 from drivers.shadow.closing.closing import Closing, closing
 from drivers.shadow.closing.collision_spheres import link_balls
 from drivers.shadow.closing.posture import TipEllipsoid
-from drivers.shadow.model.bodies import FOREARM, LINK_SHAPES, Ball, Capsule, Shape
+from drivers.shadow.model.bodies import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Shape
 from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS, forearm_T_palm, link_T_matrices
 
 _SPACING_m = 0.012
@@ -69,8 +69,9 @@ def _palm_and_forearm(table: Closing) -> tuple[Array, Array]:
         *((grasp_T_forearm * forearm_T_wrist, shape) for shape in LINK_SHAPES["WRJ2"]),
         *((table.grasp_T_palm, shape) for shape in LINK_SHAPES["WRJ1"]),
     ]
-    rows = [(transform_points(frame, places_m), radius_m) for frame, shape in parts for places_m, radius_m in [_balls(shape)]]
-    return np.concatenate([row for row, _ in rows]), np.concatenate([np.full(len(row), r) for row, r in rows])
+    rows = [(frame, *_balls(shape)) for frame, shape in parts]
+    centres_m = np.concatenate([transform_points(frame, places_m) for frame, places_m, _ in rows])
+    return centres_m, np.concatenate([np.full(len(places_m), radius_m) for _, places_m, radius_m in rows])
 
 
 def _balls(shape: Shape) -> tuple[Array, float]:
@@ -81,9 +82,7 @@ def _balls(shape: Shape) -> tuple[Array, float]:
         start_m, end_m = np.array(shape.start_m), np.array(shape.end_m)
         count = 2 + int(np.linalg.norm(end_m - start_m) / _SPACING_m)
         return np.linspace(start_m, end_m, count), shape.radius_m
-    half_m = np.array(getattr(shape, "half_size_m", None) or shape.semi_axes_m)
+    half_m = np.array(shape.half_size_m if isinstance(shape, Block) else shape.semi_axes_m)
     radius_m = float(half_m.min())
     axes = [np.linspace(-h, h, 1 + int(np.ceil(2 * h / _SPACING_m))) for h in np.maximum(half_m - radius_m, 0.0)]
     return np.array(list(product(*axes))) + np.array(shape.centre_m), radius_m
-
-

@@ -10,7 +10,8 @@ from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.posture import TipEllipsoid
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.session_outcome import Ending, SessionOutcome
-from sessions.motion.bounding_box import SIDES, BoundingBox, BoxProber, ProbingSettings
+from sessions.motion.bounding_box import SIDES, BoundingBox
+from sessions.motion.box_prober import BoxProber, ProbingSettings
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.motion import GraspFrame, Motion
 from sessions.motion.safety import SafetySettings, SafetySupervisor
@@ -26,7 +27,7 @@ from tests.support.disc_world import Disc, DiscWorld, TIP_CENTRE_m
 
 TIP = TipEllipsoid((0.0085, 0.0085, 0.0085), tuple(TIP_CENTRE_m))
 QUICK = CycleSettings(finger_rad_s=20.0, travel_m_s=1.0, turn_rad_s=5.0)
-ONE_LANE = ProbingSettings(lanes_m=(0.0,))
+ONE_LANE = ProbingSettings(lanes_m=(0.0,), enabled=True)
 WINDOW_rad = (-1.31, 1.31)
 
 
@@ -57,11 +58,28 @@ def test_empty_table_finds_nothing_and_says_so_of_every_side() -> None:
     assert "left not found: nothing met in 1 lanes" in box.in_words()
 
 
-def test_sides_of_an_object_as_high_as_the_palm_are_left_out() -> None:
-    box = prober(DiscWorld(Disc(np.zeros(2), radius_m=0.035, height_m=0.085))).feel()
-    assert box.top_m == pytest.approx(0.085, abs=3e-3)
-    assert all("the palm does not pass over" in why for why in box.missing.values())
+def test_only_the_top_is_felt_of_what_the_palm_passes_over_unless_the_sides_are_wanted() -> None:
+    box = prober(DiscWorld(Disc(np.zeros(2), height_m=0.045)), ProbingSettings()).feel()
+    assert box.top_m == pytest.approx(0.045, abs=3e-3)
     assert box.is_found
+    assert not box.has_sides
+    assert box.in_words().startswith("the object is 4")
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_what_the_palm_does_not_pass_over_is_felt_from_its_sides(enabled: bool) -> None:
+    disc = Disc(np.array([0.006, -0.004]), radius_m=0.035, height_m=0.15)
+    box = prober(DiscWorld(disc), ONE_LANE.model_copy(update={"enabled": enabled})).feel()
+    assert box.missing == {}
+    assert box.has_sides
+    assert box.top_m == pytest.approx(0.15, abs=3e-3)
+    np.testing.assert_allclose(box.centre_world_m, disc.centre_m, atol=9e-3)
+    np.testing.assert_allclose(box.high_m - box.low_m, [0.07, 0.07], atol=1e-2)
+
+
+def test_top_is_looked_for_around_where_it_is_expected() -> None:
+    box = prober(DiscWorld(Disc(np.array([0.06, 0.0]), radius_m=0.02)), ProbingSettings()).feel()
+    assert box.top_m == pytest.approx(0.04, abs=3e-3)
 
 
 def test_object_beyond_the_search_is_told() -> None:
@@ -71,7 +89,7 @@ def test_object_beyond_the_search_is_told() -> None:
 
 
 def test_probing_can_be_interrupted_between_sides() -> None:
-    asked = iter([False, False, True, True, True])
+    asked = iter([False, False, False, True, True, True])
     box = prober(DiscWorld(Disc(np.zeros(2), radius_m=0.035))).feel(lambda: next(asked))
     assert box.top_m is not None
     assert [box.missing.get(side) for side in SIDES[1:]] == ["interrupted"] * 3
@@ -84,6 +102,12 @@ class TurnedBoxToucher:
         corners = np.array([[0.04, 0.025], [-0.04, 0.025], [-0.04, -0.025], [0.04, -0.025]])
         c, s = np.cos(turn_rad), np.sin(turn_rad)
         self.outline_m = corners @ np.array([[c, s], [-s, c]])
+
+    def expect_tallest(self, height_m: float) -> None:
+        """Nothing is in the way here."""
+
+    def on_top(self, height_m: float) -> None:
+        """Nothing is in the way here."""
 
     def tap(self, frame: GraspFrame) -> np.ndarray:
         return np.array([[frame.x_m, frame.y_m, 0.04]])
@@ -109,7 +133,7 @@ class TurnedBoxToucher:
 def test_back_corner_of_a_turned_box_is_felt(turn_deg: float) -> None:
     """One lane in the middle would stop at the flank, up to 20 mm short of the corner."""
     toucher = TurnedBoxToucher(np.deg2rad(turn_deg))
-    box = BoxProber(toucher, ProbingSettings(), WINDOW_rad, (0.0, 0.0)).feel()  # type: ignore[arg-type]
+    box = BoxProber(toucher, ProbingSettings(enabled=True), WINDOW_rad, (0.0, 0.0)).feel()  # type: ignore[arg-type]
     assert "back" not in box.missing
     assert box.low_m[0] == pytest.approx(toucher.outline_m[:, 0].min(), abs=0.0095)
 

@@ -123,8 +123,8 @@ def test_a_warm_motor_slows_everything_down() -> None:
 
 
 def test_low_palm_stops() -> None:
-    with pytest.raises(SafetyError, match="palm only 50 mm above the table"):
-        supervisor().check(snapshot(palm=palm_at(0, 0, 0.05)))
+    with pytest.raises(SafetyError, match="palm only 40 mm above the table"):
+        supervisor().check(snapshot(palm=palm_at(0, 0, 0.04)))
 
 
 def test_palm_outside_the_workspace_stops() -> None:

@@ -151,7 +151,7 @@ def test_path_geometry() -> None:
 
 
 def test_unknown_closing_is_refused_by_name() -> None:
-    with pytest.raises(ConfigurationError, match="pinch, radial"):
+    with pytest.raises(ConfigurationError, match="pinch, pinch-from-left"):
         closing("scoop", 0.022)
 
 
