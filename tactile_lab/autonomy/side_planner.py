@@ -26,11 +26,15 @@ from tactile_lab.autonomy.side_clearance import StandingBox, expected_touches, i
 _MARGIN_m = 0.003
 """Of the box that the hand keeps out of, beyond what was touched."""
 
-_ASIDE_rad = (0.0, np.radians(30.0), np.radians(-30.0))
-"""Yaws beside those across the sides of the box: what is round has no sides."""
+_ASIDE_rad, _ROUND_rad = (0.0, np.radians(30.0), np.radians(-30.0)), np.radians(15.0)
+"""Yaws beside those across the sides of the box, where contacts' normals are on average so far from the sides': what is
+round has no sides. A hand that closes on the corner of a box pushes it away."""
 
 _SURELY_m, _BELOW_TOP_m = 0.008, 0.012
 """A fingertip counts that meets a box so much smaller on its sides and at its top."""
+
+_LEAST_FOR_BOX = 4
+"""Contacts that tell a box."""
 
 _HEIGHT_STEP_m, _DEPTH_STEP_m, _DEEPEST_m, _SHALLOWEST_m = 0.02, 0.005, 0.05, 0.005
 _SHALLOWER_m = 0.010
@@ -172,9 +176,17 @@ class SidePlanner:
     def _yaws(self) -> list[float]:
         """Across the sides of the box, as far as the arm turns."""
         low, high = self.yaw_window_rad
-        theta = self.box.world_T_box.theta()
-        yaws = [theta + quarter * np.pi / 2 + aside for quarter in range(-3, 4) for aside in _ASIDE_rad]
+        theta, asides = self.box.world_T_box.theta(), _ASIDE_rad if self._is_round() else (0.0,)
+        yaws = [theta + quarter * np.pi / 2 + aside for quarter in range(-3, 4) for aside in asides]
         return [float(yaw) for yaw in yaws if low <= yaw <= high]
+
+    def _is_round(self) -> bool:
+        """Whether contacts' normals say that the box is no box."""
+        normals = np.array(self._normals).reshape(-1, 3)
+        normals = normals[on_sides(normals)]
+        angles = np.arctan2(normals[:, 1], normals[:, 0]) - self.box.world_T_box.theta()
+        off = np.abs(angles - np.round(angles / (np.pi / 2)) * (np.pi / 2))
+        return len(off) >= _LEAST_FOR_BOX and float(off.mean()) > _ROUND_rad
 
     def _deepest(
         self, name: str, yaw_rad: float, height_m: float, box: StandingBox, surely: StandingBox
@@ -241,6 +253,3 @@ class SidePlanner:
     def _spread(touches_m: Array) -> str:
         low, high = 1e3 * touches_m[:, 2].min(), 1e3 * touches_m[:, 2].max()
         return f"{low:.0f} to {high:.0f} mm"
-
-
-_LEAST_FOR_BOX = 4

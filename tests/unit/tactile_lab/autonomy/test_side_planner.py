@@ -1,0 +1,140 @@
+"""Grasps from the side: clear of box and table, deep, new each time, and an end with its reason."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gtsam import Pose2, Pose3
+
+from drivers.core.contacts import Contact, Grasp
+from drivers.shadow.closing.closing import closing
+from drivers.shadow.closing.hand_envelope import open_hand
+from drivers.shadow.closing.posture import TipEllipsoid
+from sessions.motion.bounding_box import BoundingBox
+from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.motion import GraspFrame
+from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
+from tactile_lab.autonomy.planner import Planner
+from tactile_lab.autonomy.side_clearance import StandingBox, expected_touches, is_way_clear
+from tactile_lab.autonomy.side_planner import SidePlanner, SideReach
+from tactile_lab.autonomy.variance_planner import ExplorationSettings
+
+TIP = TipEllipsoid()
+WINDOW_rad = (-1.31, 1.31)
+
+
+def box(width_m: float = 0.066, length_m: float = 0.105, top_m: float = 0.187, turn_rad: float = 0.3) -> BoundingBox:
+    high = np.array([width_m, length_m]) / 2
+    return BoundingBox(Pose2(0.01, 0.0, turn_rad), -high, high, 0.008, top_m, {})
+
+
+def planner(felt: BoundingBox) -> SidePlanner:
+    return SidePlanner(felt, TIP, WINDOW_rad, SideReach())
+
+
+def grasp(points_m: np.ndarray, fingers: list[str]) -> Grasp:
+    """Contacts on the sides of the box that :func:`box` is."""
+    low, turn = np.array([0.033, 0.0525]), Pose2(0.01, 0.0, 0.3)
+    inside = np.array([turn.transformTo(point[:2]) for point in points_m])
+    beyond = np.abs(inside) - low
+    own = np.where(beyond == beyond.max(axis=1, keepdims=True), np.sign(inside), 0.0)
+    normals = np.array([[*turn.rotation().matrix() @ normal, 0.0] for normal in own])
+    contacts = tuple(
+        Contact(finger, point, normal, 1e-6 * np.eye(3), 0.1, 0.4)
+        for finger, point, normal in zip(fingers, points_m, normals, strict=True)
+    )
+    return Grasp(0, 0, contacts, Pose3(), Pose3())
+
+
+def standing(felt: BoundingBox) -> StandingBox:
+    x, y = felt.centre_world_m
+    length_m, width_m = felt.high_m - felt.low_m
+    assert felt.top_m is not None
+    return StandingBox(float(x), float(y), felt.world_T_box.theta(), (float(length_m), float(width_m), felt.top_m))
+
+
+def test_distances_of_a_standing_box() -> None:
+    upright = StandingBox(0.1, 0.0, np.pi / 2, (0.2, 0.1, 0.3))
+    places = np.array([[0.1, 0.0, 0.15], [0.1, 0.13, 0.15], [0.19, 0.0, 0.15], [0.1, 0.0, 0.34]])
+    np.testing.assert_allclose(upright.distances_m(places), [-0.05, 0.03, 0.04, 0.04], atol=1e-12)
+    assert upright.half_along_m(np.array([1.0, 0.0])) == pytest.approx(0.05)
+
+
+def test_a_plan_is_clear_on_its_way_and_thumb_and_fingers_meet_the_box() -> None:
+    felt = box()
+    plan = planner(felt).plan()
+    assert plan is not None
+    assert closing(plan.closing, plan.height_m, TIP).is_sideways
+    assert is_way_clear(plan, TIP, standing(felt))
+    touches = expected_touches(plan, TIP, standing(felt), standing(felt))
+    assert "TH" in touches
+    assert len(touches) >= 4
+    assert np.abs(standing(felt).distances_m(np.array(list(touches.values())))).max() < 0.006
+
+
+def test_a_way_through_the_box_and_a_hand_in_the_table_are_not_clear() -> None:
+    upright = StandingBox(0.0, 0.0, 0.0, (0.066, 0.105, 0.187))
+    too_deep = GraspPlan(GraspFrame(0.0, -0.06, 0.0), "pinch-from-left", 0.06)
+    assert not is_way_clear(too_deep, TIP, upright)
+    too_low = GraspPlan(GraspFrame(0.0, 0.2, 0.0), "pinch-from-right", 0.016)
+    assert open_hand(too_low.closing, too_low.height_m, TIP).lowest_m < 0.0
+    assert not is_way_clear(too_low, TIP, upright)
+
+
+def test_next_grasp_is_where_nothing_was_touched_until_nothing_is_left() -> None:
+    """A hand that touches what it expects to: every height of both broad sides comes, and then the end."""
+    beside, heights = planner(box(top_m=0.13)), []
+    for _ in range(30):
+        plan = beside.plan()
+        if plan is None:
+            break
+        touches = expected_touches(plan, TIP, standing(beside.box), standing(beside.box))
+        heights += [place[2] for place in touches.values()]
+        beside.on_grasp(grasp(np.array(list(touches.values())), list(touches)))
+    assert plan is None
+    assert min(heights) < 0.045
+    assert max(heights) > 0.10
+    assert max(np.diff(sorted(heights))) < 0.03
+    assert beside.exhausted.startswith("nothing left that the hand can reach: ")
+    assert "mm high" in beside.exhausted
+
+
+def test_a_blocked_way_is_not_tried_again_as_deep() -> None:
+    beside = planner(box())
+    first = beside.plan()
+    beside.on_blocked()
+    second = beside.plan()
+    assert first is not None
+    assert second is not None
+    same = (first.closing, first.height_m, first.frame) == (second.closing, second.height_m, second.frame)
+    assert not same
+
+
+def test_what_no_hand_can_span_ends_at_once_with_its_size() -> None:
+    beside = planner(box(width_m=0.16, length_m=0.16, turn_rad=0.0))
+    assert beside.plan() is None
+    assert "160 x 160 mm wide" in beside.exhausted
+
+
+class NoEstimate:
+    """An estimation that knows nothing yet."""
+
+    surface, world_T_object, is_lost, pose_covariance = None, None, False, None
+
+
+@pytest.mark.parametrize(("top_m", "sideways"), [(0.06, False), (0.187, True)])
+def test_the_hand_comes_from_above_or_from_the_side_as_the_object_is_tall(top_m: float, sideways: bool) -> None:
+    rule = HeuristicPlanner(PlanSettings(), np.random.default_rng(0), 3)
+    chosen = Planner(NoEstimate(), rule, ExplorationSettings(), 2, TIP, 3)  # type: ignore[arg-type]
+    chosen.on_bounding_box(box(top_m=top_m))
+    plan = chosen.plan(0)
+    assert closing(plan.closing, plan.height_m, TIP).is_sideways is sideways
+    assert chosen.exhausted == ""
+
+
+def test_an_object_that_stands_tall_is_never_carried() -> None:
+    rule = HeuristicPlanner(PlanSettings(), np.random.default_rng(0), 3)
+    chosen = Planner(NoEstimate(), rule, ExplorationSettings(), 2, TIP, 3)  # type: ignore[arg-type]
+    chosen.on_bounding_box(box())
+    plan = chosen.plan(0)
+    assert not chosen.on_grasp(grasp(np.array([[0.04, 0.0, 0.05]]), ["FF"]), plan).moves
