@@ -14,6 +14,7 @@ from drivers.simulation.world import SimulatedWorld
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import NullProgress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
+from sessions.motion.box_prober import ProbingSettings
 from sessions.recording.recorder import Recorder
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.settings import SessionSettings
@@ -60,7 +61,8 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> TallSession:
     simulation = rig.description.simulation.model_copy(update={"object": f"mesh:{file}", "start": start})
     world, watch = SimulatedWorld(simulation, 0), PhaseWatch()
     runtime = build_runtime(rig, world, Recorder(Forgetful()))
-    settings, slam = SessionSettings(grasps=1), TactileSlam(SlamSettings(dimension=3), 0)
+    near = ProbingSettings(search_m=0.08, highest_m=0.17)
+    settings, slam = SessionSettings(grasps=1, probing=near), TactileSlam(SlamSettings(dimension=3), 0)
     pressed_N, cycle, before = 0.0, runtime.cycle, world.truth().world_T_object
 
     def watched_cycle() -> None:
