@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from drivers.core.clock import NANOSECONDS, Clock
 from drivers.core.errors import CodecError, DeviceError
-from drivers.core.transports import Datagram, Transport
+from drivers.core.transports import Datagram, Transport, link_health
 from drivers.shadow.device.hand_guard import HandCounters, HandGuard
 from drivers.shadow.device.hand_motion import NO_DEMAND, HandMotion
 from drivers.shadow.device.hand_samples import HandDecoder, HandSample
@@ -28,8 +28,9 @@ from drivers.shadow.protocol.palm_images import PALMS
 class ShadowHand:
     """The hand.
 
-    Nothing moves until :meth:`set_targets`. A serious motor flag, a hot motor or a run of lost cycles stops the hand:
-    demands become zero and every further :meth:`exchange` raises, until :meth:`resume`.
+    Nothing moves until :meth:`set_targets`. A serious motor flag, a hot motor or a link that stays away stops the hand:
+    demands become zero and every further :meth:`exchange` raises, until :meth:`resume`. A link that comes back in time
+    costs the demands meanwhile, which then rise from zero again.
 
     Args:
         transport: whole process images of the palm named in the settings.
@@ -53,7 +54,7 @@ class ShadowHand:
         self._settings = settings or HandSettings()
         self._motors, self._boards = motors or MotorMap.load(), boards
         self._motion = HandMotion(self._motors, self._settings.gains, self._settings.soft_start_s, transport.name)
-        self._guard = HandGuard(self._settings, self._motors, transport.name)
+        self._guard = HandGuard(self._settings, self._motors, transport.name, lambda: link_health(transport))
         self._decoder = HandDecoder(calibration, PALMS[self._settings.palm])
         self._connected = False
         self._reset()
@@ -199,12 +200,13 @@ class ShadowHand:
         """
         if not self._connected or self._last is None:
             raise DeviceError("not connected", where=self._transport.name, hint="Connect the hand first")
+        self._guard.look_at_time(now_ns := self._clock.now_ns(), driven=self._motion.active)
         fault = self._guard.fault
-        sample = self._cycle(self._demand(self._last))
+        sample = self._cycle(self._demand(self._last, now_ns))
         if sample is None:
             self._last = replace(self._last, fresh=False)
             self._dialogue.on_lost_cycle()
-            self._guard.on_lost_cycle()
+            self._guard.on_lost_cycle(now_ns)
         else:
             self._last = sample
             self._guard.on_status()
@@ -250,15 +252,15 @@ class ShadowHand:
             if sample is not None:
                 newest = sample
                 self._dialogue.on_answer(sample.stamp_ns)
-                self._guard.look(sample.status, settling=self._dialogue.settling)
+                self._guard.look(sample.status, self._clock.now_ns(), settling=self._dialogue.settling)
         return newest
 
-    def _demand(self, last: HandSample) -> NDArray[np.int16]:
-        if self._stopped or self._guard.forbids_demands:
+    def _demand(self, last: HandSample, now_ns: int) -> NDArray[np.int16]:
+        if self._stopped or self._guard.forbids_demands(now_ns):
             self._motion.pause()
             return NO_DEMAND
         share = self._guard.pwm_share(last.motor.temperature_C)
-        words = self._motion.words(last.joints_rad, share, now_ns := self._clock.now_ns())
+        words = self._motion.words(last.joints_rad, share, now_ns)
         self._guard.look_at_demand(words, now_ns)
         return words
 

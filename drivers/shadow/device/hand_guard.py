@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import Array
 from drivers.shadow.device.hand_samples import HandSample, StatusCounts
 from drivers.shadow.device.hand_settings import HandSettings
@@ -15,6 +17,9 @@ from drivers.shadow.device.motor_watch import Fault, MotorWatch
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.motor_data import MAX_PWM
 from drivers.shadow.protocol.palm_codec import MOTORS, PalmStatus
+
+STALE_s = 0.05
+"""No demand rests on a status older than this."""
 
 
 @dataclass
@@ -41,10 +46,14 @@ class HandGuard:
         settings: of the hand, with all limits.
         motors: which motor pulls which joint.
         where: name of the hand's transport, for messages.
+        link: what the transport knows to be wrong, in words.
     """
 
-    def __init__(self, settings: HandSettings, motors: MotorMap, where: str) -> None:
-        self._settings, self._where = settings, where
+    def __init__(
+        self, settings: HandSettings, motors: MotorMap, where: str, link: Callable[[], tuple[str, ...]] = tuple
+    ) -> None:
+        self._settings, self._where, self._link = settings, where, link
+        self._heard_ns: int | None = None
         self._watch = MotorWatch(motors, settings.heat, where)
         self._load = LoadWatch(motors, settings.load, _largest_pwm(settings, motors), where)
         self.counters = HandCounters()
@@ -53,26 +62,50 @@ class HandGuard:
     def restart(self) -> None:
         """Count from zero, for a new connection."""
         self.counters = HandCounters()
+        self._heard_ns = None
 
     def resume(self) -> None:
         """Forget the fault and what led to it."""
         self.fault = None
+        self._heard_ns = None
         self.counters.lost_in_a_row = 0
         self._load.restart()
 
-    @property
-    def forbids_demands(self) -> bool:
-        """There is a fault, or nothing has been heard of the hand for several cycles."""
-        return self.fault is not None or self.counters.lost_in_a_row >= self._settings.blind_after
+    def forbids_demands(self, now_ns: int) -> bool:
+        """There is a fault, or what was heard of the hand last is too old, by cycles or by time."""
+        if self.fault is not None or self.counters.lost_in_a_row >= self._settings.blind_after:
+            return True
+        return self._silent_s(now_ns) > STALE_s
+
+    def _silent_s(self, now_ns: int) -> float:
+        return 0.0 if self._heard_ns is None else (now_ns - self._heard_ns) / NANOSECONDS
 
     def blame(self, fault: Fault | None) -> None:
         """Keep a fault unless there is an earlier one."""
         self.fault = self.fault or fault
 
-    def look(self, status: PalmStatus, *, settling: bool) -> None:
+    def look(self, status: PalmStatus, now_ns: int, *, settling: bool) -> None:
         """Look at a status; while ``settling`` motors may report that they had halted."""
+        self._heard_ns = now_ns
         self.fault = self.fault or self._watch.fault(status, settling=settling)
         self.fault = self.fault or self._load.fault(status)
+
+    def look_at_time(self, now_ns: int, *, driven: bool) -> None:
+        """Look at how long nothing was heard, before a cycle: the link was gone, or this program stood still.
+
+        Args:
+            now_ns: present time.
+            driven: there are targets or demands, so that a pause of the program matters.
+        """
+        patience_s = self._settings.link_patience_s
+        if self._silent_s(now_ns) <= patience_s:
+            return
+        if self.counters.lost_in_a_row:
+            what = ": ".join([f"stopped: no valid status for {patience_s:g} s", *self._link()[:1]])
+            self.blame(Fault(what, self._where, "Check the cable and the hand's power, then connect again"))
+        elif driven:
+            what = f"stopped: the program stood still for {self._silent_s(now_ns):.1f} s"
+            self.blame(Fault(what, self._where, "Find out what held the computer up, then resume"))
 
     def look_at_demand(self, words: NDArray[np.int16], now_ns: int) -> None:
         """Look at the demands that go out, shape (20,): a motor told its most for too long has stalled."""
@@ -86,17 +119,12 @@ class HandGuard:
         """A cycle brought a status."""
         self.counters.lost_in_a_row = 0
 
-    def on_lost_cycle(self) -> None:
+    def on_lost_cycle(self, now_ns: int) -> None:
         """A cycle brought none."""
-        counters = self.counters
-        counters.lost += 1
-        counters.lost_in_a_row += 1
-        if counters.lost_in_a_row >= self._settings.lost_limit and self.fault is None:
-            self.fault = Fault(
-                f"stopped after {counters.lost_in_a_row} cycles in a row without a valid status",
-                self._where,
-                "Check the cable and the hand's power, then connect again",
-            )
+        if self._heard_ns is None:
+            self._heard_ns = now_ns
+        self.counters.lost += 1
+        self.counters.lost_in_a_row += 1
 
     def problems(self, newest: HandSample | None, statuses: StatusCounts, connected_ns: int) -> tuple[str, ...]:
         """What is wrong with the hand, in words; empty when all is well."""

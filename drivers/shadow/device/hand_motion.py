@@ -40,6 +40,11 @@ class HandMotion:
         self._since_ns: int | None = None
 
     @property
+    def active(self) -> bool:
+        """Whether anything is to be driven."""
+        return self._nudge is not None or self._control.active
+
+    @property
     def targets_rad(self) -> dict[str, float]:
         """The targets that are set, by driven joint, radians."""
         return self._control.targets_rad

@@ -233,13 +233,13 @@ def test_a_nudge_is_small_and_of_a_driven_joint(joint: str, pwm: float) -> None:
 
 
 def test_a_palm_that_hangs_takes_the_demands_away_and_then_stops_the_hand() -> None:
-    rig = Rig(soft_start_s=0.0, lost_limit=10, blind_after=2)
+    rig = Rig(soft_start_s=0.0, link_patience_s=0.05, blind_after=2)
     rig.hand.connect()
     rig.hand.set_targets({"FFJ3": 1.5})
     rig.cycles(5)
     rig.emulated.palm.hung = True
-    with pytest.raises(DeviceError, match="10 cycles in a row without a valid status"):
-        rig.cycles(14)
+    with pytest.raises(DeviceError, match=r"stopped: no valid status for 0\.05 s"):
+        rig.cycles(60)
     rig.clock.sleep_until_ns(rig.clock.now_ns() + 20_000_000)  # a motor that hears nothing halts itself
     turned = rig.emulated.plant.joints_rad[2]
     rig.clock.sleep_until_ns(rig.clock.now_ns() + 50_000_000)
