@@ -14,6 +14,7 @@ import json
 import sys
 import time
 
+from drivers.core.child_process import failure
 from drivers.core.clock import NANOSECONDS, Clock, MonotonicClock
 from drivers.core.errors import DeviceError, TactileLabError
 from drivers.core.extensions import load_named_extensions
@@ -181,6 +182,9 @@ def main() -> None:
     except TactileLabError as error:
         pipe.put(RecordKind.ERROR, clock.now_ns(), str(error).encode())
         sys.exit(error.exit_code)
+    except Exception as error:
+        pipe.put(RecordKind.ERROR, clock.now_ns(), failure(error).encode())
+        raise
     finally:
         pipe.close()
 
