@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 from pydantic import Field, model_validator
 
 from drivers.core.configuration import StrictModel
+from drivers.shadow.device.joint_watch import SensorLimits
 from drivers.shadow.device.motor_load import LoadLimits
 from drivers.shadow.device.motor_polling import PollingRates
 from drivers.shadow.device.motor_watch import HeatLimits
@@ -38,6 +39,7 @@ class HandSettings(StrictModel):
         demand_grace_s: after a pause in the demands motors may report for so long that they had halted.
         heat: temperature limits of the motors.
         load: limits of torque and duty cycle.
+        sensors: what the joint sensors of driven joints may say.
         connect_tries: exchanges until the palm must have answered.
         close_cycles: exchanges with zero demands before the transport is closed.
         reset_motors: reset the motor boards when connecting; they then need ``reset_wait_s`` to come back.
@@ -58,6 +60,7 @@ class HandSettings(StrictModel):
     demand_grace_s: float = Field(default=0.3, ge=0.0)
     heat: HeatLimits = HeatLimits()
     load: LoadLimits = LoadLimits()
+    sensors: SensorLimits = SensorLimits()
     connect_tries: int = Field(default=20, ge=1)
     close_cycles: int = Field(default=5, ge=1)
     reset_motors: bool = False

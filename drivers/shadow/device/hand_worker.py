@@ -142,7 +142,7 @@ class HandWorker:
     def _check_motor_map(self, joints: list[str]) -> None:
         self._moving_by_itself = True
         try:
-            findings = check_motor_map(self._hand, self._motors, self._sound_turn, joints)
+            findings = check_motor_map(self._hand, self._motors, self._sound_turn, self._clock, joints)
             self._answer(RecordKind.MOVES, {"moved": [dataclasses.asdict(finding) for finding in findings]})
         except DeviceError as error:
             self._answer(RecordKind.MOVES, {"error": str(error)})

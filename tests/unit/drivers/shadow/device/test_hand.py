@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -453,6 +454,17 @@ def test_a_serious_flag_stops_the_hand_and_names_joint_motor_and_flag(rig: Rig, 
     with pytest.raises(DeviceError, match=rf"hand, LFJ0 \(motor 12\): stopped: halted, {words}"):
         rig.run(20)
     assert not any(rig.palm.pwm)
+
+
+@pytest.mark.parametrize(("demand", "stops"), [("pwm", False), ("torque", True)])
+def test_a_faulty_strain_gauge_stops_a_hand_whose_motors_keep_torques(
+    demand: Literal["pwm", "torque"], stops: bool
+) -> None:
+    rig = Rig(HandSettings(soft_start_s=0.0, demand=demand))
+    rig.hand.connect()
+    rig.palm.flags[12] = MotorFlag.GAUGE_LEFT_FAULT
+    with pytest.raises(DeviceError, match="left strain gauge faulty") if stops else nullcontext():
+        rig.run(20)
 
 
 def test_motors_that_halted_before_the_demands_began_are_forgiven_at_first_only() -> None:

@@ -184,7 +184,7 @@ def test_a_right_map_is_confirmed_motor_by_motor_and_the_joints_come_back() -> N
     rig = Rig()
     rig.hand.connect()
     before = rig.emulated.plant.joints_rad
-    findings = check_motor_map(rig.hand, TRUE_MAP, rig.cycle)
+    findings = check_motor_map(rig.hand, TRUE_MAP, rig.cycle, rig.clock)
     assert [finding.joint for finding in findings] == list(DRIVEN_JOINTS)
     assert all(finding.ok for finding in findings)
     assert np.abs(rig.emulated.plant.joints_rad - before).max() < 0.02
@@ -197,7 +197,7 @@ def test_the_first_contradiction_ends_the_check_and_is_named() -> None:
     rig = Rig(believed)
     rig.hand.connect()
     before = rig.emulated.plant.joints_rad
-    findings = check_motor_map(rig.hand, believed, rig.cycle)
+    findings = check_motor_map(rig.hand, believed, rig.cycle, rig.clock)
     assert [finding.ok for finding in findings] == [True, True, True, False]
     assert np.degrees(np.abs(rig.emulated.plant.joints_rad - before)).max() < 4.0
     with pytest.raises(DeviceError, match="motor 5 is said to pull MFJ0, but moves THJ2"):
@@ -209,7 +209,7 @@ def test_a_motor_that_turns_the_wrong_way_is_named() -> None:
     believed = MotorMap(TRUE_MAP.numbers, ("FFJ3",))
     rig = Rig(believed)
     rig.hand.connect()
-    findings = check_motor_map(rig.hand, believed, rig.cycle, ("FFJ3",))
+    findings = check_motor_map(rig.hand, believed, rig.cycle, rig.clock, ("FFJ3",))
     assert "the wrong way: name it under reversed" in str(findings[-1])
     rig.hand.close()
 
@@ -218,9 +218,10 @@ def test_a_motor_at_its_joints_limit_is_tried_the_other_way_and_a_dead_one_given
     rig = Rig()
     rig.hand.connect()
     rig.emulated.plant._angles_rad[2] = np.pi / 2
-    assert check_motor_map(rig.hand, TRUE_MAP, rig.cycle, ("FFJ3",))[0].ok
+    rig.cycles(1)
+    assert check_motor_map(rig.hand, TRUE_MAP, rig.cycle, rig.clock, ("FFJ3",))[0].ok
     rig.bank._max_pwm[:] = 0
-    findings = check_motor_map(rig.hand, TRUE_MAP, rig.cycle, ("FFJ3",), FirstMoveSettings(patience_cycles=20))
+    findings = check_motor_map(rig.hand, TRUE_MAP, rig.cycle, rig.clock, ("FFJ3",), FirstMoveSettings(patience_s=0.02))
     assert str(findings[0]) == "motor 1 moves nothing; its map says FFJ3"
     rig.hand.close()
 
