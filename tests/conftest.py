@@ -33,7 +33,8 @@ def pytest_collection() -> Generator[None, object, object]:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Modules that run in real time are spread out, so that no worker waits until another is through with its own."""
     modules = [list(tests) for _, tests in groupby(items, key=lambda item: item.path)]
-    alone, others = [], []
+    alone: list[list[pytest.Item]] = []
+    others: list[list[pytest.Item]] = []
     for module in modules:
         (alone if "real_time_alone" in getattr(module[0], "fixturenames", ()) else others).append(module)
     for place, module in enumerate(alone):
