@@ -186,7 +186,7 @@ def test_an_export_to_where_nothing_can_be_written_is_refused(inside, piece, rec
 def test_an_export_of_nothing_is_refused(inside, piece):
     answer = inside("session", "export", piece)
     assert (answer.code, answer.out) == (2, "")
-    assert "name at least one of --contacts, --csv" in answer.err
+    assert "give at least one of --contacts, --csv" in answer.err
 
 
 def test_a_piece_of_a_session_is_cut_out_and_lists_like_any_other(inside, recorded, tmp_path):
@@ -278,7 +278,7 @@ def test_a_torn_session_is_recovered_and_the_torn_one_is_kept(inside, session_co
     told = json.loads(answer.out)
     assert "/link/hand/rx" in json.dumps(told)
     assert told["left_out"] == ["results"]
-    assert f"(results); new ones: tactile-lab session replay {told['session']}" in answer.err
+    assert f"(results); make new ones with: tactile-lab session replay {told['session']}" in answer.err
     answer = inside("session", "list", "--root", tmp_path, "--json")
     assert answer.code == 0, answer.err
     assert sorted(item["status"] for item in json.loads(answer.out)) == ["damaged", "recovered"]

@@ -212,12 +212,12 @@ def test_loopback_is_told_from_the_rest() -> None:
 
 
 def test_other_addresses_need_a_token() -> None:
-    with pytest.raises(ConfigurationError, match="press the buttons"):
+    with pytest.raises(ConfigurationError, match="control the session"):
         PageAddress("0.0.0.0", 8090, "").check()
     with pytest.raises(ConfigurationError, match="at least 16"):
         PageAddress("0.0.0.0", 8090, "short").check()
     assert PageAddress("0.0.0.0", 8090, "new").check()[2] != ""
-    with pytest.raises(BadParameter, match="belongs to --view"):
+    with pytest.raises(BadParameter, match="needs --view"):
         PageAddress.if_wanted(False, "0.0.0.0", 8090, "")
     with pytest.raises(DeviceError, match="a token is needed"):
         Page("0.0.0.0", 0, "", "test")

@@ -103,7 +103,7 @@ def test_without_anybody_the_usual_answer_is_taken_and_the_page_only_shows(page:
     os.close(typed)
     alone = Asker(False, "test")
     assert alone.choose("1/3", STEP, "") == "s"
-    with pytest.raises(InterruptionError, match="nobody to ask"):
+    with pytest.raises(InterruptionError, match="nobody can answer"):
         alone.choose("2/3", STEP, "")
 
 
