@@ -232,7 +232,7 @@ def to_millimetres(index: int, contact: dict) -> None:
         (lambda log: each_contact(log, to_millimetres), ("millimetres",)),
         (lambda log: each_contact(log, negate), ("normals point into the object", "negate them")),
         (lambda log: log.update(format="tactile-contacts/9"), ("'tactile-contacts/9'",)),
-        (lambda log: log["grasps"][0]["contacts"][0].update(normal_world=[0, 0, 0]), ("a normal has length 1",)),
+        (lambda log: log["grasps"][0]["contacts"][0].update(normal_world=[0, 0, 0]), ("a normal must have length 1",)),
     ],
 )
 def test_a_log_that_makes_no_sense_is_explained(inside, planar_log, tmp_path, change, words):

@@ -287,7 +287,7 @@ def test_a_load_that_is_no_number_stops_the_hand_as_an_infinite_one(
     rig = rig_file(tmp_path, {"extensions": ["mine.py"], "fingertips": "mine"})
     ended(capsys, "run", "--rig", rig, "--grasps", 1, "--out", tmp_path / "runs", "--no-input")
     (folder,) = (tmp_path / "runs").iterdir()
-    assert "its load is no number" in Session.open(folder).manifest.problem
+    assert "its load is not a number" in Session.open(folder).manifest.problem
 
 
 def test_an_extension_that_cannot_be_loaded_ends_the_command_before_it_begins(written: Written, tmp_path: Path) -> None:

@@ -77,7 +77,7 @@ def recorded(grasps: int = 2) -> Scene:
     recorder.surface(5, {**surface, "origin_height_m": 0.02})
     plan = {"index": 2, "closing": "radial", "x_m": 0.0, "y_m": 0.0, "yaw_rad": 0.2, "height_m": 0.022, "reason": "new"}
     recorder.plan(6, plan)
-    recorder.guide(7, {"grasp": 3, "stage": "guide", "prompt": "Guide <the> hand", "paused": "coffee", "view": {}})
+    recorder.guide(7, {"grasp": 3, "stage": "guide", "prompt": "Move <the> hand", "paused": "coffee", "view": {}})
     recorder.log(8, Level.INFO, "guide", "note: hello")
     return sink.scene
 
