@@ -75,7 +75,7 @@ class Replay:
         return self._span_ns / self._taken_ns if self._taken_ns else 0.0
 
     def outcomes(self) -> Iterator[Outcome]:
-        """The grasps, camera frames and tare reports, in order. Raises: SessionError: a session event cannot be read."""
+        """The grasps, camera frames and tare reports, in order. Raises SessionError for an unreadable session event."""
         begun_ns, first_ns = self._clock.now_ns(), None
         for message in pace(self._reader.messages(), self._speed, self._clock):
             first_ns = message.stamp_ns if first_ns is None else first_ns

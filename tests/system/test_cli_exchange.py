@@ -121,7 +121,10 @@ GOOD = "time_s,x_m,y_m,nx,ny\n0,0.05,0,1,0\n1,-0.05,0,-1,0\n"
     [
         (GOOD.replace("x_m", "x_mm"), ("'x_mm' is in another unit", "name it x_m")),
         (GOOD.replace("0.05", "50"), ("millimetres",)),
-        (GOOD.replace("0,0.05", "3,0.05"), ("contact 2", "earlier than that of the previous contact", "Sort the lines")),
+        (
+            GOOD.replace("0,0.05", "3,0.05"),
+            ("contact 2", "earlier than that of the previous contact", "Sort the lines"),
+        ),
         ("", ("no column",)),
     ],
 )
@@ -229,7 +232,9 @@ def test_an_archive_becomes_a_session_that_lists_and_shows(inside, packed, tmp_p
     assert json.loads(answer.out) == {"session": str(tmp_path / "runs" / "from-afar"), "status": "closed"}
     shown = json.loads(inside("session", "show", "from-afar", "--root", tmp_path / "runs", "--json").out)
     assert (shown["name"], shown["counts"]["grasps"]) == ("from-afar", 2)
-    refused(inside("session", "import", packed, "--root", tmp_path / "runs", "--name", "from-afar"), 1, "exists already")
+    refused(
+        inside("session", "import", packed, "--root", tmp_path / "runs", "--name", "from-afar"), 1, "exists already"
+    )
     refused(inside("session", "import", packed, "--root", tmp_path / "runs", "--name", "../up"), 1, "cannot be the")
 
 
