@@ -136,8 +136,8 @@ def test_a_calibration_copy_changed_or_missing(inside, session_copy):
 def test_deleted_results_are_made_again_by_a_replay(inside, session_copy):
     before = {path.name: path.read_bytes() for path in (session_copy / "results").iterdir()}
     shutil.rmtree(session_copy / "results")
-    refused(inside("evaluate", session_copy), "trajectory", "replay it")
-    refused(inside("report", session_copy), "trajectory", "replay it")
+    refused(inside("evaluate", session_copy), "trajectory", "Replay the session")
+    refused(inside("report", session_copy), "trajectory", "Replay the session")
     answer = inside("session", "replay", session_copy)
     assert answer.code == 0
     assert {path.name for path in (session_copy / "results").iterdir()} == set(before)
