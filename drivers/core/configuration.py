@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -76,7 +76,7 @@ def recorded_keys() -> Iterator[None]:
 _reading: ContextVar[str] = ContextVar("what is being read", default="")
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(yaml.CSafeLoader):
     """Safe loader with its own implicit resolvers (the parent's table is shared: copy it)."""
 
 
@@ -94,6 +94,7 @@ _Loader.add_implicit_resolver(
 )
 
 
+_DEEPEST = 100
 _MERGE = "tag:yaml.org,2002:merge"
 
 
@@ -137,11 +138,23 @@ def loads(content: bytes, where: str) -> Any:
         ConfigurationError: it is not strict YAML in UTF-8.
     """
     try:
-        return yaml.load(content.decode("utf-8"), Loader=_Loader)
+        text = content.decode("utf-8")
+        _check_depth(text)
+        return yaml.load(text, Loader=_Loader)
     except UnicodeDecodeError as error:
         raise ConfigurationError("is not a text file", where=where, hint="Name a YAML file in UTF-8") from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date or number out of its range
         raise ConfigurationError(f"is not valid YAML: {_yaml_problem(error)}", where=where, hint=_RETRY) from error
+
+
+def _check_depth(text: str) -> None:
+    """Refuse what is nested so deep that composing it would overflow the stack. The parser itself does not recurse."""
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.CSafeLoader):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST:
+            problem = f"nested deeper than {_DEEPEST} levels"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=cast(yaml.Mark, event.start_mark))
 
 
 def load_model(path: Path, model: type[Model]) -> Model:
