@@ -87,7 +87,7 @@ def test_a_person_is_asked_for_the_bar_and_may_answer_later(
 @pytest.mark.parametrize(
     ("words", "code", "told"),
     [
-        (("poster",), 2, "neither one of single, grid, charuco, rig"),
+        (("poster",), 2, "neither one of single, grid, charuco"),
         (("charuco", "--paper", "A9"), 2, "no paper called 'A9'"),
         (("charuco", "--square-mm", 60, "--marker-mm", 40), 2, "do not fit on A4"),
         (("charuco", "--square-mm", 20, "--marker-mm", 20), 2, "marker"),

@@ -34,7 +34,7 @@ def test_the_motion_is_printed_as_the_rig_file_wants_it(inside, recorded_root, r
     monkeypatch.setattr("tactile_lab.workflow.measuring_slips.session_slips", lambda session: slips)
     said = inside("session", "slips", recorded.name, "--root", recorded_root).err
     assert "pushed by the closing hand although left in place: 0 of 40" in said
-    motion = MotionNoise.model_validate(yaml.safe_load(said.split("in the rig file:")[1])["motion"])
+    motion = MotionNoise.model_validate(yaml.safe_load(said.split("for the rig file:")[1])["motion"])
     assert motion.translation_m == pytest.approx(0.006, rel=0.2)
     assert motion.unheld == pytest.approx(0.1, rel=0.3)
 

@@ -32,7 +32,7 @@ def biotac(
     ] = None,
     finger: Annotated[Finger, typer.Option(help="Finger that carries the sensor.")] = Finger.FF,
     measurer: Annotated[
-        str, typer.Option("--rig", help="Station (of the rig file) that the calibration is for.")
+        str, typer.Option("--rig", help="Installation (of the rig file) that the calibration is for.")
     ] = "sim",
     serial: Annotated[str, typer.Option(help="Serial number of the sensor.")] = "",
     out: Annotated[

@@ -533,8 +533,8 @@ def test_hand_is_without_demand_for_as_long_as_the_session_pauses() -> None:
     assert outcome.ending is Ending.COMPLETE
     assert world.hand.stops == 2  # the pause, the end
     assert world.hand.resumes == 1
-    pauses = [text for _, text in world.log_lines if "coffee" in text or text == "goes on"]
-    assert pauses == ["paused: coffee", "goes on"]
+    pauses = [text for _, text in world.log_lines if "coffee" in text or text == "the session continues"]
+    assert pauses == ["paused: coffee", "the session continues"]
 
 
 def test_whoever_decides_ends_the_session() -> None:

@@ -118,5 +118,5 @@ def test_what_is_no_archive_is_told(tmp_path):
         import_archive(tmp_path / "a.zip", tmp_path)
     with pytest.raises(SessionError, match="No such file"):
         import_archive(tmp_path / "none.zip", tmp_path)
-    with pytest.raises(SessionError, match="holds 0 folders"):
+    with pytest.raises(SessionError, match="contains 0 folders"):
         import_archive(archive_of(tmp_path / "empty.zip", {}), tmp_path)

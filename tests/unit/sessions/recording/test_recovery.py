@@ -155,7 +155,7 @@ def test_a_list_tells_open_closed_recovered_and_damaged(tmp_path):
     assert left_open(tmp_path) == []
     problems = {item.folder: item.problem for item in list_sessions(tmp_path)}
     assert f"tactile-lab session recover {damaged}" in problems[damaged]
-    assert "is cut off" in problems[torn]
+    assert "is truncated" in problems[torn]
 
 
 def test_results_of_the_torn_recording_stay_with_it_and_are_named(tmp_path):

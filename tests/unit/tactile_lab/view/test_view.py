@@ -118,7 +118,7 @@ def test_topics_that_are_not_shown_change_nothing() -> None:
 def test_panel_tells_prompt_pause_pose_and_grasps_and_shows_no_foreign_markup() -> None:
     scene = recorded()
     text = status_html(scene)
-    assert "Guide &lt;the&gt; hand" in text
+    assert "Move &lt;the&gt; hand" in text
     assert "Paused: coffee" in text
     assert "10, 0 mm, 6°" in text
     assert "TH silent" in text
