@@ -1,13 +1,12 @@
-"""From a touch in a finger's distal frame to a contact in the world, with what is known about its error.
+"""From a touch in a finger's distal frame to a contact in the world, with its covariance.
 
 The covariance of a contact point is the sum of three independent parts:
 
 * the sensor's own, rotated into the world;
 * the joint angles', through the finger's Jacobian: the joint sensors carry a bias of about 0.6 deg that no averaging
-  removes. The wrist is left out: its error moves all contacts alike, as the mounting's does;
-* the forearm-to-world calibration's, where its covariance is known.
-
-The direction of the normal gets the same three parts as one standard deviation per axis.
+  removes. The wrist is left out: its error moves all contacts alike, as the mounting's does; * the forearm-to-world
+  calibration's, if its covariance is known. The direction of the normal has the same three parts, as one standard
+  deviation per axis.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from drivers.core.fingertip import TipContact
 from drivers.shadow.model.kinematics import JOINTS, palm_T_distal_matrices
 
 _STEP_rad = 1e-4
-"""Step of the central differences: error about 1e-9 of a transport length."""
+"""Step of the central differences: error about 1e-9 of a link's length."""
 
 
 def _same_numbered_joints() -> Array:
@@ -56,7 +55,7 @@ class MountUncertainty:
 
 
 class HandGeometry:
-    """Where the palm and the fingertips are, and how that depends on the joints.
+    """Poses of palm and fingertips, and their derivatives by the joints.
 
     Args:
         joints_rad: joint angles, shape (24,), radians.

@@ -1,19 +1,16 @@
-"""A recorded session, understood again from its raw bytes.
-
-Why a replay gives the same grasps, bit for bit:
-
-1. Live, the tap of each transport records a datagram and in the same call hands it to the session's
-   :class:`~sessions.perception.interpreter.Interpreter`, before any device decodes it. A event is recorded and
+"""Replays a recorded session from its raw bytes. Why a replay gives the same grasps, bit for bit: 1. Live, the tap of
+   each transport records a datagram and in the same call passes it to the session's
+   :class:`~sessions.perception.interpreter.Interpreter`, before any device decodes it. A session event is recorded and
    interpreted in one call too. All of it happens in one thread, so the order in the file is the order of
    interpretation.
-2. The Interpreter knows nothing else: its decoders and its Perception are objects of its own, and its clock shows
-   the newest stamp it was given. What the live devices decode for their own control does not reach it.
-3. A replay hands the received bytes and the session events of the file, in the file's order, to an Interpreter built
+2. The Interpreter has no other input: its decoders and its Perception are its own objects, and its clock shows the
+   newest stamp it was given. What the live devices decode for their own control does not reach it.
+3. A replay passes the received bytes and the session events of the file, in the file's order, to an Interpreter built
 from the
    same rig description and calibration copies.
 
 So live and replay run the same code on the same input. Transmitted bytes, samples and truth in the file are not
-read. A file that was cut off replays up to the cut.
+read. A truncated file replays up to its end.
 """
 
 from __future__ import annotations
@@ -32,7 +29,7 @@ from sessions.recording.traffic.reader import Loss, TrafficReader
 
 
 def kept_grasps(outcomes: Iterable[Outcome]) -> list[Grasp]:
-    """The grasps of a session, without those that were taken back."""
+    """The grasps of a session, without undone ones."""
     grasps: list[Grasp] = []
     for outcome in outcomes:
         if isinstance(outcome, Grasp):
@@ -49,7 +46,7 @@ class Replay:
         source: the session, or its traffic file.
         interpreter: a fresh one, as the session's own was.
         speed: 1 for the original pace, 4 for four times as fast, 0 (the default) as fast as possible.
-        clock: waits where a pace is asked for.
+        clock: waits if a speed is given.
 
     Raises:
         SessionError: the traffic file cannot be used.
@@ -74,15 +71,11 @@ class Replay:
 
     @property
     def factor(self) -> float:
-        """How many times faster than at the original pace the bytes were read; 0 before they were."""
+        """Speed relative to the original pace; 0 before reading."""
         return self._span_ns / self._taken_ns if self._taken_ns else 0.0
 
     def outcomes(self) -> Iterator[Outcome]:
-        """The grasps, camera frames and tare reports, in the order in which they came about.
-
-        Raises:
-            SessionError: a event cannot be understood.
-        """
+        """The grasps, camera frames and tare reports, in order. Raises SessionError for an unreadable session event."""
         begun_ns, first_ns = self._clock.now_ns(), None
         for message in pace(self._reader.messages(), self._speed, self._clock):
             first_ns = message.stamp_ns if first_ns is None else first_ns

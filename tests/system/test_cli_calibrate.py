@@ -118,7 +118,7 @@ def test_too_little_motion_is_refused_before_anything_is_solved(inside, data, tm
 def test_without_anybody_to_ask_it_ends_and_says_how_to_script_it(inside, data, tmp_path):
     answer = inside("calibrate", "forearm", "--from", data, "--out", tmp_path / "forearm.yaml")
     assert answer.code == 130
-    assert "Give --no-input" in answer.err
+    assert "Use --no-input" in answer.err
     assert files(tmp_path) == []
 
 
@@ -126,7 +126,7 @@ def test_from_the_first_question_to_the_stored_result_on_the_simulated_rig(progr
     (tmp_path / "settings.yaml").write_text(yaml.safe_dump(SETTINGS))
     words = ("--settings", "settings.yaml", "--touches", 3, "--out", "forearm.yaml", "--replace")
     terminal = program.terminal(tmp_path, "calibrate", "forearm", *words)
-    terminal.until("Is its way clear", "y\n")
+    terminal.until("Is its path clear", "y\n")
     terminal.until("1/15 FF presses table top")
     for number in range(1, 16):
         terminal.type("\n")

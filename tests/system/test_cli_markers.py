@@ -87,11 +87,11 @@ def test_a_person_is_asked_for_the_bar_and_may_answer_later(
 @pytest.mark.parametrize(
     ("words", "code", "told"),
     [
-        (("poster",), 2, "none of single, grid, charuco, rig"),
+        (("poster",), 2, "neither one of single, grid, charuco"),
         (("charuco", "--paper", "A9"), 2, "no paper called 'A9'"),
         (("charuco", "--square-mm", 60, "--marker-mm", 40), 2, "do not fit on A4"),
         (("charuco", "--square-mm", 20, "--marker-mm", 20), 2, "marker"),
-        (("charuco", "--side-mm", 20), 2, "'--side-mm': does not belong to charuco"),
+        (("charuco", "--side-mm", 20), 2, "'--side-mm': has no effect for charuco"),
         (("single", "--dictionary", "DICT_9X9_50"), 2, "'DICT_9X9_50' is no dictionary of OpenCV. Change"),
         (("single", "--number", 50), 2, "50"),
         (("single", "--side-mm", -4), 2, "side_m"),

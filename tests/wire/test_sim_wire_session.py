@@ -122,7 +122,7 @@ def test_a_session_is_completed_and_replays_to_the_same_grasp(
     [
         ("camera", "camera: lost"),
         ("hand", "cycles in a row without a valid status"),
-        ("ft/MF", "MF: no reading of the fingertip"),
+        ("ft/MF", "MF: no reading from the fingertip"),
         ("base", "cycles in a row without a status"),
     ],
 )

@@ -195,7 +195,7 @@ def test_contacts_that_do_not_make_a_shape_are_no_failure_of_its_model(
     text = SHAPE.format(answer="raise ShapeError('encloses nothing')")
     load_extension(written("mine.py", "from drivers.core.errors import ShapeError\n" + text))
     evaluation = judged(contact_log, tmp_path / "out", "mine")
-    assert evaluation.warnings == ("the contacts enclose no shape",)
+    assert evaluation.warnings == ("no closed shape could be estimated from the contacts",)
     assert "warnings" not in json.loads((tmp_path / "out" / "slam.json").read_text())
 
 
@@ -205,7 +205,7 @@ def test_contacts_that_do_not_make_a_shape_are_no_failure_of_its_model(
         ("raise KeyError('steps')", "raises KeyError: 'steps' (line 5)"),
         ("return float('nan')", "is not a finite number"),
         ("return {'a': 1.0, 'b': [2.0, float('inf')]}", "is not a finite number"),
-        ("return object()", "raises TypeError: no plain form for object"),
+        ("return object()", "raises TypeError: cannot convert object to plain data"),
     ],
 )
 def test_a_figure_that_fails_is_null_and_the_others_are_there(
@@ -287,7 +287,7 @@ def test_a_load_that_is_no_number_stops_the_hand_as_an_infinite_one(
     rig = rig_file(tmp_path, {"extensions": ["mine.py"], "fingertips": "mine"})
     ended(capsys, "run", "--rig", rig, "--grasps", 1, "--out", tmp_path / "runs", "--no-input")
     (folder,) = (tmp_path / "runs").iterdir()
-    assert "its load is no number" in Session.open(folder).manifest.problem
+    assert "its load is not a number" in Session.open(folder).manifest.problem
 
 
 def test_an_extension_that_cannot_be_loaded_ends_the_command_before_it_begins(written: Written, tmp_path: Path) -> None:
