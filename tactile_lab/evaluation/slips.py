@@ -32,8 +32,11 @@ _LEAST_UNHELD = 0.02
 
 @dataclass(frozen=True)
 class Slips:
-    """Slips of the object between successive grasps that the camera both saw. Attributes: carried: slips while the hand
-    carried it, as (x_m, y_m, yaw_rad), world frame, shape (n, 3). left: slips while it was left in place, shape (m, 3).
+    """Slips of the object between successive grasps that the camera both saw.
+
+    Attributes:
+        carried: slips while the hand carried it, as (x_m, y_m, yaw_rad), world frame, shape (n, 3).
+        left: slips while it was left in place, shape (m, 3).
     """
 
     carried: Array
@@ -62,8 +65,9 @@ class Slips:
 
     @property
     def motion(self) -> MotionNoise | None:
-        """The matching motion noise; None if the hand carried the object too rarely. ``unheld`` stays 1, which is
-        always safe, if the object was left in place too rarely.
+        """The matching motion noise; None if the hand carried the object too rarely.
+
+        ``unheld`` stays 1, which is always safe, if the object was left in place too rarely.
         """
         if len(self.carried) < LEAST_STEPS:
             return None
