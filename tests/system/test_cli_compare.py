@@ -130,7 +130,7 @@ def test_a_lens_of_another_rig_or_changed_by_hand_gives_no_truth(
         (("first", "first"), "first: is named twice"),
         (("first", "second", "--results", "magic"), "has no results called 'magic'"),
         (("first", "--lens", "nowhere.yaml"), "nowhere.yaml: cannot be read"),
-        (("first", "--results", "results", "--out", "{file}"), "is no folder). Choose another folder with --out"),
+        (("first", "--results", "results", "--out", "{file}"), "is not a folder). Choose another folder with --out"),
     ],
 )
 def test_comparisons_that_can_not_be_made_are_refused(

@@ -108,8 +108,8 @@ def test_a_wrong_baud_rate_is_found_out(rig: Path) -> None:
 def test_another_sensor_than_the_rig_names_is_found_out(rig: Path) -> None:
     with emulate_sensors(load_fingertip_rig(rig)):
         box, digital = (found(changed(rig, finger, serial="FT77777"))[finger] for finger in ("FF", "MF"))
-    assert "the box uses the calibration of FT20001, the rig file names FT77777" in box.detail
-    assert "the sensor is FT00002, the rig file names FT77777" in digital.detail
+    assert "the box uses the calibration of FT20001, but the rig file names FT77777" in box.detail
+    assert "the sensor is FT00002, but the rig file names FT77777" in digital.detail
 
 
 def test_a_device_that_is_no_controller_is_told(rig: Path, tmp_path: Path) -> None:

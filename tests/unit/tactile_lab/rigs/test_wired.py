@@ -114,7 +114,7 @@ def test_a_cable_that_may_not_be_made_says_how_it_can_be(monkeypatch: pytest.Mon
     with pytest.raises(DeviceError) as told, virtual_cable("lab0", "lab1"):
         pass
     words = str(told.value)
-    assert "no right to make a virtual network cable (RTNETLINK answers: Operation not permitted)" in words
+    assert "no permission to create a virtual network cable (RTNETLINK answers: Operation not permitted)" in words
     assert "sudo ip link add lab0 type veth peer name lab1" in words
     assert "unshare -Urn sh -c 'ip link set lo up; tactile-lab ...'" in words
 
@@ -147,9 +147,9 @@ def test_the_plants_memory_carries_state_and_demands_both_ways(tmp_path: Path) -
 
 def test_a_file_that_is_no_plants_memory(tmp_path: Path) -> None:
     (tmp_path / "other").write_bytes(b"something")
-    with pytest.raises(DeviceError, match="is no plant's memory"):
+    with pytest.raises(DeviceError, match="is not the memory of a simulated plant"):
         PlantMirror(tmp_path / "other", MonotonicClock())
-    with pytest.raises(DeviceError, match="no plant's memory"):
+    with pytest.raises(DeviceError, match="the memory of the simulated plant"):
         PlantMirror(tmp_path / "none", MonotonicClock())
 
 
