@@ -109,7 +109,10 @@ def test_all_results_of_one_session_are_compared_when_it_is_judged_elsewhere(
 @pytest.mark.parametrize(
     ("spoil", "told"),
     [
-        (lambda lens: write_record(lens, read_record(lens).model_copy(update={"rig": "another"})), "is of rig another"),
+        (
+            lambda lens: write_record(lens, read_record(lens).model_copy(update={"rig": "another"})),
+            "belongs to rig another",
+        ),
         (lambda lens: lens.write_text(lens.read_text().replace("focal_px: [", "focal_px: [1")), "changed"),
     ],
     ids=["another rig", "by hand"],

@@ -116,4 +116,6 @@ def test_what_can_not_be_printed_or_measured_is_named_and_nothing_is_written(
 def test_a_folder_that_can_not_be_made_is_named(inside: Any, tmp_path: Path) -> None:
     (tmp_path / "out").write_text("mine")
     answer = inside("markers", "single", "--out", tmp_path / "out", "--no-input")
-    assert (answer.code, "out is not a folder). Choose another place with --out" in answer.err) == (1, True), answer.err
+    assert (answer.code, "out is not a folder). Choose another folder with --out" in answer.err) == (1, True), (
+        answer.err
+    )

@@ -92,7 +92,7 @@ def test_a_missing_interface_is_told(tmp_path: Path) -> None:
 
 def test_files_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     with (
-        pytest.raises(ConfigurationError, match="far_end is not named"),
+        pytest.raises(ConfigurationError, match="far_end is missing"),
         emulated_hand(load_hand_rig(rig_file(tmp_path, "lo"))),
     ):
         pass
