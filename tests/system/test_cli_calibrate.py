@@ -92,7 +92,7 @@ def test_a_stated_pose_needs_its_uncertainty(inside, tmp_path):
     ("change", "words"),
     [
         ({"rig": "another"}, "was recorded on rig another, not on simulated-hand"),
-        ({"touches": []}, "needs touches, or views"),
+        ({"touches": []}, "needs either touches or views"),
         ({"colour": "red"}, "colour: unknown key"),
     ],
 )
@@ -111,7 +111,7 @@ def test_too_little_motion_is_refused_before_anything_is_solved(inside, data, tm
     answer = inside("calibrate", "forearm", "--from", path, "--out", tmp_path / "forearm.yaml", "--no-input")
     assert answer.code == 2
     assert "the motion is not enough" in answer.err
-    assert "no or few touches tell the place along" in answer.err
+    assert "too few touches determine the position along" in answer.err
     assert files(tmp_path) == ["data.json"]
 
 

@@ -286,7 +286,7 @@ def test_settings_that_do_not_fit_are_explained(inside, planar_log, tmp_path, se
 def test_other_files_in_the_folder_of_results_are_left_alone(inside, planar_log, tmp_path):
     (tmp_path / "thesis.docx").write_text("years of work")
     answer = inside("reconstruct", planar_log, "--method", "odometry", "--out", tmp_path)
-    refused(answer, 2, "holds files that are no results, such as thesis.docx")
+    refused(answer, 2, "contains files that are not results, such as thesis.docx")
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.docx"]
 
 

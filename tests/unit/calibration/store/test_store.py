@@ -108,7 +108,7 @@ def test_a_place_that_can_not_be_written_is_named(tmp_path):
 
 def test_a_covariance_that_is_none_is_refused(stored):
     bad = -np.eye(6)
-    with pytest.raises(ValueError, match="no covariance"):
+    with pytest.raises(ValueError, match="not a covariance"):
         ForearmCalibration.of(POSE, bad)
 
 
@@ -119,10 +119,10 @@ def test_a_good_calibration_is_admitted(stored):
 @pytest.mark.parametrize(
     ("changes", "here", "words"),
     [
-        ({"rig": "sim"}, HERE, "is of rig sim, not of lab"),
-        ({}, Installation("lab", {"hand": "554"}), "is of hand with serial number 378, not 554"),
+        ({"rig": "sim"}, HERE, "belongs to rig sim, not to lab"),
+        ({}, Installation("lab", {"hand": "554"}), "belongs to the hand with serial number 378, not 554"),
         ({"valid_until_utc": "2026-11-01T00:00:00+00:00"}, HERE, "is valid until 2026-11-01"),
-        ({"created_utc": "2027-11-21T09:00:00+00:00"}, HERE, "was made in the future"),
+        ({"created_utc": "2027-11-21T09:00:00+00:00"}, HERE, "was created in the future"),
         ({"verdict": "FAIL"}, HERE, "did not pass its limits"),
         ({"kind": "camera"}, HERE, "is a calibration of camera"),
     ],
