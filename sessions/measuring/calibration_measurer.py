@@ -183,7 +183,7 @@ class CalibrationMeasurer(PressingHand):
     """A rig that makes planned touches and pictures.
 
     Args:
-        rig runtime, world_T_mount, tips, settings: see :class:`PressingHand`.
+        runtime, world_T_mount, tips, settings: see :class:`PressingHand`.
         board: board on the hand, for pictures; None for touches.
         markers: the world marker, for pictures.
     """
