@@ -1,5 +1,4 @@
-"""The bounding box of an unknown object, measured by touch, side after side, before the first grasp (thesis figure
-4.2).
+"""The bounding box of an unknown object, measured by touch before the first grasp (thesis figure 4.2).
 
 The order is the figure's: top, left, front, right, back. The top is tapped. A side is raked: the four fingers hang in a
 row, the thumb held up, and come toward the object in lanes until one meets it. The back, the side toward the arm,

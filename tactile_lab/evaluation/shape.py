@@ -1,6 +1,7 @@
-"""Errors of the estimated shape in the truth's object frame, computed twice: aligned by the first grasp's true pose,
-which includes the error of the estimated pose, and after the best rigid alignment, which measures the shape alone (the
-thesis reports the second).
+"""Errors of the estimated shape in the truth's object frame, computed twice.
+
+Once aligned by the first grasp's true pose, which includes the error of the estimated pose, and once after the best
+rigid alignment, which measures the shape alone (the thesis reports the second).
 """
 
 from __future__ import annotations
