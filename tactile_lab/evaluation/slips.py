@@ -1,4 +1,4 @@
-"""How far an object slipped relative to the hand between grasps, by the marker camera, and the motion settings that fit.
+"""How far an object slipped relative to the hand between grasps, by the marker camera, and the motion that fits.
 
 The estimation expects slips of a certain size (v of equation 3.7). If it is too small, an
 object that slipped is lost; if it is too large, the pose is determined by contacts alone. So it is measured where
