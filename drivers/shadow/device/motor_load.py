@@ -102,7 +102,7 @@ class LoadWatch:
                 since = now_ns, angle_rad
             self._pushing_since[motor] = since
             if since is not None and now_ns - since[0] > self._stall_ns:
-                return self._fault(motor, f"pushed for {self._limits.stall_s:g} s with its largest duty cycle")
+                return self._fault(motor, f"stalled for {self._limits.stall_s:g} s at its largest duty cycle")
         return None
 
     def _over(
@@ -116,4 +116,4 @@ class LoadWatch:
 
     def _fault(self, motor: int, what: str) -> Fault:
         where = f"{self._where}, {self._motors.names[motor]} (motor {motor})"
-        return Fault(f"stopped: {what}", where, "Look at the hand before going on, then resume")
+        return Fault(f"stopped: {what}", where, "Check the hand, then resume")
