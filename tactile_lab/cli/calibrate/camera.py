@@ -28,7 +28,9 @@ def camera(
     out: Annotated[
         Path | None, typer.Option(help="File to write the result to.", show_default="calibrations/STATION/camera.yaml")
     ] = None,
-    measurer: Annotated[str, typer.Option(help="Installation (of the rig file) that the camera belongs to.")] = "laboratory",
+    measurer: Annotated[
+        str, typer.Option(help="Installation (of the rig file) that the camera belongs to.")
+    ] = "laboratory",
     serial: Annotated[str, typer.Option(help="Serial number of the camera.")] = "",
     size: Annotated[str, typer.Option(help="Image size to request from the camera, such as 1280x720.")] = "1280x720",
     exposure_ms: Annotated[float | None, typer.Option(help="Fix the camera's exposure.")] = None,
