@@ -49,6 +49,13 @@ def test_a_record_comes_back_as_it_was_written(stored):
     assert stored.read_text().startswith("# Where the base stands.\n")
 
 
+@pytest.mark.parametrize("notes", ["1e3", "2026-11-21", ".5", "-7", "no", "", "12:30:00", "with: a colon"])
+def test_notes_that_look_like_something_else_stay_text(tmp_path, notes):
+    path = tmp_path / "forearm.yaml"
+    write_record(path, record(notes=notes))
+    assert read_record(path).notes == notes
+
+
 def test_the_device_loader_reads_the_stored_form(stored):
     forearm = load_forearm(stored)
     assert forearm.world_T_mount.pose().equals(POSE, 1e-12)
