@@ -1,4 +1,5 @@
 """The conductor runs a session, grasp after grasp, until there are enough or there is a reason to end.
+
 :class:`~sessions.conductor.decisions.SessionRoles` decide about the grasps and execute them.
 """
 
@@ -24,10 +25,10 @@ class Conductor:
     """Runs a session on a connected rig runtime.
 
     Args:
-        rig runtime: connected; the caller closes it.
+        runtime: connected; the caller closes it.
         settings: of the session.
-        roles: decide about the grasps and execute them; the caller opens their estimator. progress: receives what
-        happens.
+        roles: decide about the grasps and execute them; the caller opens their estimator.
+        progress: receives what happens.
     """
 
     def __init__(
@@ -52,8 +53,10 @@ class Conductor:
     # --- the session -------------------------------------------------------------------------------------------
 
     def run(self) -> SessionOutcome:
-        """Grasp until done. In every case the hand ends without demands and the positioner holds. Ctrl+C once finishes
-        the current step and ends the session, twice raises KeyboardInterrupt immediately.
+        """Grasp until done.
+
+        In every case the hand ends without demands and the positioner holds. Ctrl+C once finishes the current step and
+        ends the session, twice raises KeyboardInterrupt immediately.
         """
         try:
             with self._guard:

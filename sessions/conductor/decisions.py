@@ -1,6 +1,7 @@
-"""Decision makers of a session: the planner of an autonomous session, or a person. The conductor asks a decision maker
-before every grasp and reports the outcome to it. A decision maker moves nothing: grasps are executed by a performer,
-which follows the plan by itself or guides a person through it.
+"""Decision makers of a session: the planner of an autonomous session, or a person.
+
+The conductor asks a decision maker before every grasp and reports the outcome to it. A decision maker moves nothing:
+grasps are executed by a performer, which follows the plan by itself or guides a person through it.
 """
 
 from __future__ import annotations
@@ -132,10 +133,13 @@ class SessionRoles:
     """The roles of a session: supervisor, performer, decision maker, estimator client.
 
     Attributes:
-        supervisor: checks every cycle. performer: executes the grasps. decisions: decides about them. estimator: client
-        of estimator and planner; open while the session runs. survey: measures the object's bounding box before the
-        first grasp; its argument tells whether to skip the rest. None for a session without it. guard: receives Ctrl+C
-        while the session runs; code that waits for a person checks it.
+        supervisor: checks every cycle.
+        performer: executes the grasps.
+        decisions: decides about them.
+        estimator: client of estimator and planner; open while the session runs.
+        survey: measures the object's bounding box before the first grasp; its argument tells whether to skip the rest.
+            None for a session without it.
+        guard: receives Ctrl+C while the session runs; code that waits for a person checks it.
     """
 
     supervisor: SafetySupervisor

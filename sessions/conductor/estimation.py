@@ -14,7 +14,7 @@ class Estimation:
     """Estimates grasps one after the other, and records each step.
 
     Args:
-        rig runtime: of the session.
+        runtime: of the session.
         estimator: client of the estimator.
     """
 

@@ -82,8 +82,11 @@ class Estimator(Protocol):
 
         Args:
             grasp: the next one.
-            known: number of estimates that have reached the session. Returns: the estimates that have not reached it,
-            the newest last: more than one if an earlier question was interrupted by a failing device.
+            known: number of estimates that have reached the session.
+
+        Returns:
+            the estimates that have not reached it, the newest last: more than one if an earlier question was
+            interrupted by a failing device.
         """
 
     def undo(self, hand_motion_world: Pose3) -> None:
@@ -117,8 +120,11 @@ class PolicyChoice(Protocol):
 
 @dataclass(frozen=True)
 class PlannedGrasp:
-    """The next grasp. Attributes: plan: the grasp. choice: the policy's decision about it;
-    None if no policy was asked.
+    """The next grasp.
+
+    Attributes:
+        plan: the grasp.
+        choice: the policy's decision about it; None if no policy was asked.
     """
 
     plan: GraspPlan

@@ -1,5 +1,6 @@
-"""Questions of a session to its estimator service, answered while the devices keep cycling. On a simulated rig time
-waits: the answer is computed immediately. On real clocks another process computes it
+"""Questions of a session to its estimator service, answered while the devices keep cycling.
+
+On a simulated rig time waits: the answer is computed immediately. On real clocks another process computes it
 (:mod:`tactile_lab.autonomy.estimator_process`), and the session runs cycles until it comes. The answers are the same,
 bit for bit.
 """
@@ -31,8 +32,9 @@ class EstimatorClient(Protocol):
         """The answer.
 
         Raises:
-            EstimationError: the question failed. SessionError: the service has ended. TactileLabError: raised by the
-            question itself, or by a cycle that was run meanwhile.
+            EstimationError: the question failed.
+            SessionError: the service has ended.
+            TactileLabError: raised by the question itself, or by a cycle that was run meanwhile.
         """
 
     def wait_for_person(self, question: Callable[[], Answer]) -> Answer:
@@ -45,7 +47,11 @@ class EstimatorClient(Protocol):
 
 
 class LocalClient:
-    """The service runs in this process, while time waits. Args: service: the session's."""
+    """The service runs in this process, while time waits.
+
+    Args:
+        service: the session's.
+    """
 
     def __init__(self, service: EstimatorService) -> None:
         self._service = service
@@ -68,9 +74,13 @@ class LocalClient:
 
 
 def answer(service: Any, question: Callable[..., Answer], args: Any, kwargs: Any) -> Answer:
-    """The answer to one question. A method is looked up on the service itself, so that a question may refer to the
-    protocol's method. Raises: EstimationError: a program error; the error's notes say where. TactileLabError: raised by
-    the question.
+    """The answer to one question.
+
+    A method is looked up on the service itself, so that a question may refer to the protocol's method.
+
+    Raises:
+        EstimationError: a program error; the error's notes say where.
+        TactileLabError: raised by the question.
     """
     ask: Callable[..., Answer] = getattr(service, question.__name__, None) or partial(question, service)
     try:

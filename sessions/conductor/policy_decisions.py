@@ -16,8 +16,13 @@ from sessions.rig_runtime.rig_runtime import RigRuntime
 
 @dataclass(frozen=True)
 class Proposal:
-    """The proposed next grasp. Attributes: number: from 1. plan: the grasp and its reason. vetoed: number of plans for
-    this grasp vetoed so far. withdrawn: whether the answer no longer matters because Ctrl+C ends the session.
+    """The proposed next grasp.
+
+    Attributes:
+        number: from 1.
+        plan: the grasp and its reason.
+        vetoed: number of plans for this grasp vetoed so far.
+        withdrawn: whether the answer no longer matters because Ctrl+C ends the session.
     """
 
     number: int
@@ -39,9 +44,10 @@ class PolicyDecisions(AutonomousDecisions):
     """The planner's policy decides.
 
     Args:
-        estimator: client of a planner with or without a policy. tell: receives every decision of the policy once.
-        approve: asked before every grasp; a vetoed grasp is replaced by the next best. guard: receives Ctrl+C, which
-        withdraws the question.
+        estimator: client of a planner with or without a policy.
+        tell: receives every decision of the policy once.
+        approve: asked before every grasp; a vetoed grasp is replaced by the next best.
+        guard: receives Ctrl+C, which withdraws the question.
     """
 
     def __init__(

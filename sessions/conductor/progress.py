@@ -13,11 +13,17 @@ class GraspReport:
 
     Attributes:
         number: from 1.
-        planned: number of grasps requested. closing: how the hand closed. reason: why this grasp was chosen. forces_N:
-        contact force of each finger with a contact. missing: fingers without a contact, and why. landings: number of
-        landings on the object during the approach. position_sigma_m: uncertainty of the object's position in the table
-        plane, None if there is no estimate. yaw_sigma_rad: uncertainty of the object's rotation. explored: share of the
-        surface that is known, 0..1. verdict: the estimator's verdict on the grasp. stamp_ns: session clock.
+        planned: number of grasps requested.
+        closing: how the hand closed.
+        reason: why this grasp was chosen.
+        forces_N: contact force of each finger with a contact.
+        missing: fingers without a contact, and why.
+        landings: number of landings on the object during the approach.
+        position_sigma_m: uncertainty of the object's position in the table plane, None if there is no estimate.
+        yaw_sigma_rad: uncertainty of the object's rotation.
+        explored: share of the surface that is known, 0..1.
+        verdict: the estimator's verdict on the grasp.
+        stamp_ns: session clock.
     """
 
     number: int

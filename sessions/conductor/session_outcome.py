@@ -22,9 +22,14 @@ class Ending(StrEnum):
 
 @dataclass(frozen=True)
 class SessionOutcome:
-    """Outcome of a session. Attributes: ending: how it ended. reason: the same as a sentence. grasps: all captured
-    grasps, in order. dropped: how often a finger's contact was rejected, by reason. error: what stopped the session, if
-    something did.
+    """Outcome of a session.
+
+    Attributes:
+        ending: how it ended.
+        reason: the same as a sentence.
+        grasps: all captured grasps, in order.
+        dropped: how often a finger's contact was rejected, by reason.
+        error: what stopped the session, if something did.
     """
 
     ending: Ending

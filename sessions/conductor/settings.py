@@ -15,9 +15,10 @@ class ConductorSettings(StrictModel):
     """A session.
 
     Attributes:
-        grasps: number of grasps. fixed_grasps: number of first grasps that follow the fixed rule instead of the
-        estimate. missed_approaches: number of blocked approaches in a row that ends the session. cycle, probing,
-        safety, guided: see there.
+        grasps: number of grasps.
+        fixed_grasps: number of first grasps that follow the fixed rule instead of the estimate.
+        missed_approaches: number of blocked approaches in a row that ends the session.
+        cycle, probing, safety, guided: see there.
     """
 
     grasps: int = Field(default=16, ge=1)

@@ -1,6 +1,8 @@
-"""A session as one ZIP file, and back. An archive's names, links and sizes are not trusted. Only regular files are
-extracted, only under names that a session has, only into a new folder, and never beyond the limits, whatever sizes the
-archive declares. Nothing in it is executed or unpickled.
+"""A session as one ZIP file, and back.
+
+An archive's names, links and sizes are not trusted. Only regular files are extracted, only under names that a session
+has, only into a new folder, and never beyond the limits, whatever sizes the archive declares. Nothing in it is executed
+or unpickled.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ class ArchiveLimits:
 
     Attributes:
         files: number of files.
-        total_bytes: total unpacked size. ratio: largest ratio of unpacked to packed size of a file above a megabyte.
+        total_bytes: total unpacked size.
+        ratio: largest ratio of unpacked to packed size of a file above a megabyte.
     """
 
     files: int = 10_000
@@ -61,9 +64,11 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
     """Unpack a session from a ZIP file into a new folder under ``root``.
 
     Args:
-        name: name of the new session; by default the name of the only folder in the archive. Raises: SessionError: not
-        a ZIP file, unsafe names, links or sizes, no session in it, or a session of that name exists already; then
-        nothing is left behind.
+        name: name of the new session; by default the name of the only folder in the archive.
+
+    Raises:
+        SessionError: not a ZIP file, unsafe names, links or sizes, no session in it, or a session of that name exists
+            already; then nothing is left behind.
     """
     limits = limits or ArchiveLimits()
     try:

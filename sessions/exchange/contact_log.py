@@ -46,9 +46,10 @@ class ContactLog:
         dimension: 2 or 3.
         point_sigma_m, normal_sigma_rad: standard deviation of all points and normals, per axis, where a contact does
             not state its own.
-        motion_sigma: of one re-orientation; None if unknown. grasps: a missing force is read as 0, a missing palm pose
-        as the contacts' centre with the world's axes. truth: the object, or None; for evaluation only. true_poses:
-        world_T_object at each grasp, None if not given; for evaluation only.
+        motion_sigma: of one re-orientation; None if unknown.
+        grasps: a missing force is read as 0, a missing palm pose as the contacts' centre with the world's axes.
+        truth: the object, or None; for evaluation only.
+        true_poses: world_T_object at each grasp, None if not given; for evaluation only.
     """
 
     dimension: Literal[2, 3]
@@ -64,8 +65,9 @@ def read_contact_log(path: Path) -> ContactLog:
     """Read a log.
 
     Raises:
-        SessionError: the file cannot be read or is not JSON. ConfigurationError: its content does not fit the format,
-        or its normals point into the object; the message names each entry.
+        SessionError: the file cannot be read or is not JSON.
+        ConfigurationError: its content does not fit the format, or its normals point into the object; the message names
+            each entry.
     """
     content = _load_json(path)
     tag = content.get("format") if isinstance(content, dict) else None
@@ -91,8 +93,11 @@ def write_contact_log(path: Path, log: ContactLog) -> None:
     """Write a log; the same checks as for reading.
 
     A log of dimension 2 holds the horizontal part of its contacts and motions; contacts with a vertical normal have
-        none and are left out. Raises: ConfigurationError: the log is empty or inconsistent. WriteError: the file cannot
-        be written.
+        none and are left out.
+
+    Raises:
+        ConfigurationError: the log is empty or inconsistent.
+        WriteError: the file cannot be written.
     """
     poses = log.true_poses or (None,) * len(log.grasps)
     document = {

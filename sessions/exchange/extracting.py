@@ -37,9 +37,13 @@ class Piece:
 
 
 def extract(session: Session, into: Path, piece: Piece) -> dict[str, int]:
-    """Extract part of a session into a new folder. Returns the number of messages by topic. Session events are kept, so
-    that the extract can be replayed. Raises: SessionError: the recording cannot be read, the folder exists, or the
-    extract would be empty. ConfigurationError: the recording does not have a transport.
+    """Extract part of a session into a new folder.
+
+    Returns the number of messages by topic. Session events are kept, so that the extract can be replayed.
+
+    Raises:
+        SessionError: the recording cannot be read, the folder exists, or the extract would be empty.
+        ConfigurationError: the recording does not have a transport.
     """
     check_id(into.name, str(into))
     try:

@@ -1,6 +1,7 @@
-"""All measurements of a session as plain tables, decoded from the raw bytes by the session's own drivers. The tables
-are filled from an :class:`~sessions.perception.interpreter.Interpreter` that reads the recording, so that they hold the
-session's data at full rate, and not the thinned samples for viewers. Ground truth has separate tables.
+"""All measurements of a session as plain tables, decoded from the raw bytes by the session's own drivers.
+
+The tables are filled from an :class:`~sessions.perception.interpreter.Interpreter` that reads the recording, so that
+they hold the session's data at full rate, and not the thinned samples for viewers. Ground truth has separate tables.
 """
 
 from __future__ import annotations

@@ -35,8 +35,10 @@ def write_csv(tables: SampleTables, folder: Path) -> int:
 
 
 def write_hdf5(tables: SampleTables, path: Path) -> int:
-    """Write a group per table with ``stamp_ns`` and one dataset per column. Returns the number of rows. Names of
-    columns carry their units. Pictures stay encoded as received, as arrays of bytes in ``pictures/encoded``.
+    """Write a group per table with ``stamp_ns`` and one dataset per column.
+
+    Returns the number of rows. Names of columns carry their units. Pictures stay encoded as received, as arrays of
+    bytes in ``pictures/encoded``.
 
     Raises:
         SessionError: the file exists or cannot be written.

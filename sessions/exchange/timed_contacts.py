@@ -1,6 +1,7 @@
-"""Converts contacts from other sources, one per line of a CSV table or a JSON file, into a contact log. The columns are
-described in ``docs/sessions.md``. A column's name carries its unit, so that a table in millimetres or degrees is
-refused by name instead of being misread (see :mod:`sessions.exchange.timed_table`).
+"""Converts contacts from other sources, one per line of a CSV table or a JSON file, into a contact log.
+
+The columns are described in ``docs/sessions.md``. A column's name carries its unit, so that a table in millimetres or
+degrees is refused by name instead of being misread (see :mod:`sessions.exchange.timed_table`).
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ class ImportSettings:
     Attributes:
         point_sigma_m: standard deviation of the points, per axis.
         normal_sigma_rad: of the normals; None: 0.1, or 0.35 for directions of forces, which friction tilts by this
-        much. gap_s: without a grasp column, a longer pause starts a new grasp. object_name: name of the true object.
+            much.
+        gap_s: without a grasp column, a longer pause starts a new grasp.
+        object_name: name of the true object.
         mesh: its closed mesh next to the log, or None.
     """
 
@@ -42,8 +45,11 @@ class ImportSettings:
 
 
 def read_timed_contacts(path: Path, settings: ImportSettings | None = None) -> ContactLog:
-    """Read a table of contacts, CSV or JSON by the file's suffix. Raises: SessionError: the file cannot be read, or is
-    not CSV or JSON. ConfigurationError: an invalid column or line; names it.
+    """Read a table of contacts, CSV or JSON by the file's suffix.
+
+    Raises:
+        SessionError: the file cannot be read, or is not CSV or JSON.
+        ConfigurationError: an invalid column or line; names it.
     """
     settings = settings or ImportSettings()
     truth = None if settings.mesh is None else ObjectTruth(name=settings.object_name, mesh=settings.mesh)

@@ -13,10 +13,15 @@ from sessions.motion.safety import InterruptGuard
 
 
 class AttendedDecisions(PolicyDecisions):
-    """The planner's decisions, recorded and approved as usual, unless the operator requests something else. Args:
-    estimator: client of a planner with or without a policy. tell: receives every decision of the policy that no request
-    overrides. approve: asked before every grasp. operator: the person; requests are read between grasps. guard:
-    receives Ctrl+C. wait: called in every cycle of a pause; makes a simulated rig wait for the person.
+    """The planner's decisions, recorded and approved as usual, unless the operator requests something else.
+
+    Args:
+        estimator: client of a planner with or without a policy.
+        tell: receives every decision of the policy that no request overrides.
+        approve: asked before every grasp.
+        operator: the person; requests are read between grasps.
+        guard: receives Ctrl+C.
+        wait: called in every cycle of a pause; makes a simulated rig wait for the person.
     """
 
     def __init__(

@@ -18,9 +18,13 @@ from sessions.recording.recorder import Level
 
 
 class GraspByHand:
-    """The steps of a grasp as prompts; the hand has no demands, the positioner stays or is moved by hand. Args: motion:
-    supervised cycles that read the operator's requests; nothing is moved. settings: the length of a capture.
-    console: the operator's console. tip: shape of the fingertips.
+    """The steps of a grasp as prompts; the hand has no demands, the positioner stays or is moved by hand.
+
+    Args:
+        motion: supervised cycles that read the operator's requests; nothing is moved.
+        settings: the length of a capture.
+        console: the operator's console.
+        tip: shape of the fingertips.
     """
 
     def __init__(

@@ -1,6 +1,7 @@
-"""A grasp led by keys: for a hand that cannot be moved by hand, and for the simulated hand. The hand moves only on
-request: by one increment, or a whole stage of the grasp automatically. Every motion stops if a fingertip touches
-something.
+"""A grasp led by keys: for a hand that cannot be moved by hand, and for the simulated hand.
+
+The hand moves only on request: by one increment, or a whole stage of the grasp automatically. Every motion stops if a
+fingertip touches something.
 """
 
 from __future__ import annotations
@@ -25,9 +26,14 @@ AROUND_m = 0.001
 
 
 class GraspByKeys(GraspCycle):
-    """The steps of a grasp, each executed on request. Args: motion: supervised motion that reads the operator's
-    requests. settings: speeds, forces, times. console: the operator's console. tip: shape of the fingertips.
-    yaw_window_rad: yaws the arm can reach.
+    """The steps of a grasp, each executed on request.
+
+    Args:
+        motion: supervised motion that reads the operator's requests.
+        settings: speeds, forces, times.
+        console: the operator's console.
+        tip: shape of the fingertips.
+        yaw_window_rad: yaws the arm can reach.
     """
 
     def __init__(

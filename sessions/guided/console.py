@@ -23,12 +23,13 @@ class OperatorConsole:
     """Connects the operator and the session.
 
     Args:
-        rig runtime: connected.
+        runtime: connected.
         operator: the person.
         settings: of the guided session.
-        attachments: stores notes, pictures and files. touch_force_N: force above which a finger touches. guard:
-        receives Ctrl+C, which ends the session even while waiting for the operator. pace: called with the session clock
-        after every cycle; makes a simulated rig wait for the person.
+        attachments: stores notes, pictures and files.
+        touch_force_N: force above which a finger touches.
+        guard: receives Ctrl+C, which ends the session even while waiting for the operator.
+        pace: called with the session clock after every cycle; makes a simulated rig wait for the person.
     """
 
     def __init__(

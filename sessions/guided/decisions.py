@@ -18,8 +18,11 @@ GOOD_OBSERVABILITY = 0.15
 
 
 class GuidedDecisions(AutonomousDecisions):
-    """The operator's decisions at the console. Args: estimator: client of the planner, which makes suggestions.
-    console: the operator's console.
+    """The operator's decisions at the console.
+
+    Args:
+        estimator: client of the planner, which makes suggestions.
+        console: the operator's console.
     """
 
     def __init__(self, estimator: EstimatorClient, console: OperatorConsole) -> None:

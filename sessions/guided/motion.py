@@ -12,8 +12,12 @@ from sessions.rig_runtime.rig_runtime import RigRuntime
 
 
 class GuidedMotion(Motion):
-    """As :class:`Motion`; a pause holds it, and giving up a grasp ends it. Args: rig runtime: connected. supervisor:
-    checks every cycle. console: the operator's console.
+    """As :class:`Motion`; a pause holds it, and giving up a grasp ends it.
+
+    Args:
+        runtime: connected.
+        supervisor: checks every cycle.
+        console: the operator's console.
     """
 
     def __init__(self, runtime: RigRuntime, supervisor: SafetySupervisor, console: OperatorConsole) -> None:
@@ -21,8 +25,11 @@ class GuidedMotion(Motion):
         self._console = console
 
     def tick(self) -> None:
-        """One supervised cycle, and further ones for as long as the operator pauses. Raises: GraspAbandonedError: the
-        operator has given up this grasp. SafetyError, DeviceError: as :meth:`Motion.tick`.
+        """One supervised cycle, and further ones for as long as the operator pauses.
+
+        Raises:
+            GraspAbandonedError: the operator has given up this grasp.
+            SafetyError, DeviceError: as :meth:`Motion.tick`.
         """
         super().tick()
         self._console.cycle()

@@ -45,9 +45,14 @@ class Ask(StrEnum):
 
 @dataclass(frozen=True)
 class Request:
-    """One request. Attributes: ask: its kind. text: text of a note; name of a file. fingers: fingers that move by
-    steps. steps: number of steps to close, negative to open. x, y, z, turn: steps of the hand along the world's axes
-    and about its z axis.
+    """One request.
+
+    Attributes:
+        ask: its kind.
+        text: text of a note; name of a file.
+        fingers: fingers that move by steps.
+        steps: number of steps to close, negative to open.
+        x, y, z, turn: steps of the hand along the world's axes and about its z axis.
     """
 
     ask: Ask
@@ -75,11 +80,21 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True)
 class Panel:
-    """The state shown to the operator. Attributes: stamp_ns: session clock. grasp: number of the current grasp, from 1.
-    stage: stage of the grasp. prompt: what to do now. sight: current sensor readings. capture: what is missing for a
-    capture. suggestion: the suggested next grasp. unknown: which part of the object is still unknown. message: the last
-    message. paused: why the session is paused; "" if it is not. automatic: captures are automatic. asks: requests
-    possible now, besides those that always are.
+    """The state shown to the operator.
+
+    Attributes:
+        stamp_ns: session clock.
+        grasp: number of the current grasp, from 1.
+        stage: stage of the grasp.
+        prompt: what to do now.
+        sight: current sensor readings.
+        capture: what is missing for a capture.
+        suggestion: the suggested next grasp.
+        unknown: which part of the object is still unknown.
+        message: the last message.
+        paused: why the session is paused; "" if it is not.
+        automatic: captures are automatic.
+        asks: requests possible now, besides those that always are.
     """
 
     stamp_ns: int
@@ -103,8 +118,10 @@ class Panel:
 
 
 class Operator(Protocol):
-    """The operator, or a substitute. Attributes: attended: a person is present who can fix problems; otherwise a
-    failure ends the session.
+    """The operator, or a substitute.
+
+    Attributes:
+        attended: a person is present who can fix problems; otherwise a failure ends the session.
     """
 
     attended: bool

@@ -20,11 +20,16 @@ from sessions.perception.perception import Perception
 
 @dataclass(frozen=True)
 class OperatorView:
-    """Readings at one instant. Attributes: forces_N: contact force on each fingertip; None if its sensor has no usable
-    reading or is not zeroed yet. touching: fingers in contact. steady_s: time for which contacts and hand have not
-    changed. is_steady: long enough, with enough fingers. observability: smallest eigenvalue of (3.18) of the
-    current contacts; None if unknown. silent: fingers whose sensor sends nothing usable. problems: problems
-    reported by sensors.
+    """Readings at one instant.
+
+    Attributes:
+        forces_N: contact force on each fingertip; None if its sensor has no usable reading or is not zeroed yet.
+        touching: fingers in contact.
+        steady_s: time for which contacts and hand have not changed.
+        is_steady: long enough, with enough fingers.
+        observability: smallest eigenvalue of (3.18) of the current contacts; None if unknown.
+        silent: fingers whose sensor sends nothing usable.
+        problems: problems reported by sensors.
     """
 
     forces_N: Mapping[str, float | None]
@@ -53,8 +58,12 @@ class _Instant:
 
 
 class Watcher:
-    """Evaluates every cycle. Args: perception: the live session's. settings: criteria for a steady grasp and a silent
-    sensor. touch_force_N: force above which a finger touches.
+    """Evaluates every cycle.
+
+    Args:
+        perception: the live session's.
+        settings: criteria for a steady grasp and a silent sensor.
+        touch_force_N: force above which a finger touches.
     """
 
     def __init__(self, perception: Perception, settings: GuidedSettings, touch_force_N: float) -> None:

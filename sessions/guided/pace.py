@@ -9,8 +9,11 @@ _GIVEN_UP_ns = NANOSECONDS // 5
 
 
 class Pace:
-    """Called with the simulated time after every cycle; waits while that is ahead. Args: clock: the real clock. factor:
-    simulated seconds per real second.
+    """Called with the simulated time after every cycle; waits while that is ahead.
+
+    Args:
+        clock: the real clock.
+        factor: simulated seconds per real second.
     """
 
     def __init__(self, clock: Clock, factor: float = 1.0) -> None:

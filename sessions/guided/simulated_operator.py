@@ -20,8 +20,12 @@ _ANSWERS = {
 
 @dataclass(frozen=True)
 class Cue:
-    """One scripted action, executed once when its condition holds. Attributes: fits: condition on the panel. requests:
-    requests to send. act: called before the requests.
+    """One scripted action, executed once when its condition holds.
+
+    Attributes:
+        fits: condition on the panel.
+        requests: requests to send.
+        act: called before the requests.
     """
 
     fits: Callable[[Panel], bool]
@@ -30,9 +34,11 @@ class Cue:
 
 
 class SimulatedOperator:
-    """Answers every prompt by letting the rig do the step, and captures when the grasp is steady. Args: script: cues in
-    order; when the next one fits, it is played instead of an answer. attended: play a person who fixes problems and
-    resumes.
+    """Answers every prompt by letting the rig do the step, and captures when the grasp is steady.
+
+    Args:
+        script: cues in order; when the next one fits, it is played instead of an answer.
+        attended: play a person who fixes problems and resumes.
     """
 
     def __init__(self, script: Iterable[Cue] = (), *, attended: bool = False) -> None:

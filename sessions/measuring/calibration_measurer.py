@@ -1,6 +1,7 @@
-"""Makes a calibration's touches and pictures with a rig. The positioner moves the hand, one finger stretched, in front
-of a face and presses it softly; or it shows the board on the hand to the camera. The safety supervisor checks every
-cycle.
+"""Makes a calibration's touches and pictures with a rig.
+
+The positioner moves the hand, one finger stretched, in front of a face and presses it softly; or it shows the board on
+the hand to the camera. The safety supervisor checks every cycle.
 """
 
 from __future__ import annotations
@@ -33,13 +34,21 @@ Board = SingleMarker | GridBoard | CharucoBoard
 
 
 class MeasurerSettings(StrictModel):
-    """How the hand moves during calibration. Attributes: travel_m_s, turn_rad_s: speeds between poses. press_m_s: speed
-    toward a face. fingers_rad_s: joint speed between postures. lift_m: height above a place at which the hand
-    arrives and leaves. stand_off_m: distance at which the press starts; more than the mount's error. beyond_m:
-    distance behind the expected face at which the search ends. back_m: retreat after the first touch, before the
-    slow second touch. again_m_s: speed of the second touch. press_N: force at which it stops. settle_s, capture_s:
-    rest before a measurement, and its length. tares: how often to wait for a fingertip that still swings. safety:
-    limits; wide, since the edges of a table are far out and a stretched finger keeps the palm high.
+    """How the hand moves during calibration.
+
+    Attributes:
+        travel_m_s, turn_rad_s: speeds between poses.
+        press_m_s: speed toward a face.
+        fingers_rad_s: joint speed between postures.
+        lift_m: height above a place at which the hand arrives and leaves.
+        stand_off_m: distance at which the press starts; more than the mount's error.
+        beyond_m: distance behind the expected face at which the search ends.
+        back_m: retreat after the first touch, before the slow second touch.
+        again_m_s: speed of the second touch.
+        press_N: force at which it stops.
+        settle_s, capture_s: rest before a measurement, and its length.
+        tares: how often to wait for a fingertip that still swings.
+        safety: limits; wide, since the edges of a table are far out and a stretched finger keeps the palm high.
     """
 
     travel_m_s: float = Field(default=0.25, gt=0.0)
@@ -62,8 +71,10 @@ class PressingHand:
     """A connected rig runtime whose hand is moved and presses faces; shared by all measurers.
 
     Args:
-        rig runtime: connected.
-        world_T_mount: approximate pose of the mount. tips: shape of each fingertip. settings: see there.
+        runtime: connected.
+        world_T_mount: approximate pose of the mount.
+        tips: shape of each fingertip.
+        settings: see there.
     """
 
     def __init__(
@@ -172,7 +183,7 @@ class CalibrationMeasurer(PressingHand):
     """A rig that makes planned touches and pictures.
 
     Args:
-        rig runtime, world_T_mount, tips, settings: see :class:`PressingHand`.
+        runtime, world_T_mount, tips, settings: see :class:`PressingHand`.
         board: board on the hand, for pictures; None for touches.
         markers: the world marker, for pictures.
     """
@@ -193,8 +204,8 @@ class CalibrationMeasurer(PressingHand):
         """Make one planned touch or picture.
 
         Raises:
-            DeviceError: nothing was touched, no contact was measured, or the board is not in the picture. SafetyError:
-            a limit was exceeded; the rig was stopped.
+            DeviceError: nothing was touched, no contact was measured, or the board is not in the picture.
+            SafetyError: a limit was exceeded; the rig was stopped.
         """
         observation = (
             self._press_and_observe(planned, self._capture)

@@ -22,8 +22,10 @@ _HELD = 0.7
 
 
 class FingertipMeasurerSettings(MeasurerSettings):
-    """As :class:`MeasurerSettings`, with a firmer press, to measure the lever of its force. Attributes: holds: how
-    often the hand follows a finger that yields under the press.
+    """As :class:`MeasurerSettings`, with a firmer press, to measure the lever of its force.
+
+    Attributes:
+        holds: how often the hand follows a finger that yields under the press.
     """
 
     lift_m: float = Field(default=0.12, gt=0.0)
@@ -40,8 +42,11 @@ class FingertipMeasurer(PressingHand):
     _untouched: WrenchPose
 
     def measure(self, planned: PlannedWrench) -> tuple[WrenchPose, ...]:
-        """Take one mean wrench; for a press also the one just before it, for drift and weight. Raises: DeviceError: the
-        sensor gives no usable readings, or nothing was touched. SafetyError: a limit was exceeded; the rig was stopped.
+        """Take one mean wrench; for a press also the one just before it, for drift and weight.
+
+        Raises:
+            DeviceError: the sensor gives no usable readings, or nothing was touched.
+            SafetyError: a limit was exceeded; the rig was stopped.
         """
         if isinstance(planned, PlannedFree):
             taken: tuple[WrenchPose, ...] = (self._free(planned),)

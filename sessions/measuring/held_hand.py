@@ -17,15 +17,21 @@ _STILL_deg = 1.5
 
 
 class HeldHand:
-    """Reads known poses. Args: rig runtime: connected; nothing on it moves from now on."""
+    """Reads known poses.
+
+    Args:
+        runtime: connected; nothing on it moves from now on.
+    """
 
     def __init__(self, runtime: RigRuntime) -> None:
         self._runtime = runtime
         runtime.stop()
 
     def measure(self, planned: PlannedPose) -> JointPose:
-        """The pose with the measured joint angles, averaged over half a second. Raises: DeviceError: a joint moved
-        meanwhile, or a device failed.
+        """The pose with the measured joint angles, averaged over half a second.
+
+        Raises:
+            DeviceError: a joint moved meanwhile, or a device failed.
         """
         joints = list(planned.pose.known_deg)
         columns, seen = [JOINT_INDEX[joint] for joint in joints], []

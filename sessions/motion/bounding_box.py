@@ -1,5 +1,4 @@
-"""The bounding box of an unknown object, measured by touch, side after side, before the first grasp (thesis figure
-4.2).
+"""The bounding box of an unknown object, measured by touch before the first grasp (thesis figure 4.2).
 
 The order is the figure's: top, left, front, right, back. The top is tapped. A side is raked: the four fingers hang in a
 row, the thumb held up, and come toward the object in lanes until one meets it. The back, the side toward the arm,
@@ -42,11 +41,16 @@ _TURNS_rad = {"left": np.pi / 2, "front": 0.0, "right": -np.pi / 2, "back": np.p
 
 
 class ProbingSettings(StrictModel):
-    """How the bounding box is measured. Attributes: enabled: measure it before the first grasp. search_m: distance from
-    the object's expected position at which the search starts on every side. lanes_m: offsets of the lanes across
-    the direction of a rake; neighbouring ones no farther apart than the row is wide. thumb_lane_m: spacing of the
-    lanes in which the thumb touches the back. margin_m: added on every side: contacts are few, and the corner may
-    lie between lanes. tallest_m: the palm does not pass over higher objects: their sides are not measured.
+    """How the bounding box is measured.
+
+    Attributes:
+        enabled: measure it before the first grasp.
+        search_m: distance from the object's expected position at which the search starts on every side.
+        lanes_m: offsets of the lanes across the direction of a rake; neighbouring ones no farther apart than the row is
+            wide.
+        thumb_lane_m: spacing of the lanes in which the thumb touches the back.
+        margin_m: added on every side: contacts are few, and the corner may lie between lanes.
+        tallest_m: the palm does not pass over higher objects: their sides are not measured.
     """
 
     enabled: bool = False
@@ -59,10 +63,14 @@ class ProbingSettings(StrictModel):
 
 @dataclass(frozen=True)
 class BoundingBox:
-    """The measured box. Attributes: world_T_box: its axes: x away from the arm. It moves with the object.
-    low_m, high_m: its extent there, without margin, shape (2,).
-    margin_m: additional margin. top_m: height of the top; None if it was not found.
-    missing: the sides that were not found, and why.
+    """The measured box.
+
+    Attributes:
+        world_T_box: its axes: x away from the arm. It moves with the object.
+        low_m, high_m: its extent there, without margin, shape (2,).
+        margin_m: additional margin.
+        top_m: height of the top; None if it was not found.
+        missing: the sides that were not found, and why.
     """
 
     world_T_box: Pose2
@@ -101,8 +109,13 @@ class BoundingBox:
 
 
 class BoxProber:
-    """Measures the bounding box. Args: toucher: touches with the hand. settings: see there. yaw_window_rad: of the arm.
-    start_m: expected position of the object, world x, y.
+    """Measures the bounding box.
+
+    Args:
+        toucher: touches with the hand.
+        settings: see there.
+        yaw_window_rad: of the arm.
+        start_m: expected position of the object, world x, y.
     """
 
     def __init__(

@@ -14,12 +14,18 @@ class TouchSettings(StrictModel):
         tap_m_s: speed of the hand coming down on the top.
         met_N: force on a fingertip that ends the approach.
         force_N: force that every fingertip is then brought to.
-        most_N: force on any fingertip at which the hand stops moving. reach_m: how far a fingertip moves to reach that
-        force. gain: its speed per force error, m/s per N. sink_m: how far the hand itself keeps moving. press_s: time
-        for both. capture_s: length of the capture. rake_height_m: height of the fingertips' centres in a rake.
-        rake_m_s: speed of a rake. rake_N: force that fingertips are brought to on a side: the sum must not move the
-        object. row_m: x of the fingertips in the row's own grasp frame. beyond_m: how far beyond the middle a rake
-        goes. lowest_m: height of the fingertips over the table where a tap has missed the object.
+        most_N: force on any fingertip at which the hand stops moving.
+        reach_m: how far a fingertip moves to reach that force.
+        gain: its speed per force error, m/s per N.
+        sink_m: how far the hand itself keeps moving.
+        press_s: time for both.
+        capture_s: length of the capture.
+        rake_height_m: height of the fingertips' centres in a rake.
+        rake_m_s: speed of a rake.
+        rake_N: force that fingertips are brought to on a side: the sum must not move the object.
+        row_m: x of the fingertips in the row's own grasp frame.
+        beyond_m: how far beyond the middle a rake goes.
+        lowest_m: height of the fingertips over the table where a tap has missed the object.
     """
 
     tap_m_s: float = Field(default=0.06, gt=0.0)
@@ -61,11 +67,12 @@ class CycleSettings(StrictModel):
         squeeze_force_N: force of each finger while the object is carried; the thumb holds against their sum.
         squeeze_s: time to build the squeeze up.
         squeeze_gain: fingertip speed per force error, m/s per N.
-        pressed_N: force on a fingertip above which no other finger presses harder. pressed_cycles: cycles in a row with
-        that force after which re-orientation stops. carry_turn_rad_s, carry_m_s: speeds while the object is held.
+        pressed_N: force on a fingertip above which no other finger presses harder.
+        pressed_cycles: cycles in a row with that force after which re-orientation stops.
+        carry_turn_rad_s, carry_m_s: speeds while the object is held.
         finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind would leave the path.
-        touch: taps on the top and probes from the side. finger_gap_m: the thumb stops at this distance from another
-        tip's centre, before they touch each other.
+        touch: taps on the top and probes from the side.
+        finger_gap_m: the thumb stops at this distance from another tip's centre, before they touch each other.
     """
 
     lift_m: float = Field(default=0.10, gt=0.0)

@@ -57,9 +57,10 @@ class GraspCycle:
     # --- down --------------------------------------------------------------------------------------------------
 
     def descend(self, plan: GraspPlan) -> bool:
-        """Move above, tap on the top if the plan says so, tare, and descend guarded. A fingertip that touches something
-        on the way down has landed on the object: lift, shift the grasp toward that finger and try again. If thumb and
-        fingers have both landed, the object is too long in that direction: turn.
+        """Move above, tap on the top if the plan says so, tare, and descend guarded.
+
+        A fingertip that touches something on the way down has landed on the object: lift, shift the grasp toward that
+        finger and try again. If thumb and fingers have both landed, the object is too long in that direction: turn.
 
         Returns:
             Whether the hand has descended around the object, fingers open.
@@ -111,9 +112,10 @@ class GraspCycle:
     # --- close and measure -------------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Close every finger along its path until it touches, meets the thumb, or reaches the end of the path. Links
-        above the fingertips have no sensors. A finger that one of them holds up stops, and all stop if the object is
-        pushed hard against a fingertip.
+        """Close every finger along its path until it touches, meets the thumb, or reaches the end of the path.
+
+        Links above the fingertips have no sensors. A finger that one of them holds up stops, and all stop if the object
+        is pushed hard against a fingertip.
         """
         s, table = self.settings, self._table()
         step_m = s.closing_m_s * self._motion.supervisor.speed_scale * self._motion.cycle_s
@@ -215,9 +217,10 @@ class GraspCycle:
             self._motion.tick()
 
     def _servo_forces(self, targets_N: dict[str, float]) -> None:
-        """One cycle of force control: a fingertip moves along its path in proportion to its force error. It retreats
-        faster than it presses. A fingertip that is held up presses no further, and none does while another is pressed
-        hard. Overloaded fingers without a target force retreat.
+        """One cycle of force control: a fingertip moves along its path in proportion to its force error.
+
+        It retreats faster than it presses. A fingertip that is held up presses no further, and none does while another
+        is pressed hard. Overloaded fingers without a target force retreat.
         """
         s, table, loads_N = self.settings, self._table(), self._motion.loads_N()
         pressed, held_up = self._pressed_fingers(s.pressed_N), self._motion.bent(s.held_up_rad)
@@ -242,8 +245,9 @@ class GraspCycle:
     # --- and away ----------------------------------------------------------------------------------------------
 
     def release(self) -> None:
-        """Open the hand, every tip back along its path: a straight joint motion would dip into the table. Overloaded
-        fingers are released first, the others wait for them.
+        """Open the hand, every tip back along its path: a straight joint motion would dip into the table.
+
+        Overloaded fingers are released first, the others wait for them.
         """
         table, closed, opened = self._table(), self._progress, self._open_progress()
         step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))

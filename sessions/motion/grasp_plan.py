@@ -24,7 +24,8 @@ class GraspPlan:
         frame: the grasp frame in the world.
         closing: one of :data:`drivers.shadow.closing.closing.CLOSINGS`.
         height_m: height of the fingertip centres above the table.
-        tap: tap on the top first. reason: why this grasp was chosen, for people.
+        tap: tap on the top first.
+        reason: why this grasp was chosen, for people.
     """
 
     frame: GraspFrame
@@ -57,9 +58,13 @@ def evade(
 ) -> GraspPlan:
     """The plan after a landing: shifted toward the fingers that landed, or turned when both sides did.
 
-    Args: wanted, now: the plan as chosen, and its current form. hit: fingers that landed just now. landed: those that
-    landed since the hand was turned, including ``hit``; cleared when it turns. table: the plan's closing. shift_m:
-    distance to shift. yaw_window_rad: yaws the arm can reach.
+    Args:
+        wanted, now: the plan as chosen, and its current form.
+        hit: fingers that landed just now.
+        landed: those that landed since the hand was turned, including ``hit``; cleared when it turns.
+        table: the plan's closing.
+        shift_m: distance to shift.
+        yaw_window_rad: yaws the arm can reach.
     """
     if "TH" in landed and landed - {"TH"}:
         landed.clear()

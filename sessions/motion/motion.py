@@ -53,8 +53,11 @@ class GraspFrame:
 
 
 class Motion:
-    """Moves hand and positioner together. Args: rig runtime: connected before anything moves. supervisor: checks every
-    cycle.
+    """Moves hand and positioner together.
+
+    Args:
+        runtime: connected before anything moves.
+        supervisor: checks every cycle.
     """
 
     def __init__(self, runtime: RigRuntime, supervisor: SafetySupervisor) -> None:
@@ -76,8 +79,11 @@ class Motion:
         return self.runtime.cycle_ns / NANOSECONDS
 
     def tick(self) -> None:
-        """One cycle, checked by the supervisor. Raises: SafetyError: a limit is exceeded.
-        DeviceError: a device failed.
+        """One cycle, checked by the supervisor.
+
+        Raises:
+            SafetyError: a limit is exceeded.
+            DeviceError: a device failed.
         """
         self.runtime.cycle()
         snapshot = self.runtime.snapshot()
@@ -90,9 +96,12 @@ class Motion:
             self.tick()
 
     def tare(self, rest_s: float, fingers: Sequence[str] = FINGERS, tries: int = _TARES) -> Mapping[str, str]:
-        """Rest, and tare the fingertips; retry if one refuses because the hand still moves. The reading of a fingertip
-        that keeps refusing is subtracted from now on: see :meth:`loads_N`. Returns: The reasons of those that kept
-        refusing, by finger.
+        """Rest, and tare the fingertips; retry if one refuses because the hand still moves.
+
+        The reading of a fingertip that keeps refusing is subtracted from now on: see :meth:`loads_N`.
+
+        Returns:
+            The reasons of those that kept refusing, by finger.
         """
         self._resting_N, refused = {}, dict[str, str]()
         for _ in range(tries):
@@ -148,9 +157,15 @@ class Motion:
         self.move_base(q, speed_m_s, np.inf)
 
     def probe_base(self, q: Array, speed_m_s: float, met: Callable[[], bool]) -> bool:
-        """Move toward ``q`` at constant speed, and turn back if something is touched. Args: q: target, shape (6,).
-        speed_m_s: constant speed. met: asked after every cycle. Returns: Whether ``q`` was reached. If not, the
-        positioner is moving back to its previous position.
+        """Move toward ``q`` at constant speed, and turn back if something is touched.
+
+        Args:
+            q: target, shape (6,).
+            speed_m_s: constant speed.
+            met: asked after every cycle.
+
+        Returns:
+            Whether ``q`` was reached. If not, the positioner is moving back to its previous position.
         """
         start = self._base_q
         steps = [start + share * (q - start) for share in self.shares(self._base_time_s(q, speed_m_s, np.inf))]
@@ -174,9 +189,15 @@ class Motion:
         return max(travel_s, float(np.max(np.abs(q[3:] - self._base_q[3:]))) / turn_rad_s)
 
     def follow(self, pose_at: Callable[[float], Array], duration_s: float, each: Callable[[], bool]) -> float:
-        """Move along positioner joints given as a function of smooth progress 0..1. Args: pose_at: the joints, shape
-        (6,). duration_s: of the whole path. each: called before every cycle; returns whether to continue. Returns: The
-        progress made.
+        """Move along positioner joints given as a function of smooth progress 0..1.
+
+        Args:
+            pose_at: the joints, shape (6,).
+            duration_s: of the whole path.
+            each: called before every cycle; returns whether to continue.
+
+        Returns:
+            The progress made.
         """
         made = 0.0
         for share in self.shares(duration_s):
@@ -192,8 +213,12 @@ class Motion:
     def set_fingers(
         self, closing: Closing, progress: Mapping[str, float], aside_rad: Mapping[str, float] | None = None
     ) -> None:
-        """Set the fingers' targets by their progress on the closing's paths; the wrist stays straight. Args: closing:
-        its paths. progress: of each finger. aside_rad: additional angles of single motors.
+        """Set the fingers' targets by their progress on the closing's paths; the wrist stays straight.
+
+        Args:
+            closing: its paths.
+            progress: of each finger.
+            aside_rad: additional angles of single motors.
         """
         targets = dict(_HOLD_WRIST)
         for finger in FINGERS:

@@ -1,8 +1,10 @@
-"""Safety limits, and the stop when one is exceeded. The supervisor checks every cycle. An exceeded limit raises
-:class:`SafetyError`; the session's runner then calls :meth:`SafetySupervisor.stop`, as after every other failure: zero
-demands to the hand and the positioner held in place, for several cycles (the hand's own motors halt 20 ms after the
-last demand). The reason goes into the recording with the last cycles. docs/real-laboratory.md says what the hand and
-its process monitor, and how soon each cause leads to zero demands.
+"""Safety limits, and the stop when one is exceeded.
+
+The supervisor checks every cycle. An exceeded limit raises :class:`SafetyError`; the session's runner then calls
+:meth:`SafetySupervisor.stop`, as after every other failure: zero demands to the hand and the positioner held in place,
+for several cycles (the hand's own motors halt 20 ms after the last demand). The reason goes into the recording with the
+last cycles. docs/real-laboratory.md says what the hand and its process monitor, and how soon each cause leads to zero
+demands.
 """
 
 from __future__ import annotations
@@ -30,15 +32,19 @@ class SafetySettings(StrictModel):
     Attributes:
         force_limit_N: largest contact force on any fingertip.
         force_share: largest contact force as a share of the sensor's calibrated range on its smallest axis; the smaller
-        of both limits applies. force_cycles: cycles in a row over the limit that stop the rig: a fingertip that slips
-        along the object jerks. stale_s: without a new hand status for this long the rig stops; never less than
-        ``stale_cycles`` cycles. stale_cycles: see ``stale_s`` and ``tip_stale_s``. tip_stale_s: the same for the
-        readings of a fingertip with its own transport. warm_C: above this temperature of the warmest motor everything
-        moves at ``warm_scale`` of its speed. warm_scale: see ``warm_C``. palm_minimum_height_m: lowest height of the
-        palm's origin above the table. workspace_radius_m: largest horizontal distance of the palm's origin from the
-        workspace centre. workspace_centre_m: centre of the workspace on the table, world x, y. object_radius_m: an
-        object estimated farther than this from the workspace centre is lost. empty_grasps: this many grasps in a row
-        without any contact mean that the object is gone. session_limit_s: longest session, by the session's clock.
+            of both limits applies.
+        force_cycles: cycles in a row over the limit that stop the rig: a fingertip that slips along the object jerks.
+        stale_s: without a new hand status for this long the rig stops; never less than ``stale_cycles`` cycles.
+        stale_cycles: see ``stale_s`` and ``tip_stale_s``.
+        tip_stale_s: the same for the readings of a fingertip with its own transport.
+        warm_C: above this temperature of the warmest motor everything moves at ``warm_scale`` of its speed.
+        warm_scale: see ``warm_C``.
+        palm_minimum_height_m: lowest height of the palm's origin above the table.
+        workspace_radius_m: largest horizontal distance of the palm's origin from the workspace centre.
+        workspace_centre_m: centre of the workspace on the table, world x, y.
+        object_radius_m: an object estimated farther than this from the workspace centre is lost.
+        empty_grasps: this many grasps in a row without any contact mean that the object is gone.
+        session_limit_s: longest session, by the session's clock.
         first_moves_scale: speed of the first approach as a share of the normal speed.
     """
 
@@ -79,7 +85,7 @@ class SafetySupervisor:
     """Checks each cycle against the limits and knows how to stop.
 
     Args:
-        rig runtime: what to stop.
+        runtime: what to stop.
         settings: the limits.
         cycle_ns: length of a cycle.
     """
@@ -99,7 +105,11 @@ class SafetySupervisor:
     # --- every cycle -------------------------------------------------------------------------------------------
 
     def check(self, snapshot: CycleSnapshot) -> None:
-        """Compare one cycle with the limits. Raises: SafetyError: a limit is exceeded."""
+        """Compare one cycle with the limits.
+
+        Raises:
+            SafetyError: a limit is exceeded.
+        """
         if self._start_ns is None:
             self._start_ns = snapshot.stamp_ns
         self._flight_recorder.note(snapshot)
@@ -186,8 +196,10 @@ class SafetySupervisor:
         """Zero demands and hold the base, for several cycles. Never raises.
 
         Args:
-            cause: why, unless the session ends normally; recorded with the last cycles. Returns: What went wrong while
-            stopping, as sentences; a dead device does not answer any more.
+            cause: why, unless the session ends normally; recorded with the last cycles.
+
+        Returns:
+            What went wrong while stopping, as sentences; a dead device does not answer any more.
         """
         self._runtime.stop()
         problems: dict[str, None] = {}
@@ -208,9 +220,11 @@ class SafetySupervisor:
 
 
 class InterruptGuard:
-    """Ctrl+C once: finish the step and close the session. Twice: stop now. A context manager; while it is open the
-    first SIGINT only sets :attr:`requested`, and every later one does what it did before, or raises KeyboardInterrupt
-    if it was ignored. Signals reach only the main thread: elsewhere the guard does nothing.
+    """Ctrl+C once: finish the step and close the session.
+
+    Twice: stop now. A context manager; while it is open the first SIGINT only sets :attr:`requested`, and every later
+    one does what it did before, or raises KeyboardInterrupt if it was ignored. Signals reach only the main thread:
+    elsewhere the guard does nothing.
     """
 
     def __init__(self) -> None:

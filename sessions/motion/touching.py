@@ -24,8 +24,12 @@ from sessions.perception.approach_paths import TipSurface
 
 @dataclass(frozen=True)
 class Pattern:
-    """Arrangement of the fingertips in a touch. Attributes: closing: its paths. progress: position on them, by finger.
-    held_rad: joint angles of fingers that are held out of the way, by finger and motor.
+    """Arrangement of the fingertips in a touch.
+
+    Attributes:
+        closing: its paths.
+        progress: position on them, by finger.
+        held_rad: joint angles of fingers that are held out of the way, by finger and motor.
     """
 
     closing: str
@@ -73,8 +77,10 @@ class Toucher:
         return self._cycle.touch
 
     def tap(self, frame: GraspFrame) -> Array:
-        """Come down on the object under a grasp frame, lay the fingertips on it, and rise again. Returns: Where
-        fingertips touched something, shape (n, 3), world frame.
+        """Come down on the object under a grasp frame, lay the fingertips on it, and rise again.
+
+        Returns:
+            Where fingertips touched something, shape (n, 3), world frame.
         """
         s, table, motion = self.settings, closing(TAP.closing, TAP_HEIGHT_m, self._tip), self._motion
         self._poise(table, TAP, frame)
@@ -89,9 +95,14 @@ class Toucher:
         return found
 
     def rake(self, frame: GraspFrame, from_m: float) -> Array | None:
-        """Come toward the middle of a grasp frame from its +x side, fingers in a row, until they touch something. Args:
-        frame: fingers move along its -x axis, over its origin and as far beyond. from_m: their start, relative to its
-        origin. Returns: Where fingertips touched something, shape (n, 3), world frame; None if they could not descend.
+        """Come toward the middle of a grasp frame from its +x side, fingers in a row, until they touch something.
+
+        Args:
+            frame: fingers move along its -x axis, over its origin and as far beyond.
+            from_m: their start, relative to its origin.
+
+        Returns:
+            Where fingertips touched something, shape (n, 3), world frame; None if they could not descend.
         """
         s, motion = self.settings, self._motion
         table = closing(ROW.closing, s.rake_height_m, self._tip)
@@ -112,8 +123,11 @@ class Toucher:
         return found
 
     def close_thumb(self, frame: GraspFrame) -> Array | None:
-        """Come down around a grasp frame, the hand open, and close only the thumb. Returns: Where the thumb touched
-        something, or landed on it on the way down, shape (n, 3), world frame; None if another finger could not descend.
+        """Come down around a grasp frame, the hand open, and close only the thumb.
+
+        Returns:
+            Where the thumb touched something, or landed on it on the way down, shape (n, 3), world frame; None if
+            another finger could not descend.
         """
         s, motion = self.settings, self._motion
         table = closing(ROW.closing, s.rake_height_m, self._tip)
@@ -191,9 +205,10 @@ class Toucher:
         force_N: float,
         sink_m: float,
     ) -> None:
-        """Every fingertip moves along a direction until it has the contact force, or has reached its limit. The hand
-        sinks a little meanwhile, and fingers that touch yield: the thumb can hardly move in that direction itself.
-        While a fingertip is pressed hard the hand waits, and continues when the finger has yielded.
+        """Every fingertip moves along a direction until it has the contact force, or has reached its limit.
+
+        The hand sinks a little meanwhile, and fingers that touch yield: the thumb can hardly move in that direction
+        itself. While a fingertip is pressed hard the hand waits, and continues when the finger has yielded.
         """
         s, motion = self.settings, self._motion
         rates = motor_rates(table, pattern.progress, direction_grasp, self._tip)

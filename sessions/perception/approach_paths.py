@@ -1,7 +1,8 @@
-"""Approach paths of the fingertips while they closed: free space that the object does not fill. A fingertip's surface
-is modelled as an ellipsoid. A path starts at its leading point in the direction of motion, and ends at the contact, or
-at the leading point where the finger stopped. Start and end lie on the tip, and a convex tip that moves straight covers
-the straight line between them: no part of that line can be inside the object.
+"""Approach paths of the fingertips while they closed: free space that the object does not fill.
+
+A fingertip's surface is modelled as an ellipsoid. A path starts at its leading point in the direction of motion, and
+ends at the contact, or at the leading point where the finger stopped. Start and end lie on the tip, and a convex tip
+that moves straight covers the straight line between them: no part of that line can be inside the object.
 """
 
 from __future__ import annotations

@@ -1,12 +1,13 @@
-"""From a touch in a finger's distal frame to a contact in the world, with its covariance.
+"""From a touch in a finger's distal frame to a contact in the world, with what is known about its error.
 
 The covariance of a contact point is the sum of three independent parts:
 
 * the sensor's own, rotated into the world;
 * the joint angles', through the finger's Jacobian: the joint sensors carry a bias of about 0.6 deg that no averaging
-  removes. The wrist is left out: its error moves all contacts alike, as the mounting's does; * the forearm-to-world
-  calibration's, if its covariance is known. The direction of the normal has the same three parts, as one standard
-  deviation per axis.
+  removes. The wrist is left out: its error moves all contacts alike, as the mounting's does;
+* the forearm-to-world calibration's, where its covariance is known.
+
+The direction of the normal gets the same three parts as one standard deviation per axis.
 """
 
 from __future__ import annotations

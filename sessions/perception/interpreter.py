@@ -1,10 +1,11 @@
-"""The single path from received bytes to samples and grasps, shared by live sessions and replays. Live, every transport
-is tapped. The tap (:class:`Observer`) first records a datagram and then, before the requesting device sees it, passes
-the same bytes to the :class:`Interpreter`, whose decoders and :class:`Perception` are separate from the live devices. A
-replay passes the recorded bytes to an equal Interpreter. In both cases the order of recording *is* the order of
-processing, for session events too, and the Interpreter's clock shows the newest stamp that is confirmed by more than
-one transport (:mod:`sessions.recording.session_clock`). So a live session cannot know anything that is not in its
-recording.
+"""The single path from received bytes to samples and grasps, shared by live sessions and replays.
+
+Live, every transport is tapped. The tap (:class:`Observer`) first records a datagram and then, before the requesting
+device sees it, passes the same bytes to the :class:`Interpreter`, whose decoders and :class:`Perception` are separate
+from the live devices. A replay passes the recorded bytes to an equal Interpreter. In both cases the order of recording
+*is* the order of processing, for session events too, and the Interpreter's clock shows the newest stamp that is
+confirmed by more than one transport (:mod:`sessions.recording.session_clock`). So a live session cannot know anything
+that is not in its recording.
 """
 
 from __future__ import annotations

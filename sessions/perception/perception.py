@@ -49,8 +49,8 @@ class Perception:
         slot_fingertips: fingertips whose data come with the hand's samples, by finger.
         mount_T_forearm: the positioner's kinematics, from its joint vector (6,).
         world_T_mount: the forearm-to-world calibration.
-        mount_covariance: its covariance, see :class:`MountUncertainty`; None if unknown. tip_surfaces: of the
-        fingertips whose approach paths are computed, by finger.
+        mount_covariance: its covariance, see :class:`MountUncertainty`; None if unknown.
+        tip_surfaces: of the fingertips whose approach paths are computed, by finger.
     """
 
     def __init__(
@@ -200,8 +200,11 @@ class Perception:
     # -------------------------------------------------------------------------------------------------
 
     def event(self, event: SessionEvent) -> Outcome | None:
-        """Process a session event. Returns the grasp, frame or report it completes. Raises: SessionError: the event is
-        not valid here (an end without a beginning). DeviceError: the hand or the positioner has not sent a sample yet.
+        """Process a session event. Returns the grasp, frame or report it completes.
+
+        Raises:
+            SessionError: the event is not valid here (an end without a beginning).
+            DeviceError: the hand or the positioner has not sent a sample yet.
         """
         match event.kind:
             case EventKind.TARE:

@@ -1,16 +1,19 @@
-"""Replays a recorded session from its raw bytes. Why a replay gives the same grasps, bit for bit: 1. Live, the tap of
-   each transport records a datagram and in the same call passes it to the session's
-   :class:`~sessions.perception.interpreter.Interpreter`, before any device decodes it. A session event is recorded and
+"""A recorded session, understood again from its raw bytes.
+
+Why a replay gives the same grasps, bit for bit:
+
+1. Live, the tap of each transport records a datagram and in the same call hands it to the session's
+   :class:`~sessions.perception.interpreter.Interpreter`, before any device decodes it. A event is recorded and
    interpreted in one call too. All of it happens in one thread, so the order in the file is the order of
    interpretation.
-2. The Interpreter has no other input: its decoders and its Perception are its own objects, and its clock shows the
-   newest stamp it was given. What the live devices decode for their own control does not reach it.
-3. A replay passes the received bytes and the session events of the file, in the file's order, to an Interpreter built
+2. The Interpreter knows nothing else: its decoders and its Perception are objects of its own, and its clock shows
+   the newest stamp it was given. What the live devices decode for their own control does not reach it.
+3. A replay hands the received bytes and the session events of the file, in the file's order, to an Interpreter built
 from the
    same rig description and calibration copies.
 
 So live and replay run the same code on the same input. Transmitted bytes, samples and truth in the file are not
-read. A truncated file replays up to its end.
+read. A file that was cut off replays up to the cut.
 """
 
 from __future__ import annotations
@@ -75,7 +78,11 @@ class Replay:
         return self._span_ns / self._taken_ns if self._taken_ns else 0.0
 
     def outcomes(self) -> Iterator[Outcome]:
-        """The grasps, camera frames and tare reports, in order. Raises SessionError for an unreadable session event."""
+        """The grasps, camera frames and tare reports, in the order in which they came about.
+
+        Raises:
+            SessionError: a event cannot be understood.
+        """
         begun_ns, first_ns = self._clock.now_ns(), None
         for message in pace(self._reader.messages(), self._speed, self._clock):
             first_ns = message.stamp_ns if first_ns is None else first_ns

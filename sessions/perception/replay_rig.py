@@ -18,10 +18,15 @@ from sessions.recording.traffic.reader import TrafficReader
 
 
 class RecordedTransport:
-    """A transport that plays a recording. Args: name: name of the transport. received: what the device sent, in order.
-    clock: the program's; the recording starts when the transport is first used. transmitted: what the program sent, in
-    order. speed: multiple of the original pace. first_ns: stamp at which the recording starts; by default that of the
-    first message.
+    """A transport that plays a recording.
+
+    Args:
+        name: name of the transport.
+        received: what the device sent, in order.
+        clock: the program's; the recording starts when the transport is first used.
+        transmitted: what the program sent, in order.
+        speed: multiple of the original pace.
+        first_ns: stamp at which the recording starts; by default that of the first message.
 
     Attributes:
         sent: what the program sends now.

@@ -14,8 +14,11 @@ from sessions.perception.contact_world import HandGeometry
 
 
 class TouchSelection:
-    """Selects valid touches. Args: fingertips: sensors, by finger. minimum_force_N: a lighter touch does not count as a
-    contact.
+    """Selects valid touches.
+
+    Args:
+        fingertips: sensors, by finger.
+        minimum_force_N: a lighter touch does not count as a contact.
     """
 
     def __init__(self, fingertips: Mapping[str, FingertipSensor], minimum_force_N: float) -> None:
@@ -26,8 +29,11 @@ class TouchSelection:
         """The reasons over the whole session."""
 
     def touches(self, geometry: HandGeometry, *, heard: bool) -> dict[str, TipContact]:
-        """The valid touches; :attr:`dropped` has the reasons for rejected ones. Args: geometry: the hand during the
-        capture. heard: whether joint angles arrived during it.
+        """The valid touches; :attr:`dropped` has the reasons for rejected ones.
+
+        Args:
+            geometry: the hand during the capture.
+            heard: whether joint angles arrived during it.
         """
         tips, self.dropped = {}, {}
         for finger, fingertip in self._fingertips.items():

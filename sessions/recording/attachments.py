@@ -18,8 +18,10 @@ LARGEST_BYTES = 50_000_000
 
 
 class Attachments:
-    """A session's attachments. Args: session_folder: the session's folder; the subfolder is created with the first
-    attachment.
+    """A session's attachments.
+
+    Args:
+        session_folder: the session's folder; the subfolder is created with the first attachment.
     """
 
     def __init__(self, session_folder: Path) -> None:

@@ -19,12 +19,15 @@ class SessionSummary:
 
     Attributes:
         status: that of the manifest, where ``open`` means that it is being recorded; or ``damaged``: left open by a
-        crash, truncated, or not readable. grasps: number of grasps, if the session was closed. traffic_bytes: size of
-        the traffic file, 0 if there is none. data_loss: whether the manifest lists losses. problem: why it cannot be
-        read, why it failed, or how to repair it; otherwise empty. readable: whether its manifest can be read.
-        left_open: whether a crash ended it. derived: how it was made from another session (``piece``, ``import``,
-        ``recovered``); empty for a recording. recorded_here: whether it is a recording or the recovery of one, and can
-        be the last one.
+            crash, truncated, or not readable.
+        grasps: number of grasps, if the session was closed.
+        traffic_bytes: size of the traffic file, 0 if there is none.
+        data_loss: whether the manifest lists losses.
+        problem: why it cannot be read, why it failed, or how to repair it; otherwise empty.
+        readable: whether its manifest can be read.
+        left_open: whether a crash ended it.
+        derived: how it was made from another session (``piece``, ``import``, ``recovered``); empty for a recording.
+        recorded_here: whether it is a recording or the recovery of one, and can be the last one.
     """
 
     name: str
@@ -94,7 +97,11 @@ def left_open(root: Path) -> list[SessionSummary]:
 
 def list_sessions(root: Path) -> list[SessionSummary]:
     """All sessions directly under ``root``, by time of recording, oldest first; none if the folder does not exist.
-    Derived sessions follow their recording. Raises: SessionError: ``root`` is not a readable folder.
+
+    Derived sessions follow their recording.
+
+    Raises:
+        SessionError: ``root`` is not a readable folder.
     """
     if not root.exists():
         return []
@@ -112,7 +119,10 @@ def find_session(root: Path, name: str) -> Session:
 
     ``last`` is the session whose recording under ``root`` began last, or its recovery if it is damaged. Extracts and
     imports are ignored: they carry the time of an earlier recording or of another clock, and their name is known to the
-    person who made them. Raises: SessionError: there is none, or its manifest cannot be read.
+    person who made them.
+
+    Raises:
+        SessionError: there is none, or its manifest cannot be read.
     """
     return Session.open(session_folder(root, name))
 

@@ -39,9 +39,12 @@ class CalibrationCopy(StrictModel):
 
 
 class Derivation(StrictModel):
-    """A step by which a session was derived from another one. Attributes: how: recovered after a crash, extracted, or
-    imported from an archive. source: name of the other session, or of the archive's file. made_utc: time of this step,
-    ISO 8601; the recording keeps its own times.
+    """A step by which a session was derived from another one.
+
+    Attributes:
+        how: recovered after a crash, extracted, or imported from an archive.
+        source: name of the other session, or of the archive's file.
+        made_utc: time of this step, ISO 8601; the recording keeps its own times.
     """
 
     how: Making
@@ -56,14 +59,22 @@ class Derivation(StrictModel):
 
 
 class Manifest(StrictModel):
-    """The content of ``session.yaml``. Attributes: status: open while it runs; closed if it ended normally; interrupted
-    by a person; failed with an error; recovered if an open one was closed later. rig, rig_description: the rig's
-    name and its complete description. object_name: the object on the table. calibration: copies of the files used,
-    by their role. versions, seeds, settings: needed to repeat it. notes: the operator's. started_utc, ended_utc:
-    ISO 8601, of the recording. derived: how it was derived from a recording, oldest step first; empty for a
-    recording. counts: messages by topic, number of grasps and so on. streams: for each topic the messages recorded,
-    gaps, late and dropped ones. data_loss: lost or dropped data, by kind; empty if nothing was lost. problem: why
-    it failed.
+    """The content of ``session.yaml``.
+
+    Attributes:
+        status: open while it runs; closed if it ended normally; interrupted by a person; failed with an error;
+            recovered if an open one was closed later.
+        rig, rig_description: the rig's name and its complete description.
+        object_name: the object on the table.
+        calibration: copies of the files used, by their role.
+        versions, seeds, settings: needed to repeat it.
+        notes: the operator's.
+        started_utc, ended_utc: ISO 8601, of the recording.
+        derived: how it was derived from a recording, oldest step first; empty for a recording.
+        counts: messages by topic, number of grasps and so on.
+        streams: for each topic the messages recorded, gaps, late and dropped ones.
+        data_loss: lost or dropped data, by kind; empty if nothing was lost.
+        problem: why it failed.
     """
 
     format: Literal["tactile-session/3"] = "tactile-session/3"
@@ -123,8 +134,11 @@ def _validate(content: Any, where: str) -> Manifest:
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
-    """Write ``session.yaml`` atomically: at any moment either the old or the new one exists completely. Raises:
-    SessionError: it has a value that YAML cannot represent. WriteError: it cannot be written.
+    """Write ``session.yaml`` atomically: at any moment either the old or the new one exists completely.
+
+    Raises:
+        SessionError: it has a value that YAML cannot represent.
+        WriteError: it cannot be written.
     """
     try:
         text = yaml.dump(manifest.model_dump(), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=120)

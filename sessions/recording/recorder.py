@@ -1,6 +1,8 @@
-"""The recorder: every byte, every event, and samples for viewers. A replay needs only bytes and session events. The
-samples (joints, loads, transforms, contacts, pictures, poses) are for viewers and thinned out; the program never reads
-them back. Ground truth has separate topics, which only the evaluation reads.
+"""The recorder: every byte, every event, and samples for viewers.
+
+A replay needs only bytes and session events. The samples (joints, loads, transforms, contacts, pictures, poses) are for
+viewers and thinned out; the program never reads them back. Ground truth has separate topics, which only the evaluation
+reads.
 """
 
 from __future__ import annotations

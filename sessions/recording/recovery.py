@@ -1,6 +1,8 @@
-"""Recovers a session after a crash. A recording that is truncated or has damaged parts is read as far as possible and
-written into a new session folder. The damaged session is never changed. Losses are reported by topic: messages in
-damaged parts are known from their index; of the last moments only a bound is known, a tenth of a second.
+"""Recovers a session after a crash.
+
+A recording that is truncated or has damaged parts is read as far as possible and written into a new session folder. The
+damaged session is never changed. Losses are reported by topic: messages in damaged parts are known from their index; of
+the last moments only a bound is known, a tenth of a second.
 """
 
 from __future__ import annotations
@@ -28,9 +30,13 @@ LAST_MOMENTS_s = 0.1
 
 @dataclass(frozen=True)
 class TopicRecovery:
-    """Recovery of one topic. Attributes: read: messages recovered. lost: messages known to be lost. at_most_more:
-    further messages of the last moments that may be lost, by the previous rate. last_s: stamp of the last recovered
-    message, session clock, seconds.
+    """Recovery of one topic.
+
+    Attributes:
+        read: messages recovered.
+        lost: messages known to be lost.
+        at_most_more: further messages of the last moments that may be lost, by the previous rate.
+        last_s: stamp of the last recovered message, session clock, seconds.
     """
 
     read: int
@@ -41,9 +47,15 @@ class TopicRecovery:
 
 @dataclass(frozen=True)
 class Recovery:
-    """Recovery of a session. Attributes: source: the folder that was recovered. folder: the new session; None if the
-    old one was complete. topics: by topic. loss: what could not be read. left_out: results folders of the old session,
-    by name, which are not copied: they belong to another recording than the new one.
+    """Recovery of a session.
+
+    Attributes:
+        source: the folder that was recovered.
+        folder: the new session; None if the old one was complete.
+        topics: by topic.
+        loss: what could not be read.
+        left_out: results folders of the old session, by name, which are not copied: they belong to another recording
+            than the new one.
     """
 
     source: Path
@@ -59,9 +71,16 @@ class Recovery:
 
 
 def recover(source: Path, root: Path | None = None) -> Recovery:
-    """Recover a damaged session. Args: source: its folder. root: folder for the new session; by default that of the old
-    one. Raises: SessionError: it is being recorded, is not a session, contains nothing readable, or the new folder
-    cannot be created. WriteError: the new folder cannot be written.
+    """Recover a damaged session.
+
+    Args:
+        source: its folder.
+        root: folder for the new session; by default that of the old one.
+
+    Raises:
+        SessionError: it is being recorded, is not a session, contains nothing readable, or the new folder cannot be
+            created.
+        WriteError: the new folder cannot be written.
     """
     if being_written(source / TRAFFIC):
         raise SessionError("is being recorded", where=str(source), hint="Wait until the session has ended")

@@ -142,9 +142,12 @@ class RunningSession(Session):
         problem: str = "",
         now: datetime | None = None,
     ) -> None:
-        """Finish the traffic file and ``session.yaml``; idempotent, the first call counts. Args: counts: counts besides
-        those of the messages (grasps, cycles, overruns). data_loss: undecodable messages and so on; zeros are left out.
-        Losses known to the recorder (gaps, late and dropped messages) are added.
+        """Finish the traffic file and ``session.yaml``; idempotent, the first call counts.
+
+        Args:
+            counts: counts besides those of the messages (grasps, cycles, overruns).
+            data_loss: undecodable messages and so on; zeros are left out. Losses known to the recorder (gaps, late and
+                dropped messages) are added.
 
         Raises:
             WriteError: the folder cannot be written.
@@ -204,10 +207,14 @@ def create_session(
     Args:
         rig_description, settings: plain data (what a YAML file can hold).
         calibration_files: role to file; copied with their hashes.
-        truth_mesh_ply: the true mesh as PLY bytes, if the rig knows it. started: start time, UTC; default: now.
-        stampers: by transport, the reader of the device's own counter and clock. traffic_settings: how the recording is
-        stored; the defaults suit a rig whose time waits for the disk. Raises: SessionError: the folder cannot be
-        created or a calibration file cannot be read. WriteError: the folder cannot be written.
+        truth_mesh_ply: the true mesh as PLY bytes, if the rig knows it.
+        started: start time, UTC; default: now.
+        stampers: by transport, the reader of the device's own counter and clock.
+        traffic_settings: how the recording is stored; the defaults suit a rig whose time waits for the disk.
+
+    Raises:
+        SessionError: the folder cannot be created or a calibration file cannot be read.
+        WriteError: the folder cannot be written.
     """
     started = started or datetime.now(UTC)
     folder = new_folder(root, f"{started:%Y%m%d-%H%M%S}-{slug(rig)}-{slug(object_name)}")

@@ -1,4 +1,5 @@
 """The time of a session, derived from the stamps of all its messages, robust against a jump of one transport's clock.
+
 What the program stamps itself (session events, state, sent bytes) is the session's clock. The stamps of received
 messages come from elsewhere: a kernel, another process, a device. If the stamps of a transport whose clock has jumped
 ahead were trusted, all others would look late or silent. So a received stamp far ahead counts only once another
@@ -14,8 +15,10 @@ fingertips are silent.
 
 
 class SessionClock:
-    """Follows the newest stamp confirmed by more than one transport. Attributes: now_ns: the time; 0 before the first
-    stamp.
+    """Follows the newest stamp confirmed by more than one transport.
+
+    Attributes:
+        now_ns: the time; 0 before the first stamp.
     """
 
     def __init__(self) -> None:

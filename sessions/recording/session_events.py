@@ -1,6 +1,7 @@
-"""Session events: the conductor's intentions, recorded between the bytes. The bytes of the transports say what the
-devices measured; session events say what it was measured for. They are recorded in order with the bytes, so that a
-replay has the same information as the live session.
+"""Session events: the conductor's intentions, recorded between the bytes.
+
+The bytes of the transports say what the devices measured; session events say what it was measured for. They are
+recorded in order with the bytes, so that a replay has the same information as the live session.
 """
 
 from __future__ import annotations
@@ -39,9 +40,12 @@ class EventKind(StrEnum):
 
 @dataclass(frozen=True)
 class SessionEvent:
-    """One session event. Attributes: kind: its meaning.
-    stamp_ns: session clock.
-    fingers: the idle fingers, for a tare; all of them by default.
+    """One session event.
+
+    Attributes:
+        kind: its meaning.
+        stamp_ns: session clock.
+        fingers: the idle fingers, for a tare; all of them by default.
     """
 
     kind: EventKind
@@ -57,7 +61,11 @@ class SessionEvent:
 
     @classmethod
     def from_bytes(cls, data: bytes, *, where: str = "/marks") -> SessionEvent:
-        """Parse a session event. Raises: SessionError: the content is not a session event of this version."""
+        """Parse a session event.
+
+        Raises:
+            SessionError: the content is not a session event of this version.
+        """
         try:
             content = json.loads(data)
             fingers = tuple(str(finger) for finger in content.get("fingers", FINGERS))

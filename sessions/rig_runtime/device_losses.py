@@ -1,6 +1,7 @@
-"""Data losses of a running session's devices, by kind, for its manifest and exit code. The recorder knows the gaps of
-transports with numbered messages. A palm's are not numbered: only its driver knows in which cycles no valid status
-arrived.
+"""Data losses of a running session's devices, by kind, for its manifest and exit code.
+
+The recorder knows the gaps of transports with numbered messages. A palm's are not numbered: only its driver knows in
+which cycles no valid status arrived.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ class DeviceLosses:
     """Counts over one session.
 
     Args:
-        interpreter: knows undecodable messages and clock jumps. hand: knows its own losses.
+        interpreter: knows undecodable messages and clock jumps.
+        hand: knows its own losses.
     """
 
     def __init__(self, interpreter: Interpreter, hand: HandInstrument) -> None:

@@ -15,13 +15,18 @@ LAST_CYCLES = 100
 
 @dataclass(frozen=True)
 class CycleSnapshot:
-    """One cycle as the supervisor sees it. Attributes: stamp_ns: when the cycle began to read its devices, session
-    clock. Everything that arrived before is included, however long reading took. hand_stamp_ns: arrival of the
-    newest hand status; None before the first. loads_N: contact force on each fingertip; infinite if its readings
-    are invalid. palm_world_m: origin of the palm, shape (3,), world; None before the first status. tip_stamps_ns:
-    arrival of the newest reading of each fingertip with its own transport; None before the first. force_ranges_N:
-    calibrated range of the fingertips' sensors, smallest axis. warmest_C: temperature of the hand's warmest motor;
-    None while unknown. void_tips: why readings of fingertips are invalid, by finger.
+    """One cycle as the supervisor sees it.
+
+    Attributes:
+        stamp_ns: when the cycle began to read its devices, session clock. Everything that arrived before is included,
+            however long reading took.
+        hand_stamp_ns: arrival of the newest hand status; None before the first.
+        loads_N: contact force on each fingertip; infinite if its readings are invalid.
+        palm_world_m: origin of the palm, shape (3,), world; None before the first status.
+        tip_stamps_ns: arrival of the newest reading of each fingertip with its own transport; None before the first.
+        force_ranges_N: calibrated range of the fingertips' sensors, smallest axis.
+        warmest_C: temperature of the hand's warmest motor; None while unknown.
+        void_tips: why readings of fingertips are invalid, by finger.
     """
 
     stamp_ns: int

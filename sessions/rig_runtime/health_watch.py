@@ -1,5 +1,6 @@
-"""Problems that devices report during a session: logged when they begin, and with their final counts at the end. A
-driver counts a fault and continues, or stops. The counted faults are recorded here, so that a session with dropped
+"""Problems that devices report during a session: logged when they begin, and with their final counts at the end.
+
+A driver counts a fault and continues, or stops. The counted faults are recorded here, so that a session with dropped
 messages can be distinguished from one without.
 """
 
@@ -14,8 +15,13 @@ _AT_REST = ("not tared", "no sample received yet", "no reading received yet", "h
 
 
 class HealthWatch:
-    """Compares the problems of devices with earlier ones. Args: tell: receives each problem once, by device and words,
-    however its counts grow. Attributes: listener: receives the same, for the operator.
+    """Compares the problems of devices with earlier ones.
+
+    Args:
+        tell: receives each problem once, by device and words, however its counts grow.
+
+    Attributes:
+        listener: receives the same, for the operator.
     """
 
     def __init__(self, tell: Callable[[str, str], None]) -> None:

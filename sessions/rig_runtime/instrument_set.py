@@ -45,8 +45,10 @@ class InstrumentSet:
         return problems
 
     def problems(self, *, ask: bool = False) -> list[str]:
-        """Problems of the devices, each beginning with the device's name. Args: ask: also ask a hand in its own
-        process, which may have to be waited for.
+        """Problems of the devices, each beginning with the device's name.
+
+        Args:
+            ask: also ask a hand in its own process, which may have to be waited for.
         """
         named = {"hand": self._hand, "base": self._base, **self._wrench_devices, "camera": self._camera}
         if isinstance(self._hand, CyclingInstrument) and not ask:

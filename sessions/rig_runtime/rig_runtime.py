@@ -248,8 +248,10 @@ class RigRuntime:
         self._record_event(EventKind.HOLD_END)
 
     def picture(self, cycle: Callable[[], None] | None = None) -> FrameReading:
-        """Take a picture; cycles continue until it arrives. Args: cycle: runs one cycle, for supervised callers;
-        default :meth:`cycle`.
+        """Take a picture; cycles continue until it arrives.
+
+        Args:
+            cycle: runs one cycle, for supervised callers; default :meth:`cycle`.
 
         Raises:
             DeviceError: there is no camera, or it gave no picture.

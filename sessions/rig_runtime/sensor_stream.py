@@ -7,8 +7,11 @@ from sessions.perception.instruments import AskedInstrument, Instrument, NamedIn
 
 
 class SensorStream:
-    """A device that sends by itself, read without decoding: the tap of its transport already feeds Perception. Args:
-    device: starts and ends the stream. transport: its tapped transport.
+    """A device that sends by itself, read without decoding: the tap of its transport already feeds Perception.
+
+    Args:
+        device: starts and ends the stream.
+        transport: its tapped transport.
     """
 
     def __init__(self, device: Instrument, transport: Transport) -> None:

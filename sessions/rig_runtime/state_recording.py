@@ -30,9 +30,17 @@ class TruthReading(Protocol):
 
 
 class StateRecording:
-    """Records the hand's state at the recorder's rate, together with the truth. Args: observer: has recorder and
-    Perception. clock: the session's. truth: the truth channel of a simulated rig. devices: report their problems.
-    losses: their data losses; updated here. Attributes: watch: reports problems of devices and fingertips.
+    """Records the hand's state at the recorder's rate, together with the truth.
+
+    Args:
+        observer: has recorder and Perception.
+        clock: the session's.
+        truth: the truth channel of a simulated rig.
+        devices: report their problems.
+        losses: their data losses; updated here.
+
+    Attributes:
+        watch: reports problems of devices and fingertips.
     """
 
     def __init__(

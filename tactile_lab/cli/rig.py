@@ -133,8 +133,9 @@ def check(
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Read a rig file and its calibration, connect every device and report its state. Nothing moves without --move. A
-    rig with force fingertips only, without a hand, can be checked too.
+    """Read a rig file and its calibration, connect every device and report its state.
+
+    Nothing moves without --move. A rig with force fingertips only, without a hand, can be checked too.
 
     Exit code 0: all ready; 2: a file is invalid; 4: a device is not ready.
     """

@@ -1,6 +1,7 @@
-"""Compares several evaluations: methods on one session, or one method over several sessions. Metrics are grouped by
-method; means have a 95 % confidence interval by Student's t. If all methods were run on the same sessions, each is also
-compared with the first one, session by session, so that the sessions' difficulty cancels.
+"""Compares several evaluations: methods on one session, or one method over several sessions.
+
+Metrics are grouped by method; means have a 95 % confidence interval by Student's t. If all methods were run on the same
+sessions, each is also compared with the first one, session by session, so that the sessions' difficulty cancels.
 """
 
 from __future__ import annotations
@@ -75,8 +76,10 @@ class MethodSummary:
 
 
 def compare(judged: Sequence[Judged]) -> list[MethodSummary]:
-    """One summary per method, in order of appearance. Several results of one method on one session are not independent
-    runs: then each results folder is a separate group, with its name.
+    """One summary per method, in order of appearance.
+
+    Several results of one method on one session are not independent runs: then each results folder is a separate group,
+    with its name.
     """
     counts = Counter((each.session, each.method) for each in judged)
     repeated = {method for (_, method), count in counts.items() if count > 1}

@@ -1,6 +1,7 @@
-"""All error metrics of a session in one record, and its file ``evaluation.json``. Estimates come from ``results/``;
-ground truth from the marker camera and the object's mesh. Unknown values (no camera, no mesh, no shape) are None in the
-record and null in the file.
+"""All error metrics of a session in one record, and its file ``evaluation.json``.
+
+Estimates come from ``results/``; ground truth from the marker camera and the object's mesh. Unknown values (no camera,
+no mesh, no shape) are None in the record and null in the file.
 """
 
 from __future__ import annotations
@@ -43,9 +44,9 @@ class Evaluation:
             see :func:`tactile_lab.evaluation.truth.rotational_symmetry.symmetry_turns`; None for none.
         uncertainty: see :class:`UncertaintyFigures`; None without a shape.
         sensing: see :class:`SensingFigures`; None without sightings or mesh.
-        failed: the object was lost or the registration error is above 5 mm; None if neither is known. warnings: why the
-        result should not be trusted, as sentences. further: metrics of extensions by name; left out of the file if
-        there are none.
+        failed: the object was lost or the registration error is above 5 mm; None if neither is known.
+        warnings: why the result should not be trusted, as sentences.
+        further: metrics of extensions by name; left out of the file if there are none.
     """
 
     schema_version: int
@@ -83,9 +84,16 @@ class Evaluation:
 
 
 def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
-    """Evaluate the results in a folder. Args: folder: a session's ``results/``. truth: poses, one per grasp, and mesh.
-    object_name: the name in the session. Raises: SessionError: results are missing or unreadable, or do not belong to
-    the truth. ShapeError: the true mesh or contour cannot be compared.
+    """Evaluate the results in a folder.
+
+    Args:
+        folder: a session's ``results/``.
+        truth: poses, one per grasp, and mesh.
+        object_name: the name in the session.
+
+    Raises:
+        SessionError: results are missing or unreadable, or do not belong to the truth.
+        ShapeError: the true mesh or contour cannot be compared.
     """
     judged = Judged(folder, read_results(folder), truth)
     results, poses = judged.results, judged.poses

@@ -1,6 +1,7 @@
-"""The error metrics of an evaluation, in units for people: millimetres, degrees, shares. Each is computed by a function
-registered in :data:`FIGURES`; extensions add theirs. A metric that cannot be computed is null in the file, with the
-reason among the warnings; the others are not affected.
+"""The error metrics of an evaluation, in units for people: millimetres, degrees, shares.
+
+Each is computed by a function registered in :data:`FIGURES`; extensions add theirs. A metric that cannot be computed is
+null in the file, with the reason among the warnings; the others are not affected.
 """
 
 from __future__ import annotations

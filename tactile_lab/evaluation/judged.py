@@ -28,9 +28,12 @@ from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, sy
 
 @dataclass(frozen=True)
 class Truth:
-    """Ground truth, for the evaluation only. Attributes: world_T_object: the object's pose at each grasp by the marker
-    camera, None if it was not seen. mesh: the object's surface in the truth's object frame, or None. outline_m: its
-    horizontal outline in that frame, shape (n, 2), if only that is known.
+    """Ground truth, for the evaluation only.
+
+    Attributes:
+        world_T_object: the object's pose at each grasp by the marker camera, None if it was not seen.
+        mesh: the object's surface in the truth's object frame, or None.
+        outline_m: its horizontal outline in that frame, shape (n, 2), if only that is known.
     """
 
     world_T_object: tuple[Pose3 | None, ...]
@@ -40,8 +43,12 @@ class Truth:
 
 @dataclass(frozen=True)
 class Judged:
-    """An estimate with its ground truth. Attributes: folder: of the results. results: its content. truth: the ground
-    truth, with one pose per grasp.
+    """An estimate with its ground truth.
+
+    Attributes:
+        folder: of the results.
+        results: its content.
+        truth: the ground truth, with one pose per grasp.
     """
 
     folder: Path
@@ -67,8 +74,10 @@ class Judged:
 
     @cached_property
     def shape(self) -> tuple[ShapeComparison | None, tuple[str, ...]]:
-        """The contour or mesh compared with the truth, None if one of them is missing; and the reason. Raises:
-        ShapeError: the true mesh or contour cannot be compared.
+        """The contour or mesh compared with the truth, None if one of them is missing; and the reason.
+
+        Raises:
+            ShapeError: the true mesh or contour cannot be compared.
         """
         name = "contour.csv" if self.results.dimension == 2 else "mesh.ply"
         if not (self.folder / name).is_file():

@@ -20,8 +20,11 @@ FAILURE_LIMIT_MM = 5.0
 
 
 def registration_verdict(error_mm: float, symmetry_turns: int | None) -> tuple[bool, str]:
-    """Whether a run passes, and the verdict as text. Args: error_mm: its registration error. own_turns: see
-    :func:`tactile_lab.evaluation.truth.rotational_symmetry.symmetry_turns`.
+    """Whether a run passes, and the verdict as text.
+
+    Args:
+        error_mm: its registration error.
+        own_turns: see :func:`tactile_lab.evaluation.truth.rotational_symmetry.symmetry_turns`.
     """
     without = "" if symmetry_turns is None else ", ignoring rotations about its axis of symmetry"
     passed = error_mm <= FAILURE_LIMIT_MM

@@ -1,6 +1,7 @@
-"""Errors of the estimated shape in the truth's object frame, computed twice: aligned by the first grasp's true pose,
-which includes the error of the estimated pose, and after the best rigid alignment, which measures the shape alone (the
-thesis reports the second).
+"""Errors of the estimated shape in the truth's object frame, computed twice.
+
+Once aligned by the first grasp's true pose, which includes the error of the estimated pose, and once after the best
+rigid alignment, which measures the shape alone (the thesis reports the second).
 """
 
 from __future__ import annotations
@@ -22,8 +23,11 @@ from tactile_lab.slam.shape.surfaces.sampling import TriangleMesh, distances_to_
 
 @dataclass(frozen=True)
 class ShapeComparison:
-    """Errors of one shape with two alignments. Attributes: first_grasp: aligned by the first grasp's true pose; None if
-    that is unknown. best_fit: after the best rigid alignment.
+    """Errors of one shape with two alignments.
+
+    Attributes:
+        first_grasp: aligned by the first grasp's true pose; None if that is unknown.
+        best_fit: after the best rigid alignment.
     """
 
     first_grasp: ShapeErrors | None
@@ -47,8 +51,9 @@ def compare_contour(contour_m: Array, truth_m: Array, truth_T_estimate: Pose3 | 
 
 
 def compare_mesh(mesh: TriangleMesh, truth: TriangleMesh, truth_T_estimate: Pose3 | None) -> ShapeComparison:
-    """Compare a mesh with the true one, as :func:`compare_contour` does. The best fit rotates about the vertical only,
-    since the object stands on the table throughout a session.
+    """Compare a mesh with the true one, as :func:`compare_contour` does.
+
+    The best fit rotates about the vertical only, since the object stands on the table throughout a session.
 
     Raises:
         ShapeError: a mesh without faces or with coordinates that are not numbers.
@@ -82,8 +87,9 @@ def horizontal_outline(mesh: trimesh.Trimesh, height_m: float) -> Array:
 
 
 def contact_distances_m(contacts_world_m: list[Array], truth: list[Pose3], mesh: TriangleMesh) -> Array:
-    """Distance of each contact from the true surface at its time, shape (n,). It measures the sensing alone: joints,
-    fingertips and calibration, without any estimated pose.
+    """Distance of each contact from the true surface at its time, shape (n,).
+
+    It measures the sensing alone: joints, fingertips and calibration, without any estimated pose.
     """
     points = _in_truth(contacts_world_m, truth)
     return distances_to_mesh(points, mesh) if len(points) else np.zeros(0)

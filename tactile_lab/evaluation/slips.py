@@ -1,5 +1,6 @@
-"""Measures with the marker camera how far an object slipped relative to the hand between grasps, and derives the
-``motion`` settings of a rig. The estimation expects slips of a certain size (v of equation 3.7). If it is too small, an
+"""How far an object slipped relative to the hand between grasps, by the marker camera, and the motion that fits.
+
+The estimation expects slips of a certain size (v of equation 3.7). If it is too small, an
 object that slipped is lost; if it is too large, the pose is determined by contacts alone. So it is measured where
 ground truth is available.
 """
@@ -32,8 +33,11 @@ _LEAST_UNHELD = 0.02
 
 @dataclass(frozen=True)
 class Slips:
-    """Slips of the object between successive grasps that the camera both saw. Attributes: carried: slips while the hand
-    carried it, as (x_m, y_m, yaw_rad), world frame, shape (n, 3). left: slips while it was left in place, shape (m, 3).
+    """Slips of the object between successive grasps that the camera both saw.
+
+    Attributes:
+        carried: slips while the hand carried it, as (x_m, y_m, yaw_rad), world frame, shape (n, 3).
+        left: slips while it was left in place, shape (m, 3).
     """
 
     carried: Array
@@ -62,8 +66,9 @@ class Slips:
 
     @property
     def motion(self) -> MotionNoise | None:
-        """The matching motion noise; None if the hand carried the object too rarely. ``unheld`` stays 1, which is
-        always safe, if the object was left in place too rarely.
+        """The matching motion noise; None if the hand carried the object too rarely.
+
+        ``unheld`` stays 1, which is always safe, if the object was left in place too rarely.
         """
         if len(self.carried) < LEAST_STEPS:
             return None

@@ -30,8 +30,12 @@ RunSession = Callable[[SweepRun], Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class SweepRow:
-    """The outcome of one run. Attributes: run: the session. evaluation: content of its ``evaluation.json``, and why it
-    ``ended_early``; None if there is none. problem: why there is none, "" otherwise.
+    """The outcome of one run.
+
+    Attributes:
+        run: the session.
+        evaluation: content of its ``evaluation.json``, and why it ``ended_early``; None if there is none.
+        problem: why there is none, "" otherwise.
     """
 
     run: SweepRun
@@ -89,8 +93,10 @@ class SweepSummary:
     """All runs of one object in one dimension.
 
     Attributes:
-        object_name, dimension: of the runs. runs: number of runs. spreads: one for each of :data:`COLUMNS`, over all
-        runs with a value, including failed ones. failures: seed and reason of each failed run.
+        object_name, dimension: of the runs.
+        runs: number of runs.
+        spreads: one for each of :data:`COLUMNS`, over all runs with a value, including failed ones.
+        failures: seed and reason of each failed run.
     """
 
     object_name: str
@@ -111,9 +117,13 @@ def sweep(
     finished: Callable[[SweepRow], None] = lambda row: None,
     each: Callable[[Callable[[SweepRun], SweepRow], Iterable[SweepRun]], Iterable[SweepRow]] = map,
 ) -> list[SweepRow]:
-    """Run sessions; an error makes a failed row, and the sweep continues. Args: runs: the sessions to run. run_session:
-    runs one session and returns the content of its ``evaluation.json``. finished: called with each row, in the order of
-    the runs. each: applies a function to all runs, in order: the built-in ``map``, or a process pool's.
+    """Run sessions; an error makes a failed row, and the sweep continues.
+
+    Args:
+        runs: the sessions to run.
+        run_session: runs one session and returns the content of its ``evaluation.json``.
+        finished: called with each row, in the order of the runs.
+        each: applies a function to all runs, in order: the built-in ``map``, or a process pool's.
     """
     rows = []
     for row in each(partial(run_one, run_session=run_session), runs):

@@ -1,6 +1,7 @@
-"""The object's trajectory: its file, and its errors relative to the marker camera. The estimate's object frame is
-defined by the first grasp and independent of the frame of the object's model. One fixed transform relates them: the one
-that makes both agree at the first grasp for which both are known.
+"""The object's trajectory: its file, and its errors relative to the marker camera.
+
+The estimate's object frame is defined by the first grasp and independent of the frame of the object's model. One fixed
+transform relates them: the one that makes both agree at the first grasp for which both are known.
 """
 
 from __future__ import annotations

@@ -15,9 +15,16 @@ __all__ = ["REPORT", "write"]
 
 
 def write(folder: Path, results: Path | None = None) -> Path:
-    """Write ``report.html`` next to its results. Returns the file's path. Args: folder: the session's folder. results:
-    the folder of the results to show; the session's own if None. Raises: SessionError: not a session folder, or no
-    results yet. ShapeError: a mesh cannot be read. WriteError: the file cannot be written.
+    """Write ``report.html`` next to its results. Returns the file's path.
+
+    Args:
+        folder: the session's folder.
+        results: the folder of the results to show; the session's own if None.
+
+    Raises:
+        SessionError: not a session folder, or no results yet.
+        ShapeError: a mesh cannot be read.
+        WriteError: the file cannot be written.
     """
     results = results or folder / RESULTS
     path = results / REPORT

@@ -23,8 +23,9 @@ text.title { fill:var(--ink); font-weight:600; }
 
 
 def comparison_svg(summaries: Sequence[MethodSummary]) -> str:
-    """Dots are means, bars their 95 % intervals, ticks the largest value; metrics without values are left out. No
-    metric can be negative: an interval is cut off at zero.
+    """Dots are means, bars their 95 % intervals, ticks the largest value; metrics without values are left out.
+
+    No metric can be negative: an interval is cut off at zero.
     """
     count = len(summaries[0].figures)
     panels = [[(summary.method, summary.figures[index]) for summary in summaries] for index in range(count)]

@@ -26,10 +26,14 @@ class SessionFacts:
     """The session's manifest as text for people.
 
     Attributes:
-        object_name: the object's catalogue name or the name the operator gave. rig: name of the rig. started: date and
-        time, ISO 8601, or "" with a virtual clock. status: closed, interrupted, failed or recovered. notes: the
-        operator's notes. problem: why the session failed, "" if it did not. made_with: names and values of command,
-        versions and settings. calibrations: file name and hash of each calibration copy.
+        object_name: the object's catalogue name or the name the operator gave.
+        rig: name of the rig.
+        started: date and time, ISO 8601, or "" with a virtual clock.
+        status: closed, interrupted, failed or recovered.
+        notes: the operator's notes.
+        problem: why the session failed, "" if it did not.
+        made_with: names and values of command, versions and settings.
+        calibrations: file name and hash of each calibration copy.
     """
 
     object_name: str
@@ -83,12 +87,18 @@ class TrueShape:
 
 @dataclass(frozen=True)
 class ReportContent:
-    """The content of one report. Attributes: facts: the session's manifest. results: the SLAM results. evaluation:
-    ``evaluation.json``, or None if the session was not evaluated. surface: the estimated surface, or None if there
-    is none. contour_m: the estimated contour or section, shape (n, 2), estimate's object frame, or None.
-    contour_sigma_m: standard deviation at each point of the contour, shape (n,). truth: ground truth, or None.
-    fitted_outline_m: the true outline fitted to the estimate, shape (n, 2), estimate's object frame, or None.
-    course: decisions and stops of the session.
+    """The content of one report.
+
+    Attributes:
+        facts: the session's manifest.
+        results: the SLAM results.
+        evaluation: ``evaluation.json``, or None if the session was not evaluated.
+        surface: the estimated surface, or None if there is none.
+        contour_m: the estimated contour or section, shape (n, 2), estimate's object frame, or None.
+        contour_sigma_m: standard deviation at each point of the contour, shape (n,).
+        truth: ground truth, or None.
+        fitted_outline_m: the true outline fitted to the estimate, shape (n, 2), estimate's object frame, or None.
+        course: decisions and stops of the session.
     """
 
     facts: SessionFacts

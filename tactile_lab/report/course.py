@@ -30,10 +30,18 @@ class ChosenGrasp:
 
 @dataclass(frozen=True)
 class PolicyDecision:
-    """The policy's decision about one grasp. Attributes: number: of the grasp, from 1. policy: its name. outcome:
-    grasp, stop or nothing. reason: as a sentence. chosen: the grasp; None if none was chosen. promised_gain: expected
-    gain in the policy's own unit; None if it has none. candidates: number of feasible candidates. vetoed: number vetoed
-    by a person. ruled_out: number of infeasible candidates, by obstacle.
+    """The policy's decision about one grasp.
+
+    Attributes:
+        number: of the grasp, from 1.
+        policy: its name.
+        outcome: grasp, stop or nothing.
+        reason: as a sentence.
+        chosen: the grasp; None if none was chosen.
+        promised_gain: expected gain in the policy's own unit; None if it has none.
+        candidates: number of feasible candidates.
+        vetoed: number vetoed by a person.
+        ruled_out: number of infeasible candidates, by obstacle.
     """
 
     number: int
@@ -64,8 +72,12 @@ class Course:
 
 
 def read_course(session: Session) -> Course:
-    """The course of a session; of several decisions about a grasp the last one counts. Empty for a session without its
-    recording. Raises: SessionError: the recording cannot be read, or a message in it has another format.
+    """The course of a session; of several decisions about a grasp the last one counts.
+
+    Empty for a session without its recording.
+
+    Raises:
+        SessionError: the recording cannot be read, or a message in it has another format.
     """
     path = session.folder / TRAFFIC
     if not path.is_file() or not may_hold(path, (DECISION_TOPIC, SAFETY_TOPIC)):

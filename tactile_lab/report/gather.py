@@ -32,9 +32,15 @@ _EVALUATE = "Run: tactile-lab evaluate"
 
 
 def gather(session: Session, folder: Path) -> ReportContent:
-    """Gather the content of a report from the session's manifest, its results and its evaluation. Args: session: the
-    session. folder: its results, or those of a replay. Raises: SessionError: there are no results, a file is invalid,
-    or the recording cannot be read. ShapeError: a mesh cannot be read.
+    """Gather the content of a report from the session's manifest, its results and its evaluation.
+
+    Args:
+        session: the session.
+        folder: its results, or those of a replay.
+
+    Raises:
+        SessionError: there are no results, a file is invalid, or the recording cannot be read.
+        ShapeError: a mesh cannot be read.
     """
     results = read_results(folder)
     surface = _surface(folder / "mesh.ply", results.dimension)
@@ -87,8 +93,10 @@ def _surface(path: Path, dimension: int) -> Surface | None:
 
 
 def read_surface(path: Path) -> Surface:
-    """An estimated surface with the standard deviations in its file. Raises: ShapeError: not a mesh written by this
-    program.
+    """An estimated surface with the standard deviations in its file.
+
+    Raises:
+        ShapeError: not a mesh written by this program.
     """
     mesh = read_mesh(path)
     written = mesh.metadata["_ply_raw"]["vertex"]["data"]  # reading merges equal vertices and drops their properties

@@ -37,7 +37,8 @@ class Controls:
 
     Args:
         server: the page.
-        press: called with a button's request and a text. live: whether a session accepts requests.
+        press: called with a button's request and a text.
+        live: whether a session accepts requests.
     """
 
     def __init__(self, server: viser.ViserServer, press: Press, *, live: bool) -> None:

@@ -38,8 +38,11 @@ class Patch:
 
 
 class Drawing:
-    """Draws what has changed. Args: server: the page. distance: initial camera distance, as a multiple of the one that
-    shows a hand at an object.
+    """Draws what has changed.
+
+    Args:
+        server: the page.
+        distance: initial camera distance, as a multiple of the one that shows a hand at an object.
     """
 
     def __init__(self, server: viser.ViserServer, distance: float = 1.0) -> None:
@@ -214,8 +217,9 @@ def quaternion(pose: Pose3) -> Array:
 
 
 def patches(surface: ShownSurface) -> list[Patch]:
-    """The surface in parts of one colour each: dark where certain, yellow where uncertain. An outline is shown as a
-    vertical wall from the table to twice the height of the contacts.
+    """The surface in parts of one colour each: dark where certain, yellow where uncertain.
+
+    An outline is shown as a vertical wall from the table to twice the height of the contacts.
     """
     vertices_m, faces, sigma_m = surface.vertices_m, surface.faces, surface.sigma_m
     if surface.dimension == 2:

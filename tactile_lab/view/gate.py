@@ -1,7 +1,8 @@
-"""Access control of the page: who may see it and press its buttons. The page itself listens on a random address of the
-loopback network, new for each session, and is reached only through this gate. The gate accepts a visitor who uses one
-of its known host names (so that no other web site open in the same browser can press a button) and who has the token if
-there is one: once in the address, then in a cookie.
+"""Access control of the page: who may see it and press its buttons.
+
+The page itself listens on a random address of the loopback network, new for each session, and is reached only through
+this gate. The gate accepts a visitor who uses one of its known host names (so that no other web site open in the same
+browser can press a button) and who has the token if there is one: once in the address, then in a cookie.
 """
 
 from __future__ import annotations
@@ -58,8 +59,11 @@ def parse_head(data: bytes) -> Head | None:
 
 
 class Gate:
-    """Decides about requests. Args: names: host names and addresses of the page.
-    token: "" for none.
+    """Decides about requests.
+
+    Args:
+        names: host names and addresses of the page.
+        token: "" for none.
     """
 
     def __init__(self, names: frozenset[str], token: str) -> None:

@@ -33,9 +33,11 @@ class Page:
     """A page that shows a scene.
 
     Args:
-        address, port: where it listens; port 0: any free port. token: access token; needed for any address but the
-        loopback interface's. title: of the page. panel: which buttons it has. say: called with a pressed button, in
-        another thread; None without requests.
+        address, port: where it listens; port 0: any free port.
+        token: access token; needed for any address but the loopback interface's.
+        title: of the page.
+        panel: which buttons it has.
+        say: called with a pressed button, in another thread; None without requests.
     """
 
     def __init__(

@@ -1,6 +1,7 @@
-"""Runs the page in a separate process and exchanges messages with it without waiting. Messages to the page go through a
-bounded queue to a thread that writes to the process's standard input: a page that is slow, stopped or dead blocks only
-that thread, and messages that do not fit into the queue are counted and dropped.
+"""Runs the page in a separate process and exchanges messages with it without waiting.
+
+Messages to the page go through a bounded queue to a thread that writes to the process's standard input: a page that is
+slow, stopped or dead blocks only that thread, and messages that do not fit into the queue are counted and dropped.
 """
 
 from __future__ import annotations
@@ -28,9 +29,13 @@ _LINE_BYTES = 10_000
 
 
 class PageTransport(ABC):
-    """Starts a page, sends it messages and receives its requests; a :class:`~.recorder.TrafficSink`. Args: panel: which
-    buttons the page has. address, port: where the page listens; port 0: any free port. token: access token; "" for
-    none, on the loopback interface only. title: of the page.
+    """Starts a page, sends it messages and receives its requests; a :class:`~.recorder.TrafficSink`.
+
+    Args:
+        panel: which buttons the page has.
+        address, port: where the page listens; port 0: any free port.
+        token: access token; "" for none, on the loopback interface only.
+        title: of the page.
     """
 
     def __init__(self, panel: Literal["session", "wizard"], address: str, port: int, token: str, title: str) -> None:

@@ -1,5 +1,6 @@
-"""The page's process: reads settings and messages from standard input, writes button presses to standard output. It
-ends with its input, so that no page outlives its session.
+"""The page's process: reads settings and messages from standard input, writes button presses to standard output.
+
+It ends with its input, so that no page outlives its session.
 """
 
 from __future__ import annotations

@@ -63,17 +63,22 @@ class ShownSurface:
 
 @dataclass
 class Scene:
-    """The newest state. Attributes:
-    world_T_palm, world_T_distal: the hand.
-    loads_N: contact force of each fingertip; None if there is no usable reading.
-    grasps: the contacts so far.
-    world_T_object, covariance: the pose, and that of its x, y (m) and yaw (rad).
-    surface: as estimated.
-    plan: the next grasp, as :meth:`sessions.motion.grasp_plan.GraspPlan.as_plain` gives it.
-    steps: the estimator's verdict on each grasp. guide: the panel of a guided session. wizard: the panel of a
-    calibration wizard: question, lines, tables. messages: the newest events. stamp_ns: session clock of the newest
-    message. dropped: messages dropped because the page did not keep up. changed: names of the attributes that
-    changed since they were drawn.
+    """The newest state.
+
+    Attributes:
+        world_T_palm, world_T_distal: the hand.
+        loads_N: contact force of each fingertip; None if there is no usable reading.
+        grasps: the contacts so far.
+        world_T_object, covariance: the pose, and that of its x, y (m) and yaw (rad).
+        surface: as estimated.
+        plan: the next grasp, as :meth:`sessions.motion.grasp_plan.GraspPlan.as_plain` gives it.
+        steps: the estimator's verdict on each grasp.
+        guide: the panel of a guided session.
+        wizard: the panel of a calibration wizard: question, lines, tables.
+        messages: the newest events.
+        stamp_ns: session clock of the newest message.
+        dropped: messages dropped because the page did not keep up.
+        changed: names of the attributes that changed since they were drawn.
     """
 
     world_T_palm: Pose3 | None = None

@@ -25,8 +25,9 @@ _LONG_BONES_m = (0.045, 0.025)
 
 
 def bones(world_T_palm: Pose3, world_T_distal: Mapping[str, Pose3]) -> Array:
-    """The bones of the fingers with known frames, shape (n, 2, 3): three per finger, from the knuckle to the tip. The
-    joint between the first two follows from their lengths; it is on the back of the hand. The thumb's base rotation
+    """The bones of the fingers with known frames, shape (n, 2, 3): three per finger, from the knuckle to the tip.
+
+    The joint between the first two follows from their lengths; it is on the back of the hand. The thumb's base rotation
     cannot be derived from its tip, so that its joint is drawn approximately.
     """
     found = []

@@ -72,8 +72,10 @@ class WizardFeed(PageTransport):
     # --- in ----------------------------------------------------------------------------------------------------
 
     def on_press(self, content: Mapping[str, Any]) -> None:
-        """Store an answer to the current question; to quit without a question is like Ctrl+C. Raises: TypeError: it is
-        not an answer.
+        """Store an answer to the current question; to quit without a question is like Ctrl+C.
+
+        Raises:
+            TypeError: it is not an answer.
         """
         key, number = content.get("answer"), content.get("question")
         if key == QUIT and not self._answers:

@@ -21,8 +21,12 @@ _HEAD, _BUTTONS, _QUIT, _TOLD = 0.0, 1.0, 50.0, 100.0
 
 
 class WizardPanel:
-    """Draws the panel. Args: server: the page. answer: called with a pressed answer. quit_key: the answer of the button
-    that is always shown.
+    """Draws the panel.
+
+    Args:
+        server: the page.
+        answer: called with a pressed answer.
+        quit_key: the answer of the button that is always shown.
     """
 
     def __init__(self, server: viser.ViserServer, answer: Answer, quit_key: str) -> None:

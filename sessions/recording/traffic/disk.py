@@ -1,6 +1,7 @@
-"""Writing a recording to disk: files that can be truncated to their last complete point, and the writing threads. The
-control thread only queues finished chunks. One thread compresses and writes them, another flushes them to disk, so that
-a disk that stalls for a while delays no cycle. The queue is bounded.
+"""Writing a recording to disk: files that can be truncated to their last complete point, and the writing threads.
+
+The control thread only queues finished chunks. One thread compresses and writes them, another flushes them to disk, so
+that a disk that stalls for a while delays no cycle. The queue is bounded.
 """
 
 from __future__ import annotations
@@ -21,8 +22,10 @@ SYNC_PERIOD_s = 1.0
 
 
 class CutBackFile:
-    """An unbuffered new file that can be truncated to the last point declared complete. It is locked while it is open,
-    to distinguish a session that is being recorded from one left open by a crash (see :func:`being_written`).
+    """An unbuffered new file that can be truncated to the last point declared complete.
+
+    It is locked while it is open, to distinguish a session that is being recorded from one left open by a crash (see
+    :func:`being_written`).
     """
 
     def __init__(self, path: Path) -> None:
@@ -104,9 +107,13 @@ class DiskThread(threading.Thread):
 
     Args:
         first: the segment to begin with.
-        next_segment: creates the segment after a full one; called in this thread. segment_bytes: size at which a
-        segment is full. queue_bytes: uncompressed bytes that may wait. idle: called at least every ``idle_s`` seconds
-        while the queue is empty. Attributes: failure: why writing ended; nothing is written after that.
+        next_segment: creates the segment after a full one; called in this thread.
+        segment_bytes: size at which a segment is full.
+        queue_bytes: uncompressed bytes that may wait.
+        idle: called at least every ``idle_s`` seconds while the queue is empty.
+
+    Attributes:
+        failure: why writing ended; nothing is written after that.
     """
 
     def __init__(

@@ -1,6 +1,7 @@
-"""Format versions of sessions, and conversion of older ones. Each version has one converter to the next version;
-reading applies all that are needed, so that a converter never changes. A recording of a newer version is refused with
-its name.
+"""Format versions of sessions, and conversion of older ones.
+
+Each version has one converter to the next version; reading applies all that are needed, so that a converter never
+changes. A recording of a newer version is refused with its name.
 """
 
 from __future__ import annotations

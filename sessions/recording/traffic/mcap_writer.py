@@ -57,8 +57,9 @@ class McapWriter:
     """An MCAP file with zstd-compressed, indexed chunks, a summary and checksums.
 
     Args:
-        output: the file to write; not closed here. chunk_bytes: size at which a chunk is written; None if the caller
-        takes the chunks. profile, library: for the header.
+        output: the file to write; not closed here.
+        chunk_bytes: size at which a chunk is written; None if the caller takes the chunks.
+        profile, library: for the header.
     """
 
     def __init__(self, output: Output, chunk_bytes: int | None, profile: str, library: str) -> None:

@@ -1,6 +1,8 @@
-"""A transport's message as stored in a traffic file: its bytes and stamps. The format is ROS 2 CDR, so that any MCAP
-reader with a CDR decoder can read the fields. Devices that number or stamp their messages do so inside the bytes; a
-:data:`Stamper` extracts that without decoding the rest, so that a gap shows even if the message cannot be decoded.
+"""A transport's message as stored in a traffic file: its bytes and stamps.
+
+The format is ROS 2 CDR, so that any MCAP reader with a CDR decoder can read the fields. Devices that number or stamp
+their messages do so inside the bytes; a :data:`Stamper` extracts that without decoding the rest, so that a gap shows
+even if the message cannot be decoded.
 """
 
 from __future__ import annotations

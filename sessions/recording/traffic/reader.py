@@ -1,8 +1,9 @@
-"""Reading a traffic file, complete or damaged. A truncated file (killed process, full disk, power cut) has no summary,
-and its last record may be incomplete. Every complete chunk is read, and :attr:`TrafficReader.loss` says what was not. A
-chunk that was damaged on disk is skipped and counted; the chunks after it are read. A recording in several files is
-read as one. Recordings of older versions are converted while they are read (see
-:mod:`sessions.recording.traffic.formats`).
+"""Reading a traffic file, complete or damaged.
+
+A truncated file (killed process, full disk, power cut) has no summary, and its last record may be incomplete. Every
+complete chunk is read, and :attr:`TrafficReader.loss` says what was not. A chunk that was damaged on disk is skipped
+and counted; the chunks after it are read. A recording in several files is read as one. Recordings of older versions are
+converted while they are read (see :mod:`sessions.recording.traffic.formats`).
 """
 
 from __future__ import annotations
@@ -94,8 +95,10 @@ class TrafficReader:
     """Streams the messages of a recording in the order in which they happened.
 
     Args:
-        path: of its first file; the following files are in the same folder. Raises: SessionError: the file is missing,
-        not an MCAP file, not one of a session, or of an unknown version.
+        path: of its first file; the following files are in the same folder.
+
+    Raises:
+        SessionError: the file is missing, not an MCAP file, not one of a session, or of an unknown version.
     """
 
     def __init__(self, path: Path) -> None:

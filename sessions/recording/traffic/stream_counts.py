@@ -17,9 +17,10 @@ class StreamCounts:
 
     Attributes:
         messages: recorded.
-        gaps: readings that the device numbered but that never arrived. late: messages that arrived so late that they
-        are out of order. dropped: messages that did not fit into the recorder's queue. unwritten: messages not written
-        when the disk failed.
+        gaps: readings that the device numbered but that never arrived.
+        late: messages that arrived so late that they are out of order.
+        dropped: messages that did not fit into the recorder's queue.
+        unwritten: messages not written when the disk failed.
     """
 
     def __init__(self) -> None:

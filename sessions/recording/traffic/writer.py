@@ -42,8 +42,10 @@ class TrafficWriter:
 
     Args:
         path: of its first file; must not exist.
-        info: facts about the session, stored in each file with the format's name. attachments: files stored in each
-        file. stampers: by transport, the reader of the device's own stamp. settings: see there.
+        info: facts about the session, stored in each file with the format's name.
+        attachments: files stored in each file.
+        stampers: by transport, the reader of the device's own stamp.
+        settings: see there.
 
     Raises:
         SessionError: the file exists or cannot be created.
@@ -92,8 +94,10 @@ class TrafficWriter:
         """Append one message.
 
         Args:
-            device: the device's own stamp; by default read from the message. Raises: SessionError: the disk is full or
-            failed; the earlier recording stays readable.
+            device: the device's own stamp; by default read from the message.
+
+        Raises:
+            SessionError: the disk is full or failed; the earlier recording stays readable.
         """
         with self._lock:
             self._check()
@@ -121,8 +125,10 @@ class TrafficWriter:
         self._disk.settle(CLOSE_TIMEOUT_s)
 
     def close(self, end: Mapping[str, str] | None = None) -> None:
-        """Finish the file; idempotent. After a failed write the file remains unchanged. Args: end: facts for the record
-        at the end, besides the losses of each stream.
+        """Finish the file; idempotent. After a failed write the file remains unchanged.
+
+        Args:
+            end: facts for the record at the end, besides the losses of each stream.
 
         Raises:
             SessionError: the last part could not be written, or the disk does not answer.

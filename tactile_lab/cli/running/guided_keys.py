@@ -18,7 +18,8 @@ class Binding:
 
     Attributes:
         key: the character, or the name of a key without a character.
-        word: typed in place of the key. request: the request it makes.
+        word: typed in place of the key.
+        request: the request it makes.
         wants_text: a line of text follows.
         help: description for people.
     """

@@ -27,8 +27,9 @@ class LiveProgress:
     terminal.
 
     Args:
-        title: title of the session. live: show the current step; a guided session shows it itself. reasons: show below
-        each grasp why it was chosen.
+        title: title of the session.
+        live: show the current step; a guided session shows it itself.
+        reasons: show below each grasp why it was chosen.
     """
 
     def __init__(self, title: str, *, live: bool = True, reasons: bool = False) -> None:

@@ -43,10 +43,15 @@ def write_results(
     settings: Mapping[str, Any] | None = None,
     largest_sigma_m: float | None = None,
 ) -> list[Path]:
-    """Write all result files of one SLAM run. Returns the files written, in the order of the table above. Args: folder:
-    the session's ``results/`` folder, created if missing. result: the finished run. grasps: its grasps, in order.
-    settings: the SLAM settings, stored in ``slam.json``. largest_sigma_m: also write the part of the shape with a
-    standard deviation below this to a separate file; None: do not.
+    """Write all result files of one SLAM run. Returns the files written, in the order of the table above.
+
+    Args:
+        folder: the session's ``results/`` folder, created if missing.
+        result: the finished run.
+        grasps: its grasps, in order.
+        settings: the SLAM settings, stored in ``slam.json``.
+        largest_sigma_m: also write the part of the shape with a standard deviation below this to a separate file; None:
+            do not.
 
     Raises:
         WriteError: the folder cannot be written.

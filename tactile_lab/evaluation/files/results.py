@@ -38,7 +38,11 @@ class Results:
 
 
 def read_results(folder: Path) -> Results:
-    """Read ``results/``. Raises: SessionError: a file is missing or not as :func:`write_results` writes it."""
+    """Read ``results/``.
+
+    Raises:
+        SessionError: a file is missing or not as :func:`write_results` writes it.
+    """
     trajectory = read_trajectory(folder / "trajectory.csv")
     slam = read_json_object(folder / "slam.json", hint=RERUN)
     missing = [key for key in ("method", "seed", "dimension", "status", "steps", "loops") if key not in slam]

@@ -24,12 +24,15 @@ RERUN = "Replay the session to write its results"
 
 @dataclass(frozen=True)
 class ContactRows:
-    """The contacts of one grasp as in ``contacts.csv``, world frame. Attributes: fingers: names, one per contact.
-    points_world_m: shape (n, 3).
-    normals_world: shape (n, 3), pointing out of the object.
-    point_sigma_m: shape (n,), root mean variance of the point over the three axes.
-    normal_sigma_rad: shape (n,).
-    force_N: shape (n,).
+    """The contacts of one grasp as in ``contacts.csv``, world frame.
+
+    Attributes:
+        fingers: names, one per contact.
+        points_world_m: shape (n, 3).
+        normals_world: shape (n, 3), pointing out of the object.
+        point_sigma_m: shape (n,), root mean variance of the point over the three axes.
+        normal_sigma_rad: shape (n,).
+        force_N: shape (n,).
     """
 
     fingers: tuple[str, ...]
@@ -65,8 +68,10 @@ def _csv_text(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def read_contacts(path: Path, grasp_count: int) -> tuple[ContactRows, ...]:
-    """Read ``contacts.csv``: one entry per grasp, in order. Raises: SessionError: the file is missing or not in the
-    format of :func:`contacts_text`.
+    """Read ``contacts.csv``: one entry per grasp, in order.
+
+    Raises:
+        SessionError: the file is missing or not in the format of :func:`contacts_text`.
     """
     grasps: list[list[list[str]]] = [[] for _ in range(grasp_count)]
     for number, row in enumerate(_read_csv(path, CONTACT_COLUMNS), start=2):

@@ -1,7 +1,8 @@
-"""The object's true poses, recomputed from the recorded marker camera. The recording contains the detected corners of
-every frame, and the requested pictures. So the truth can be computed again with another lens or other markers from the
-corners, or with another detector from the pictures. First the world marker is averaged over the session while it stood
-still; then every grasp's frame is evaluated.
+"""The object's true poses, recomputed from the recorded marker camera.
+
+The recording contains the detected corners of every frame, and the requested pictures. So the truth can be computed
+again with another lens or other markers from the corners, or with another detector from the pictures. First the world
+marker is averaged over the session while it stood still; then every grasp's frame is evaluated.
 """
 
 from __future__ import annotations
@@ -25,10 +26,15 @@ Basis = Literal["corners", "pictures"]
 
 @dataclass
 class TruthReport:
-    """Quality of the marker camera's truth, for people. Attributes: basis: computed from recorded corners, or from the
-    pictures again. frames: frames of the recording. world_frames: frames averaged for the world marker.
-    world_reprojection_px: error of that mean. refused: number of rejected frames by reason. position_sigma_mm,
-    yaw_sigma_deg: largest standard deviation of a pose; None without poses.
+    """Quality of the marker camera's truth, for people.
+
+    Attributes:
+        basis: computed from recorded corners, or from the pictures again.
+        frames: frames of the recording.
+        world_frames: frames averaged for the world marker.
+        world_reprojection_px: error of that mean.
+        refused: number of rejected frames by reason.
+        position_sigma_mm, yaw_sigma_deg: largest standard deviation of a pose; None without poses.
     """
 
     basis: Basis
@@ -47,8 +53,11 @@ class TruthReport:
 
 class MarkerTruth:
     """Finds the object in recorded datagrams of the camera; called with one, it returns ``world_T_object`` or None.
-    Args: lens, markers: the calibration to use. recorded: all datagrams of the camera, for the world marker; each is
-    read once. basis: from the recorded corners, or from the pictures again.
+
+    Args:
+        lens, markers: the calibration to use.
+        recorded: all datagrams of the camera, for the world marker; each is read once.
+        basis: from the recorded corners, or from the pictures again.
     """
 
     def __init__(

@@ -1,8 +1,9 @@
-"""Rotations of an object about its vertical axis that leave it unchanged, so that no contact can distinguish them. A
-cylinder rotated by 20 degrees between two grasps feels the same, and so does a hexagonal prism after a sixth of a turn.
-A method cannot follow such rotations, and is not evaluated by them: its poses are rotated towards the true heading
-before contacts are compared. A sixth of a turn is three times the motion noise; a box, with its symmetry of half a
-turn, must be followed.
+"""Rotations of an object about its vertical axis that leave it unchanged, so that no contact can distinguish them.
+
+A cylinder rotated by 20 degrees between two grasps feels the same, and so does a hexagonal prism after a sixth of a
+turn. A method cannot follow such rotations, and is not evaluated by them: its poses are rotated towards the true
+heading before contacts are compared. A sixth of a turn is three times the motion noise; a box, with its symmetry of
+half a turn, must be followed.
 """
 
 from __future__ import annotations
@@ -28,8 +29,11 @@ _UPRIGHT = 1e-3
 
 
 def symmetry_turns(mesh: trimesh.Trimesh) -> int | None:
-    """Order of an object's rotational symmetry about its frame's z axis, to a millimetre RMS. Returns: :data:`ANY_TURN`
-    for a round object, a number from 6 on, or None for an object whose rotations can be distinguished.
+    """Order of an object's rotational symmetry about its frame's z axis, to a millimetre RMS.
+
+    Returns:
+        :data:`ANY_TURN` for a round object, a number from 6 on, or None for an object whose rotations can be
+        distinguished.
     """
     points = sample_mesh(mesh, _POINTS)
 
@@ -43,10 +47,15 @@ def symmetry_turns(mesh: trimesh.Trimesh) -> int | None:
 
 
 def modulo_symmetry(estimate: Poses, world_T_object: Poses, turns: int | None) -> tuple[Pose3 | None, ...]:
-    """Estimated poses, rotated about the object's axis towards the true heading. The axis in the estimated object frame
-    is the true axis as placed by the estimates, averaged over all grasps. Poses of an object that does not always stand
-    upright are unchanged. Args: estimate: estimated poses, None if unknown. world_T_object: true poses, None if
-    unknown. turns: see :func:`symmetry_turns`; None leaves the poses unchanged.
+    """Estimated poses, rotated about the object's axis towards the true heading.
+
+    The axis in the estimated object frame is the true axis as placed by the estimates, averaged over all grasps. Poses
+    of an object that does not always stand upright are unchanged.
+
+    Args:
+        estimate: estimated poses, None if unknown.
+        world_T_object: true poses, None if unknown.
+        turns: see :func:`symmetry_turns`; None leaves the poses unchanged.
     """
     known = zip(estimate, world_T_object, strict=True)
     pairs = [(pose, truth) for pose, truth in known if pose is not None and truth is not None]

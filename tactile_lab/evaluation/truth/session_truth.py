@@ -35,8 +35,11 @@ def session_truth(session: Session, grasp_count: int, look: Look | None, traffic
         session: the recorded session.
         grasp_count: number of grasps.
         look: the marker detector; None for a rig without a camera.
-        traffic: reader of the session's traffic, for a caller who needs its losses afterwards. Raises: SessionError:
-        the traffic file or a session event in it cannot be read. ShapeError: the mesh cannot be used.
+        traffic: reader of the session's traffic, for a caller who needs its losses afterwards.
+
+    Raises:
+        SessionError: the traffic file or a session event in it cannot be read.
+        ShapeError: the mesh cannot be used.
     """
     pictures = {} if look is None else marked_pictures((traffic or session.traffic()).messages())
     poses = [look(pictures[index]) if look and index in pictures else None for index in range(grasp_count)]
@@ -49,8 +52,10 @@ def read_truth_mesh(session: Session) -> trimesh.Trimesh | None:
 
 
 def marked_pictures(messages: Iterable[TrafficMessage]) -> dict[int, Datagram]:
-    """The camera datagram that shows the truth of each grasp. A session event refers to the newest picture since the
-    last event, and to the grasp being captured, otherwise the last one; the first picture of a grasp counts.
+    """The camera datagram that shows the truth of each grasp.
+
+    A session event refers to the newest picture since the last event, and to the grasp being captured, otherwise the
+    last one; the first picture of a grasp counts.
     """
     found: dict[int, Datagram] = {}
     picture: Datagram | None = None

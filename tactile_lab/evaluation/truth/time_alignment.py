@@ -1,7 +1,8 @@
-"""Offset between the stamps of camera and hand, from the object's motion while the hand holds it. A held object moves
-with the palm. With the correct offset its position in the palm's frame is the same in every picture of a hold; with a
-wrong one it varies, the more the faster the hand moves. The offset minimizes this variation; its standard deviation
-follows from the curvature at the minimum.
+"""Offset between the stamps of camera and hand, from the object's motion while the hand holds it.
+
+A held object moves with the palm. With the correct offset its position in the palm's frame is the same in every picture
+of a hold; with a wrong one it varies, the more the faster the hand moves. The offset minimizes this variation; its
+standard deviation follows from the curvature at the minimum.
 """
 
 from __future__ import annotations
@@ -31,9 +32,13 @@ class Track:
 
 @dataclass(frozen=True)
 class ClockOffset:
-    """The estimated offset. Attributes: offset_ms: add it to a camera stamp to get the hand's time of the same moment;
-    None if it cannot be determined. sigma_ms: its standard deviation. pictures: number of pictures of the moving object
-    used. reason: why it cannot be determined, "" otherwise.
+    """The estimated offset.
+
+    Attributes:
+        offset_ms: add it to a camera stamp to get the hand's time of the same moment; None if it cannot be determined.
+        sigma_ms: its standard deviation.
+        pictures: number of pictures of the moving object used.
+        reason: why it cannot be determined, "" otherwise.
     """
 
     offset_ms: float | None
