@@ -11,17 +11,17 @@ from gtsam import Pose2
 from drivers.core.contacts import Array
 
 SIDES = ("left", "front", "right", "back")
-"""Beside the top, in the order of thesis figure 4.2, the front away from the arm, the back toward it."""
+"""Sides besides the top, in the order of thesis figure 4.2; the front faces away from the arm."""
 
 
 @dataclass(frozen=True)
 class BoundingBox:
-    """What was felt.
+    """The measured box.
 
     Attributes:
         world_T_box: its axes: x away from the arm. It moves with the object.
         low_m, high_m: its extent there, without margin, shape (2,).
-        margin_m: to keep besides.
+        margin_m: additional margin.
         top_m: height of the top; None if it was not found.
         missing: the sides that were not found, and why.
         has_sides: whether sides were looked for at all; else only the top counts.
@@ -37,7 +37,7 @@ class BoundingBox:
 
     @property
     def is_found(self) -> bool:
-        """Whether anything was felt at all."""
+        """Whether anything was found."""
         return self.top_m is not None or len(self.missing) < len(SIDES)
 
     @property
