@@ -20,6 +20,9 @@ from sessions.motion.touching import SideTouch, Toucher
 _ASSUMED_m = 0.030
 """From the middle to a side that was not found."""
 
+_ASKEW_m = 0.008
+"""Left and right are felt again where the middle turns out to be farther from where they were felt."""
+
 _LOW_m = 0.045
 """Fingertips up to this height are laid on together."""
 
@@ -59,21 +62,27 @@ class SideSurvey:
         """
         found: dict[str, SideTouch] = {}
         missing: dict[str, str] = {}
+        begun_m = centre_m
         for name, yaw_rad, side in self._directions():
             felt = "interrupted" if stop() else self._feel_side(centre_m, yaw_rad, side)
             if isinstance(felt, str):
                 missing[name] = felt
             else:
                 found[name] = felt
-            if set(found) == set(SIDES):
+            if set(found) in (set(SIDES), {*SIDES, "back", "front"}):
                 centre_m = self._between(found, centre_m)
-        return self._box(list(found.values()), centre_m, top_m, missing)
+        touches = list(found.values())
+        if not missing and not stop() and np.linalg.norm(centre_m - begun_m) > _ASKEW_m:
+            again = [self._feel_side(centre_m, yaw_rad, side) for _, yaw_rad, side in self._directions()[:2]]
+            touches += [touch for touch in again if not isinstance(touch, str)]
+        return self._box(touches, centre_m, top_m, missing)
 
     def _between(self, found: Mapping[str, SideTouch], centre_m: Array) -> Array:
-        """The middle between left and right: fingers of a tap often meet one part of a top only."""
-        yaw = float(np.mean(self._window_rad))
-        across = np.array([-np.sin(yaw), np.cos(yaw)])
-        middle_m = np.mean([(touch.points_m[:, :2] @ across).mean() for touch in found.values()])
+        """The middle between opposite sides: fingers of a tap often meet one part of a top only."""
+        yaw, pair = float(np.mean(self._window_rad)), list(found.values())[-2:]
+        ahead = np.array([np.cos(yaw), np.sin(yaw)])
+        across = ahead if len(found) > len(SIDES) else np.array([-ahead[1], ahead[0]])
+        middle_m = np.mean([(touch.points_m[:, :2] @ across).mean() for touch in pair])
         return np.asarray(centre_m + (middle_m - centre_m @ across) * across)
 
     def _directions(self) -> list[tuple[str, float, str]]:
@@ -101,7 +110,7 @@ class SideSurvey:
             blocked += felt is None
         if blocked:
             return f"something stands {1e3 * self._search_m:.0f} mm from where the object is expected"
-        return f"nothing met in {len(self._lanes_m)} lanes"
+        return f"nothing touched in {len(self._lanes_m)} lanes"
 
     def _box(self, found: list[SideTouch], centre_m: Array, top_m: float, missing: dict[str, str]) -> BoundingBox:
         """Around all that was felt; where hardly anything was, as far as objects typically reach."""
