@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import lru_cache
 from pathlib import Path
 
@@ -18,22 +19,48 @@ LARGEST_m, SMALLEST_m = 0.25, 0.01
 _NEARLY_CONVEX = 0.96  # share of its hull a mesh fills when the hull alone stands for it
 _MOST_PIECES = 16
 _LEANING_rad = np.radians(15.0)  # a scan that leans by less was meant to stand
+_LYING_rad = np.radians(45.0)  # turned by more than this from how it stands an object lies
+_SAME_POSE_rad = np.radians(5.0)  # the facets of a curved side are one pose
+
+STANDING, LYING = "standing", "lying"
+_POSED = re.compile(rf"^(?P<path>.+)@(?P<pose>{STANDING}|{LYING}|[0-9]+)$")
+
+
+def in_pose(name: str, pose: str) -> str:
+    """The name of a mesh's object that rests in a pose: ``mesh:<path>@<pose>``.
+
+    Args:
+        name: ``mesh:<path>``.
+        pose: ``standing``, ``lying``, or a number from 1, the most probable resting pose.
+
+    Raises:
+        ShapeError: there is no such pose, or the object is no mesh.
+    """
+    if not name.startswith(MESH_PREFIX):
+        raise ShapeError(
+            "only meshes can be laid down", where=name, hint=f"Give {MESH_PREFIX}FILE, or leave --pose out"
+        )
+    if not _POSED.match(posed := f"{name}@{pose}"):
+        raise ShapeError(f"there is no pose {pose!r}", where=name, hint=f"Give {STANDING}, {LYING} or a number from 1")
+    return posed
 
 
 def load_truth_mesh(name: str) -> trimesh.Trimesh:
-    """The mesh called ``mesh:<path>``, metres, standing, its origin at the centre of volume.
+    """The mesh called ``mesh:<path>`` or ``mesh:<path>@<pose>``, metres, at rest, its origin at the centre of volume.
 
-    It stands as in the file, turned by the few degrees that make it stand firmly; one that cannot stand so is laid
-    down in its most probable resting pose.
+    Without a pose it stands as in the file, turned by the few degrees that make it stand firmly; one that cannot stand
+    so is laid down in its most probable resting pose. Small holes are closed and faces turned outward.
 
     Raises:
-        ShapeError: the file cannot be read, holds no closed surface, or its size is not that of a graspable object.
+        ShapeError: the file cannot be read, holds no closed surface, its size is not that of a graspable object, or
+            there is no such pose.
     """
-    path = Path(name.removeprefix(MESH_PREFIX))
+    found = _POSED.match(name)
+    path = Path((found["path"] if found else name).removeprefix(MESH_PREFIX))
     mesh = _read(path)
     _check(mesh, str(path))
     mesh.apply_translation(-mesh.center_mass)
-    mesh.apply_transform(_standing(mesh))
+    mesh.apply_transform(_resting(mesh, found["pose"] if found else STANDING, str(path)))
     return mesh
 
 
@@ -66,16 +93,32 @@ def _decompose(vertices: bytes, faces: bytes) -> tuple[Array, ...]:
     return tuple(np.asarray(corners, float) for corners, _ in pieces)
 
 
-def _standing(mesh: trimesh.Trimesh) -> Array:
+def _resting(mesh: trimesh.Trimesh, pose: str, where: str) -> Array:
     """The rotation about the origin that puts the mesh on a stable foot, shape (4, 4), without a turn about z."""
     poses, chances = trimesh.poses.compute_stable_poses(mesh, sigma=0.0, n_samples=1, threshold=0.0)
-    down = -poses[:, 2, :3]  # the direction of the table in the file's axes
+    down = -poses[np.argsort(-chances, kind="stable"), 2, :3]  # the table in the file's axes, most probable first
     upright = -down[:, 2]
-    firm = upright.argmax() if upright.max() > np.cos(_LEANING_rad) else np.argmax(chances)
-    rotation, _ = Rotation.align_vectors([[0.0, 0.0, -1.0]], [down[firm]])
+    stands = down[upright.argmax() if upright.max() > np.cos(_LEANING_rad) else 0]
+    chosen = stands if pose == STANDING else _laid(down, stands, pose, where)
+    rotation, _ = Rotation.align_vectors([[0.0, 0.0, -1.0]], [chosen])
     matrix = np.eye(4)
     matrix[:3, :3] = rotation.as_matrix()
     return matrix
+
+
+def _laid(down: Array, stands: Array, pose: str, where: str) -> Array:
+    """The direction of the table, shape (3,), in a pose that is not how the object stands anyway."""
+    distinct: list[Array] = []
+    for direction in down:
+        if all(direction @ other < np.cos(_SAME_POSE_rad) for other in distinct):
+            distinct.append(direction)
+    lying = [direction for direction in distinct if direction @ stands < np.cos(_LYING_rad)]
+    found = lying if pose == LYING else distinct[int(pose) - 1 :] if int(pose) > 0 else []
+    if not found:
+        raise ShapeError(
+            f"has no pose {pose}: it rests in {len(distinct)} poses", where=where, hint="Give another --pose"
+        )
+    return found[0]
 
 
 def _read(path: Path) -> trimesh.Trimesh:
@@ -108,7 +151,18 @@ def _check(mesh: trimesh.Trimesh, where: str) -> None:
             where=where,
             hint="The unit must be the metre: was the mesh scaled from millimetres twice?",
         )
+    _repair(mesh)
     if not mesh.is_watertight or mesh.volume <= 0:
-        raise ShapeError(
-            "is not a closed surface with its faces turned outward", where=where, hint="Repair it in a mesh editor"
-        )
+        open_edges = len(trimesh.grouping.group_rows(mesh.edges_sorted, require_count=1))
+        what = f"is not a closed surface: {open_edges} edges are open, and filling small holes did not close it"
+        raise ShapeError(what, where=where, hint="Repair it in a mesh editor")
+
+
+def _repair(mesh: trimesh.Trimesh) -> None:
+    """Close small holes and turn faces outward, in place, where the mesh needs it."""
+    if mesh.is_watertight and mesh.volume > 0:
+        return
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
+    trimesh.repair.fill_holes(mesh)
+    trimesh.repair.fix_normals(mesh)

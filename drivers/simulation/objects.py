@@ -106,6 +106,8 @@ class ObjectModel:
 def object_model(name: str) -> ObjectModel:
     """The object called ``name``: one of :data:`CATALOGUE`, or ``mesh:<path>`` for a watertight mesh in metres.
 
+    A mesh rests in another pose where its name ends with that (:func:`drivers.simulation.mesh_object.in_pose`).
+
     Raises:
         ConfigurationError: no such object.
         ShapeError: the mesh file cannot be used.

@@ -35,6 +35,9 @@ def run(
     object_name: Annotated[
         str, typer.Option("--object", help="Simulated rig: an object of its catalogue, or mesh:FILE (metres).")
     ] = "box-10x6x4",
+    pose: Annotated[
+        str, typer.Option(help="How a mesh rests on the table: standing, lying, or N, the N-th most probable pose.")
+    ] = "standing",
     grasps: Annotated[
         int | None, typer.Option(min=1, help="Number of grasps.", show_default="from the rig, 16 on sim")
     ] = None,
@@ -112,6 +115,7 @@ def run(
     Ctrl+C finishes the current grasp and closes the session; pressed twice, it stops immediately. Either way the
     session can be read.
     """
+    from drivers.simulation.mesh_object import STANDING, in_pose
     from tactile_lab.cli.running.approval import TerminalApproval
     from tactile_lab.cli.running.attending import GuidedWay, attendance
     from tactile_lab.cli.running.progress import LiveProgress
@@ -119,6 +123,8 @@ def run(
     from tactile_lab.cli.sessions.tables import tell_left_open
     from tactile_lab.workflow.running import SessionRequest, run_session
 
+    if pose != STANDING:
+        object_name = in_pose(object_name, pose)
     guided = mode is Mode.GUIDED
     if confirm and (no_input or guided):
         raise typer.BadParameter("needs an autonomous session", param_hint="'--confirm'")

@@ -10,6 +10,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from drivers.core.errors import ConfigurationError, ShapeError
+from drivers.simulation.mesh_object import in_pose
 from drivers.simulation.objects import CATALOGUE, QUIET_ZONE, Hull, ObjectModel, Solid, object_model
 
 NAMES = tuple(CATALOGUE)
@@ -160,3 +161,53 @@ def check_scan(model: ObjectModel) -> None:
 @pytest.mark.parametrize("name", ["cracker_box", "tomato_soup_can", "mustard_bottle"])
 def test_scanned_household_object_is_usable(name: str, lab_data: Path) -> None:
     check_scan(object_model(f"mesh:{lab_data / 'ycb_meshes' / f'ycb_{name}.ply'}"))
+
+
+@pytest.fixture
+def carton(tmp_path: Path) -> str:
+    """A box of 40 x 90 x 160 mm that stands on its smallest face in the file."""
+    trimesh.creation.box((0.040, 0.090, 0.160)).export(tmp_path / "carton.ply")
+    return f"mesh:{tmp_path / 'carton.ply'}"
+
+
+@pytest.mark.parametrize(
+    ("pose", "height_m"), [("standing", 0.160), ("lying", 0.040), ("1", 0.040), ("3", 0.090), ("5", 0.160)]
+)
+def test_a_mesh_rests_in_the_pose_that_is_asked_for(carton: str, pose: str, height_m: float) -> None:
+    """The first two of its six poses are those on its largest faces."""
+    assert object_model(in_pose(carton, pose)).height_m == pytest.approx(height_m)
+
+
+def test_without_a_pose_a_mesh_stands_as_in_its_file(carton: str) -> None:
+    assert object_model(carton).height_m == pytest.approx(0.160)
+
+
+@pytest.mark.parametrize("pose", ["0", "7"])
+def test_a_pose_that_there_is_not_is_refused_with_how_many_there_are(carton: str, pose: str) -> None:
+    with pytest.raises(ShapeError, match="rests in 6 poses"):
+        object_model(in_pose(carton, pose))
+
+
+def test_poses_are_for_meshes_and_have_names(carton: str) -> None:
+    with pytest.raises(ShapeError, match="only meshes"):
+        in_pose("cube-6", "lying")
+    with pytest.raises(ShapeError, match="there is no pose 'upside-down'"):
+        in_pose(carton, "upside-down")
+
+
+def test_small_holes_are_closed_and_faces_turned_outward(tmp_path: Path) -> None:
+    mesh = trimesh.creation.icosphere(subdivisions=2, radius=0.04)
+    mesh.update_faces(np.arange(len(mesh.faces)) > 0)
+    mesh.invert()
+    mesh.export(tmp_path / "ball.ply")
+    model = object_model(f"mesh:{tmp_path / 'ball.ply'}")
+    assert model.mesh.is_watertight
+    assert model.mesh.volume > 0
+
+
+def test_an_open_surface_is_refused_with_what_is_open(tmp_path: Path) -> None:
+    mesh = trimesh.creation.icosphere(subdivisions=2, radius=0.04)
+    mesh.update_faces(mesh.triangles_center[:, 2] < 0.0)
+    mesh.export(tmp_path / "bowl.ply")
+    with pytest.raises(ShapeError, match="edges are open"):
+        object_model(f"mesh:{tmp_path / 'bowl.ply'}")
