@@ -165,4 +165,4 @@ def _repair(mesh: trimesh.Trimesh) -> None:
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
     trimesh.repair.fill_holes(mesh)
-    trimesh.repair.fix_normals(mesh)
+    mesh.fix_normals()  # type: ignore[no-untyped-call]
