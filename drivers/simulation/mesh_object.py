@@ -153,7 +153,8 @@ def _check(mesh: trimesh.Trimesh, where: str) -> None:
         )
     _repair(mesh)
     if not mesh.is_watertight or mesh.volume <= 0:
-        open_edges = len(trimesh.grouping.group_rows(mesh.edges_sorted, require_count=1))
+        _, uses = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
+        open_edges = int(np.count_nonzero(uses == 1))
         what = f"is not a closed surface: {open_edges} edges are open, and filling small holes did not close it"
         raise ShapeError(what, where=where, hint="Repair it in a mesh editor")
 
@@ -165,4 +166,4 @@ def _repair(mesh: trimesh.Trimesh) -> None:
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
     trimesh.repair.fill_holes(mesh)
-    mesh.fix_normals()  # type: ignore[no-untyped-call]
+    mesh.fix_normals()
