@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import product
 
 from drivers.core.clock import Clock, VirtualClock
-from drivers.shadow.closing.closing import closing
+from drivers.shadow.closing.closing import SIDEWAYS, closing
 from drivers.shadow.closing.posture import TipEllipsoid
 from sessions.motion.touching import ROW, TAP, TAP_HEIGHT_m
 from tactile_lab.autonomy.settings import SessionSettings
@@ -25,7 +25,9 @@ def solve_closings(clock: Clock, settings: SessionSettings, tip: TipEllipsoid, d
         wanted.add((TAP.closing, TAP_HEIGHT_m))
         if (exploration := settings.exploration).policy:
             wanted |= set(product(exploration.side_closings, exploration.side_heights_m))
+    if settings.probing.is_wanted:
+        wanted |= {(TAP.closing, TAP_HEIGHT_m), *((each.upright, each.height_m) for each in SIDEWAYS.values())}
     if settings.probing.enabled:
-        wanted |= {(TAP.closing, TAP_HEIGHT_m), (ROW.closing, settings.cycle.touch.rake_height_m)}
+        wanted.add((ROW.closing, settings.cycle.touch.rake_height_m))
     for name, height_m in sorted(wanted):
         closing(name, height_m, tip)

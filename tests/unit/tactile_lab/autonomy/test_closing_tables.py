@@ -24,7 +24,9 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, float]]:
 
 
 def solve(clock: Clock, dimension: int, **settings: Any) -> None:
-    solve_closings(clock, validate(settings, SessionSettings, where="test"), TipEllipsoid(), dimension)
+    """Of a session that begins at once, unless its settings say what is felt first."""
+    content = {"probing": {"top": False}, **settings}
+    solve_closings(clock, validate(content, SessionSettings, where="test"), TipEllipsoid(), dimension)
 
 
 def test_a_contour_needs_every_closing_at_its_height(solved: list[tuple[str, float]]) -> None:
@@ -48,6 +50,13 @@ def test_a_policy_may_have_the_hand_lean_where_a_surface_is_wanted(solved: list[
 def test_a_bounding_box_needs_the_row_of_fingers_too(solved: list[tuple[str, float]]) -> None:
     solve(MonotonicClock(), 2, probing={"enabled": True}, cycle={"touch": {"rake_height_m": 0.03}})
     assert ("pinch", 0.03) in solved
+
+
+def test_what_is_felt_first_and_grasped_from_the_side_needs_the_tables_that_are_turned(
+    solved: list[tuple[str, float]],
+) -> None:
+    solve(MonotonicClock(), 2, probing={"top": True})
+    assert solved == [("pinch", 0.028), ("pinch", 0.034), ("radial", 0.022), ("radial", 0.034)]
 
 
 def test_simulated_time_waits_until_a_table_is_needed(solved: list[tuple[str, float]]) -> None:
