@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from functools import lru_cache
 from pathlib import Path
 
@@ -13,36 +12,14 @@ from scipy.spatial.transform import Rotation
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
+from drivers.simulation.object_names import LYING, STANDING, posed_path
 
-MESH_PREFIX = "mesh:"
 LARGEST_m, SMALLEST_m = 0.25, 0.01
 _NEARLY_CONVEX = 0.96  # share of its hull a mesh fills when the hull alone stands for it
 _MOST_PIECES = 16
 _LEANING_rad = np.radians(15.0)  # a scan that leans by less was meant to stand
 _LYING_rad = np.radians(45.0)  # turned by more than this from how it stands an object lies
 _SAME_POSE_rad = np.radians(5.0)  # the facets of a curved side are one pose
-
-STANDING, LYING = "standing", "lying"
-_POSED = re.compile(rf"^(?P<path>.+)@(?P<pose>{STANDING}|{LYING}|[0-9]+)$")
-
-
-def in_pose(name: str, pose: str) -> str:
-    """The name of a mesh's object that rests in a pose: ``mesh:<path>@<pose>``.
-
-    Args:
-        name: ``mesh:<path>``.
-        pose: ``standing``, ``lying``, or a number from 1, the most probable resting pose.
-
-    Raises:
-        ShapeError: there is no such pose, or the object is no mesh.
-    """
-    if not name.startswith(MESH_PREFIX):
-        raise ShapeError(
-            "only meshes can be laid down", where=name, hint=f"Give {MESH_PREFIX}FILE, or leave --pose out"
-        )
-    if not _POSED.match(posed := f"{name}@{pose}"):
-        raise ShapeError(f"there is no pose {pose!r}", where=name, hint=f"Give {STANDING}, {LYING} or a number from 1")
-    return posed
 
 
 def load_truth_mesh(name: str) -> trimesh.Trimesh:
@@ -55,12 +32,11 @@ def load_truth_mesh(name: str) -> trimesh.Trimesh:
         ShapeError: the file cannot be read, holds no closed surface, its size is not that of a graspable object, or
             there is no such pose.
     """
-    found = _POSED.match(name)
-    path = Path((found["path"] if found else name).removeprefix(MESH_PREFIX))
+    path, pose = posed_path(name)
     mesh = _read(path)
     _check(mesh, str(path))
     mesh.apply_translation(-mesh.center_mass)
-    mesh.apply_transform(_resting(mesh, found["pose"] if found else STANDING, str(path)))
+    mesh.apply_transform(_resting(mesh, pose, str(path)))
     return mesh
 
 

@@ -17,7 +17,8 @@ from scipy.spatial import ConvexHull
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
-from drivers.simulation.mesh_object import MESH_PREFIX, convex_pieces, load_truth_mesh
+from drivers.simulation.mesh_object import convex_pieces, load_truth_mesh
+from drivers.simulation.object_names import MESH_PREFIX
 
 _CURVE_SEGMENTS = 64  # chord error 0.06 mm on the largest curve
 _SPHERE_SUBDIVISIONS = 4  # 0.03 mm on a 35 mm sphere
@@ -106,7 +107,7 @@ class ObjectModel:
 def object_model(name: str) -> ObjectModel:
     """The object called ``name``: one of :data:`CATALOGUE`, or ``mesh:<path>`` for a watertight mesh in metres.
 
-    A mesh rests in another pose where its name ends with that (:func:`drivers.simulation.mesh_object.in_pose`).
+    A mesh rests in another pose where its name ends with that (:func:`drivers.simulation.object_names.in_pose`).
 
     Raises:
         ConfigurationError: no such object.

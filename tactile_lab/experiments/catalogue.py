@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.experiment import Experiment
-from tactile_lab.experiments.studies import ablation, exploration, laboratory, planar, solids, thesis_figures
+from tactile_lab.experiments.studies import ablation, everyday, exploration, laboratory, planar, solids, thesis_figures
 
 EXPERIMENTS: Mapping[str, Experiment] = {
     study.name: study
@@ -29,6 +29,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         exploration.TABLE_4_3,
         exploration.EXPLORATION_HAND,
         exploration.EXPLORATION_KINEMATIC,
+        everyday.EVERYDAY_OBJECTS,
         laboratory.CAMERA_TRUTH,
         laboratory.GRAPH_STRESS,
         laboratory.CALIBRATE_FOREARM,

@@ -12,7 +12,7 @@ from drivers.core.clock import Clock, MonotonicClock
 from drivers.core.configuration import load_model
 from drivers.emulators.laboratory.emulated_laboratory import EmulatedLaboratory
 from drivers.shadow.device.real_time import prefer
-from drivers.simulation.mesh_object import MESH_PREFIX
+from drivers.simulation.object_names import MESH_PREFIX
 from drivers.simulation.objects import CATALOGUE, ObjectModel, object_model
 from drivers.simulation.world import SimulatedWorld, marker_settings
 from sessions.recording.recorder import Recorder, TrafficSink

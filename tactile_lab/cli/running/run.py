@@ -115,7 +115,7 @@ def run(
     Ctrl+C finishes the current grasp and closes the session; pressed twice, it stops immediately. Either way the
     session can be read.
     """
-    from drivers.simulation.mesh_object import STANDING, in_pose
+    from drivers.simulation.object_names import STANDING, in_pose
     from tactile_lab.cli.running.approval import TerminalApproval
     from tactile_lab.cli.running.attending import GuidedWay, attendance
     from tactile_lab.cli.running.progress import LiveProgress

@@ -70,10 +70,14 @@ def estimation(rig: Rig, cell: Cell) -> TactileSlam:
 
 
 def conductor_settings(rig: Rig, cell: Cell) -> SessionSettings:
-    """Those of the rig, with the cell's policy; every grasp is an action at least."""
+    """Those of the rig, with the cell's policy; every grasp is an action at least.
+
+    The objects are known to be low: nothing is felt before the first grasp, as in the thesis.
+    """
     own = rig.description.conductor
     exploration = own.exploration.model_copy(update={"policy": cell["policy"]})
-    return own.model_copy(update={"exploration": exploration, "grasps": int(cell["actions"])})
+    at_once = own.probing.model_copy(update={"top": False})
+    return own.model_copy(update={"exploration": exploration, "grasps": int(cell["actions"]), "probing": at_once})
 
 
 class Watch(NullProgress):

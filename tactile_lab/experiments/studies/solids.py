@@ -17,7 +17,8 @@ SCANNED_SOLIDS = tuple(YCB_PREFIX + name for name in YCB_NAMES)
 SPATIAL_GRASPS = 24
 
 
-def _scans_left_out() -> str:
+def scans_left_out() -> str:
+    """Why scanned solids are left out, "" where they are here."""
     try:
         for name in YCB_NAMES:
             ycb_path(name)
@@ -27,7 +28,7 @@ def _scans_left_out() -> str:
 
 
 def _solids() -> tuple[str, ...]:
-    return (*FACETED_SOLIDS, *CURVED_SOLIDS, *(() if _scans_left_out() else SCANNED_SOLIDS))
+    return (*FACETED_SOLIDS, *CURVED_SOLIDS, *(() if scans_left_out() else SCANNED_SOLIDS))
 
 
 def _methods_on_table(grasps: int) -> list[Setting]:
@@ -68,7 +69,7 @@ METHODS_3D = Experiment(
     pooled=("shape",),
     kind=_followable,
     grasps=SPATIAL_GRASPS,
-    left_out=_scans_left_out,
+    left_out=scans_left_out,
 )
 
 KNOWN_SHAPE = Experiment(
@@ -80,7 +81,7 @@ KNOWN_SHAPE = Experiment(
     ranges("shape", "Registration error, mm", "registration_mm", _kind_of_solid),
     pooled=("shape",),
     grasps=SPATIAL_GRASPS,
-    left_out=_scans_left_out,
+    left_out=scans_left_out,
 )
 
 SOLID_LIMIT = Experiment(

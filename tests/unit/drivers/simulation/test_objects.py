@@ -10,7 +10,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from drivers.core.errors import ConfigurationError, ShapeError
-from drivers.simulation.mesh_object import in_pose
+from drivers.simulation.object_names import in_pose
 from drivers.simulation.objects import CATALOGUE, QUIET_ZONE, Hull, ObjectModel, Solid, object_model
 
 NAMES = tuple(CATALOGUE)

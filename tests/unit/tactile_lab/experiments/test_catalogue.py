@@ -35,6 +35,7 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "table-4.3": ({"tracking": ["joint"], "policy": ["det"]}, 5),
     "exploration-hand": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
     "exploration-kinematic": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
+    "everyday-objects": ({"object": ["cube-6"], "dimension": ["2"]}, 1),
     "camera-truth": ({"condition": ["sharp"]}, None),
     "calibrate-forearm": ({"method": ["touch"], "poses": ["20"]}, None),
     "forearm-on-rig": ({"method": ["marker"], "poses": ["10"]}, None),

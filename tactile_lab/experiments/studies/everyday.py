@@ -1,0 +1,43 @@
+"""Objects that a hand can hold: scans of household things, as a user would try them."""
+
+from __future__ import annotations
+
+from tactile_lab.experiments.cells import Cell, Setting
+from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.runs import everyday_runs
+from tactile_lab.experiments.studies.columns import HAUSDORFF, MEAN_DISTANCE, REGISTRATION
+from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, ranges
+from tactile_lab.experiments.studies.solids import scans_left_out
+from tactile_lab.experiments.summary import Column
+
+
+def _settings(grasps: int) -> list[Setting]:
+    everything = everyday_runs.settings(grasps)
+    return [one for one in everything if not scans_left_out() or dict(one)["object"] == everyday_runs.LOW]
+
+
+def _panel(cell: Cell) -> str:
+    return f"{cell['pose']}, {cell['dimension']}-D"
+
+
+EVERYDAY_OBJECTS = Experiment(
+    "everyday-objects",
+    "Sessions on scanned household objects, standing and lying: how they end, with what force, and what model.",
+    _settings,
+    everyday_runs.explore_everyday,
+    (
+        Column("ended complete or partial", "in_order", 0, kind="percent"),
+        Column("grasps", "grasps_done", 0, kind="median"),
+        Column("contacts", "contacts", 0, kind="median"),
+        Column("highest force outside a grasp, N", "outside_N", 2),
+        Column("in a grasp, N", "grasp_N", 1),
+        Column("object moved, mm", "moved_mm"),
+        HAUSDORFF,
+        MEAN_DISTANCE,
+        REGISTRATION,
+        Column("simulated minutes", "minutes", 1, kind="median"),
+    ),
+    ranges("object", HAUSDORFF_LABEL, "hausdorff_mm", _panel, columns=1),
+    grasps=everyday_runs.GRASPS,
+    left_out=scans_left_out,
+)
