@@ -231,9 +231,7 @@ class TactileSlam:
 
     @property
     def surface_grasps(self) -> NDArray[np.intp]:
-        """Number of the grasp of each contact of :attr:`surface`, from the one that defined the object frame, shape
-        (n,).
-        """
+        """Number of the grasp of each contact of :attr:`surface`, from the first in the map, shape (n,)."""
         return np.empty(0, dtype=np.intp) if self._tracker is None else self._tracker.refined.grasp_indices
 
     @property

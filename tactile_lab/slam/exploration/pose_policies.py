@@ -1,5 +1,4 @@
-"""The thesis's policies for shape and pose (section 4.5.2.2): for the pose while it is uncertain, otherwise by
-(4.20).
+"""The thesis's policies for shape and pose (section 4.5.2.2): for an uncertain pose first, then by (4.20).
 
 While the determinant of the pose's covariance is above a threshold, every candidate's contacts are predicted by the
 estimate, the particles are weighted by them, and the candidate with the most informative weighting wins: det (4.21),

@@ -1,10 +1,9 @@
 """Tests how certain the placement of each grasp on the object is.
 
-Loops are made from pairs of contacts on the same
-face, and which face that is follows from the present poses. So a wrongly placed grasp makes loops that all agree with
-each other and with the wrong placement. Each grasp is therefore first tested by independent evidence: its contacts are
-compared with the shape made from all other grasps, here and at every other place where they fit, and the motion from
-the previous and to the next grasp is included.
+Loops are made from pairs of contacts on the same face, which follows from the present poses. So a wrongly placed grasp
+makes loops that all agree with each other and with the wrong placement. Each grasp is therefore first tested by
+independent evidence: its contacts are compared with the shape made from all other grasps, here and at every other place
+where they fit, and the motion from the previous and to the next grasp is included.
 """
 
 from __future__ import annotations

@@ -99,7 +99,7 @@ class _ClosestPoints:
         return pose
 
     def run_along_normals(self, pose: _Rigid, steps: int) -> _Rigid:
-        """Least squares of the pairs' distances along the normals, by Gauss-Newton: quick and exact near the solution."""
+        """Least squares of the pairs' distances along the normals, by Gauss-Newton: fast near the solution."""
         start = pose
         for _ in range(steps):
             sources, targets, normals = self._pairs(pose)

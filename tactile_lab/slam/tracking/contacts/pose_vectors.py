@@ -65,8 +65,7 @@ class PoseVectors(Protocol):
         """
 
     def by_row(self, rows: Array, points: Array, normals: Array, by_points: Array, by_normals: Array) -> Array:
-        """Chain rule: from derivatives by object-frame points and normals to those by the pose vector, shape (...,
-        size).
+        """Chain rule: derivatives by the pose vector, shape (..., size), from those by object-frame points and normals.
 
         Arguments as those and the results of :meth:`to_object`.
         """
