@@ -224,7 +224,7 @@ def test_a_watchdog_that_is_set_reads_back_and_trips_and_the_palm_is_brought_bac
     assert wire.hand.palm_slave.counts.watchdog_trips == wire.transport.counts.restarts == 1
     assert wire.states == [AlState.OP, AlState.OP]
     assert statuses[-1] is not None
-    assert "the palm's watchdog tripped 1 times for want of commands" in wire.transport.health()
+    assert "the palm's watchdog tripped 1 times because no commands came" in wire.transport.health()
 
 
 @pytest.mark.parametrize(
