@@ -1,4 +1,4 @@
-"""Sessions and their folders of results, judged beside one another, with what the truth and the clocks were worth."""
+"""Compares the results folders of sessions, with the quality of ground truth and clocks."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from drivers.core.errors import SessionError
 from sessions.recording.session import TRAJECTORY, Session
 from sessions.recording.session_events import EventKind, SessionEvent
 from sessions.recording.traffic.schemas import SESSION_EVENTS_TOPIC, TRANSFORMS_TOPIC
-from tactile_lab.evaluation.comparison import Judged, MethodSummary, compare, markdown, rows_csv
+from tactile_lab.evaluation.comparison import EvaluatedResults, MethodSummary, compare, markdown, rows_csv
 from tactile_lab.evaluation.files.plain import json_text, plain
 from tactile_lab.evaluation.truth.marker_truth import MarkerTruth, TruthReport, report_json
 from tactile_lab.evaluation.truth.session_truth import camera_datagrams
 from tactile_lab.evaluation.truth.time_alignment import ClockOffset, Track, clock_offset
 from tactile_lab.report.comparison_plot import comparison_svg
 from tactile_lab.rigs.description import rig_of_session
-from tactile_lab.workflow.judging import TruthChoice, judge_results, marker_detector
+from tactile_lab.workflow.finishing import TruthChoice, evaluate_results, marker_detector
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Everything that was judged.
+    """All evaluated results.
 
     Attributes:
-        judged: one a folder of results, in order.
+        judged: one per results folder, in order.
         truths: what each session's truth was worth, by session; None without a camera.
         clocks: offset of the camera's clock to the hand's, by session.
         unread: what of a recording could not be read, by session, in words; empty when all was.
         summaries: by method.
     """
 
-    judged: tuple[Judged, ...]
+    judged: tuple[EvaluatedResults, ...]
     truths: dict[str, TruthReport | None]
     clocks: dict[str, ClockOffset]
     unread: dict[str, str]
@@ -68,12 +68,12 @@ def compare_sessions(sessions: Sequence[Session], folders: Sequence[str], choice
         ConfigurationError: the chosen calibration cannot be used.
     """
     _check_different(sessions)
-    judged: list[Judged] = []
+    judged: list[EvaluatedResults] = []
     truths, clocks, unread = dict[str, TruthReport | None](), dict[str, ClockOffset](), dict[str, str]()
     for session in sessions:
         for results in result_folders(session, folders):
-            evaluation, truth, lost = judge_results(session, results, choice)
-            judged.append(Judged(session.manifest.name, results.name, evaluation.as_json()))
+            evaluation, truth, lost = evaluate_results(session, results, choice)
+            judged.append(EvaluatedResults(session.manifest.name, results.name, evaluation.as_json()))
             truths[session.manifest.name] = truth
             if lost:
                 unread[session.manifest.name] = lost

@@ -20,7 +20,7 @@ from tactile_lab.evaluation.files.result_files import write_results
 from tactile_lab.evaluation.judged import Truth
 from tactile_lab.evaluation.prism import open_ring
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
-from tactile_lab.workflow.judging import FinishedSession, estimate_rest, remove_results, write_evaluation
+from tactile_lab.workflow.finishing import FinishedSession, estimate_rest, remove_results, write_evaluation
 from tactile_lab.workflow.replaying import check_replaceable, recorded_seed, recorded_slam, replay_session
 
 _LEAST_MOTION = {"translation_m": 1e-5, "rotation_rad": 1e-4}

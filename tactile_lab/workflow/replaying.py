@@ -18,12 +18,12 @@ from tactile_lab.evaluation.truth.session_truth import session_truth
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import OTHER_VERSION, rig_of_session
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
-from tactile_lab.workflow.judging import (
+from tactile_lab.workflow.finishing import (
     RESULT_FILES,
     FinishedSession,
     estimate_rest,
+    finish,
     has_results,
-    judge,
     marker_detector,
 )
 
@@ -62,7 +62,7 @@ def replay_session(
     slam = TactileSlam(settings, seed, known_poses)
     estimate_rest(slam, grasps, progress)
     progress.phase(len(grasps), "model and evaluation")
-    finished = judge(session, rig, slam, grasps, out)
+    finished = finish(session, rig, slam, grasps, out)
     unread = _unread(replay.loss, len(grasps), session.manifest.counts.get("grasps"))
     return replace(finished, data_loss=session.manifest.data_loss, unread=unread, read_factor=replay.factor)
 

@@ -27,7 +27,7 @@ from tactile_lab.slam.exploration.policies import make_policy
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.workflow.attending import Attendance, roles_for, settings_for
-from tactile_lab.workflow.judging import FinishedSession, estimate_rest, judge
+from tactile_lab.workflow.finishing import FinishedSession, estimate_rest, finish
 
 ALONE = Attendance()
 
@@ -113,7 +113,7 @@ def _evaluate(session: RunningSession, rig: Rig, slam: TactileSlam, outcome: Ses
     if isinstance(outcome.error, EstimationError):
         return FinishedSession(session.folder, session.results, problem=str(outcome.error))
     estimate_rest(slam, outcome.grasps)
-    return judge(session, rig, slam, outcome.grasps, session.results)
+    return finish(session, rig, slam, outcome.grasps, session.results)
 
 
 @contextmanager

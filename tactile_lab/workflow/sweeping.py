@@ -14,7 +14,7 @@ from sessions.recording.session import Session
 from tactile_lab.evaluation.sweep import SweepRun
 from tactile_lab.rigs.build import check_calibration, simulated_world
 from tactile_lab.rigs.description import load_rig
-from tactile_lab.workflow.judging import differing_files
+from tactile_lab.workflow.finishing import differing_files
 from tactile_lab.workflow.replaying import recorded_seed, recorded_slam, replay_session
 from tactile_lab.workflow.running import SessionRequest, refuse_known_pose, run_session
 

@@ -56,14 +56,14 @@ def evaluate(
     method, with confidence intervals.
     """
     from sessions.recording.listing import find_session
-    from tactile_lab.workflow.judging import TruthChoice
+    from tactile_lab.workflow.finishing import TruthChoice
 
     del no_input
     choice = TruthChoice(lens, markers, basis.value)
     found = [find_session(root, session) for session in sessions]
     if len(found) == 1 and not results and choice.is_recorded and out is None:
         from tactile_lab.cli.running.results import conclude
-        from tactile_lab.workflow.judging import evaluate_session
+        from tactile_lab.workflow.finishing import evaluate_session
 
         conclude(evaluate_session(found[0]), as_json)
         return

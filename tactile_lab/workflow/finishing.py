@@ -1,4 +1,4 @@
-"""From a session and its estimation to a folder of results: model, evaluation, report."""
+"""Finishes a session's estimation: writes model, evaluation and report to a results folder."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class FinishedSession:
         folder: the session's; the log's file.
         results: the folder of these results.
         outcome: how the autonomous part ended; None for a replay.
-        evaluation: None when there was nothing to judge.
+        evaluation: None if there was nothing to evaluate.
         data_loss: what was dropped or not recorded while the session ran, by kind.
         unread: what of the recording could not be read, in words; "" when all of it was.
         problem: why there is no evaluation, "" when there is one.
@@ -84,7 +84,9 @@ class TruthChoice:
         return self.lens is None and self.markers is None and self.basis == "corners"
 
 
-def judge_results(session: Session, results: Path, choice: TruthChoice) -> tuple[Evaluation, TruthReport | None, str]:
+def evaluate_results(
+    session: Session, results: Path, choice: TruthChoice
+) -> tuple[Evaluation, TruthReport | None, str]:
     """Judge one folder of results with a truth of one's choice; nothing is written.
 
     Returns:
@@ -143,8 +145,8 @@ def estimate_rest(slam: TactileSlam, grasps: Sequence[Grasp], progress: Progress
         slam.add_grasp(grasp)
 
 
-def judge(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp], out: Path) -> FinishedSession:
-    """Finish the estimation and write model, evaluation and report; what stands in the way is told in the record."""
+def finish(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp], out: Path) -> FinishedSession:
+    """Finish the estimation and write model, evaluation and report; an error is stored in the returned record."""
     remove_results(out)
     if not grasps:
         return FinishedSession(session.folder, out, problem="no grasp was recorded")
