@@ -18,7 +18,7 @@ from drivers.core.errors import SessionError
 from sessions.recording.session import TRAJECTORY, Session
 from sessions.recording.session_events import EventKind, SessionEvent
 from sessions.recording.traffic.schemas import SESSION_EVENTS_TOPIC, TRANSFORMS_TOPIC
-from tactile_lab.evaluation.comparison import EvaluatedResults, MethodSummary, compare, markdown, rows_csv
+from tactile_lab.evaluation.comparison import EvaluatedRun, MethodSummary, compare, markdown, rows_csv
 from tactile_lab.evaluation.files.plain import json_text, plain
 from tactile_lab.evaluation.truth.marker_truth import MarkerTruth, TruthReport, report_json
 from tactile_lab.evaluation.truth.session_truth import camera_datagrams
@@ -40,7 +40,7 @@ class Comparison:
         summaries: by method.
     """
 
-    judged: tuple[EvaluatedResults, ...]
+    judged: tuple[EvaluatedRun, ...]
     truths: dict[str, TruthReport | None]
     clocks: dict[str, ClockOffset]
     unread: dict[str, str]
@@ -68,12 +68,12 @@ def compare_sessions(sessions: Sequence[Session], folders: Sequence[str], choice
         ConfigurationError: the chosen calibration cannot be used.
     """
     _check_different(sessions)
-    judged: list[EvaluatedResults] = []
+    judged: list[EvaluatedRun] = []
     truths, clocks, unread = dict[str, TruthReport | None](), dict[str, ClockOffset](), dict[str, str]()
     for session in sessions:
         for results in result_folders(session, folders):
             evaluation, truth, lost = evaluate_results(session, results, choice)
-            judged.append(EvaluatedResults(session.manifest.name, results.name, evaluation.as_json()))
+            judged.append(EvaluatedRun(session.manifest.name, results.name, evaluation.as_json()))
             truths[session.manifest.name] = truth
             if lost:
                 unread[session.manifest.name] = lost
