@@ -1,8 +1,8 @@
-"""All of a session that takes its time: tactile SLAM, and the planner that chooses grasps by it.
+"""The estimator service: tactile SLAM, and the planner that uses its estimate.
 
 Nothing here touches a device. The session asks it one question after the other (see
-:mod:`sessions.conductor.estimator_client`), so that it can live in the session's process or in one of its own, and
-answers alike in both.
+:mod:`sessions.conductor.estimator_client`), so that it can run in the session's process or in a separate one, with
+equal answers.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ class SlamService:
     """The estimation and the planner of one session: an :class:`~sessions.conductor.estimator.EstimatorService`.
 
     Args:
-        slam: fresh.
-        planner: over that estimation.
+        slam: unused.
+        planner: uses that estimation.
     """
 
     def __init__(self, slam: TactileSlam, planner: Planner) -> None:
@@ -80,7 +80,7 @@ class SlamService:
         self.planner.on_carry(hand_motion_world)
 
     def estimate(self, grasp: Grasp, known: int) -> tuple[Estimate, ...]:
-        """See :meth:`sessions.conductor.estimator.Estimator.estimate`; the planner hears of the step too."""
+        """See :meth:`sessions.conductor.estimator.Estimator.estimate`; the planner is notified too."""
         self._memory.remember()
         step = self.slam.add_grasp(grasp)
         self.planner.on_estimate(step.index, step.verdict != "untracked")
@@ -96,18 +96,18 @@ class SlamService:
         self.planner.on_undo(hand_motion_world)
 
     def state(self) -> dict[str, Any]:
-        """Everything that the estimation knows, the source of chance too."""
+        """The complete state of the estimation, including its random numbers."""
         return dict(vars(self.slam))
 
 
 class SlamMemory:
     """States of an estimation, one for each grasp it was given through :meth:`remember`.
 
-    A state holds everything, the source of chance too: after :meth:`undo` the estimation goes on exactly as if the
-    grasp had never been.
+    A state includes the random numbers: after :meth:`undo` the estimation continues exactly as if the grasp had never
+    been added.
 
     Args:
-        slam: the estimation; its states are put back into this object.
+        slam: the estimation; its states are restored into this object.
     """
 
     def __init__(self, slam: TactileSlam) -> None:
@@ -115,11 +115,11 @@ class SlamMemory:
         self._states: list[dict[str, Any]] = []
 
     def remember(self) -> None:
-        """Keep the present state; call this before every step."""
+        """Store the present state; call this before every step."""
         self._states.append(copy.deepcopy(vars(self._slam)))
 
     def undo(self) -> None:
-        """Go back to before the last step."""
+        """Restore the state before the last step."""
         state = self._states.pop()
         vars(self._slam).clear()
         vars(self._slam).update(state)

@@ -61,7 +61,7 @@ class Comparison:
 
 
 def compare_sessions(sessions: Sequence[Session], folders: Sequence[str], choice: TruthChoice) -> Comparison:
-    """Judge folders of results of sessions; all that hold results when none is named.
+    """Evaluate results folders of sessions; by default all that contain results.
 
     Raises:
         SessionError: a session has no such results, cannot be read, or is named twice.
@@ -111,7 +111,7 @@ def _folder(session: Session, name: str) -> Path:
 
 
 def write_comparison(comparison: Comparison, out: Path) -> list[Path]:
-    """Write table, rows, everything, and a plot; the files. Raises WriteError."""
+    """Write table, rows, all data and a plot. Returns the files. Raises WriteError."""
     texts = {
         "comparison.md": markdown(comparison.summaries),
         "comparison.csv": rows_csv(comparison.judged),
@@ -124,7 +124,7 @@ def write_comparison(comparison: Comparison, out: Path) -> list[Path]:
 
 
 def session_clock_offset(session: Session, choice: TruthChoice) -> ClockOffset:
-    """How far the camera's clock is behind the hand's in one session, from the motion both saw."""
+    """Offset of the camera's clock from the hand's in one session, from the motion both saw."""
     detector = marker_detector(session, rig_of_session(session), choice)
     if detector is None:
         return ClockOffset(None, None, 0, "the session has no camera")
@@ -145,7 +145,7 @@ def _object_track(session: Session, detector: MarkerTruth) -> tuple[Array, Array
 
 
 def _hand_track(session: Session) -> tuple[Track | None, list[tuple[float, float]]]:
-    """The palm as the session showed it, and when it held the object; None before it was seen twice."""
+    """The palm's trajectory in the session, and when it held the object; None before two samples."""
     stamps, places, turns = [], [], []
     holds: list[tuple[float, float]] = []
     begun: float | None = None
