@@ -210,7 +210,7 @@ def read_answer(line: bytes, where: str) -> dict[str, Any]:
         if isinstance(content := json.loads(line), dict):
             return content
     shown = line[:_SHOWN].decode(errors="replace")
-    raise DeviceError(f"its process says what is no answer: {shown!r}", where=where, hint="Start it again")
+    raise DeviceError(f"unexpected output of its process: {shown!r}", where=where, hint="Start it again")
 
 
 # --- the child's side ----------------------------------------------------------------------------------------------

@@ -178,7 +178,7 @@ def poses_to_be_told(method: Method, poses: Sequence[Pose3 | None] | None) -> tu
         ConfigurationError: the method needs poses and has none, or is given poses that it must not use.
     """
     if method == "known-pose" and (poses is None or all(pose is None for pose in poses)):
-        hint = "Take data with the true poses, or another method"
+        hint = "Use data with true poses, or another method"
         raise ConfigurationError("needs the object's true poses, and there are none", where="known-pose", hint=hint)
     if method != "known-pose" and poses is not None:
         raise ConfigurationError("must not be given the true poses", where=method)
