@@ -26,7 +26,7 @@ from drivers.core.errors import ConfigurationError
 Model = TypeVar("Model", bound=BaseModel)
 
 _RETRY = "Correct the file and try again"
-_UNPARSED = ", unable to parse string as a number"
+_UNPARSED = ", unable to parse string as an? (number|integer)$"
 _SHOWN, _LONGEST_VALUE = 5, 40
 
 
@@ -200,11 +200,17 @@ def _problem(item: ErrorDetails, model: type[BaseModel]) -> str:
         return f"{place}: is missing"
     if item["type"] in {"model_type", "model_attributes_type", "dict_type"}:
         return f"{place}: must be keys with values"
-    words = re.sub(r"^[A-Z]\w+ should", "must", item["msg"].removeprefix("Value error, ")).removesuffix(_UNPARSED)
+    words = plain_words(item["msg"])
     own = item["type"] == "value_error"
     if own and not item["loc"]:
         return words
     return f"{place}: {words}{'' if own and _names(words, item['input']) else _quote_value(item['input'])}"
+
+
+def plain_words(message: str) -> str:
+    """What pydantic says about a value, without its own turns of phrase ("Value error, ...", "Input should ...")."""
+    own = message.removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    return re.sub(_UNPARSED, "", re.sub(r"^[A-Z]\w+ should", "must", own))
 
 
 def _names(words: str, value: Any) -> bool:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, SessionError, given_by_a_person
 from sessions.recording.manifest import MANIFEST, read_manifest, write_manifest
 from sessions.recording.session import TRAFFIC, Session
 from sessions.recording.session_ids import check_id
@@ -42,7 +42,8 @@ def export_archive(session: Session, path: Path) -> int:
     """Write a session's files into a new ZIP file; gives their number. Links are left out.
 
     Raises:
-        SessionError: the file exists or cannot be written.
+        ConfigurationError: the file exists.
+        SessionError: it cannot be written.
     """
     files = [item for item in sorted(session.folder.rglob("*")) if item.is_file() and not item.is_symlink()]
     try:
@@ -51,7 +52,7 @@ def export_archive(session: Session, path: Path) -> int:
                 name = (PurePosixPath(session.folder.name) / item.relative_to(session.folder).as_posix()).as_posix()
                 archive.write(item, name)
     except FileExistsError as error:
-        raise SessionError("exists already", where=str(path), hint="Choose another name") from error
+        raise ConfigurationError("exists already", where=str(path), hint="Choose another name") from error
     except OSError as error:
         with suppress(OSError):
             path.unlink(missing_ok=True)
@@ -66,8 +67,8 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
         name: of the new session; by default the name of the one folder in the archive.
 
     Raises:
-        SessionError: no ZIP file, one with unsafe names, links or sizes, no session in it, or a session of that name
-            is there already; nothing is left behind then.
+        ConfigurationError: no ZIP file, one with unsafe names, links or sizes, no session in it, or a session of that
+            name is there already; nothing is left behind then.
     """
     limits = limits or ArchiveLimits()
     try:
@@ -76,9 +77,11 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
             folder = root / check_id(name or _common_folder(entries, path), str(path))
             return _unpack(archive, entries, folder, path, limits)
     except zipfile.BadZipFile as error:
-        raise SessionError(f"not a ZIP archive ({error})", where=str(path), hint=_ADVICE) from error
+        raise ConfigurationError(f"not a ZIP archive ({error})", where=str(path), hint=_ADVICE) from error
     except OSError as error:
-        raise SessionError(f"cannot be read ({error.strerror or error})", where=str(path), hint=_ADVICE) from error
+        raise ConfigurationError(
+            f"cannot be read ({error.strerror or error})", where=str(path), hint=_ADVICE
+        ) from error
 
 
 def _checked_entries(archive: zipfile.ZipFile, path: Path, limits: ArchiveLimits) -> list[zipfile.ZipInfo]:
@@ -125,7 +128,7 @@ def _unpack(
         folder.mkdir(parents=True)
     except FileExistsError as error:
         hint = f"{_ADVICE}; choose another name with --name"
-        raise SessionError("a session of that name is there already", where=str(folder), hint=hint) from error
+        raise ConfigurationError("a session of that name is there already", where=str(folder), hint=hint) from error
     try:
         left = limits.total_bytes
         for entry in entries:
@@ -133,7 +136,8 @@ def _unpack(
             target.parent.mkdir(parents=True, exist_ok=True)
             with archive.open(entry) as source, target.open("xb") as out:
                 left -= _copy(source, out, left, path)  # type: ignore[arg-type]
-        return _as_session(folder, path)
+        with given_by_a_person():
+            return _as_session(folder, path)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)  # only what came out of the archive
         raise
@@ -164,5 +168,5 @@ def _as_session(folder: Path, path: Path) -> Session:
     return Session.open(folder)
 
 
-def _refusal(path: Path, what: str) -> SessionError:
-    return SessionError(what, where=str(path), hint=_ADVICE)
+def _refusal(path: Path, what: str) -> ConfigurationError:
+    return ConfigurationError(what, where=str(path), hint=_ADVICE)

@@ -42,14 +42,16 @@ def extract(session: Session, into: Path, piece: Piece) -> dict[str, int]:
     Session events are kept, so that the piece can be understood as far as it goes.
 
     Raises:
-        SessionError: the recording cannot be read, the folder exists, or nothing is in the piece.
-        ConfigurationError: a transport that the recording does not have.
+        SessionError: the recording cannot be read, or nothing is in the piece.
+        ConfigurationError: the folder exists, or a transport that the recording does not have.
     """
     check_id(into.name, str(into))
     try:
         into.mkdir(parents=True)
     except OSError as error:
-        what = "exists already" if isinstance(error, FileExistsError) else f"cannot be made ({error.strerror})"
+        if isinstance(error, FileExistsError):
+            raise ConfigurationError("exists already", where=str(into), hint="Choose another folder") from error
+        what = f"cannot be made ({error.strerror})"
         raise SessionError(what, where=str(into), hint="Choose another folder") from error
     try:
         counts = _copy_traffic(session.traffic(), into, session.manifest.name, piece)

@@ -50,7 +50,9 @@ def bench(
             "recorder: hand and five force sensors at 1 kHz and 30 pictures a second, recorded."
         ),
     ] = Part.PATHS,
-    seconds: Annotated[float, typer.Option(min=1.0, help="Duration of camera, ethercat, load and recorder.")] = 30.0,
+    seconds: Annotated[
+        float, typer.Option(min=1.0, max=86_400.0, help="Duration of camera, ethercat, load and recorder.")
+    ] = 30.0,
     with_hand: Annotated[bool, typer.Option("--hand/--no-hand", help="With load: the hand too.")] = True,
     store: Annotated[
         bool, typer.Option("--store", help="Keep the tables in the repository, write their page.")
@@ -144,7 +146,7 @@ def _load(seconds: float, with_hand: bool, as_json: bool) -> list[Table]:
     from dataclasses import asdict
 
     from tactile_lab.benchmarks.load import measure_load
-    from tactile_lab.cli.console import emit_json, say, show_table
+    from tactile_lab.cli.console import answer, emit_json, show_table
 
     result = measure_load(seconds, with_hand=with_hand)
     title, head = f"All at once for {result.seconds:g} s", ["device", "sent", "received", "lost", "detail"]
@@ -159,7 +161,7 @@ def _load(seconds: float, with_hand: bool, as_json: bool) -> list[Table]:
     else:
         show_table(title, head, cells, right=(1, 2, 3))
         for name, text in facts:
-            say(f"{name}: {text}")
+            answer(f"{name}: {text}")
     return [(title, head, cells), ("", ["what", "figure"], facts)]
 
 

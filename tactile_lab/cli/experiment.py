@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput
+from tactile_lab.cli.completion import complete_experiment
+from tactile_lab.cli.options import LARGEST_SEED, MOST_GRASPS, MOST_JOBS, Json, NoInput
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -24,19 +25,22 @@ def experiment(
         str,
         typer.Argument(
             help="Name of the experiment. 'list' shows them all, 'pages' writes the pages of the stored results, "
-            "'commands' shows what made these."
+            "'commands' shows what made these.",
+            autocompletion=complete_experiment,
         ),
     ],
     seeds: Annotated[str, typer.Option(help="Seeds, for example 0-2,7. Those from 1000 on are for reports.")] = (
         "1000-1029"
     ),
-    jobs: Annotated[int, typer.Option(min=0, help="Runs side by side; 0 takes all cores.")] = 0,
+    jobs: Annotated[int, typer.Option(min=0, max=MOST_JOBS, help="Runs side by side; 0 takes all cores.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder of the results (runs/experiments/NAME).")] = None,
     only: Annotated[
         list[str] | None,
         typer.Option(help="Limit a setting: method=joint,icp (; where values have commas)."),
     ] = None,
-    grasps: Annotated[int | None, typer.Option(min=1, help="Other number of grasps, for a quick look.")] = None,
+    grasps: Annotated[
+        int | None, typer.Option(min=1, max=MOST_GRASPS, help="Other number of grasps, for a quick look.")
+    ] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the results of another version of the program.")] = False,
     store: Annotated[
         bool, typer.Option("--store", help="Keep the outcome in the repository, write its pages.")
@@ -53,7 +57,7 @@ def experiment(
         return
     if store and keep:
         raise typer.BadParameter("a result of several versions is not stored: leave out --keep", param_hint="'--store'")
-    from tactile_lab.cli.console import emit_json, say, show_table, warn
+    from tactile_lab.cli.console import answer, emit_json, show_table, warn
     from tactile_lab.cli.experiment_progress import ExperimentProgress
     from tactile_lab.experiments.catalogue import experiment
     from tactile_lab.experiments.reporting import LINES_FILE, document, part_of, write_report
@@ -78,8 +82,11 @@ def experiment(
     else:
         head, *body = short_table(group_runs(rows, over=study.pooled), study.columns)
         show_table(study.sentence, head, body)
-    say(f"results  {folder}")
+    answer(f"results  {folder}")
     _end(rows)
+
+
+_MOST_SEEDS = 100_000
 
 
 def _command(name: str, seeds: str, only: Sequence[str], grasps: int | None, jobs: int) -> str:
@@ -117,7 +124,7 @@ def _write_pages(docs: Path, as_json: bool = False) -> None:
 
 
 def _show_commands(docs: Path, as_json: bool) -> None:
-    from tactile_lab.cli.console import emit_json
+    from tactile_lab.cli.console import answer, emit_json
     from tactile_lab.experiments.results.publishing import stored_results
 
     made = [command for result in stored_results(docs).values() for part in result.parts for command in part.commands]
@@ -126,7 +133,7 @@ def _show_commands(docs: Path, as_json: bool) -> None:
         emit_json(commands)
         return
     for command in commands:
-        typer.echo(command)
+        answer(command)
 
 
 def _list(docs: Path, as_json: bool) -> None:
@@ -153,6 +160,8 @@ def _end(rows: Sequence[Row]) -> None:
 
         complain(f"every run failed; the first: {rows[0].problem}")
         raise typer.Exit(1)
+    if any(row.figures is None for row in rows):
+        raise typer.Exit(3)
 
 
 def _seeds(text: str) -> list[int]:
@@ -163,7 +172,11 @@ def _seeds(text: str) -> list[int]:
         if not low.isdigit() or (high and not high.isdigit()) or part.strip().endswith("-"):
             problem = f"{text!r} is not a list of seeds like 0-2,7"
             raise typer.BadParameter(problem, param_hint="'--seeds'")
-        seeds += range(int(low), int(high or low) + 1)
+        first, last = int(low), int(high or low)
+        if last > LARGEST_SEED or last - first >= _MOST_SEEDS:
+            problem = f"seeds go up to {LARGEST_SEED}, and {_MOST_SEEDS} of them at a time"
+            raise typer.BadParameter(problem, param_hint="'--seeds'")
+        seeds += range(first, last + 1)
     if not seeds:
         raise typer.BadParameter(f"{text!r} has no seed in it", param_hint="'--seeds'")
     return list(dict.fromkeys(seeds))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput
+from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigArgument
 
 if TYPE_CHECKING:
     from tactile_lab.rigs.description import Rig
@@ -19,7 +19,9 @@ app = typer.Typer(help="Rigs: the devices of a laboratory, and their calibration
 @app.command("list")
 def list_rigs(
     ports: Annotated[bool, typer.Option("--ports", help="List serial ports, CAN and network interfaces.")] = False,
-    watch: Annotated[float, typer.Option(min=0.0, help="List ports; wait so many seconds for a change.")] = 0.0,
+    watch: Annotated[
+        float, typer.Option(min=0.0, max=86_400.0, help="List ports; wait so many seconds for a change.")
+    ] = 0.0,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -45,7 +47,7 @@ def _list_ports(watch_s: float, as_json: bool) -> None:
     from dataclasses import asdict
 
     from drivers.core.clock import MonotonicClock
-    from tactile_lab.cli.console import emit_json, say, show_table
+    from tactile_lab.cli.console import answer, emit_json, show_table
     from tactile_lab.rigs.ports import list_all_ports, wait_for_change
 
     found = list_all_ports()
@@ -61,22 +63,23 @@ def _list_ports(watch_s: float, as_json: bool) -> None:
     changed = {port.name for port in gone} & {port.name for port in come}
     for port in gone:
         if port.name not in changed:
-            say(f"{port.name} went: {port.description}")
+            answer(f"{port.name} went: {port.description}")
     for port in come:
-        say(f"{port.name}: now {port.description}" if port.name in changed else f"{port.name} came: {port.description}")
+        words = f": now {port.description}" if port.name in changed else f" came: {port.description}"
+        answer(f"{port.name}{words}")
     if watch_s and not (gone or come):
-        say("nothing changed")
+        answer("nothing changed")
 
 
 @app.command("show")
 def show(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="Name of a shipped rig, or a rig file.")],
+    rig: RigArgument,
     every: Annotated[bool, typer.Option("--all", help="The usual settings too.")] = False,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
     """Show what a rig works with: its devices, its calibration files beside the rig file, and its unusual settings."""
-    from tactile_lab.cli.console import emit_json, say, show_facts, show_table
+    from tactile_lab.cli.console import answer, emit_json, say, show_facts, show_table
     from tactile_lab.rigs.description import load_rig
     from tactile_lab.rigs.effective_settings import effective_settings
 
@@ -88,7 +91,7 @@ def show(
     settings = effective_settings(loaded.description)
     shown = [item for item in settings if every or item.value != item.usual]
     show_facts(f"Rig {loaded.description.name}", _facts(loaded))
-    say("")
+    answer("")
     if shown:
         title = "All settings" if every else f"Settings that are not the usual ones ({len(shown)} of {len(settings)})"
         show_table(title, ["setting", "here", "usual"], [(item.name, item.value, item.usual) for item in shown])
@@ -118,8 +121,8 @@ def _facts(rig: Rig) -> list[tuple[str, str]]:
 
 @app.command("check")
 def check(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="Name of a shipped rig, or a rig file.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
+    rig: RigArgument,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of a simulated rig.")] = 0,
     move: Annotated[
         bool, typer.Option("--move", help="Nudge every motor of a real hand: does it move the joint its map says?")
     ] = False,
@@ -132,7 +135,7 @@ def check(
 
     Exit code 0: all well; 2: the files; 4: a device is not ready.
     """
-    from tactile_lab.cli.console import emit_json, say, show_table
+    from tactile_lab.cli.console import answer, emit_json, show_table
     from tactile_lab.rigs.checks.check import check_rig
 
     del no_input
@@ -144,7 +147,7 @@ def check(
     else:
         rows = [[finding.device, "ok" if finding.ok else "NOT READY", finding.detail] for finding in findings]
         show_table(f"Rig {rig}", ["device", "state", "detail"], rows)
-        say("ready" if ready else "not ready", "bold green" if ready else "bold red")
+        answer("ready" if ready else "not ready", "bold green" if ready else "bold red")
     if not ready:
         raise typer.Exit(4)
 
@@ -152,7 +155,7 @@ def check(
 @app.command("emulate")
 def emulate(
     rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file of kind fingertips or hand.")],
-    seconds: Annotated[float, typer.Option(min=0.0, help="How long; 0 until Ctrl+C.")] = 0.0,
+    seconds: Annotated[float, typer.Option(min=0.0, max=1e8, help="How long; 0 until Ctrl+C.")] = 0.0,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -163,7 +166,7 @@ def emulate(
     """
     import time
 
-    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.cli.console import answer, emit_json, say
     from tactile_lab.rigs.emulate import emulated_rig
 
     del no_input
@@ -171,6 +174,6 @@ def emulate(
         if as_json:
             emit_json({"rig": rig, "devices": places})
         for finger, place in places.items():
-            say(f"{finger}: {place}")
+            answer(f"{finger}: {place}")
         say(f"tactile-lab rig check {rig}  in another terminal; Ctrl+C ends this")
         time.sleep(seconds or _FOR_EVER_s)

@@ -11,7 +11,7 @@ import trimesh
 
 from drivers.core.configuration import load, validate
 from drivers.core.contacts import Array
-from drivers.core.errors import ConfigurationError, TactileLabError
+from drivers.core.errors import ConfigurationError, TactileLabError, given_by_a_person
 from sessions.conductor.progress import NullProgress, Progress
 from sessions.exchange.contact_log import ContactLog, read_contact_log
 from sessions.recording.listing import find_session
@@ -82,10 +82,12 @@ def reconstruct(
         progress: is told which grasp is being estimated.
 
     Raises:
-        ConfigurationError: log, settings or folder do not fit, or the method needs a truth that is not there.
-        SessionError, ShapeError: the data, or the true mesh, cannot be read.
+        ConfigurationError: options, log, true mesh, settings or folder do not fit, or the method needs a truth that is
+            not there.
+        SessionError: the recording cannot be read.
     """
     path = Path(source)
+    wishes.apply({})  # a mistake in the options is told before anything is read
     if path.suffix.lower() == ".csv":
         hint = f"Timed contacts become one by: tactile-lab session import {source}"
         raise ConfigurationError("is a table, not a contact log", where=source, hint=hint)
@@ -140,12 +142,14 @@ def log_truth(log: ContactLog, folder: Path) -> Truth:
     """The truth in a log, for evaluation. A mesh is a file beside the log.
 
     Raises:
-        ShapeError: the mesh cannot be used, or the polygon has no area.
+        ConfigurationError: the mesh cannot be used.
     """
     mesh: trimesh.Trimesh | None = None
     outline_m: Array | None = None
     if log.truth is not None and log.truth.mesh is not None:
-        mesh = read_mesh(folder / log.truth.mesh)
+        with given_by_a_person():
+            mesh = read_mesh(folder / log.truth.mesh)
     if log.truth is not None and log.truth.polygon_m is not None:
-        outline_m = open_ring(np.array(log.truth.polygon_m))
+        with given_by_a_person():
+            outline_m = open_ring(np.array(log.truth.polygon_m))
     return Truth(log.true_poses, mesh, outline_m)

@@ -121,9 +121,9 @@ def test_sound_electrodes_are_told_with_their_tare(inside, tmp_path):
 def test_dead_and_open_electrodes_are_named_with_exit_code_3(inside, tmp_path):
     answer = inside("calibrate", "electrodes", "--from", counts(tmp_path / "counts.csv", {3: 1800.0, 7: 4095.0}))
     assert answer.code == 3
-    assert "does not move at all: dead" in answer.err
-    assert "at the end of its range" in answer.err
-    assert "2 faulty" in answer.err
+    assert "does not move at all: dead" in answer.out
+    assert "at the end of its range" in answer.out
+    assert "2 faulty" in answer.out
 
 
 @pytest.mark.parametrize(

@@ -112,7 +112,7 @@ def test_a_description_that_can_not_be_read(inside, session_copy, change, words)
         refused(inside(*command.split(), session_copy), "session.yaml", words)
     listed = inside("session", "list", "--root", session_copy.parent)
     assert listed.code == 0
-    assert "damaged" in listed.err
+    assert "damaged" in listed.out
     assert words in listed.err
 
 
@@ -171,5 +171,5 @@ def test_evaluating_a_damaged_recording_warns(inside, session_copy):
 def test_a_session_never_closed_is_shown_and_replayed(inside, session_copy):
     manifest = session_copy / "session.yaml"
     manifest.write_text(manifest.read_text().replace("status: closed", "status: open"))
-    assert "killed before it was closed" in inside("session", "show", session_copy).err
+    assert "killed before it was closed" in inside("session", "show", session_copy).out
     assert inside("session", "replay", session_copy, "--method", "odometry").code == 0

@@ -17,8 +17,8 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 def test_slips_of_recorded_sessions_are_told_and_too_few_say_so(inside, recorded_root, recorded):
     answer = inside("session", "slips", "--root", recorded_root)
     assert answer.code == 0
-    assert "Slips in 1 session (" in answer.err
-    assert "left where it was" in answer.err
+    assert "Slips in 1 session (" in answer.out
+    assert "left where it was" in answer.out
     assert "at least 10 are needed" in answer.err
     document = json.loads(inside("session", "slips", recorded.name, "--root", recorded_root, "--json").out)
     assert document["sessions"] == [recorded.name]

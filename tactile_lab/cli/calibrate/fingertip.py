@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.calibrate.biotac import Finger
-from tactile_lab.cli.options import Json, NoInput, RigName
+from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName
 from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ def fingertip(
         Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/fingertips.yaml")
     ] = None,
     settings: Annotated[Path | None, typer.Option(help="Settings: limits, speeds, force.")] = None,
-    presses: Annotated[int, typer.Option(min=6, help="Presses on the table.")] = 10,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
+    presses: Annotated[int, typer.Option(min=6, max=1000, help="Presses on the table.")] = 10,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of a simulated rig.")] = 0,
     replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
     notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
     view: View = False,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput, RigName
+from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName
 from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -46,14 +46,20 @@ def forearm(
     geometry: Annotated[Path | None, typer.Option(help="What is pressed, instead of the rig's.")] = None,
     board: Annotated[Path | None, typer.Option(help="Board on the hand, instead of the rig's.")] = None,
     fingers: Annotated[str, typer.Option(help="Long fingers that press.")] = "FF,MF",
-    touches: Annotated[int, typer.Option(min=1, help="Touches of each face.")] = 8,
-    pictures: Annotated[int | None, typer.Option(min=3, help="Pictures of the board.", show_default="20")] = None,
+    touches: Annotated[int, typer.Option(min=1, max=1000, help="Touches of each face.")] = 8,
+    pictures: Annotated[
+        int | None, typer.Option(min=3, max=1000, help="Pictures of the board.", show_default="20")
+    ] = None,
     translation_mm: Annotated[Triple, typer.Option(help="manual: world_T_mount, x y z.")] = (0.0, 0.0, 0.0),
     rpy_deg: Annotated[Triple, typer.Option(help="manual: roll pitch yaw about fixed axes.")] = (0.0, 0.0, 0.0),
-    sigma_mm: Annotated[float | None, typer.Option(min=0.0, help="manual: standard deviation per axis.")] = None,
-    sigma_deg: Annotated[float | None, typer.Option(min=0.0, help="manual: the same of the rotation.")] = None,
-    valid_days: Annotated[float, typer.Option(min=0.01, help="How long the result may be used.")] = 90.0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
+    sigma_mm: Annotated[
+        float | None, typer.Option(min=0.0, max=1000.0, help="manual: standard deviation per axis.")
+    ] = None,
+    sigma_deg: Annotated[
+        float | None, typer.Option(min=0.0, max=180.0, help="manual: the same of the rotation.")
+    ] = None,
+    valid_days: Annotated[float, typer.Option(min=0.01, max=36_500.0, help="How long the result may be used.")] = 90.0,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of a simulated rig.")] = 0,
     replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
     notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
     view: View = False,

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.options import METHOD_HELP, Json, Method, NoInput, RigName
+from tactile_lab.cli.options import LARGEST_SEED, METHOD_HELP, MOST_GRASPS, MOST_JOBS, Json, Method, NoInput, RigName
 
 
 def sweep(
@@ -16,9 +16,9 @@ def sweep(
     seeds: Annotated[str, typer.Option(help="Comma-separated seeds.")] = "1,2,3",
     dimensions: Annotated[str, typer.Option(help="2, 3 or 2,3.")] = "2,3",
     method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
-    grasps: Annotated[int, typer.Option(min=1, help="Grasps a session.")] = 16,
+    grasps: Annotated[int, typer.Option(min=1, max=MOST_GRASPS, help="Grasps a session.")] = 16,
     rig: RigName = "sim",
-    jobs: Annotated[int, typer.Option(min=1, help="Sessions side by side.")] = 2,
+    jobs: Annotated[int, typer.Option(min=1, max=MOST_JOBS, help="Sessions side by side.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the sessions and of table.md.")] = Path("runs/sweep"),
     check_replay: Annotated[
         bool, typer.Option("--check-replay", help="Replay every session; one that differs counts as failed.")
@@ -31,7 +31,7 @@ def sweep(
     from functools import partial
 
     from drivers.core.atomic_files import write_whole
-    from tactile_lab.cli.console import emit_json, say, show_table
+    from tactile_lab.cli.console import answer, emit_json, say, show_table
     from tactile_lab.evaluation.sweep import (
         markdown_table,
         planned_runs,
@@ -45,7 +45,7 @@ def sweep(
     del no_input
     names = None if objects == "all" else tuple(name.strip() for name in objects.split(","))
     chosen = _numbers(dimensions, "--dimensions", smallest=2, largest=3)
-    drawn = _numbers(seeds, "--seeds")
+    drawn = _numbers(seeds, "--seeds", largest=LARGEST_SEED)
     runs = planned_runs(check_sweep(rig, names, out, method), chosen, drawn)
     job = partial(run_for_sweep, rig=rig, method=str(method), grasps=grasps, root=out, check_replay=check_replay)
     with ProcessPoolExecutor(jobs, initializer=_leave_ctrl_c_to_the_parent) as pool:
@@ -56,9 +56,9 @@ def sweep(
     else:
         show_table("Median / 90 % below / maximum", summary_titles(), map(summary_cells, found))
     write_whole(out / "table.md", markdown_table(found))
-    say(f"table  {out / 'table.md'}")
-    if all(row.evaluation is None for row in rows):
-        raise typer.Exit(1)
+    answer(f"table  {out / 'table.md'}")
+    if any(row.evaluation is None for row in rows):
+        raise typer.Exit(1 if all(row.evaluation is None for row in rows) else 3)
 
 
 def _leave_ctrl_c_to_the_parent() -> None:

@@ -7,30 +7,42 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.options import LAST, METHOD_HELP, SHAPE_HELP, Json, Method, NoInput, Root
+from tactile_lab.cli.completion import complete_session, complete_shape
+from tactile_lab.cli.options import LARGEST_SEED, LAST, METHOD_HELP, SHAPE_HELP, Json, Method, NoInput, Root
+from tactile_lab.cli.sessions.choosing import resolve_name
 
 
 def reconstruct(
     source: Annotated[
         str,
         typer.Argument(
-            metavar="LOG.json|SESSION", help=f"A contact log, a session's folder, its name under --root, or {LAST}."
+            metavar="LOG.json|SESSION",
+            help=f"A contact log, a session's folder, its name under --root, or {LAST}.",
+            autocompletion=complete_session,
         ),
     ],
     method: Annotated[Method | None, typer.Option(help=METHOD_HELP, show_default="joint, or the session's own")] = None,
-    shape: Annotated[str | None, typer.Option(metavar="MODEL", help=SHAPE_HELP, show_default="auto")] = None,
+    shape: Annotated[
+        str | None, typer.Option(metavar="MODEL", help=SHAPE_HELP, show_default="auto", autocompletion=complete_shape)
+    ] = None,
     dimension: Annotated[
         int | None, typer.Option(min=2, max=3, help="2: contour; 3: surface.", show_default="the data's")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed of the estimation.", show_default="0, or the session's")
+        int | None,
+        typer.Option(min=0, max=LARGEST_SEED, help="Seed of the estimation.", show_default="0, or the session's"),
     ] = None,
     settings: Annotated[
         Path | None, typer.Option(help="YAML file with parameters of the estimation, by the names in slam.json.")
     ] = None,
     largest_sigma: Annotated[
         float | None,
-        typer.Option(metavar="MM", help="Write the parts of the shape that are known so well once more: known.ply."),
+        typer.Option(
+            min=0.001,
+            max=1000.0,
+            metavar="MM",
+            help="Write the parts of the shape that are known so well once more: known.ply.",
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the results.", show_default="beside the data, named by method")
@@ -57,5 +69,5 @@ def reconstruct(
         None if largest_sigma is None else largest_sigma / 1000,
     )
     with LiveProgress(f"reconstruction of {source}") as progress:
-        finished = reconstruct(source, root, wishes, out, progress)
+        finished = reconstruct(resolve_name(root, source), root, wishes, out, progress)
     conclude(finished, as_json)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, SessionError
 from sessions.recording.listing import find_session, list_sessions, summarize
 from sessions.recording.manifest import Manifest, read_manifest, write_manifest
 from sessions.recording.session import Session, create_session
@@ -183,13 +183,13 @@ def test_a_calibration_copy_can_not_point_outside_the_session(tmp_path):
 
 def test_sessions_are_found_by_path_name_and_last(tmp_path):
     assert list_sessions(tmp_path / "none") == []
-    with pytest.raises(SessionError, match="no session yet"):
+    with pytest.raises(ConfigurationError, match="no session yet"):
         find_session(tmp_path, "last")
     with create(tmp_path) as session:
         pass
     assert find_session(tmp_path, session.folder.name).folder == session.folder
     assert find_session(tmp_path / "elsewhere", str(session.folder)).folder == session.folder
-    with pytest.raises(SessionError, match="no such session"):
+    with pytest.raises(ConfigurationError, match="no such session"):
         find_session(tmp_path, "nothing")
 
 
