@@ -19,6 +19,7 @@ from tactile_lab.evaluation.files.mesh_io import read_mesh
 from tactile_lab.evaluation.files.result_files import write_results
 from tactile_lab.evaluation.judged import Truth
 from tactile_lab.evaluation.prism import open_ring
+from tactile_lab.slam.shape.planar.outlines import is_simple
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.workflow.judging import FinishedSession, estimate_rest, remove_results, write_evaluation
 from tactile_lab.workflow.replaying import check_replaceable, recorded_seed, recorded_slam, replay_session
@@ -142,14 +143,26 @@ def log_truth(log: ContactLog, folder: Path) -> Truth:
     """The truth in a log, for evaluation. A mesh is a file beside the log.
 
     Raises:
-        ConfigurationError: the mesh cannot be used.
+        ConfigurationError: the mesh cannot be used or is elsewhere, or the polygon has no area or crosses itself.
     """
     mesh: trimesh.Trimesh | None = None
     outline_m: Array | None = None
     if log.truth is not None and log.truth.mesh is not None:
-        with given_by_a_person():
-            mesh = read_mesh(folder / log.truth.mesh)
+        mesh = _mesh_beside(folder, log.truth.mesh)
     if log.truth is not None and log.truth.polygon_m is not None:
         with given_by_a_person():
             outline_m = open_ring(np.array(log.truth.polygon_m))
+        if not is_simple(outline_m):
+            what, hint = "crosses itself", "List its corners one after the other, around the object"
+            raise ConfigurationError(what, where="object.polygon_m", hint=hint)
     return Truth(log.true_poses, mesh, outline_m)
+
+
+def _mesh_beside(folder: Path, name: str) -> trimesh.Trimesh:
+    """The mesh of this name in a folder. Raises ConfigurationError, also for a link that leads out of it."""
+    path = folder / name
+    if path.resolve().parent != folder.resolve():
+        what = "leads out of the log's own folder"
+        raise ConfigurationError(what, where=str(path), hint="Put a copy of the mesh beside the log")
+    with given_by_a_person():
+        return read_mesh(path)

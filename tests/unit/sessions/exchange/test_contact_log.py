@@ -123,6 +123,17 @@ def test_a_planar_log_keeps_the_horizontal_part(tmp_path):
         (["grasps", 0, "hand_motion_world"], np.diag([1.0, 1.0, -1.0, 1.0]).tolist(), "not a rigid motion"),
         (["grasps", 0, "hand_motion"], IDENTITY, "hand_motion"),
         (["object", "polygon_m"], [[0, 0], [1, 1]], "polygon_m"),
+        (["object", "polygon_m"], [[0.0, 0.001 * k] for k in range(2001)], "polygon_m"),
+        (
+            ["object"],
+            {"mesh": "../secret.ply"},
+            "is not the name of a file in the log's own folder",
+        ),
+        (["object"], {"mesh": "/etc/truth.ply"}, "log's own folder"),
+        (["object"], {"mesh": ".."}, "log's own folder"),
+        (["grasps", 0, "contacts", 0, "point_world_m"], [1e6, 0.0, 0.0], "millimetres"),
+        (["grasps", 0, "world_T_object"], [[1, 0, 0, 1e6], *IDENTITY[1:]], "move the world's origin"),
+        (["grasps", 0, "hand_motion_world"], [[1, 0, 0, 1e6], *IDENTITY[1:]], "move the world's origin"),
     ],
 )
 def test_bad_logs_are_explained(tmp_path, path, value, message):

@@ -63,6 +63,21 @@ def test_the_outline_runs_counter_clockwise_whichever_way_the_log_has_it(tmp_pat
         log_truth(log(truth=ObjectTruth(mesh="none.ply")), tmp_path)
 
 
+def test_an_outline_that_crosses_itself_is_no_truth(tmp_path: Path) -> None:
+    bow = np.array([[0, 0], [0.1, 0.1], [0.1, 0], [0, 0.1]])
+    with pytest.raises(ConfigurationError, match=r"object\.polygon_m: crosses itself"):
+        log_truth(log(truth=replace_polygon(bow)), tmp_path)
+
+
+def test_a_link_does_not_lead_out_of_the_folder_either(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "truth.ply").write_text("secret")
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs" / "truth.ply").symlink_to(tmp_path / "elsewhere" / "truth.ply")
+    with pytest.raises(ConfigurationError, match="leads out of the log's own folder"):
+        log_truth(log(truth=ObjectTruth(mesh="truth.ply")), tmp_path / "logs")
+
+
 def replace_polygon(points_m: np.ndarray) -> ObjectTruth:
     return ObjectTruth(polygon_m=tuple(map(tuple, points_m.tolist())))
 
