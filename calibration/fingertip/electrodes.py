@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from drivers.core.bounded_files import LARGEST_TABLE_bytes, read_bounded
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 
@@ -24,7 +25,7 @@ def load_untouched(path: Path) -> Array:
         ConfigurationError: it cannot be read, or is no such table.
     """
     try:
-        text = path.read_text(encoding="utf-8").replace(",", " ")
+        text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8").replace(",", " ")
         counts = np.array([[float(word) for word in line.split()] for line in text.splitlines() if line.strip()])
     except OSError as error:
         raise ConfigurationError(

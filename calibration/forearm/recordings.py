@@ -21,6 +21,7 @@ from calibration.steps.observations import HandPose, Plane, PosePair, Spot, Targ
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.markers import MarkerSettings
 from drivers.core.atomic_files import write_whole
+from drivers.core.bounded_files import LARGEST_JSON_bytes, read_bounded
 from drivers.core.configuration import StrictModel, validate
 from drivers.core.contacts import FINGERS, Array
 from drivers.core.errors import ConfigurationError
@@ -175,7 +176,7 @@ def save_data(path: Path, data: ForearmData) -> None:
 
 def _json(path: Path) -> Any:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(read_bounded(path, LARGEST_JSON_bytes))
     except OSError as error:
         raise ConfigurationError(
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"

@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from drivers.core.bounded_files import LARGEST_MESH_bytes, check_size
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 
@@ -82,6 +83,7 @@ def _standing(mesh: trimesh.Trimesh) -> Array:
 def _read(path: Path) -> trimesh.Trimesh:
     if not path.is_file():
         raise ConfigurationError("file not found", where=str(path), hint="Check the path of the mesh")
+    check_size(path, LARGEST_MESH_bytes)
     try:
         mesh = trimesh.load(path, force="mesh")
     except Exception as error:  # the readers of a dozen formats raise whatever they like

@@ -30,7 +30,7 @@ class ArchiveLimits:
     Attributes:
         files: number of files.
         total_bytes: all files unpacked.
-        ratio: unpacked over packed size of one file of more than a megabyte.
+        ratio: unpacked over packed size, of one file of more than a megabyte and of all together.
     """
 
     files: int = 10_000
@@ -92,6 +92,9 @@ def _checked_entries(archive: zipfile.ZipFile, path: Path, limits: ArchiveLimits
         _check_entry(entry, path, limits)
     if (total := sum(entry.file_size for entry in entries)) > limits.total_bytes:
         raise _refusal(path, f"holds {total} bytes, more than {limits.total_bytes}")
+    packed = sum(entry.compress_size for entry in entries)
+    if total > _BLOCK_BYTES and total > limits.ratio * max(1, packed):
+        raise _refusal(path, f"would unpack {packed} bytes to {total}, out of all proportion")
     names = [entry.filename for entry in entries]
     if len(set(names)) < len(names):
         raise _refusal(path, "holds two files of one name")

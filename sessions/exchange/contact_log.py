@@ -17,6 +17,7 @@ import numpy as np
 from gtsam import Pose2, Pose3
 
 from drivers.core.atomic_files import write_whole
+from drivers.core.bounded_files import LARGEST_JSON_bytes, read_bounded
 from drivers.core.clock import NANOSECONDS
 from drivers.core.configuration import validate
 from drivers.core.contact_checks import opposing_pairs
@@ -118,7 +119,7 @@ def write_contact_log(path: Path, log: ContactLog) -> None:
 
 def _load_json(path: Path) -> Any:
     try:
-        return json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_without_repeats)
+        return json.loads(read_bounded(path, LARGEST_JSON_bytes), object_pairs_hook=_without_repeats)
     except OSError as error:
         raise ConfigurationError(
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 import re
@@ -14,6 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from drivers.core.bounded_files import LARGEST_JSON_bytes, LARGEST_TABLE_bytes, read_bounded
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 
@@ -38,7 +40,8 @@ Row = Mapping[str, Any]
 def read_csv(path: Path) -> list[dict[str, str]]:
     """The lines of a CSV table without their empty values. Raises ConfigurationError."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
+        text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8-sig")
+        with io.StringIO(text, newline="") as file:
             lines = csv.DictReader(line for line in file if not line.startswith("#"))
             rows = [{str(name).strip(): value for name, value in row.items()} for row in lines]
             names = [name.strip() for name in lines.fieldnames or ()]
@@ -62,7 +65,7 @@ def read_csv(path: Path) -> list[dict[str, str]]:
 def read_json(path: Path) -> dict[str, Any]:
     """A document of the form :data:`FORMAT`. Raises ConfigurationError."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(read_bounded(path, LARGEST_JSON_bytes))
     except OSError as error:
         raise ConfigurationError(
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"

@@ -17,8 +17,9 @@ import numpy as np
 from gtsam import Pose3
 from numpy.typing import NDArray
 
+from drivers.core.bounded_files import LARGEST_TABLE_bytes, read_bounded
 from drivers.core.contacts import Array
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, SessionError
 from drivers.core.poses import rotation_angle_rad
 
 COLUMNS = ("stamp_s", *(f"world_T_object_{row}{column}" for row in range(4) for column in range(4)))
@@ -102,8 +103,8 @@ def read_trajectory(path: Path) -> Trajectory:
         SessionError: the file is missing or not in the form of :func:`trajectory_text`.
     """
     try:
-        rows = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
-    except (OSError, UnicodeDecodeError) as error:
+        rows = list(csv.reader(io.StringIO(read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8"))))
+    except (OSError, ConfigurationError, UnicodeDecodeError) as error:
         raise SessionError("trajectory cannot be read", where=str(path), hint="Run the session or replay it") from error
     if not rows or tuple(rows[0]) != COLUMNS:
         raise SessionError(f"first line is not '{COLUMNS[0]}' and the 16 entries of world_T_object", where=str(path))

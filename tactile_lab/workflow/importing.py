@@ -31,12 +31,12 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
     if log.exists():
         raise ConfigurationError("exists already", where=str(log), hint="Choose another name with --out")
     if mesh is not None:
+        with given_by_a_person():
+            read_mesh(mesh)
         settings = replace(settings, object_name=mesh.stem, mesh=log.with_suffix(mesh.suffix).name)
     contacts, made = read_timed_contacts(file, settings), [log]
     try:
         if mesh is not None:
-            with given_by_a_person():
-                read_mesh(mesh)
             made += _copy(mesh, log.with_suffix(mesh.suffix))
         write_contact_log(log, contacts)
         read_contact_log(log)  # refuses normals that point inward

@@ -77,7 +77,7 @@ def test_joints_outside_their_limits_end_with_3_and_replace_nothing(inside, tmp_
     out = tmp_path / "joints.yaml"
     answer = inside("calibrate", "joints", "--from", source, "--out", out, "--no-input")
     assert answer.code == 3
-    assert words in " ".join(answer.err.split())
+    assert words in " ".join(answer.out.split())
     assert files(tmp_path) == ["joints.failed.yaml", "poses.yaml"]
     assert read_record(tmp_path / "joints.failed.yaml").verdict == "FAIL"
 

@@ -11,8 +11,8 @@ from mcap.writer import Writer
 EVERY = ("session show", "session replay", "evaluate", "report")
 
 
-def refused(answer, *words: str) -> None:
-    assert (answer.code, answer.out) == (1, ""), answer
+def refused(answer, *words: str, code: int = 1) -> None:
+    assert (answer.code, answer.out) == (code, ""), answer
     errors = [line for line in answer.err.splitlines() if line.startswith("error: ")]
     assert len(errors) == 1, answer.err
     for word in words:
@@ -30,7 +30,7 @@ def foreign_mcap(path) -> None:
 
 @pytest.mark.parametrize("command", EVERY)
 def test_a_folder_that_is_no_session(inside, tmp_path, command):
-    refused(inside(*command.split(), tmp_path), "not a session folder")
+    refused(inside(*command.split(), tmp_path), "not a session folder", code=2)
 
 
 @pytest.mark.parametrize("share", [0.95, 0.6])

@@ -96,7 +96,7 @@ def test_a_person_is_asked_for_the_bar_and_may_answer_later(
         (("single", "--number", 50), 2, "50"),
         (("single", "--side-mm", -4), 2, "side_m"),
         (("single", "--measured-mm", 99.2), 2, "at most 0.5 % are allowed"),
-        (("grid", "--measured-mm", "nan"), 2, "measured_bar_mm"),
+        (("grid", "--measured-mm", "nan"), 2, "must be a finite number, not nan"),
         (("rig", "--rig", "nowhere"), 2, "nowhere"),
         (("rig", "--measured-mm", 101), 2, "at most 0.5 % are allowed"),
         (("{folder}/nothing.yaml", "--measured-mm", 100), 2, "file not found"),

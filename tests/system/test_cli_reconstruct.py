@@ -124,9 +124,10 @@ def test_a_spatial_log_gets_a_mesh_with_its_uncertainty(inside, spatial_log, tmp
     assert json.loads(flat.out)["dimension"] == 2
 
 
-def test_people_get_a_table_and_programs_nothing(inside, planar_log, tmp_path):
+def test_people_get_a_table_on_standard_output(inside, planar_log, tmp_path):
     answer = inside("reconstruct", planar_log, "--method", "known-pose", "--out", tmp_path / "out")
-    assert (answer.code, answer.out) == (0, "")
+    assert answer.code == 0
+    assert "Hausdorff distance" not in answer.err
     assert "Hausdorff distance" in answer.out
     assert f"contact log  {planar_log}" in answer.out
 
@@ -319,8 +320,8 @@ def honest(document: dict) -> None:
 
 def reconstructed(inside, log: Path, *options: object) -> dict:
     answer = inside("reconstruct", log, "--out", log.with_name("out"), "--json", *options)
-    assert answer.code == 0, answer.err
     document = json.loads(answer.out)
+    assert answer.code == (3 if document["status"] == "lost" else 0), answer.err
     for warning in document["warnings"]:
         assert f"warning: {warning}" in answer.err
     return document

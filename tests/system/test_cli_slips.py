@@ -32,7 +32,7 @@ def test_the_motion_is_printed_as_the_rig_file_wants_it(inside, recorded_root, r
     rng = np.random.default_rng(3)
     slips = Slips(rng.normal(size=(40, 3)) * [0.006, 0.006, 0.15], rng.normal(size=(40, 3)) * [0.0006, 0.0006, 0.01])
     monkeypatch.setattr("tactile_lab.workflow.measuring_slips.session_slips", lambda session: slips)
-    said = inside("session", "slips", recorded.name, "--root", recorded_root).err
+    said = inside("session", "slips", recorded.name, "--root", recorded_root).out
     assert "pushed by the closing hand where it was to be left: 0 of 40" in said
     motion = MotionNoise.model_validate(yaml.safe_load(said.split("in the rig file:")[1])["motion"])
     assert motion.translation_m == pytest.approx(0.006, rel=0.2)

@@ -70,7 +70,7 @@ def test_help_loads_nothing_heavy():
     code = (
         "import sys; from typer.testing import CliRunner; from tactile_lab.cli.app import app;"
         "assert CliRunner().invoke(app, ['run', '--help']).exit_code == 0;"
-        "heavy = {'numpy', 'gtsam', 'mujoco', 'cv2', 'scipy', 'matplotlib', 'numba', 'pydantic', 'yaml', 'viser',"
+        "heavy = {'numpy', 'gtsam', 'mujoco', 'cv2', 'scipy', 'matplotlib', 'numba', 'yaml', 'viser',"
         " 'trimesh', 'h5py'} & set(sys.modules);"
         "assert not heavy, heavy"
     )

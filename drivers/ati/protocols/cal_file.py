@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.ati.protocols.xml_text import parse_xml
+from drivers.ati.protocols.xml_text import LARGEST, parse_xml
+from drivers.core.bounded_files import read_bounded
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 
@@ -117,7 +118,7 @@ def load(path: Path) -> AtiCalibration:
 
 def _parse(path: Path) -> ET.Element:
     try:
-        return parse_xml(path.read_bytes())
+        return parse_xml(read_bounded(path, LARGEST))
     except OSError as error:
         raise ConfigurationError(f"cannot be read ({error.strerror})", where=str(path)) from error
     except ValueError as error:

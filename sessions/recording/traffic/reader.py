@@ -32,6 +32,9 @@ from sessions.recording.traffic.files import END_RECORD, PROFILE, segment_path
 from sessions.recording.traffic.mcap_frames import Frames
 from sessions.recording.traffic.raw_frames import UNSTAMPED, DeviceStamp
 
+LARGEST_CHUNK_bytes = 16 << 20
+"""A chunk is closed after 64 KiB: more is a picture. A small file may claim to hold gigabytes."""
+
 _UNREADABLE = (McapError, zstandard.ZstdError, struct.error, ValueError, OverflowError, MemoryError)
 """What the mcap package raises on damaged content."""
 
@@ -220,7 +223,9 @@ class _SegmentMessages:
         try:
             if opcode == Opcode.CHUNK:
                 self._after_damage = True  # until it is read
-                records = breakup_chunk(Chunk.read(ReadDataStream(BytesIO(content))), validate_crc=True)
+                chunk = Chunk.read(ReadDataStream(BytesIO(content)))
+                _check_size(chunk)
+                records = breakup_chunk(chunk, validate_crc=True)
                 self._after_damage = False
                 return records
             if opcode == Opcode.MESSAGE_INDEX and self._after_damage:
@@ -235,6 +240,13 @@ class _SegmentMessages:
         except _UNREADABLE:
             self._loss.damaged_chunks += opcode == Opcode.CHUNK
         return []
+
+
+def _check_size(chunk: Chunk) -> None:
+    """No recorder makes a chunk larger than this, and unpacking one takes no more. Raises ValueError."""
+    packed = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else len(chunk.data)
+    if chunk.compression not in ("", "zstd") or max(chunk.uncompressed_size, packed) > LARGEST_CHUNK_bytes:
+        raise ValueError(f"a chunk of {max(chunk.uncompressed_size, packed)} bytes, packed by {chunk.compression!r}")
 
 
 def _open(path: Path) -> BinaryIO:

@@ -39,8 +39,6 @@ def conclude(finished: FinishedSession, as_json: bool, extra: Mapping[str, Any] 
         show_evaluation(finished.evaluation.as_json())
     _tell_files(finished)
     _tell_losses(finished)
-    if finished.evaluation is not None and finished.evaluation.status == "lost":
-        warn("the object was lost while it was tracked: pose and shape are not to be relied on")
     for objection in finished.overlooked:
         warn(f"{objection}: allowed, and recorded")
     for reservation in finished.evaluation.warnings if finished.evaluation else ():

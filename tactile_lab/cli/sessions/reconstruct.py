@@ -39,7 +39,7 @@ def reconstruct(
         float | None,
         typer.Option(
             min=0.001,
-            max=1000.0,
+            max=1e9,
             metavar="MM",
             help="Write the parts of the shape that are known so well once more: known.ply.",
         ),

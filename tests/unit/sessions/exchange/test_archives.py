@@ -101,6 +101,13 @@ def test_an_archive_that_is_no_whole_session_is_refused_and_nothing_is_left(sess
     assert not (tmp_path / "in").exists() or not list((tmp_path / "in").iterdir())
 
 
+def test_many_small_files_are_weighed_together(tmp_path):
+    path = archive_of(tmp_path / "many.zip", {f"s/{number}": bytes(1 << 20) for number in range(40)})
+    with pytest.raises(ConfigurationError, match="to 41943040, out of all proportion"):
+        import_archive(path, tmp_path / "in")
+    assert not (tmp_path / "in").exists()
+
+
 @pytest.mark.parametrize("name", ["Big", "a b", "x" * 65, "", "../up", "ä"])
 def test_names_that_are_no_ids_are_refused(session, tmp_path, name):
     export_archive(session, tmp_path / "s.zip")
