@@ -17,6 +17,7 @@ from drivers.core.transports import Datagram
 
 _IDENTIFIER = struct.Struct(">H")
 _AT_ONCE = 10_000
+_SEND_TIMEOUT_S = 0.5  # the clock runs while this process waits for its turn, too
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,8 @@ class CanTransport:
         """Send one frame. Raises DeviceError when the bus is gone, CodecError when it is no frame."""
         frame, bus = decode_frame(payload), self._open_bus()
         try:
-            bus.send(can.Message(arbitration_id=frame.identifier, data=frame.data, is_extended_id=False), timeout=0.1)
+            message = can.Message(arbitration_id=frame.identifier, data=frame.data, is_extended_id=False)
+            bus.send(message, timeout=_SEND_TIMEOUT_S)
         except (can.CanError, OSError) as error:
             raise DeviceError(
                 f"the CAN bus takes no frame ({error})", where=self.name, hint="Check wiring, termination and bit rate"

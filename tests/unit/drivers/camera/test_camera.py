@@ -79,6 +79,7 @@ def test_a_silent_camera_is_an_error_after_the_time_out() -> None:
         (b"\xff\xd8\xff\xd9", "without a size"),
         (encoded(".png")[:16] + b"\x7f\xff\xff\xff" * 2 + encoded(".png")[24:], "2147483647 x 2147483647"),
         (encoded(".png")[:16] + b"\x00" * 8 + encoded(".png")[24:], "0 x 0"),
+        (encoded(".png")[:33] + b"\x40\x00\x00\x00" + encoded(".png")[37:], "parts are longer than it is"),
     ],
 )
 def test_a_damaged_picture_is_a_codec_error(payload: bytes, complaint: str) -> None:

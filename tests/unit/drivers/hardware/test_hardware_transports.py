@@ -52,22 +52,37 @@ def udp(device: socket.socket) -> Iterator[UdpTransport]:
     transport.close()
 
 
-def test_datagrams_come_in_order_and_are_stamped_when_they_arrived(udp: UdpTransport, device: socket.socket) -> None:
+def test_datagrams_come_in_order(udp: UdpTransport, device: socket.socket) -> None:
     udp.send(b"hello")
     _, client = device.recvfrom(100)
-    before_ns = CLOCK.now_ns()
     for number in range(5):
         device.sendto(bytes([number]), client)
-    sent_ns = CLOCK.now_ns()
-    time.sleep(0.05)
     arrived = wait_for(udp, 5)
     assert [datagram.payload for datagram in arrived] == [bytes([number]) for number in range(5)]
     stamps = [datagram.stamp_ns for datagram in arrived]
     assert stamps == sorted(stamps)
-    if udp.kernel_stamps:  # the kernel's stamps are those of arrival, however late the program reads
-        assert before_ns - 1_000_000 <= stamps[0]
-        assert stamps[-1] <= sent_ns + 10_000_000
     assert udp.health() == ()
+
+
+def test_datagrams_are_stamped_when_they_arrive_however_late_the_program_reads(
+    udp: UdpTransport, device: socket.socket
+) -> None:
+    udp.send(b"hello")
+    _, client = device.recvfrom(100)
+    if not udp.kernel_stamps:
+        pytest.skip("the kernel of this machine stamps no datagrams")
+
+    def lateness_ns() -> int:
+        before_ns = CLOCK.now_ns()
+        device.sendto(b"reading", client)
+        sent_ns = CLOCK.now_ns()
+        time.sleep(0.05)
+        (arrived,) = wait_for(udp, 1)
+        assert arrived.stamp_ns >= before_ns - 1_000_000
+        return arrived.stamp_ns - sent_ns
+
+    # A busy machine may deliver one of them late; a program that stamps what it reads stamps all of them late.
+    assert any(lateness_ns() < 10_000_000 for _ in range(20))
 
 
 def test_a_stranger_is_counted_and_left_out(udp: UdpTransport, device: socket.socket) -> None:
