@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.core.bounded_files import LARGEST_TABLE_bytes, read_bounded
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 
 LEAST_SAMPLES = 20
 LARGEST_DRIFT = 30.0

@@ -21,11 +21,11 @@ from calibration.steps.observations import HandPose, Plane, PosePair, Spot, Targ
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.markers import MarkerSettings
 from drivers.core.atomic_files import write_whole
-from drivers.core.bounded_files import LARGEST_JSON_bytes, read_bounded
 from drivers.core.configuration import StrictModel, validate
 from drivers.core.contacts import FINGERS, Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.fingertip import RigidTransform, Vector3
+from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
 from drivers.shadow.model.kinematics import JOINTS
 
 FORMAT = "tactile-forearm-data/1"

@@ -17,9 +17,9 @@ import numpy as np
 
 from drivers.biotac.electrodes import ElectrodeCount
 from drivers.biotac.learned_normal import Presses
-from drivers.core.bounded_files import LARGEST_TABLE_bytes, read_bounded
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 
 _NORMAL = ("nx", "ny", "nz")
 _COUNTS: tuple[ElectrodeCount, ...] = get_args(ElectrodeCount)

@@ -1,4 +1,4 @@
-"""Configuration files: YAML read into models, with errors in plain words (see :mod:`drivers.core.yaml_text`)."""
+"""Configuration files: YAML read into models, errors in plain words (see :mod:`drivers.core.reading.yaml_text`)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-from drivers.core.bounded_files import LARGEST_YAML_bytes, read_bounded
 from drivers.core.errors import ConfigurationError
-from drivers.core.yaml_text import parse, problem_of
+from drivers.core.reading.bounded_files import LARGEST_YAML_bytes, read_bounded
+from drivers.core.reading.yaml_text import parse, problem_of
 
 Model = TypeVar("Model", bound=BaseModel)
 

@@ -10,9 +10,9 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from drivers.core.bounded_files import LARGEST_MESH_bytes, check_size
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size
 
 MESH_PREFIX = "mesh:"
 LARGEST_m, SMALLEST_m = 0.25, 0.01

@@ -17,13 +17,13 @@ import numpy as np
 from gtsam import Pose2, Pose3
 
 from drivers.core.atomic_files import write_whole
-from drivers.core.bounded_files import LARGEST_JSON_bytes, read_bounded
 from drivers.core.clock import NANOSECONDS
 from drivers.core.configuration import validate
 from drivers.core.contact_checks import opposing_pairs
 from drivers.core.contacts import LARGEST_SLOPE, ApproachPath, Array, Contact, Grasp
 from drivers.core.errors import ConfigurationError
 from drivers.core.poses import palm_heading, planar, spatial
+from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
 from sessions.exchange.contact_form import (
     FORMAT,
     ContactEntry,

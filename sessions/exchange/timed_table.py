@@ -15,9 +15,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from drivers.core.bounded_files import LARGEST_JSON_bytes, LARGEST_TABLE_bytes, read_bounded
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, LARGEST_TABLE_bytes, read_bounded
 
 FORMAT = "tactile-timed-contacts/1"
 

@@ -17,10 +17,10 @@ import numpy as np
 from gtsam import Pose3
 from numpy.typing import NDArray
 
-from drivers.core.bounded_files import LARGEST_TABLE_bytes, read_bounded
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError, SessionError
 from drivers.core.poses import rotation_angle_rad
+from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 
 COLUMNS = ("stamp_s", *(f"world_T_object_{row}{column}" for row in range(4) for column in range(4)))
 """Columns of ``trajectory.csv``: the stamp, then the 4 x 4 matrix row by row."""

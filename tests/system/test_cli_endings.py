@@ -104,7 +104,7 @@ def test_ctrl_c_at_the_beginning(tmp_path, delay_s):
         time.sleep(delay_s)
         process.send_signal(signal.SIGINT)
         out, told = process.communicate(timeout=120)
-    assert ("Traceback" in told, out) == (False, "")
+    assert "Traceback" not in out + told
     assert process.returncode == 130
 
 

@@ -9,9 +9,9 @@ import trimesh
 from numpy.typing import NDArray
 
 from drivers.core.atomic_files import write_whole
-from drivers.core.bounded_files import LARGEST_MESH_bytes, check_size
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
+from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
 SMALLEST_EXTENT_m, LARGEST_EXTENT_m = 0.005, 1.0

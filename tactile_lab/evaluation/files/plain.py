@@ -14,8 +14,8 @@ import numpy as np
 from gtsam import Pose2, Pose3
 from pydantic import BaseModel
 
-from drivers.core.bounded_files import LARGEST_JSON_bytes, read_bounded
 from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
 
 
 def plain(value: Any) -> Any:

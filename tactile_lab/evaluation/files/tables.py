@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.core.bounded_files import LARGEST_TABLE_bytes, read_bounded
 from drivers.core.contacts import Array, Grasp
 from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 from tactile_lab.evaluation.prism import open_ring
 
 NANOSECOND_s = 1e-9

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from drivers.core.bounded_files import check_size, read_bounded
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import check_size, read_bounded
 
 
 def test_a_file_is_read_up_to_its_limit(tmp_path: Path) -> None:
