@@ -64,9 +64,7 @@ class CameraWorker:
 
     def _begin_again(self) -> None:
         if not self._settings.repeat or self._frames == self._frames_before:
-            raise DeviceError(
-                "the video or folder has ended", where="camera", hint="Say repeat: true to begin it again"
-            )
+            raise DeviceError("the video or folder has ended", where="camera", hint="Set repeat: true to play it again")
         self._frames_before = self._frames
         self._source.close()
         self._source.open()

@@ -92,13 +92,13 @@ def _size(payload: bytes) -> tuple[int, int]:
     """Width and height that the head promises; refuses what is no picture or lacks its end."""
     if payload.startswith(_PNG_HEAD):
         if not payload.endswith(_PNG_TAIL) or len(payload) < 33:
-            raise _error("PNG cut short")
+            raise _error("PNG truncated")
         _check_chunks(payload)
         width, height = struct.unpack(">II", payload[16:24])
         return width, height
     if payload.startswith(_JPEG_HEAD):
         if not payload.rstrip(b"\0").endswith(_JPEG_TAIL):
-            raise _error("JPEG cut short")
+            raise _error("JPEG truncated")
         return _jpeg_size(payload)
     raise _error(f"{len(payload)} bytes that are neither JPEG nor PNG")
 
@@ -125,4 +125,4 @@ def _jpeg_size(payload: bytes) -> tuple[int, int]:
 
 
 def _error(what: str) -> CodecError:
-    return CodecError(what, where="camera frame", hint="Check the camera's link and its picture format")
+    return CodecError(what, where="camera frame", hint="Check the camera's connection and its picture format")

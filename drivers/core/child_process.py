@@ -47,7 +47,7 @@ class ChildProcess:
         Raises:
             DeviceError: it ended at once.
         """
-        assert self._process is None, f"{self.name} has been started"
+        assert self._process is None, f"{self.name} has been started already"
         command = [sys.executable, "-m", self._module]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
         assert self._process.stdin is not None
@@ -96,7 +96,7 @@ class ChildProcess:
         if not (data := os.read(process.stdout.fileno(), _READ_BYTES)):
             with suppress(subprocess.TimeoutExpired):  # it says nothing more a moment before it has ended
                 process.wait(_ENDING_s)
-            raise DeviceError("its process has ended", where=self.name, hint="See its last error, and connect again")
+            raise DeviceError("its process has ended", where=self.name, hint="Check its last error, and connect again")
         return data
 
     def ready(self, patience_s: float) -> dict[str, Any]:

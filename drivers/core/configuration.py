@@ -49,13 +49,13 @@ class StrictModel(BaseModel):
             if key not in current:
                 continue
             if new in current:
-                raise ValueError(f"{key} is the former name of {new}: keep {new} alone")
+                raise ValueError(f"{key} is the former name of {new}: remove {key}")
             current[new] = current.pop(key)
             warnings.warn(RenamedKeyWarning(f"{_reading.get()}{key} is now called {new}"), stacklevel=2)
         for key in cls.retired:
             if key in current:
                 del current[key]
-                warnings.warn(RenamedKeyWarning(f"{_reading.get()}{key} has no effect any more"), stacklevel=2)
+                warnings.warn(RenamedKeyWarning(f"{_reading.get()}{key} no longer has any effect"), stacklevel=2)
         return current
 
 
@@ -71,7 +71,7 @@ def recorded_keys() -> Iterator[None]:
         yield
 
 
-_reading: ContextVar[str] = ContextVar("what is being read", default="")
+_reading: ContextVar[str] = ContextVar("the file being read", default="")
 
 
 def load(path: Path) -> Any:
@@ -100,7 +100,7 @@ def loads(content: bytes, where: str) -> Any:
     try:
         return parse(content.decode("utf-8"))
     except UnicodeDecodeError as error:
-        raise ConfigurationError("is not a text file", where=where, hint="Name a YAML file in UTF-8") from error
+        raise ConfigurationError("is not a text file", where=where, hint="Give a YAML file in UTF-8") from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date or number out of its range
         raise ConfigurationError(f"is not valid YAML: {problem_of(error)}", where=where, hint=_RETRY) from error
 

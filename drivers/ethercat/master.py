@@ -197,7 +197,7 @@ class EtherCatMaster:
         raise self._eeprom_error(slave, "stays busy")
 
     def _eeprom_error(self, slave: Slave, what: str) -> DeviceError:
-        hint = "Switch the hand off and on; if it stays, the board needs service"
+        hint = "Switch the hand off and on; if the error remains, the board needs service"
         return DeviceError(f"the EEPROM of slave {slave.position} {what}", where=self.where, hint=hint)
 
     def al_status(self, slave: Slave) -> AlStatus:
@@ -218,7 +218,7 @@ class EtherCatMaster:
                 return
             if status.error:
                 break
-        what = f"slave {slave.position} does not go to {state.name}: it is in {status}"
+        what = f"slave {slave.position} does not enter {state.name}: it is in {status}"
         raise DeviceError(what, where=self.where, hint="Switch the hand off and on, and connect again")
 
 

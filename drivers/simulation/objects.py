@@ -121,7 +121,7 @@ def check_object(name: str) -> None:
         load_truth_mesh(name)
     elif name not in CATALOGUE:
         known = ", ".join([*CATALOGUE, f"{MESH_PREFIX}<path>"])
-        raise ConfigurationError(f"no object called {name!r}", where="object", hint=f"Objects are {known}")
+        raise ConfigurationError(f"there is no object {name!r}", where="object", hint=f"Available objects: {known}")
 
 
 def prism_mesh(outline_m: Array, height_m: float) -> trimesh.Trimesh:

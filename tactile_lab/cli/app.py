@@ -62,9 +62,9 @@ def options(
             callback=_load_extensions,
             is_eager=True,
             metavar="FILE",
-            help="Python file that registers policies, shape models, fingertips, figures or commands of your own "
-            "(docs/extending.md); again for more.",
+            help="Python file that registers your own policies, shape models, fingertips, metrics or commands "
+            "(docs/extending.md). Can be repeated.",
         ),
     ] = None,
 ) -> None:
-    """Options of the program itself."""
+    """Global options."""

@@ -52,7 +52,7 @@ def check_output() -> None:
 
 
 class Onlooker(Protocol):
-    """Somewhere else that people are told the same, such as a wizard's page."""
+    """Another place that shows the same text, such as a wizard's page."""
 
     def line(self, text: str, style: str = "") -> None: ...
     def table(
@@ -65,7 +65,7 @@ _onlookers: list[Onlooker] = []
 
 @contextmanager
 def tell_also(onlooker: Onlooker) -> Iterator[None]:
-    """Within the block, whatever people are told here is told there too."""
+    """Within the block, everything printed for people is also shown there."""
     _onlookers.append(onlooker)
     try:
         yield
@@ -74,7 +74,7 @@ def tell_also(onlooker: Onlooker) -> Iterator[None]:
 
 
 def say(text: str, style: str = "") -> None:
-    """A line of progress, or a remark; shown as it is (no markup, never broken)."""
+    """A line of progress, or a remark; printed literally (no markup, no wrapping)."""
     _tell(people, Text(text, style=style), style)
 
 
@@ -84,7 +84,7 @@ def answer(text: str, style: str = "") -> None:
 
 
 def count(number: int, noun: str) -> str:
-    """A number of things: "1 grasp", "3 grasps"."""
+    """A number with its noun: "1 grasp", "3 grasps"."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
@@ -105,7 +105,7 @@ def _tell(where: Console, line: Text, style: str) -> None:
 
 
 def emit_json(document: Any) -> None:
-    """The one machine-readable document of a command. NaN is not JSON and is refused."""
+    """Print the command's single JSON document. NaN is not JSON and is refused."""
     _out.write(json.dumps(document, indent=2, allow_nan=False) + "\n")
     _out.flush()
 
@@ -118,10 +118,11 @@ def show_table(
     right: Sequence[int] = (),
     where: Console | None = None,
 ) -> None:
-    """A table with a rule below its head; ``right`` lists the columns that hold numbers.
+    """A table with a rule below its header; ``right`` lists the columns that hold numbers.
 
-    It is an answer, unless it is shown on another console such as :data:`people`. Cells are shown as they are. The
-    last column takes what room is left and wraps; on a terminal that is too narrow for the others each row is a block
+    It is an answer, unless it is shown on another console such as :data:`people`. Cells are printed literally. The
+    last column takes the remaining width and wraps; on a terminal too narrow for the
+    other columns each row becomes a block
     of lines.
     """
     shown, console = list(rows), where or answers()
@@ -131,7 +132,7 @@ def show_table(
 
 
 def show_facts(title: str, facts: Iterable[tuple[str, str]]) -> None:
-    """Names with values; facts without a value are left out."""
+    """Names with values; empty values are left out."""
     shown = [(name, value) for name, value in facts if value]
     answers().print(Text(title, style="bold"), soft_wrap=True)
     answers().print(facts_form(answers(), shown), crop=False)

@@ -1,4 +1,4 @@
-"""``tactile-lab experiment``: the figures of the thesis and the tables of methods, from simulated contacts."""
+"""``tactile-lab experiment``: the thesis's figures and tables of methods, from simulated contacts."""
 
 from __future__ import annotations
 
@@ -24,39 +24,45 @@ def experiment(
     name: Annotated[
         str,
         typer.Argument(
-            help="Name of the experiment. 'list' shows them all, 'pages' writes the pages of the stored results, "
-            "'commands' shows what made these.",
+            help="Name of the experiment. 'list' lists all experiments, 'pages' writes the pages of stored results, "
+            "'commands' prints the commands that made them.",
             autocompletion=complete_experiment,
         ),
     ],
-    seeds: Annotated[str, typer.Option(help="Seeds, for example 0-2,7. Those from 1000 on are for reports.")] = (
-        "1000-1029"
-    ),
-    jobs: Annotated[int, typer.Option(min=0, max=MOST_JOBS, help="Runs side by side; 0 takes all cores.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="Folder of the results (runs/experiments/NAME).")] = None,
+    seeds: Annotated[
+        str, typer.Option(help="Random seeds, for example 0-2,7. Seeds from 1000 on are reserved for reported results.")
+    ] = ("1000-1029"),
+    jobs: Annotated[int, typer.Option(min=0, max=MOST_JOBS, help="Number of parallel runs; 0 uses all cores.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Folder for the results (default: runs/experiments/NAME).")] = None,
     only: Annotated[
         list[str] | None,
-        typer.Option(help="Limit a setting: method=joint,icp (; where values have commas)."),
+        typer.Option(
+            help="Restrict a setting: method=joint,icp (separate values that contain commas by ;). Can be repeated."
+        ),
     ] = None,
     grasps: Annotated[
-        int | None, typer.Option(min=1, max=MOST_GRASPS, help="Other number of grasps, for a quick look.")
+        int | None, typer.Option(min=1, max=MOST_GRASPS, help="Use another number of grasps, for a quick check.")
     ] = None,
-    keep: Annotated[bool, typer.Option("--keep", help="Keep the results of another version of the program.")] = False,
-    store: Annotated[
-        bool, typer.Option("--store", help="Keep the outcome in the repository, write its pages.")
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep finished runs that were made by another version of the program.")
     ] = False,
-    forget: Annotated[bool, typer.Option("--forget", help="With --store: drop what older versions made.")] = False,
-    docs: Annotated[Path, typer.Option(help="Documents that keep stored results and pages.")] = Path("docs"),
+    store: Annotated[
+        bool, typer.Option("--store", help="Store the result in the repository and write its pages.")
+    ] = False,
+    forget: Annotated[bool, typer.Option("--forget", help="With --store: discard results of older versions.")] = False,
+    docs: Annotated[Path, typer.Option(help="Documentation folder with the stored results and pages.")] = Path("docs"),
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Run an experiment over its seeds; one that was broken off goes on where it stopped."""
+    """Run an experiment over its seeds. An interrupted experiment resumes where it stopped."""
     del no_input
     if name in _WORDS:
         _WORDS[name](docs, as_json)
         return
     if store and keep:
-        raise typer.BadParameter("a result of several versions is not stored: leave out --keep", param_hint="'--store'")
+        raise typer.BadParameter(
+            "a result made by several versions cannot be stored: leave out --keep", param_hint="'--store'"
+        )
     from tactile_lab.cli.console import answer, emit_json, show_table, warn
     from tactile_lab.cli.experiment_progress import ExperimentProgress
     from tactile_lab.experiments.catalogue import experiment
@@ -90,7 +96,7 @@ _MOST_SEEDS = 100_000
 
 
 def _command(name: str, seeds: str, only: Sequence[str], grasps: int | None, jobs: int) -> str:
-    """The command that runs this again."""
+    """The command that repeats this run."""
     words = ["tactile-lab", "experiment", name, "--seeds", seeds]
     words += [word for text in only for word in ("--only", text)]
     words += [] if grasps is None else ["--grasps", str(grasps)]
@@ -98,7 +104,7 @@ def _command(name: str, seeds: str, only: Sequence[str], grasps: int | None, job
 
 
 def _of_study(study: Experiment, rows: Sequence[Row], grasps: int | None) -> list[Row]:
-    """The runs with this number of grasps, in the order of the settings: parts may have been run one by one."""
+    """The runs with this number of grasps, ordered by settings: parts may have been run separately."""
     seeds = sorted({row.cell.seed for row in rows})
     places = {cell.key: place for place, cell in enumerate(study.cells(seeds, None, grasps))}
     return sorted((row for row in rows if row.cell.key in places), key=lambda row: places[row.cell.key])
@@ -120,7 +126,7 @@ def _write_pages(docs: Path, as_json: bool = False) -> None:
     changed = publish(docs)
     for path in changed:
         say(f"page  {path}")
-    say(f"{len(changed)} pages and pictures are new")
+    say(f"{len(changed)} pages and pictures changed")
 
 
 def _show_commands(docs: Path, as_json: bool) -> None:
@@ -151,14 +157,14 @@ def _list(docs: Path, as_json: bool) -> None:
 
 
 _WORDS: Mapping[str, Callable[[Path, bool], None]] = {"list": _list, "pages": _write_pages, "commands": _show_commands}
-"""Words in place of a name, and what they do with the documents."""
+"""Keywords accepted in place of a name, and what they do."""
 
 
 def _end(rows: Sequence[Row]) -> None:
     if all(row.figures is None for row in rows):
         from tactile_lab.cli.console import complain
 
-        complain(f"every run failed; the first: {rows[0].problem}")
+        complain(f"every run failed; first error: {rows[0].problem}")
         raise typer.Exit(1)
     if any(row.figures is None for row in rows):
         raise typer.Exit(3)
@@ -170,7 +176,7 @@ def _seeds(text: str) -> list[int]:
     for part in text.split(","):
         low, _, high = part.strip().partition("-")
         if not low.isdigit() or (high and not high.isdigit()) or part.strip().endswith("-"):
-            problem = f"{text!r} is not a list of seeds like 0-2,7"
+            problem = f"{text!r} is not a list of seeds such as 0-2,7"
             raise typer.BadParameter(problem, param_hint="'--seeds'")
         first, last = int(low), int(high or low)
         if last > LARGEST_SEED or last - first >= _MOST_SEEDS:
@@ -178,12 +184,12 @@ def _seeds(text: str) -> list[int]:
             raise typer.BadParameter(problem, param_hint="'--seeds'")
         seeds += range(first, last + 1)
     if not seeds:
-        raise typer.BadParameter(f"{text!r} has no seed in it", param_hint="'--seeds'")
+        raise typer.BadParameter(f"{text!r} contains no seed", param_hint="'--seeds'")
     return list(dict.fromkeys(seeds))
 
 
 def _limits(only: list[str]) -> dict[str, list[str]]:
-    """Values by the name of their setting. Raises BadParameter."""
+    """Values by setting. Raises BadParameter."""
     limits = {}
     for text in only:
         name, equals, values = text.partition("=")

@@ -1,4 +1,4 @@
-"""``tactile-lab``: the entry point and the meaning of its exit codes.
+"""``tactile-lab``: the entry point and its exit codes.
 
 0 done. 1 begun and failed. 2 not begun: an option, or a name or file that was given, is missing or cannot be used.
 3 done, but not as it should be: data or the object were lost, a result is outside its limits, some runs failed. 4 a
@@ -25,10 +25,10 @@ os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; every error that a person or an extension can cause ends here as one line.
+    """Run the command line; every error that a user or an extension can cause is printed here as one line.
 
     Args:
-        arguments: the words behind ``tactile-lab``; those of the process when None.
+        arguments: the words after ``tactile-lab``; those of the process if None.
 
     Raises:
         SystemExit: always, with the exit code.
@@ -71,7 +71,7 @@ def _run(app: Callable[..., None], arguments: Sequence[str] | None) -> None:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    """What Python's own warnings mechanism has to say, in the program's form: a line and no source text."""
+    """Show Python warnings in the program's format: one line, without source text."""
     from tactile_lab.cli.console import warn
 
     warn(str(message))

@@ -60,7 +60,7 @@ def test_keys_without_a_meaning_any_more_are_left_out_and_told() -> None:
     class Newer(MotionNoise):
         retired = ("wobble",)
 
-    with pytest.warns(RenamedKeyWarning, match="test: wobble has no effect any more"):
+    with pytest.warns(RenamedKeyWarning, match="test: wobble no longer has any effect"):
         assert validate({"wobble": 3, "unheld": 0.5}, Newer, where="test").unheld == 0.5
 
 

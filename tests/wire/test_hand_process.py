@@ -161,7 +161,7 @@ def test_without_orders_for_long_the_demands_are_taken_away(ends: tuple[str, str
         process.set_targets({"FFJ3": 1.5})
         exchanged(process, lambda: any(tap.demands()))
         time.sleep(1.5)  # a session that hangs
-        with pytest.raises(DeviceError, match=r"no order from the session for \d\.\d s: demands taken away"):
+        with pytest.raises(DeviceError, match=r"no command from the session for \d\.\d s: demands set to zero"):
             process.exchange()
         assert not any(tap.demands()[-20:])
         process.close()
@@ -196,7 +196,7 @@ def test_the_motor_map_is_checked_in_the_process(ends: tuple[str, str], tmp_path
         process = hand(ends[0], motors=wrong)
         process.connect()
         (finding,) = process.first_move(["FFJ3", "THJ2"])
-        assert "is said to pull FFJ3, but moves MFJ3" in str(finding)
+        assert "moves MFJ3, but the motor map says FFJ3" in str(finding)
         process.close()
 
 

@@ -62,7 +62,7 @@ class NetBoxProcess:
             self.http_ports = self._child.ready(_START_s)["http_ports"]
         except DeviceError as error:
             where = ", ".join(self._start["hosts"])
-            raise DeviceError("the emulated boxes do not start", where=where, hint=_TAKEN) from error
+            raise DeviceError("the emulated boxes did not start", where=where, hint=_TAKEN) from error
         return self
 
     def __exit__(self, *ended: object) -> None:
@@ -79,7 +79,7 @@ class NetBoxProcess:
             self.sent = json.loads(said)["sent"]
 
 
-_TAKEN = "Another program may hold their addresses; end it"
+_TAKEN = "Another program may be using their addresses: end it"
 
 if __name__ == "__main__":
     main()

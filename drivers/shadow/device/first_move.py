@@ -61,11 +61,11 @@ class MoveFinding:
     def __str__(self) -> str:
         """In words: ``motor 5 is said to pull THJ2, but moves FFJ3``."""
         if self.moved is None:
-            return f"motor {self.motor} moves nothing; its map says {self.joint}"
+            return f"motor {self.motor} moves nothing; the motor map says {self.joint}"
         if self.moved != self.joint:
-            return f"motor {self.motor} is said to pull {self.joint}, but moves {self.moved}"
+            return f"motor {self.motor} moves {self.moved}, but the motor map says {self.joint}"
         if self.backwards:
-            return f"motor {self.motor} turns {self.joint} the wrong way: name it under reversed in the motor map"
+            return f"motor {self.motor} turns {self.joint} the wrong way: list it under reversed in the motor map"
         return f"motor {self.motor} moves {self.joint}"
 
 

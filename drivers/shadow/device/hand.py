@@ -128,7 +128,7 @@ class ShadowHand:
                 self._last = sample
                 return
         raise DeviceError(
-            f"the palm gave no valid status in {self._settings.connect_tries} cycles",
+            f"the palm sent no valid status in {self._settings.connect_tries} cycles",
             where=self._transport.name,
             hint="Check the hand's power and its cable",
         )

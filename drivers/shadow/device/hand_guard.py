@@ -106,9 +106,9 @@ class HandGuard:
         if self.counters.lost:
             problems.append(f"{self.counters.lost} of {self.counters.cycles} cycles lost")
         if self.counters.malformed:
-            problems.append(f"{self.counters.malformed} messages were no status of a {self._settings.palm} palm")
+            problems.append(f"{self.counters.malformed} messages were not a status of a {self._settings.palm} palm")
         if statuses.stale:
-            problems.append(f"{statuses.stale} statuses were repetitions of old ones")
+            problems.append(f"{statuses.stale} statuses repeated old ones")
         if newest is not None:
             problems += self._watch.problems(newest, connected_ns)
         return tuple(problems)

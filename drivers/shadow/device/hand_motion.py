@@ -62,7 +62,7 @@ class HandMotion:
         """
         if joint not in self._motors.numbers or not abs(pwm) <= LARGEST_NUDGE:
             what = f"cannot nudge {joint} with {pwm} counts"
-            raise DeviceError(what, where=self._where, hint=f"At most {LARGEST_NUDGE} for a driven joint")
+            raise DeviceError(what, where=self._where, hint=f"Use at most {LARGEST_NUDGE}, and a driven joint")
         self._control.clear()
         motor = self._motors.numbers[joint]
         self._nudge = np.zeros(MOTORS, dtype=np.int16) if pwm else None

@@ -77,5 +77,5 @@ class HandSettings(StrictModel):
     def _duty_cycles_exist(self) -> HandSettings:
         largest = max(self.gains.of(joint).max_pwm for joint in DRIVEN_JOINTS)
         if self.demand == "pwm" and largest > MAX_PWM:
-            raise ValueError(f"a duty cycle of {largest:g} counts is more than the full one, {MAX_PWM}")
+            raise ValueError(f"a duty cycle of {largest:g} counts is more than the maximum, {MAX_PWM}")
         return self

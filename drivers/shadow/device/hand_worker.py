@@ -103,7 +103,7 @@ class HandWorker:
         silent_ns = self._clock.now_ns() - self._heard_ns
         if silent_ns > self._patience_ns and self._hand.targets_rad and not self._moving_by_itself:
             self._hand.stop()
-            self._tell(f"no order from the session for {silent_ns / NANOSECONDS:.1f} s: demands taken away")
+            self._tell(f"no command from the session for {silent_ns / NANOSECONDS:.1f} s: demands set to zero")
 
     def _tell(self, error: str) -> None:
         if not self._trouble:
@@ -151,7 +151,7 @@ class HandWorker:
     def _sound_turn(self) -> HandSample:
         """A cycle of the motor check, which ends with the session or with the hand."""
         if (sample := self._turn()) is None or self._ended:
-            raise DeviceError(self._trouble or f"{self._transport.name}: the check of its motors was broken off")
+            raise DeviceError(self._trouble or f"{self._transport.name}: the check of its motors was interrupted")
         return sample
 
     def _answer(self, kind: RecordKind, content: dict[str, object]) -> None:

@@ -88,7 +88,7 @@ class LoadWatch:
         ]
         for motor, since in enumerate(since_ns):
             if since is not None and now_ns - since > self._stall_ns:
-                return self._fault(motor, f"pushed for {self._limits.stall_s:g} s with its largest duty cycle")
+                return self._fault(motor, f"stalled for {self._limits.stall_s:g} s at its largest duty cycle")
         return None
 
     def _over(
@@ -102,4 +102,4 @@ class LoadWatch:
 
     def _fault(self, motor: int, what: str) -> Fault:
         where = f"{self._where}, {self._motors.names[motor]} (motor {motor})"
-        return Fault(f"stopped: {what}", where, "Look at the hand before going on, then resume")
+        return Fault(f"stopped: {what}", where, "Check the hand, then resume")

@@ -85,7 +85,7 @@ class MotorWatch:
 
     def problems(self, sample: HandSample, connected_ns: int) -> list[str]:
         """What is wrong with palm and motors in this sample, in words."""
-        problems = [f"only {sample.idle_us} us of spare time in the palm"] if sample.idle_us < SPARE_TIME_us else []
+        problems = [f"only {sample.idle_us} us of idle time in the palm"] if sample.idle_us < SPARE_TIME_us else []
         for motor, flags in enumerate(sample.motor.flags.tolist()):
             problems += [f"{self._name(motor)}: {words}" for words in describe_flags(flags)]
         for motor in np.flatnonzero(sample.motor.temperature_C >= self._heat.warm_C).tolist():

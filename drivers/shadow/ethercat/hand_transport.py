@@ -81,9 +81,9 @@ class EthercatCounts:
             f"{self.lost} of {self.cycles} frames lost": self.lost,
             f"{self.stale} frames came back late": self.stale,
             f"{self.damaged} frames came back damaged": self.damaged,
-            f"{self.refused} commands not taken by a late palm": self.refused,
+            f"{self.refused} commands not accepted by a late palm": self.refused,
             f"{self.empty} cycles without a new status": self.empty,
-            f"the hand was not seen in the first {self.misread} of the looks at its ring": self.misread,
+            f"the hand was not found in the first {self.misread} scans of its EtherCAT ring": self.misread,
         }
         return tuple(words for words, count in remarks.items() if count)
 
@@ -178,8 +178,8 @@ class EthercatTransport:
         """The hand that was found, when it is the one that was there before: its calibration is in use."""
         known = self._known or found
         if (known.bridge, known.palm) != (found.bridge, found.palm):
-            what = f"hand {found.serial}, palm {found.image.name}, answers where hand {known.serial} did before"
-            hint = "Put the cable back, or start again with the rig file of this hand"
+            what = f"hand {found.serial}, palm {found.image.name}, answers instead of hand {known.serial}"
+            hint = "Reconnect the former hand, or start again with the rig file of this hand"
             raise DeviceError(what, where=self.name, hint=hint)
         return found
 

@@ -129,7 +129,7 @@ class HandRing:
                 return
             self._master.wait(0.001)
         hint = "Switch the hand off and on, and connect again"
-        raise self._wrong(f"the palm took no process image in {_FIRST_EXCHANGES} tries", hint)
+        raise self._wrong(f"the palm accepted no process image in {_FIRST_EXCHANGES} tries", hint)
 
     def _wrong(self, what: str, hint: str) -> DeviceError:
         return DeviceError(what, where=self._master.where, hint=hint)

@@ -151,7 +151,7 @@ def _check_complete(joints: Sequence[str], where: str) -> None:
             f"{word} {', '.join(names)}" for word, names in (("misses", missing), ("has unknown", unknown)) if names
         ]
         raise ConfigurationError(
-            " and ".join(problems), where=where, hint="A hand's calibration names each of the 24 joints once"
+            " and ".join(problems), where=where, hint="A hand's calibration must name each of the 24 joints once"
         )
 
 

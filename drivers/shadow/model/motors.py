@@ -113,6 +113,6 @@ def _check_one_to_one(numbers: Mapping[str, int], backwards: tuple[str, ...], wh
     if missing := sorted(set(DRIVEN_JOINTS) - set(numbers)):
         raise ConfigurationError(f"no motor for {', '.join(missing)}", where=where, hint=hint)
     if unknown := sorted((set(numbers) | set(backwards)) - set(DRIVEN_JOINTS)):
-        raise ConfigurationError(f"no driven joint called {', '.join(unknown)}", where=where, hint=hint)
+        raise ConfigurationError(f"unknown driven joints {', '.join(unknown)}", where=where, hint=hint)
     if sorted(numbers.values()) != list(range(MOTORS)):
-        raise ConfigurationError(f"motor numbers are not 0 to {MOTORS - 1}, each once", where=where, hint=hint)
+        raise ConfigurationError(f"the motor numbers must be 0 to {MOTORS - 1}, each once", where=where, hint=hint)

@@ -33,7 +33,7 @@ DAMAGE = 0
 
 
 def ends_well(path: Path) -> bool:
-    """Whether a file ends as a finished MCAP file does; nothing else of it is looked at."""
+    """Whether a file ends like a finished MCAP file; nothing else is checked."""
     with path.open("rb") as file:
         size = file.seek(0, 2)
         file.seek(max(0, size - len(MCAP0_MAGIC)))
@@ -41,7 +41,7 @@ def ends_well(path: Path) -> bool:
 
 
 class Frames:
-    """Iterates over the records of an MCAP file, torn or not, as opcode and content; :data:`DAMAGE` where one is not.
+    """Iterates over the records of an MCAP file, truncated or not, as opcode and content; :data:`DAMAGE` between them.
 
     Args:
         file: from its beginning.
@@ -56,7 +56,7 @@ class Frames:
         self.damaged_magic = not MCAP0_MAGIC.startswith(magic)
         """It does not begin as an MCAP file does, or as the beginning of one."""
         self.complete = False
-        """The closing magic was reached."""
+        """Whether the closing magic was reached."""
         self.unreadable_bytes = 0
 
     def __iter__(self) -> Iterator[tuple[int, bytes]]:

@@ -101,7 +101,7 @@ def test_blurred_pictures_and_pictures_without_the_board_are_refused_by_name() -
     assert isinstance(blurred, str)
     assert blurred.startswith(("blurred: edges", "no marker of"))
     empty = view_of("a", np.full((480, 640), 90, np.uint8), BOARD)
-    assert empty == "no marker of DICT_4X4_50 is to be seen"
+    assert empty == "no marker of DICT_4X4_50 is visible"
 
 
 def write_views(folder: Path, count: int) -> None:

@@ -89,7 +89,7 @@ def test_a_busy_child_does_not_hold_up_orders_and_is_killed_when_it_does_not_end
     child.give({"sleep_s": 600.0})
     with pytest.raises(DeviceError, match="echo: its process does not answer"):
         child.answer(0.0)
-    with pytest.raises(DeviceError, match="echo: its process takes no orders"):
+    with pytest.raises(DeviceError, match="echo: its process accepts no commands"):
         child.give({"echo": ["x" * 100_000]})
     assert child.close(0.0) == b""
 

@@ -70,7 +70,7 @@ def test_a_network_cable_that_is_pulled_is_told(
 
     monkeypatch.setattr(ports, "wait_for_change", pulled_while_waiting)
     told = CliRunner().invoke(app, ["rig", "list", "--watch", "30"])
-    assert "enp3s0: now no cable, or not set up" in told.output
+    assert "enp3s0: now no cable, or interface down" in told.output
 
 
 def test_the_port_that_is_unplugged_while_the_command_waits_is_named(

@@ -136,7 +136,7 @@ def test_another_sensor_than_the_rig_names_is_refused(
     unit: Callable[[EmulatedSensor], Unit], wire: Callable[..., ForceWire]
 ) -> None:
     sensor = EmulatedSensor(emulated_calibration("FT11111"))
-    with pytest.raises(DeviceError, match="the sensor is FT11111, the rig file names FT22222"):
+    with pytest.raises(DeviceError, match="the sensor is FT11111, but the rig file names FT22222"):
         Line(unit(sensor), wire(serial="FT22222")).device.connect()
     line = Line(unit(sensor), wire(serial="FT11111"))
     line.device.connect()

@@ -151,7 +151,7 @@ def test_connecting_twice_and_closing_twice_is_harmless() -> None:
 def test_a_silent_palm_is_not_connected_and_its_link_is_closed_again() -> None:
     rig = Rig()
     rig.palm.mute = True
-    with pytest.raises(DeviceError, match="hand: the palm gave no valid status in 20 cycles"):
+    with pytest.raises(DeviceError, match="hand: the palm sent no valid status in 20 cycles"):
         rig.hand.connect()
     with pytest.raises(DeviceError, match="not connected"):
         rig.hand.exchange()
@@ -406,7 +406,7 @@ def test_messages_of_another_kind_count_as_lost_and_show_in_the_health(rig: Rig)
     assert not rig.run(3).fresh
     rig.palm.garbage = b""
     assert rig.hand.counters.malformed == 3
-    assert "3 messages were no status of a 0220 palm" in rig.hand.health()
+    assert "3 messages were not a status of a 0220 palm" in rig.hand.health()
 
 
 @pytest.mark.parametrize(

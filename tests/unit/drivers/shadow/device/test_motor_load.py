@@ -76,7 +76,7 @@ def test_pushing_for_long_stops_and_a_rest_begins_anew() -> None:
     assert load.stall(words, 1_900_000_000) is None
     fault = load.stall(words, 2_100_000_000)
     assert fault is not None
-    assert "motor 7): stopped: pushed for 1 s with its largest duty cycle" in str(fault.error())
+    assert "motor 7): stopped: stalled for 1 s at its largest duty cycle" in str(fault.error())
 
 
 def test_a_hand_that_pushes_stops_itself_at_the_next_cycle() -> None:
@@ -88,7 +88,7 @@ def test_a_hand_that_pushes_stops_itself_at_the_next_cycle() -> None:
     hand = ShadowHand(transport, world.clock, world.calibration.joints, settings)
     hand.connect()
     hand.set_targets({"WRJ2": 0.4})
-    with pytest.raises(DeviceError, match=r"WRJ2 .*: stopped: pushed for 0.05 s"):
+    with pytest.raises(DeviceError, match=r"WRJ2 .*: stopped: stalled for 0.05 s"):
         _exchange(hand, world, 200)
     assert not np.any(PALMS["0220"].decode_command(sent[-1]).motor_data)
     hand.close()

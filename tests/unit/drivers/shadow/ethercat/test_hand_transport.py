@@ -94,7 +94,7 @@ def test_a_product_code_that_can_not_be_driven_is_told_with_what_to_do() -> None
     wire = Wire(ChainSettings(product=0x0A))
     with pytest.raises(DeviceError, match=r"a board this program does not know \(product 0xa\)") as told:
         find_palm(EthercatSettings(interface="memory"), wire.clock, wire.port)
-    assert "0220, 0230 and 0240 can be driven; ask Shadow Robot" in str(told.value)
+    assert "0220, 0230 and 0240 are supported; ask Shadow Robot" in str(told.value)
     with pytest.raises(DeviceError, match="not open"):
         wire.port.send(b"")
 
@@ -251,7 +251,7 @@ def test_another_hand_on_the_cable_ends_the_link_and_is_not_taken_for_the_first(
     wire.hand.ring.slaves = emulated_hand(wire.clock, CALIBRATION, ChainSettings(serial=12)).ring.slaves
     with pytest.raises(DeviceError, match="the palm has left operation: it is in INIT"):
         wire.cycles(3)
-    with pytest.raises(DeviceError, match=r"hand 12, palm 0220, answers where hand 634 did before.*the cable back"):
+    with pytest.raises(DeviceError, match=r"hand 12, palm 0220, answers instead of hand 634.*the former hand"):
         wire.transport.open()
     with pytest.raises(DeviceError, match="not open"):
         wire.transport.send(bytes(70))
@@ -301,7 +301,7 @@ def test_a_link_failure_takes_the_demands_away_and_stays_until_reconnected() -> 
 @pytest.mark.parametrize(
     ("chain", "settings", "words"),
     [
-        (ChainSettings(vendor=0x2), {}, "first slave is of vendor 0x2, not of Shadow Robot"),
+        (ChainSettings(vendor=0x2), {}, "first slave is from vendor 0x2, not from Shadow Robot"),
         (ChainSettings(product=0x01000002), {}, "second slave is a muscle hand"),
         (ChainSettings(product=77), {}, r"does not know \(product 0x4d\)"),
         (ChainSettings(palm="0240"), {"palm": "0220"}, 'a 0240 palm, not a 0220. Set hand.palm to "0240"'),
@@ -355,7 +355,7 @@ def test_opening_twice_and_closing_twice_do_no_harm() -> None:
 
 
 def test_a_missing_interface_is_named_beside_those_present() -> None:
-    with pytest.raises(DeviceError, match=r"nosuch0: no such network interface. Present are .*lo"):
+    with pytest.raises(DeviceError, match=r"nosuch0: no such network interface. Available interfaces: .*lo"):
         EthercatTransport("hand", EthercatSettings(interface="nosuch0"), MonotonicClock()).open()
 
 
@@ -399,7 +399,7 @@ def test_a_palm_refuses_safeop_without_its_sync_managers(skip: int, code: int) -
     for number, manager in enumerate(PALMS["0220"].sync_managers()):
         if number != skip:
             master.write(palm, Register.SYNC_MANAGER + 8 * number, manager.encode())
-    with pytest.raises(DeviceError, match=f"slave 1 does not go to SAFEOP: it is in PREOP with error 0x{code:04X}"):
+    with pytest.raises(DeviceError, match=f"slave 1 does not enter SAFEOP: it is in PREOP with error 0x{code:04X}"):
         master.change_state(palm, AlState.SAFEOP)
 
 
