@@ -139,8 +139,8 @@ def test_the_rigs_are_listed_for_people_and_for_programs(inside):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("run", "--object", "boxx"), "no object called 'boxx'"),
-        (("run", "--policy", "guess"), "no policy is called 'guess'"),
+        (("run", "--object", "boxx"), "there is no object 'boxx'"),
+        (("run", "--policy", "guess"), "there is no policy 'guess'"),
         (("run", "--rig", "nowhere"), "nowhere"),
         (("run", "--method", "known-pose"), "known-pose"),
         (("run", "--object", "mesh:none.ply"), "none.ply: file not found"),
