@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
+from drivers.core.atomic_files import writing_into
 from drivers.core.errors import ConfigurationError, SessionError, given_by_a_person
 from sessions.recording.manifest import MANIFEST, read_manifest, write_manifest
 from sessions.recording.session import TRAFFIC, Session
@@ -70,6 +71,7 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
     Raises:
         ConfigurationError: not a ZIP file, unsafe names, links or sizes, no session in it, or a session of that name
             exists already; then nothing is left behind.
+        WriteError: the new folder cannot be written; nothing is left behind either.
     """
     limits = limits or ArchiveLimits()
     try:
@@ -137,8 +139,9 @@ def _unpack(
         left = limits.total_bytes
         for entry in entries:
             target = folder.joinpath(*PurePosixPath(entry.filename).parts[1:])
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with archive.open(entry) as source, target.open("xb") as out:
+            with writing_into(folder):
+                target.parent.mkdir(parents=True, exist_ok=True)
+            with archive.open(entry) as source, writing_into(folder), target.open("xb") as out:
                 left -= _copy(source, out, left, path)  # type: ignore[arg-type]
         with given_by_a_person():
             return _as_session(folder, path)

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from drivers.core.atomic_files import writing_into
 from drivers.core.clock import NANOSECONDS
 from drivers.core.errors import ConfigurationError, SessionError
 from sessions.recording.manifest import write_manifest
@@ -55,7 +56,8 @@ def extract(session: Session, into: Path, piece: Piece) -> dict[str, int]:
         raise SessionError(what, where=str(into), hint="Choose another folder") from error
     try:
         counts = _copy_traffic(session.traffic(), into, session.manifest.name, piece)
-        _copy_calibration(session, into)
+        with writing_into(into):
+            _copy_calibration(session, into)
         _write_manifest(session, into, counts)
     except BaseException:
         shutil.rmtree(into, ignore_errors=True)

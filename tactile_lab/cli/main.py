@@ -47,6 +47,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
+    except MemoryError:
+        from tactile_lab.cli.console import complain
+
+        complain("the memory is exhausted. Close other programs, or raise the limit (ulimit -v)")
+        sys.exit(1)
     except Exception as error:
         if not (words := blamed(error)):
             raise

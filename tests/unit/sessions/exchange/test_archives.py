@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import stat
 import zipfile
 
 import pytest
 
-from drivers.core.errors import ConfigurationError
+from drivers.core.errors import ConfigurationError, WriteError
+from sessions.exchange import archives
 from sessions.exchange.archives import ArchiveLimits, export_archive, import_archive
 from sessions.recording.session import create_session
 
@@ -127,3 +130,14 @@ def test_what_is_no_archive_is_told(tmp_path):
         import_archive(tmp_path / "none.zip", tmp_path)
     with pytest.raises(ConfigurationError, match="contains 0 folders"):
         import_archive(archive_of(tmp_path / "empty.zip", {}), tmp_path)
+
+
+def test_a_full_disk_is_not_the_archive_s_fault_and_nothing_is_left(session, tmp_path, monkeypatch):
+    def fill(*arguments):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    export_archive(session, tmp_path / "s.zip")
+    monkeypatch.setattr(archives, "_copy", fill)
+    with pytest.raises(WriteError, match="the disk is full"):
+        import_archive(tmp_path / "s.zip", tmp_path / "in")
+    assert not list((tmp_path / "in").iterdir())

@@ -3,6 +3,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import shutil
 from datetime import UTC, datetime
 
 import pytest
@@ -234,3 +235,38 @@ def test_a_recording_that_was_broken_off_is_told_as_data_loss(tmp_path, monkeypa
     }
     assert summary.data_loss
     assert next(Session.open(summary.folder).traffic().messages()).data == b"kept"
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (SystemExit(1), "the program was ended with exit code 1"),
+        (MemoryError(), "the memory was exhausted"),
+        (KeyError("FF"), "KeyError: 'FF'"),
+        (ValueError(), "ValueError"),
+    ],
+)
+def test_the_reason_of_a_failure_is_told_in_words(tmp_path, error, told):
+    def run():
+        with create(tmp_path):
+            raise error
+
+    with pytest.raises(type(error)):
+        run()
+    assert list_sessions(tmp_path)[0].problem == told
+
+
+@pytest.mark.parametrize("removed", [True, False])
+def test_a_folder_that_goes_while_it_is_recorded_is_told_and_not_made_again(tmp_path, removed):
+    session = create(tmp_path)
+    session.recorder.on_received("hand", b"bytes", 1)
+    session.settle()
+    if removed:
+        shutil.rmtree(session.folder)
+    else:
+        session.folder.rename(tmp_path / "elsewhere")
+    with pytest.raises(SessionError, match="was removed or renamed while it was recorded"):
+        session.close()
+    assert not session.folder.exists()
+    if not removed:
+        assert next(Session.open(tmp_path / "elsewhere").traffic().messages()).data == b"bytes"
