@@ -20,6 +20,7 @@ from drivers.camera.packet import encode_packet
 from drivers.camera.pictures import Picture, Source
 from drivers.camera.source_settings import CameraSourceSettings
 from drivers.camera.sources import open_source
+from drivers.core.child_process import failure
 from drivers.core.clock import NANOSECONDS, MonotonicClock
 from drivers.core.configuration import validate
 from drivers.core.errors import DeviceError, TactileLabError
@@ -116,6 +117,9 @@ def main() -> None:
     except TactileLabError as error:
         pipe.put(RecordKind.ERROR, clock.now_ns(), str(error).encode())
         sys.exit(error.exit_code)
+    except Exception as error:
+        pipe.put(RecordKind.ERROR, clock.now_ns(), failure(error).encode())
+        raise
     finally:
         pipe.close()
 

@@ -20,6 +20,7 @@ from drivers.shadow.closing.closing import Closing
 from drivers.shadow.closing.posture import TipEllipsoid
 from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm
 from sessions.motion.safety import SafetySupervisor
+from sessions.recording.recorder import Level
 from sessions.rig_runtime.rig_runtime import RigRuntime
 
 _STRAIGHT_WRIST = forearm_T_palm(np.zeros(len(JOINTS)))
@@ -79,12 +80,30 @@ class Motion:
         return self.runtime.cycle_ns / NANOSECONDS
 
     def tick(self) -> None:
-        """One cycle, checked by the supervisor.
+        """One cycle, checked by the supervisor; as many more as a hand whose link is gone needs to come back.
+
+        So nothing goes on along its path while the hand cannot follow.
 
         Raises:
             SafetyError: a limit is exceeded.
             DeviceError: a device failed.
         """
+        self._watched_cycle()
+        if self.supervisor.hand_is_silent:
+            self._await_hand()
+
+    def _await_hand(self) -> None:
+        self._log("the hand is not heard: everything waits where it is")
+        began_ns = self.runtime.clock.now_ns()
+        while self.supervisor.hand_is_silent:
+            self._watched_cycle()
+        waited_s = (self.runtime.clock.now_ns() - began_ns) / NANOSECONDS
+        self._log(f"the hand is heard again after {waited_s:.1f} s: the session goes on")
+
+    def _log(self, words: str) -> None:
+        self.runtime.log(Level.WARNING, "hand", words)
+
+    def _watched_cycle(self) -> None:
         self.runtime.cycle()
         snapshot = self.runtime.snapshot()
         self._loads_N = dict(snapshot.loads_N)

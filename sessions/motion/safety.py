@@ -34,8 +34,10 @@ class SafetySettings(StrictModel):
         force_share: largest contact force as a share of the sensor's calibrated range on its smallest axis; the smaller
             of both limits applies.
         force_cycles: cycles in a row over the limit that stop the rig: a fingertip that slips along the object jerks.
-        stale_s: without a new hand status for this long the rig stops; never less than ``stale_cycles`` cycles.
-        stale_cycles: see ``stale_s`` and ``tip_stale_s``.
+        hold_s: without a new hand status for this long everything waits where it is, the hand's own demands being
+            gone; never less than ``stale_cycles`` cycles.
+        stale_s: without one for this long the rig stops; a little more than the hand's own patience with its link.
+        stale_cycles: see ``hold_s``, ``stale_s`` and ``tip_stale_s``.
         tip_stale_s: the same for the readings of a fingertip with its own transport.
         warm_C: above this temperature of the warmest motor everything moves at ``warm_scale`` of its speed.
         warm_scale: see ``warm_C``.
@@ -51,7 +53,8 @@ class SafetySettings(StrictModel):
     force_limit_N: float = Field(default=6.0, gt=0.0)
     force_share: float = Field(default=0.5, gt=0.0, le=0.8)
     force_cycles: int = Field(default=3, ge=1)
-    stale_s: float = Field(default=0.010, gt=0.0)
+    hold_s: float = Field(default=0.05, gt=0.0)
+    stale_s: float = Field(default=2.5, gt=0.0)
     stale_cycles: int = Field(default=5, ge=1)
     tip_stale_s: float = Field(default=0.2, gt=0.0)
     warm_C: float = Field(default=50.0, gt=0.0)
@@ -88,6 +91,9 @@ class SafetySupervisor:
         runtime: what to stop.
         settings: the limits.
         cycle_ns: length of a cycle.
+
+    Attributes:
+        hand_is_silent: at the last look the hand had not been heard for so long that everything has to wait.
     """
 
     def __init__(self, runtime: Stoppable, settings: SafetySettings, cycle_ns: int) -> None:
@@ -95,6 +101,8 @@ class SafetySupervisor:
         patience_ns = settings.stale_cycles * cycle_ns
         self._stale_ns = max(round(settings.stale_s * NANOSECONDS), patience_ns)
         self._tip_stale_ns = max(round(settings.tip_stale_s * NANOSECONDS), patience_ns)
+        self._hold_ns = max(round(settings.hold_s * NANOSECONDS), patience_ns)
+        self.hand_is_silent = False
         self._flight_recorder = FlightRecorder()
         self._warm = False
         self._start_ns: int | None = None
@@ -120,7 +128,9 @@ class SafetySupervisor:
             self._check_workspace(snapshot.palm_world_m)
 
     def _check_freshness(self, snapshot: CycleSnapshot) -> None:
-        if (silent_ns := self._silent_ns(snapshot, snapshot.hand_stamp_ns)) > self._stale_ns:
+        silent_ns = self._silent_ns(snapshot, snapshot.hand_stamp_ns)
+        self.hand_is_silent = silent_ns > self._hold_ns
+        if silent_ns > self._stale_ns:
             raise SafetyError(
                 f"no new status for {silent_ns / 1e6:.0f} ms", where="hand", hint="Check cable, power and the bus"
             )

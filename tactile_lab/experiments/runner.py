@@ -114,7 +114,7 @@ def _execute(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
 
 def _in_processes(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
     """Rows as they are finished; the processes end with this generator, however it ends."""
-    os.environ.update(ONE_THREAD)  # the workers inherit it before they load any library
+    os.environ.update(ONE_THREAD, PYTHONSAFEPATH="1")  # inherited: no worker imports from the current folder
     context = multiprocessing.get_context("spawn")
     watch = _WorkerWatch(context.SimpleQueue(), cells)
     pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare_worker, initargs=(watch.begun,))

@@ -11,13 +11,13 @@ import contextlib
 import json
 import queue
 import subprocess
-import sys
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from types import TracebackType
 from typing import Any, Literal, Self
 
+from drivers.core.child_process import child_command, child_environment
 from drivers.core.errors import DeviceError
 from tactile_lab.view.scene import SHOWN_TOPICS
 
@@ -54,9 +54,13 @@ class PageTransport(ABC):
 
     def __enter__(self) -> Self:
         """Start the page and wait until it listens. Raises DeviceError if it does not."""
-        command = [sys.executable, "-m", "tactile_lab.view.process"]
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True
+            child_command("tactile_lab.view.process"),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+            env=child_environment(),
         )
         self._queue.put_nowait(json.dumps(self._settings).encode() + b"\n")
         for work in (self._send, self._listen):

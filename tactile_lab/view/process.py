@@ -12,6 +12,7 @@ import sys
 import threading
 from typing import Any, BinaryIO
 
+from drivers.core.child_process import failure
 from drivers.core.errors import TactileLabError
 
 DRAW_PERIOD_s = 0.1
@@ -37,14 +38,17 @@ def main() -> int:
     """Show messages until the input ends. Returns 1 if the page cannot be opened."""
     mouth = Mouth()
     settings = json.loads(sys.stdin.buffer.readline())
-    from tactile_lab.view.page import Page
-
     try:
+        from tactile_lab.view.page import Page
+
         with Page(**settings, say=mouth.say) as page:
             mouth.say(url=page.url)
             _show(page)
     except TactileLabError as error:
         mouth.say(problem=str(error))
+        return 1
+    except Exception as error:
+        mouth.say(problem=failure(error))
         return 1
     return 0
 

@@ -130,7 +130,7 @@ def test_a_lens_of_another_rig_or_changed_by_hand_gives_no_truth(
     ("words", "told"),
     [
         (("first", "nowhere"), "no such session"),
-        (("first", "first"), "first: is named twice"),
+        (("first", "first"), "first: is given twice"),
         (("first", "second", "--results", "magic"), "has no results called 'magic'"),
         (("first", "--lens", "nowhere.yaml"), "nowhere.yaml: cannot be read"),
         (("first", "--results", "results", "--out", "{file}"), "is not a folder). Choose another folder with --out"),

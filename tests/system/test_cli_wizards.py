@@ -168,7 +168,7 @@ def test_ended_at_any_step_nothing_is_stored(
     ("spoil", "words"),
     [
         (lambda data: wrenches(data, -1.0), "opposite sign"),
-        (lambda data: {**data, "presses": data["presses"][:2]}, "2 presses, 6 needed"),
+        (lambda data: {**data, "presses": data["presses"][:2]}, "2 presses, but 6 are needed"),
         (lambda data: {**data, "rig": "another"}, "another"),
     ],
 )

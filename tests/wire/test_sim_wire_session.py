@@ -121,7 +121,7 @@ def test_a_session_is_completed_and_replays_to_the_same_grasp(
     ("device", "words"),
     [
         ("camera", "camera: lost"),
-        ("hand", "cycles in a row without a valid status"),
+        ("hand", "no valid status for 2 s"),
         ("ft/MF", "MF: no reading from the fingertip"),
         ("base", "cycles in a row without a status"),
     ],

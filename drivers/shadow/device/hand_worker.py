@@ -14,6 +14,7 @@ import json
 import sys
 import time
 
+from drivers.core.child_process import failure
 from drivers.core.clock import NANOSECONDS, Clock, MonotonicClock
 from drivers.core.errors import DeviceError, TactileLabError
 from drivers.core.extensions import load_named_extensions
@@ -141,7 +142,7 @@ class HandWorker:
     def _check_motor_map(self, joints: list[str]) -> None:
         self._moving_by_itself = True
         try:
-            findings = check_motor_map(self._hand, self._motors, self._sound_turn, joints)
+            findings = check_motor_map(self._hand, self._motors, self._sound_turn, self._clock, joints)
             self._answer(RecordKind.MOVES, {"moved": [dataclasses.asdict(finding) for finding in findings]})
         except DeviceError as error:
             self._answer(RecordKind.MOVES, {"error": str(error)})
@@ -181,6 +182,9 @@ def main() -> None:
     except TactileLabError as error:
         pipe.put(RecordKind.ERROR, clock.now_ns(), str(error).encode())
         sys.exit(error.exit_code)
+    except Exception as error:
+        pipe.put(RecordKind.ERROR, clock.now_ns(), failure(error).encode())
+        raise
     finally:
         pipe.close()
 

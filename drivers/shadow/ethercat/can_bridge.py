@@ -106,7 +106,8 @@ class ShadowBridgeBus(can.BusABC):
                 return
             if deadline_ns is not None and self._clock.now_ns() >= deadline_ns:
                 break
-        raise can.CanOperationError("the palm did not accept the frame. Check the hand's power and cable")
+        what = ": ".join(["the palm did not accept the frame", *link_health(self._transport)[:1]])
+        raise can.CanOperationError(f"{what}. Check the hand's power and cable")
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         deadline_ns = None if timeout is None else self._clock.now_ns() + round(timeout * NANOSECONDS)

@@ -126,7 +126,7 @@ class PysoemTransport:
         arrived = select.select(self._sockets, [], [], patience_s)[0]
         counter = self._master.receive_processdata(round(patience_s * 1e6) if arrived else 0, release_gil=True)
         stamp_ns = self._clock.now_ns()
-        if self.counts.cycles % self._settings.poll_every == 0:
+        if counter >= 0 and self.counts.cycles % self._settings.poll_every == 0:  # a link that is gone tells no state
             self._check_states()
         expected, self._taken = self._taken, self._sent if counter > 0 and counter & _WRITTEN else self._taken
         if counter < 0:

@@ -90,7 +90,7 @@ def _motor_map(hand: ShadowHand, motors: MotorMap, clock: Clock, cycle_s: float)
         clock.sleep_until_ns(clock.now_ns() + round(cycle_s * NANOSECONDS))
         return hand.exchange()
 
-    moved = check_motor_map(hand, motors, cycle)
+    moved = check_motor_map(hand, motors, cycle, clock)
     wrong = [str(finding) for finding in moved if not finding.ok]
     return Finding("motor map", not wrong, "; ".join(wrong) or f"each of {len(moved)} motors moves its own joint")
 

@@ -224,7 +224,18 @@ def test_silent_hand_stops_the_rig() -> None:
 
     outcome = run(DiscWorld(disc(), before_cycle=cut))
     assert outcome.ending is Ending.STOPPED
-    assert outcome.reason.startswith("hand: no new status for 60 ms")
+    assert outcome.reason.startswith("hand: no new status for 2510 ms")
+
+
+def test_a_hand_that_is_silent_for_a_moment_costs_the_session_that_time_and_no_more() -> None:
+    def cut(world: DiscWorld) -> None:
+        world.silent = 100 < world.cycles <= 200
+
+    whole, interrupted = DiscWorld(disc()), DiscWorld(disc(), before_cycle=cut)
+    outcomes = [run(world, grasps=1) for world in (whole, interrupted)]
+    assert [outcome.ending for outcome in outcomes] == [Ending.COMPLETE] * 2
+    assert len({outcome.grasps[0].touching for outcome in outcomes}) == 1
+    assert 90 <= interrupted.cycles - whole.cycles <= 100
 
 
 def test_failing_device_stops_the_rig_and_is_told_once() -> None:

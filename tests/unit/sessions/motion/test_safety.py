@@ -137,10 +137,18 @@ def test_workspace_is_about_its_own_centre() -> None:
 
 
 def test_stale_hand_stops_after_the_allowed_cycles() -> None:
-    watch = supervisor(stale_cycles=5)
+    watch = supervisor(stale_cycles=5, stale_s=0.01)
     watch.check(snapshot(stamp_ns=5 * CYCLE_ns, hand_stamp_ns=0))
     with pytest.raises(SafetyError, match="no new status for 60 ms"):
         watch.check(snapshot(stamp_ns=6 * CYCLE_ns, hand_stamp_ns=0))
+
+
+def test_a_hand_that_is_silent_for_a_moment_has_everything_wait() -> None:
+    watch, silent = supervisor(stale_cycles=5), []
+    for now, heard in ((5, 0), (6, 0), (7, 7)):
+        watch.check(snapshot(stamp_ns=now * CYCLE_ns, hand_stamp_ns=heard * CYCLE_ns))
+        silent.append(watch.hand_is_silent)
+    assert silent == [False, True, False]
 
 
 def test_stale_time_rules_on_fast_cycles() -> None:
@@ -151,7 +159,7 @@ def test_stale_time_rules_on_fast_cycles() -> None:
 
 
 def test_hand_that_never_answers_stops() -> None:
-    watch = supervisor(stale_cycles=5)
+    watch = supervisor(stale_cycles=5, stale_s=0.01)
     watch.check(snapshot(stamp_ns=1000, hand_stamp_ns=None))
     with pytest.raises(SafetyError, match="no new status"):
         watch.check(snapshot(stamp_ns=1000 + 6 * CYCLE_ns, hand_stamp_ns=None))

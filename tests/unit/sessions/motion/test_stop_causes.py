@@ -84,7 +84,7 @@ def rig() -> Iterator[Running]:
     ("device", "words", "cycles"),
     [
         ("ft/MF", "MF: no reading from the fingertip", 22),
-        ("hand", "hand: no new status|without a valid status", 2),
+        ("hand", "hand: no new status|stopped: no valid status for 2 s", 2),
         ("base", "cycles in a row without a status", 12),
     ],
 )

@@ -43,7 +43,7 @@ def test_the_shipped_rig_is_sound() -> None:
     assert sorted(plan.wires) == ["FF", "LF", "MF", "RF", "TH"]
     assert (plan.simulation.object, plan.seed) == ("cube-6", 3)
     assert hand_setup(rig).hand.cycle_s == rig.description.hand.cycle_s < rig.description.cycle_s
-    unstated = rig.description.model_copy(update={"hand": HandSettings(lost_limit=5)})
+    unstated = rig.description.model_copy(update={"hand": HandSettings(blind_after=5)})
     assert hand_setup(replace(rig, description=unstated)).hand.cycle_s == 0.002
     assert set(build_interpreter(rig).perception.fingertips) == {"FF", "MF", "RF", "LF", "TH"}
 
