@@ -35,8 +35,8 @@ def camera(
     size: Annotated[str, typer.Option(help="Image size to request from the camera, such as 1280x720.")] = "1280x720",
     exposure_ms: Annotated[float | None, typer.Option(help="Fix the camera's exposure.")] = None,
     focus: Annotated[float | None, typer.Option(help="Fix the camera's focus, in its driver's units.")] = None,
-    views: Annotated[int, typer.Option(min=5, help="Minimum number of views for a PASS.")] = 12,
-    most: Annotated[int, typer.Option(min=5, help="Stop after this many views.")] = 60,
+    views: Annotated[int, typer.Option(min=5, max=10_000, help="Minimum number of views for a PASS.")] = 12,
+    most: Annotated[int, typer.Option(min=5, max=10_000, help="Stop after this many views.")] = 60,
     third_radial: Annotated[
         bool, typer.Option("--k3", help="Estimate a third radial distortion coefficient, for wide lenses.")
     ] = False,
