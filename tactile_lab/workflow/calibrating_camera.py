@@ -30,12 +30,14 @@ class Gathering:
         pictures: number examined.
         refused: reasons by picture.
         alike: number of pictures that show nothing new.
+        newest: name of the picture that was examined last.
     """
 
     views: list[BoardView] = field(default_factory=list)
     pictures: int = 0
     refused: dict[str, str] = field(default_factory=dict)
     alike: int = 0
+    newest: str = ""
 
     @property
     def coverage(self) -> Coverage:
@@ -85,7 +87,7 @@ def gather_views(
 def _take(found: Gathering, picture: Picture, board: AnyBoard) -> bool:
     """Examine one picture. Returns whether it adds anything."""
     found.pictures += 1
-    name = f"picture {picture.counter}"
+    name = found.newest = picture.name
     view = view_of(name, picture.image, board)
     if isinstance(view, str):
         found.refused[name] = view
