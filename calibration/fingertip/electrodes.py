@@ -1,4 +1,4 @@
-"""Health of a BioTac's electrodes, from counts that it gives while nothing touches it."""
+"""Health of a BioTac's electrodes, from counts without contact."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 
 LEAST_SAMPLES = 20
 LARGEST_DRIFT = 30.0
-"""Counts between the means of both halves, median of the electrodes: beyond it the sensor was not left alone."""
+"""Counts between the means of both halves, median of the electrodes: above it the sensor was touched."""
 
 _RANGE = (50.0, 4045.0)
 _NOISY = 10.0
@@ -24,7 +25,7 @@ def load_untouched(path: Path) -> Array:
         ConfigurationError: it cannot be read, or is no such table.
     """
     try:
-        text = path.read_text(encoding="utf-8").replace(",", " ")
+        text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8").replace(",", " ")
         counts = np.array([[float(word) for word in line.split()] for line in text.splitlines() if line.strip()])
     except OSError as error:
         raise ConfigurationError(
@@ -41,7 +42,7 @@ def load_untouched(path: Path) -> Array:
 
 
 def faulty_electrodes(untouched: Array) -> dict[int, str]:
-    """What is wrong with a BioTac's electrodes, by index, from untouched counts of shape (samples, electrodes).
+    """Faults of a BioTac's electrodes, by index, from untouched counts of shape (samples, electrodes).
 
     Raises:
         ConfigurationError: too few samples, or the sensor was touched meanwhile.

@@ -1,10 +1,11 @@
-"""Files that are written whole or not at all: after a power cut, too, either the old or the new one is there."""
+"""Atomic files: even after a power cut either the old or the new file is complete."""
 
 from __future__ import annotations
 
 import errno
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from drivers.core.errors import WriteError
@@ -15,14 +16,14 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 def write_whole(
     path: Path, content: str | bytes, hint: str = "Choose another folder, or check its permissions"
 ) -> None:
-    """Write a file, and its folder where there is none, whole or not at all.
+    """Write a file atomically, and create its folder if needed.
 
     Args:
-        content: text goes out as UTF-8 with the line ends it has.
-        hint: what to do when this place cannot be written; a full disk has an advice of its own.
+        content: text is written as UTF-8 with its line ends unchanged.
+        hint: what to do if the path cannot be written; a full disk has its own hint.
 
     Raises:
-        WriteError: the disk is full, or the place cannot be written; an older file is as it was.
+        WriteError: the disk is full, or the path cannot be written; an older file is unchanged.
     """
     partial = path.with_name(f".{path.name}.part")
     try:
@@ -42,11 +43,21 @@ def write_whole(
             partial.unlink(missing_ok=True)
 
 
+@contextmanager
+def writing_into(folder: Path) -> Iterator[None]:
+    """Within the block files of a folder are written or copied. Raises WriteError, in words, where one cannot be."""
+    try:
+        yield
+    except OSError as error:
+        advice = "Free some space on it, then try again" if disk_full(error) else "Check the folder and the disk"
+        raise WriteError(write_failure(error), where=str(error.filename or folder), hint=advice) from error
+
+
 def disk_full(error: OSError) -> bool:
     """Whether the disk, or one's share of it, is full."""
     return error.errno in _FULL
 
 
 def write_failure(error: OSError) -> str:
-    """Why something could not be written, in words."""
+    """Why something could not be written, as text."""
     return "the disk is full" if disk_full(error) else f"cannot be written ({error.strerror or error})"

@@ -1,23 +1,28 @@
-"""Every error a person can meet, in one tree.
+"""All errors that users can see, in one tree.
 
 TactileLabError                exit 1
- |- ConfigurationError         exit 2   a file the user wrote: rig, calibration, options
+ |- ConfigurationError         exit 2   an option, name or file that was given: rig, calibration, mesh, log
  |- DeviceError                exit 4   a device that does not answer, or answers wrongly
- |   `- CodecError                      bytes that are not what the protocol says
- |- SafetyError                exit 1   a limit of the hand or the workspace was passed: the rig has stopped
+ |   `- CodecError                      bytes that do not follow the protocol
+ |- SafetyError                exit 1   a limit of the hand or the workspace was exceeded: the rig has stopped
  |- SessionError               exit 1   a session folder or its traffic file
- |   `- EstimationError                 the program itself failed while it estimated or planned
+ |   `- EstimationError                 a program error during estimation or planning
  |- WriteError                 exit 1   a file that cannot be written: a full disk, a folder one may not write to
  |- ShapeError                 exit 1   a mesh, contour or model that cannot be used
  |- TrackingError              exit 1   the object cannot be followed any further
- `- InterruptionError          exit 130 a person ended the work before it was done
+ `- InterruptionError          exit 130 a person interrupted the work
 
 Each message says what happened, where (which device or file), and what to do next.
-Exit codes are those of the command line: 0 done, 1 failed, 2 usage, 3 done with data loss or
-outside a limit, 4 hardware not ready, 130 interrupted.
+Exit codes are those of the command line, see :mod:`tactile_lab.cli.main`.
 """
 
 from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 class TactileLabError(Exception):
@@ -41,7 +46,7 @@ class TactileLabError(Exception):
 
 
 class ConfigurationError(TactileLabError):
-    """A rig, calibration or option file that cannot be used as written."""
+    """An option, a name or a file that was given is missing, or cannot be used as it is; nothing was begun."""
 
     exit_code = 2
 
@@ -57,7 +62,7 @@ class CodecError(DeviceError):
 
 
 class SafetyError(TactileLabError):
-    """A limit of the hand or the workspace was passed; the rig has to stop."""
+    """A limit of the hand or the workspace was exceeded; the rig must stop."""
 
 
 class SessionError(TactileLabError):
@@ -65,7 +70,7 @@ class SessionError(TactileLabError):
 
 
 class EstimationError(SessionError):
-    """The estimation or the planning of a running session failed for a reason nobody foresaw; its notes say where."""
+    """A program error in the estimation or planning of a running session; its notes say where."""
 
 
 class WriteError(TactileLabError):
@@ -81,6 +86,15 @@ class TrackingError(TactileLabError):
 
 
 class InterruptionError(TactileLabError):
-    """A person ended the work before it was done; says what is kept."""
+    """A person interrupted the work; says what is kept."""
 
     exit_code = 130
+
+
+@contextmanager
+def given_by_a_person() -> Iterator[None]:
+    """Within the block a mesh or session that cannot be used is a mistake in what was asked for: ConfigurationError."""
+    try:
+        yield
+    except (ShapeError, SessionError) as error:
+        raise ConfigurationError(error.what, where=error.where, hint=error.hint) from error

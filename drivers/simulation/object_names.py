@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from drivers.core.errors import ShapeError
+from drivers.core.errors import ConfigurationError
 
 MESH_PREFIX = "mesh:"
 STANDING, LYING = "standing", "lying"
@@ -23,14 +23,16 @@ def in_pose(name: str, pose: str) -> str:
         pose: ``standing``, ``lying``, or a number from 1, the most probable resting pose.
 
     Raises:
-        ShapeError: there is no such pose, or the object is no mesh.
+        ConfigurationError: there is no such pose, or the object is no mesh.
     """
     if not name.startswith(MESH_PREFIX):
-        raise ShapeError(
+        raise ConfigurationError(
             "only meshes can be laid down", where=name, hint=f"Give {MESH_PREFIX}FILE, or leave --pose out"
         )
     if not _POSED.match(posed := f"{name}@{pose}"):
-        raise ShapeError(f"there is no pose {pose!r}", where=name, hint=f"Give {STANDING}, {LYING} or a number from 1")
+        raise ConfigurationError(
+            f"there is no pose {pose!r}", where=name, hint=f"Give {STANDING}, {LYING} or a number from 1"
+        )
     return posed
 
 

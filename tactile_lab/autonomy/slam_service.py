@@ -1,13 +1,14 @@
-"""All of a session that takes its time: tactile SLAM, and the planner that chooses grasps by it.
+"""The estimator service: tactile SLAM, and the planner that uses its estimate.
 
 Nothing here touches a device. The session asks it one question after the other (see
-:mod:`sessions.conductor.estimator_client`), so that it can live in the session's process or in one of its own, and
-answers alike in both.
+:mod:`sessions.conductor.estimator_client`), so that it can run in the session's process or in a separate one, with
+equal answers.
 """
 
 from __future__ import annotations
 
 import copy
+from collections import deque
 from dataclasses import replace
 from typing import Any
 
@@ -24,19 +25,24 @@ from tactile_lab.autonomy.unknown_part import describe_unknown
 from tactile_lab.autonomy.variance_planner import KnownShape
 from tactile_lab.slam.tactile_slam import TactileSlam
 
+KEPT_STATES = 3
+"""More grasps than this are seldom taken back one after the other."""
+
 
 class SlamService:
     """The estimation and the planner of one session: an :class:`~sessions.conductor.estimator.EstimatorService`.
 
     Args:
-        slam: fresh.
-        planner: over that estimation.
+        slam: unused.
+        planner: uses that estimation.
     """
 
     def __init__(self, slam: TactileSlam, planner: Planner) -> None:
         self.slam, self.planner = slam, planner
         self._memory = SlamMemory(slam)
         self._estimates: list[Estimate] = []
+        """Those that the session may not have yet: surfaces are large."""
+        self._count = 0
 
     # --- what comes next ---------------------------------------------------------------------------------------
 
@@ -83,46 +89,66 @@ class SlamService:
         self.planner.on_carry(hand_motion_world)
 
     def estimate(self, grasp: Grasp, known: int) -> tuple[Estimate, ...]:
-        """See :meth:`sessions.conductor.estimator.Estimator.estimate`; the planner hears of the step too."""
-        self._memory.remember()
+        """See :meth:`sessions.conductor.estimator.Estimator.estimate`; the planner is notified too."""
+        self._memory.remember(grasp)
         step = self.slam.add_grasp(grasp)
         self.planner.on_estimate(step.index, step.verdict != "untracked")
         shape = self.planner.known_shape()
         step = replace(step, world_T_object=self.slam.world_T_object)
         self._estimates.append(Estimate(step, surface_message(shape), None if shape is None else shape.explored))
-        return tuple(self._estimates[known:])
+        self._count += 1
+        self._estimates = self._estimates[known - self._count :]
+        return tuple(self._estimates)
 
     def undo(self, hand_motion_world: Pose3) -> None:
         """See :meth:`sessions.conductor.estimator.Estimator.undo`."""
         self._memory.undo()
-        self._estimates.pop()
+        self._count -= 1
+        self._estimates = self._estimates[:-1]
         self.planner.on_undo(hand_motion_world)
 
     def state(self) -> dict[str, Any]:
-        """Everything that the estimation knows, the source of chance too."""
+        """The complete state of the estimation, including its random numbers."""
         return dict(vars(self.slam))
 
 
 class SlamMemory:
-    """States of an estimation, one for each grasp it was given through :meth:`remember`.
+    """What an estimation knew before each of its last grasps, so that they can be taken back.
 
-    A state holds everything, the source of chance too: after :meth:`undo` the estimation goes on exactly as if the
-    grasp had never been.
+    A state includes the random numbers: after :meth:`undo` the estimation continues exactly as if the grasp had never
+    been added. States grow with the session, so that only the last few are kept; to go back farther the grasps are
+    estimated again from the beginning, with the same result.
 
     Args:
-        slam: the estimation; its states are put back into this object.
+        slam: the estimation, unused; its states are restored into this object.
     """
 
     def __init__(self, slam: TactileSlam) -> None:
         self._slam = slam
-        self._states: list[dict[str, Any]] = []
+        self._fresh = self._state()
+        self._grasps: list[Grasp] = []
+        self._states: deque[dict[str, Any]] = deque(maxlen=KEPT_STATES)
 
-    def remember(self) -> None:
-        """Keep the present state; call this before every step."""
-        self._states.append(copy.deepcopy(vars(self._slam)))
+    def remember(self, grasp: Grasp) -> None:
+        """Store the present state; call this before every step, with its grasp."""
+        self._grasps.append(grasp)
+        self._states.append(self._state())
 
     def undo(self) -> None:
         """Go back to before the last step."""
-        state = self._states.pop()
+        grasps, self._grasps = self._grasps[:-1], self._grasps[:-1]
+        if self._states:
+            self._put_back(self._states.pop())
+            return
+        self._put_back(copy.deepcopy(self._fresh))
+        self._grasps = []
+        for grasp in grasps:
+            self.remember(grasp)
+            self._slam.add_grasp(grasp)
+
+    def _state(self) -> dict[str, Any]:
+        return copy.deepcopy(vars(self._slam))
+
+    def _put_back(self, state: dict[str, Any]) -> None:
         vars(self._slam).clear()
         vars(self._slam).update(state)

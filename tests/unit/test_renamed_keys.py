@@ -52,7 +52,7 @@ def test_the_command_line_tells_it_in_one_line_each(tmp_path: Path, capsys: pyte
 def test_both_names_at_once_are_refused_with_both(tmp_path: Path) -> None:
     path = tmp_path / "motion.yaml"
     path.write_text(yaml.safe_dump({"unheld": 0.2, "left_lying": 0.3}))
-    with pytest.raises(ConfigurationError, match="left_lying is the former name of unheld: keep unheld alone"):
+    with pytest.raises(ConfigurationError, match="left_lying is the former name of unheld: remove left_lying"):
         load_model(path, MotionNoise)
 
 

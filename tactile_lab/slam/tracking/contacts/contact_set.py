@@ -9,10 +9,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.core.contacts import LARGEST_SLOPE, ApproachPath, Array, Contact, Grasp, LARGEST_GRASP_m
+from drivers.core.contacts import LARGEST_SLOPE, ApproachPath, Array, Contact, FARTHEST_m, Grasp, LARGEST_GRASP_m
 from drivers.core.errors import TrackingError
 from tactile_lab.slam.tracking.contacts.free_space import fingertip_places, places_on_line
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
+
+LEAST_SIGMA_m, LEAST_SIGMA_rad = 1e-6, 1e-5
+"""No contact is known better, whatever its covariance says: one that is known exactly has no finite weight."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,8 @@ class ContactSet:
     def of_grasp(cls, grasp: Grasp, dimension: int, origin_height_m: float) -> Self:
         """The contacts of a grasp, heights counted from the object origin's.
 
-        In two dimensions points and normals are projected onto the table plane, and contacts on slopes too
-        flat to tell about the contour are left out.
+        In two dimensions points and normals are projected onto the table plane, and contacts on slopes too flat to be
+        informative about the contour are left out.
 
         Raises:
             TrackingError: NaN or infinite entries, normals without length, contacts metres apart.
@@ -66,6 +69,8 @@ class ContactSet:
             normal_sigma, counted = normal_sigma[keep] / flat, [counted[index] for index in np.flatnonzero(keep)]
         along_normal = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariances, normals))
         heights = np.array([0.0, 0.0, origin_height_m])
+        along_normal = np.maximum(along_normal, LEAST_SIGMA_m)
+        normal_sigma = np.maximum(normal_sigma, LEAST_SIGMA_rad)
         seen = cls((points - heights)[:, :dimension], normals[:, :dimension].copy(), along_normal, normal_sigma)
         free, free_of = _free_places(grasp, seen, counted, heights)
         return replace(seen, free_m=free, free_of=free_of)
@@ -89,7 +94,7 @@ class ContactSet:
 
         Args:
             world_T_object: one pose of shape (size,), or one for each contact, shape (n, size).
-            space: what rows of poses mean.
+            space: kind of the pose vectors.
         """
         points, normals = space.to_object(world_T_object, self.points_m, self.normals)
         return ContactSet(points, normals, self.point_sigma_m, self.normal_sigma_rad)
@@ -104,11 +109,10 @@ class ContactSet:
 def _free_places(
     grasp: Grasp, contacts: ContactSet, counted: Sequence[Contact], origin: Array
 ) -> tuple[Array, NDArray[np.intp]]:
-    """Free places and the contact of each, by the approach paths; where those are not known, in the fingertips.
+    """Free places and the contact of each, by the approach paths; if those are unknown, in the fingertips.
 
     Args:
-        grasp, contacts, counted: what was touched, and what of it counts.
-        origin: of the object frame, world frame.
+        grasp, contacts, counted: all contacts, and those that count. origin: of the object frame, world frame.
     """
     if not grasp.approach_paths:
         places = [fingertip_places(contacts.points_m[i], contacts.normals[i]) for i in range(len(contacts))]
@@ -122,7 +126,7 @@ def _free_places(
 
 
 def _comes_down(line: ApproachPath) -> bool:
-    """A way from above tells nothing about the contour: the object may be under it."""
+    """Whether a path is horizontal: one from above says nothing about the contour, as the object may be under it."""
     way = line.end_world_m - line.start_world_m
     return bool(abs(way[2]) > LARGEST_SLOPE * np.linalg.norm(way))
 
@@ -140,7 +144,7 @@ def placement_sigma_m(contacts: ContactSet, row: Array, covariance: Array, space
     Args:
         contacts: world frame.
         row, covariance: of the pose, shapes (size,) and (size, size).
-        space: what rows mean.
+        space: kind of the pose vector.
     """
     points, normals = space.to_object(row, contacts.points_m, contacts.normals)
     rows = space.by_row(row, points, normals, normals, np.zeros_like(normals))
@@ -164,6 +168,9 @@ def _check(grasp: Grasp, points: Array, normals: Array, covariances: Array, norm
         raise TrackingError("the hand's motion has NaN or infinite entries", where=where)
     if len(points) and np.linalg.norm(normals, axis=1).min() < 1e-6:
         raise TrackingError("a contact normal has no length", where=where)
+    if len(points) and np.abs(points).max() > FARTHEST_m:
+        what = f"a contact lies {np.abs(points).max():.3g} m from the world's origin"
+        raise TrackingError(what, where=where, hint="Move the origin near the object")
     if len(points) and float(np.ptp(points, axis=0).max()) > LARGEST_GRASP_m:
         raise TrackingError(
             f"contacts lie {np.ptp(points, axis=0).max():.3g} m apart",

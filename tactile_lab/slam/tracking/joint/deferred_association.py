@@ -1,12 +1,12 @@
-"""Grasps that could not be placed when they came, or not well: where they belong is looked for with more known.
+"""Deferred association: places grasps later that could not be placed, or fitted badly, at first.
 
-Three ways lead there: the motion model from the neighbouring grasps; if the object was to be left lying, a push of the
+Three ways lead there: the motion model from the neighbouring grasps; if the object was left in place, a push of the
 closing hand; and, if the object was lost, poses anywhere on the known object, which need no motion at all (relocation).
-Nothing is forced: a grasp stays where it is or aside unless the evidence for all contacts gets better.
+A grasp stays at its place, or left out, unless the evidence of all contacts improves.
 
 While the object is explored, and anywhere on it, a grasp needs most of its contacts to be placed. On a known object
-near where the motion leads, two of them with their normals can be enough: fingers with two or three wrong contacts of
-five else stayed aside, a centimetre off.
+near where the motion leads, two of them with their normals can be enough: otherwise grasps with two or three wrong
+contacts of five stayed left out, a centimetre off.
 """
 
 from __future__ import annotations
@@ -33,40 +33,40 @@ _SMOOTHED = 2
 _LEAST_CONTACTS = 3
 _LEAST_FITTING = 2
 _DOUBTFUL = 2
-"""So many contacts of a grasp have to be left out for its place to be looked for again."""
+"""Number of left-out contacts from which a grasp's place is searched again."""
 
 
-def relocate_last(hypothesis: Hypothesis, relocate: Relocate, judge: HypothesisScorer) -> list[Hypothesis]:
+def relocate_last(hypothesis: Hypothesis, relocate: Relocate, scorer: HypothesisScorer) -> list[Hypothesis]:
     """The hypothesis with its last grasp at other places on the object.
 
     Args:
-        hypothesis: whose last grasp is aside, or on ground that nothing else supports.
+        hypothesis: whose last grasp is left out, or on a part that nothing else supports.
         relocate: proposes places.
-        judge: rates them.
+        scorer: scores them.
     """
     last = len(hypothesis.map.placed) - 1
     contacts = hypothesis.map.placed[last].contacts_world
     anywhere = relocate(hypothesis.map.without_grasp(last), contacts)[:_TRIED]
-    return _place_at(hypothesis, last, anywhere, judge, _most(contacts), Moved.FREELY)
+    return _place_at(hypothesis, last, anywhere, scorer, _most(contacts), Moved.FREELY)
 
 
 def propose_pushes(
-    hypothesis: Hypothesis, noise: MotionNoise, settings: ProposalSettings, judge: HypothesisScorer
+    hypothesis: Hypothesis, noise: MotionNoise, settings: ProposalSettings, scorer: HypothesisScorer
 ) -> list[Hypothesis]:
-    """The hypothesis with its last grasp where a push brought the object, if it was to be left and fits badly so.
+    """The hypothesis with its last grasp at a place after a push, if the object was left in place and fits badly.
 
     Args:
         hypothesis: to improve.
         noise: of the motion model.
         settings: of the search.
-        judge: rates them.
+        scorer: scores them.
     """
     last = len(hypothesis.map.placed) - 1
     grasp = hypothesis.map.placed[last]
     if not _is_doubtful(grasp) or not _was_left(grasp, noise):
         return []
     near = _near(hypothesis, last, noise, settings)
-    return _place_at(hypothesis, last, near, judge, _most(grasp.contacts_world), Moved.PUSHED)
+    return _place_at(hypothesis, last, near, scorer, _most(grasp.contacts_world), Moved.PUSHED)
 
 
 def associate_deferred(
@@ -74,31 +74,31 @@ def associate_deferred(
     noise: MotionNoise,
     settings: ProposalSettings,
     relocate: Relocate | None,
-    judge: HypothesisScorer,
+    scorer: HypothesisScorer,
     *,
     pushes: bool = True,
 ) -> Hypothesis:
-    """The hypothesis with grasps that are aside or fit badly placed anew, one after the other, where that is likelier.
+    """The hypothesis with left-out or badly fitting grasps placed again where that is more likely.
 
     Args:
         hypothesis: to improve.
         noise: of the motion model.
         settings: of the search near the predicted pose.
-        relocate: proposes places anywhere for grasps that are aside; None for none.
-        judge: rates them.
-        pushes: the closing hand may have pushed an object that was to be left.
+        relocate: proposes places anywhere for left-out grasps; None for none.
+        scorer: scores them.
+        pushes: whether the closing hand may have pushed an object left in place.
     """
     for index, grasp in enumerate(hypothesis.map.placed[1:], start=1):
         if not _is_doubtful(grasp):
             continue
         near, contacts = _near(hypothesis, index, noise.accumulate(2), settings), grasp.contacts_world
         fitting = max(_LEAST_FITTING, len(grasp.kept) + 1)
-        candidates = _place_at(hypothesis, index, near, judge, fitting, Moved.AS_MEANT)
+        candidates = _place_at(hypothesis, index, near, scorer, fitting, Moved.AS_MEANT)
         if pushes and _was_left(grasp, noise):
-            candidates += _place_at(hypothesis, index, near, judge, fitting, Moved.PUSHED)
+            candidates += _place_at(hypothesis, index, near, scorer, fitting, Moved.PUSHED)
         if relocate is not None and not grasp.used:
             anywhere = relocate(hypothesis.map.without_grasp(index), contacts)[:_TRIED]
-            candidates += _place_at(hypothesis, index, anywhere, judge, _most(contacts), Moved.FREELY)
+            candidates += _place_at(hypothesis, index, anywhere, scorer, _most(contacts), Moved.FREELY)
         hypothesis = min([hypothesis, *candidates], key=cost)
     return hypothesis
 
@@ -108,7 +108,7 @@ def _is_doubtful(grasp: PlacedGrasp) -> bool:
 
 
 def _was_left(grasp: PlacedGrasp, noise: MotionNoise) -> bool:
-    """Whether the hand was to leave the object where it was before a grasp, and it is expected to lie stiller so."""
+    """Whether the hand left the object in place before a grasp, and it is therefore expected to move less."""
     return noise.after(grasp.motion) != noise
 
 
@@ -125,23 +125,23 @@ def _most(contacts: ContactSet) -> int:
 
 
 def _place_at(
-    hypothesis: Hypothesis, index: int, rows: Array, judge: HypothesisScorer, fitting: int, moved: Moved
+    hypothesis: Hypothesis, index: int, rows: Array, scorer: HypothesisScorer, fitting: int, moved: Moved
 ) -> list[Hypothesis]:
-    """The hypothesis with one grasp at the likeliest poses that enough contacts fit, smoothed."""
+    """The hypothesis with one grasp at the most likely poses that enough contacts fit, smoothed."""
     found = []
     for row in rows:
         grasp = replace(hypothesis.map.placed[index], row=row, left_out=frozenset(), moved=moved)
-        cleaned, _ = judge.clean(_with(hypothesis.map, index, grasp), index)
+        cleaned, _ = scorer.clean(_with(hypothesis.map, index, grasp), index)
         if len(cleaned.placed[index].kept) >= fitting:
-            found.append(judge.score(cleaned))
+            found.append(scorer.score(cleaned))
     likeliest = sorted(found, key=cost)[:_SMOOTHED]
-    return [_following(judge.smooth(one.map, 15), index, judge) for one in likeliest]
+    return [_following(scorer.smooth(one.map, 15), index, scorer) for one in likeliest]
 
 
-def _following(hypothesis: Hypothesis, index: int, judge: HypothesisScorer) -> Hypothesis:
-    """The hypothesis with one grasp as the motion model has it after all, if that is no less likely."""
+def _following(hypothesis: Hypothesis, index: int, scorer: HypothesisScorer) -> Hypothesis:
+    """The hypothesis with one grasp moved as the motion model expects, if that is no less likely."""
     bound = replace(hypothesis.map.placed[index], moved=Moved.AS_MEANT)
-    return min(judge.score(hypothesis.map.with_placed(index, bound)), hypothesis, key=cost)
+    return min(scorer.score(hypothesis.map.with_placed(index, bound)), hypothesis, key=cost)
 
 
 def _with(contact_map: ContactMap, index: int, grasp: PlacedGrasp) -> ContactMap:

@@ -209,8 +209,8 @@ def test_forces_of_the_opposite_sign_are_named():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"free": 3}, "3 untouched wrenches, 6 needed"),
-        ({"presses": 2}, "2 presses, 6 needed"),
+        ({"free": 3}, "3 untouched wrenches, but 6 are needed"),
+        ({"presses": 2}, "2 presses, but 6 are needed"),
     ],
 )
 def test_too_few_wrenches_are_named(change, words):

@@ -194,7 +194,7 @@ def test_connecting_asks_and_moves_nothing(rig: Rig) -> None:
 def test_a_silent_positioner_is_not_connected() -> None:
     rig = Rig()
     rig.base.mute = True
-    with pytest.raises(DeviceError, match="base: no answer to 20 questions"):
+    with pytest.raises(DeviceError, match="base: no answer to 20 requests"):
         rig.device.connect()
     with pytest.raises(DeviceError, match="not connected"):
         rig.device.exchange()

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from drivers.core.errors import ConfigurationError, ShapeError
+from drivers.core.errors import ConfigurationError
 from drivers.simulation.object_names import in_pose
 from drivers.simulation.objects import CATALOGUE, QUIET_ZONE, Hull, ObjectModel, Solid, object_model
 
@@ -135,7 +135,7 @@ def test_hollow_mesh_is_cut_into_the_same_convex_pieces_every_time(tmp_path: Pat
     ],
 )
 def test_unusable_mesh_is_refused_with_a_hint(mesh: trimesh.Trimesh, message: str, tmp_path: Path) -> None:
-    with pytest.raises(ShapeError, match=message) as caught:
+    with pytest.raises(ConfigurationError, match=message) as caught:
         object_model(written(mesh, tmp_path))
     assert "part.ply" in str(caught.value)
 
@@ -143,12 +143,12 @@ def test_unusable_mesh_is_refused_with_a_hint(mesh: trimesh.Trimesh, message: st
 @pytest.mark.parametrize("content", [b"", b"ply\nthis is not one\n", b"\x00\xff" * 40])
 def test_unreadable_mesh_file_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "broken.ply").write_bytes(content)
-    with pytest.raises(ShapeError, match=r"broken\.ply"):
+    with pytest.raises(ConfigurationError, match=r"broken\.ply"):
         object_model(f"mesh:{tmp_path / 'broken.ply'}")
 
 
 def test_missing_mesh_file_is_refused() -> None:
-    with pytest.raises(ShapeError, match="file not found"):
+    with pytest.raises(ConfigurationError, match="file not found"):
         object_model("mesh:nowhere/bottle.ply")
 
 
@@ -184,14 +184,14 @@ def test_without_a_pose_a_mesh_stands_as_in_its_file(carton: str) -> None:
 
 @pytest.mark.parametrize("pose", ["0", "7"])
 def test_a_pose_that_there_is_not_is_refused_with_how_many_there_are(carton: str, pose: str) -> None:
-    with pytest.raises(ShapeError, match="rests in 6 poses"):
+    with pytest.raises(ConfigurationError, match="rests in 6 poses"):
         object_model(in_pose(carton, pose))
 
 
 def test_poses_are_for_meshes_and_have_names(carton: str) -> None:
-    with pytest.raises(ShapeError, match="only meshes"):
+    with pytest.raises(ConfigurationError, match="only meshes"):
         in_pose("cube-6", "lying")
-    with pytest.raises(ShapeError, match="there is no pose 'upside-down'"):
+    with pytest.raises(ConfigurationError, match="there is no pose 'upside-down'"):
         in_pose(carton, "upside-down")
 
 
@@ -209,5 +209,5 @@ def test_an_open_surface_is_refused_with_what_is_open(tmp_path: Path) -> None:
     mesh = trimesh.creation.icosphere(subdivisions=2, radius=0.04)
     mesh.update_faces(mesh.triangles_center[:, 2] < 0.0)
     mesh.export(tmp_path / "bowl.ply")
-    with pytest.raises(ShapeError, match="edges are open"):
+    with pytest.raises(ConfigurationError, match="edges are open"):
         object_model(f"mesh:{tmp_path / 'bowl.ply'}")

@@ -87,7 +87,7 @@ def test_the_port_that_is_unplugged_while_the_command_waits_is_named(
     monkeypatch.setattr(ports.list_ports, "comports", comports)
     told = CliRunner().invoke(app, ["rig", "list", "--ports", "--watch", "30"])
     assert told.exit_code == 0
-    assert "/dev/ttyUSB1 went: RS-485" in told.output
+    assert "/dev/ttyUSB1 removed: RS-485" in told.output
     assert "nothing changed" not in told.output
     answer = CliRunner().invoke(app, ["rig", "list", "--ports", "--watch", "30", "--json"])
     assert [port["name"] for port in json.loads(answer.stdout)["come"]] == ["/dev/ttyUSB1"]

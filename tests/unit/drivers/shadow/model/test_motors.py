@@ -51,7 +51,7 @@ def test_a_map_without_one_of_the_motors_is_refused(tmp_path: Path) -> None:
     path.write_text("motors: {FFJ0: 0}\n")
     with pytest.raises(ConfigurationError, match=r"motors.yaml: no motor for FFJ3, FFJ4"):
         MotorMap.load(path)
-    with pytest.raises(ConfigurationError, match="called FFJ9"):
+    with pytest.raises(ConfigurationError, match="unknown driven joints FFJ9"):
         MotorMap(MOTORS.numbers, ("FFJ9",))
 
 
