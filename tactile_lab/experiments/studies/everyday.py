@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tactile_lab.experiments.cells import Cell, Setting
 from tactile_lab.experiments.experiment import Experiment
-from tactile_lab.experiments.runs import everyday_runs
+from tactile_lab.experiments.studies import everyday_sessions
 from tactile_lab.experiments.studies.columns import HAUSDORFF, MEAN_DISTANCE, REGISTRATION
 from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, ranges
 from tactile_lab.experiments.studies.solids import scans_left_out
@@ -12,8 +12,8 @@ from tactile_lab.experiments.summary import Column
 
 
 def _settings(grasps: int) -> list[Setting]:
-    everything = everyday_runs.settings(grasps)
-    return [one for one in everything if not scans_left_out() or dict(one)["object"] == everyday_runs.LOW]
+    everything = everyday_sessions.settings(grasps)
+    return [one for one in everything if not scans_left_out() or dict(one)["object"] == everyday_sessions.LOW]
 
 
 def _panel(cell: Cell) -> str:
@@ -24,7 +24,7 @@ EVERYDAY_OBJECTS = Experiment(
     "everyday-objects",
     "Sessions on scanned household objects, standing and lying: how they end, with what force, and what model.",
     _settings,
-    everyday_runs.explore_everyday,
+    everyday_sessions.explore_everyday,
     (
         Column("ended complete or partial", "in_order", 0, kind="percent"),
         Column("grasps", "grasps_done", 0, kind="median"),
@@ -38,6 +38,6 @@ EVERYDAY_OBJECTS = Experiment(
         Column("simulated minutes", "minutes", 1, kind="median"),
     ),
     ranges("object", HAUSDORFF_LABEL, "hausdorff_mm", _panel, columns=1),
-    grasps=everyday_runs.GRASPS,
+    grasps=everyday_sessions.GRASPS,
     left_out=scans_left_out,
 )
