@@ -134,7 +134,7 @@ def check(
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Read a rig file and its calibration, connect every device and report its state.
+    """Read a rig file and its calibration, connect every device, and report its state and what to do next.
 
     Nothing moves without --move. A rig with force fingertips only, without a hand, can be checked too.
 
@@ -142,17 +142,21 @@ def check(
     """
     from tactile_lab.cli.console import answer, emit_json, show_table
     from tactile_lab.rigs.checks.check import check_rig
+    from tactile_lab.rigs.checks.next_steps import next_steps
 
     del no_input
     findings = check_rig(rig, seed, move=move)
+    steps = next_steps(rig, findings, moved=move)
     ready = all(finding.ok for finding in findings)
     if as_json:
         devices = [{"device": f.device, "ok": f.ok, "detail": f.detail, "figures": dict(f.figures)} for f in findings]
-        emit_json({"rig": rig, "ready": ready, "devices": devices})
+        emit_json({"rig": rig, "ready": ready, "devices": devices, "next": steps})
     else:
         rows = [[finding.device, "ok" if finding.ok else "NOT READY", finding.detail] for finding in findings]
         show_table(f"Rig {rig}", ["device", "state", "detail"], rows)
         answer("ready" if ready else "not ready", "bold green" if ready else "bold red")
+        for number, step in enumerate(steps, 1):
+            answer(f"{number}. {step}")
     if not ready:
         raise typer.Exit(4)
 

@@ -107,9 +107,8 @@ def _guide(found: Gathering) -> None:
     """One line per view: how many there are, and what is missing next."""
     from tactile_lab.cli.console import count, say
 
-    name = f"picture {found.pictures}"
-    if name in found.refused:
-        say(f"{name}: rejected, {found.refused[name]}", "dim")
+    if found.newest in found.refused:
+        say(f"{found.newest}: rejected, {found.refused[found.newest]}", "dim")
         return
     missing = found.coverage.missing
     rest = f"; and {len(missing) - 1} more" if len(missing) > 1 else ""

@@ -1,4 +1,4 @@
-"""Are the force fingertips of a rig fit to work? Connect each, listen for a second, and tell. Nothing moves."""
+"""Checks the force fingertips of a rig: connects each and reads it for a second. Nothing moves."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from drivers.core.errors import DeviceError
 from drivers.fingertips.kinds import WIRES
 from drivers.fingertips.wiring import place_of
 from drivers.force.force_fingertip import WrenchSample
+from drivers.force.plausibility import noise_objection
 from tactile_lab.rigs.checks.findings import Finding
 from tactile_lab.rigs.fingertip_rig import FingertipRig
 
 LISTEN_ns = NANOSECONDS
 _POLL_ns = 2_000_000
-_NOISY = 6.0
-"""How many times the calibrated noise a still sensor may show."""
 
 
 def check_fingertips(rig: FingertipRig, clock: Clock) -> list[Finding]:
-    """One finding a finger.
+    """One finding per finger.
 
     Raises:
         ConfigurationError: a calibration file that a wire names.
@@ -44,7 +43,7 @@ def _check(rig: FingertipRig, finger: str, tip: Nano17, clock: Clock) -> Finding
     usable = np.array([sample.wrench for sample in samples if np.isfinite(sample.wrench).all()])
     if len(usable) < 2:
         return Finding(device, False, f"{place}: {'; '.join(problems) or 'no usable sample'}")
-    problems += _noise_problem(tip, usable)
+    problems += filter(None, [noise_objection(usable.std(axis=0), tip.calibration)])
     words = f"{place}: {'; '.join((*problems, _words(tip, samples, usable)))}"
     return Finding(device, not problems, words, _figures(tip, samples, usable))
 
@@ -89,16 +88,8 @@ def _words(tip: Nano17, samples: list[WrenchSample], usable: Array) -> str:
     )
 
 
-def _noise_problem(tip: Nano17, usable: Array) -> list[str]:
-    noise, known = usable.std(axis=0), tip.calibration
-    allowed = _NOISY * np.repeat([known.force_sigma_N, known.moment_sigma_Nm], 3)
-    if np.all(noise <= allowed):
-        return []
-    return ["noisier than its calibration says: is it being touched, or is a cable loose?"]
-
-
 def _other_baud(rig: FingertipRig, finger: str, clock: Clock) -> str:
-    """Whether a silent device answers under other settings than the rig file's, such as another rate, in words."""
+    """Whether a silent device answers with other settings than the rig file's, such as another rate; as text."""
     wiring = rig.description.wires[finger]
     for other in WIRES[wiring.wire].alternatives(wiring):
         if _answers(rig.device(finger, clock, other)):
