@@ -68,9 +68,9 @@ def test_without_a_surface_there_are_no_figures() -> None:
     assert touched_figures(data, replace(told(data, box(), 1e-3), mesh=None)) == NOTHING_TOUCHED
 
 
-@pytest.mark.parametrize(("name", "least_mm"), [("cup", 70), ("wedge", 30)])
+@pytest.mark.parametrize(("name", "least_mm"), [("cup", 60), ("wedge", 30)])
 def test_grasps_at_all_heights_reach_from_the_foot_to_the_top(name: str, least_mm: float) -> None:
     data = simulate(name, 3001, heights="all", count=12)
     heights = np.concatenate([grasp.points_world_m[:, 2] for grasp in data.grasps])
     assert 1e3 * np.ptp(heights) > least_mm
-    assert heights.min() < 0.012
+    assert heights.min() < 0.025
