@@ -8,6 +8,7 @@ import os
 import signal
 import threading
 from collections.abc import Generator, Iterator
+from itertools import groupby
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,18 @@ def pytest_collection() -> Generator[None, object, object]:
     finally:
         gc.freeze()
         gc.enable()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Modules that run in real time are spread out, so that no worker waits until another is through with its own."""
+    modules = [list(tests) for _, tests in groupby(items, key=lambda item: item.path)]
+    alone: list[list[pytest.Item]] = []
+    others: list[list[pytest.Item]] = []
+    for module in modules:
+        (alone if "real_time_alone" in getattr(module[0], "fixturenames", ()) else others).append(module)
+    for place, module in enumerate(alone):
+        others.insert(place * len(modules) // len(alone), module)
+    items[:] = [test for module in others for test in module]
 
 
 @pytest.fixture(scope="session")

@@ -80,11 +80,11 @@ def calibrate_lens(
     """
     limits = limits or LensLimits()
     if len(views) < _FEWEST_VIEWS:
-        what = f"{len(views)} usable views of the board, {_FEWEST_VIEWS} are needed to compute a lens at all"
-        raise ConfigurationError(what, where="camera calibration", hint="Show the board in more places and tilts")
+        what = f"{len(views)} usable views of the board, but at least {_FEWEST_VIEWS} are needed"
+        raise ConfigurationError(what, where="camera calibration", hint="Show the board in more positions and tilts")
     if len({view.size_px for view in views}) > 1:
         sizes = ", ".join(sorted({"{} x {}".format(*view.size_px) for view in views}))
-        hint = "Keep the camera at one resolution"
+        hint = "Use one camera resolution"
         raise ConfigurationError(f"pictures of different sizes: {sizes}", where="camera calibration", hint=hint)
     solution = _solve(views, third_radial)
     used, left_out = _without_outliers(views, solution)
@@ -115,8 +115,8 @@ def _solve(views: Sequence[BoardView], third_radial: bool) -> _Solution:
             points, pixels, size, np.eye(3), np.zeros(5), flags=flags
         )
     except cv2.error as error:
-        hint = "Show the board in more places and tilts"
-        raise ConfigurationError("the views allow no lens", where="camera calibration", hint=hint) from error
+        hint = "Show the board in more positions and tilts"
+        raise ConfigurationError("no lens fits the views", where="camera calibration", hint=hint) from error
     lens = CameraCalibration(
         focal_px=(float(matrix[0, 0]), float(matrix[1, 1])),
         centre_px=(float(matrix[0, 2]), float(matrix[1, 2])),

@@ -75,12 +75,12 @@ def view_of(name: str, image: Image, board: AnyBoard) -> BoardView | str:
     """The view a picture gives, or why it gives none, in words."""
     blurs = [marker.blur_px for marker in seen_markers(image, board.dictionary).values()]
     if not blurs:
-        return f"no marker of {board.dictionary} is to be seen"
+        return f"no marker of {board.dictionary} is visible"
     if (blur := float(np.median(blurs))) > _LARGEST_BLUR_px:
-        return f"blurred: edges {blur:.1f} px wide, at most {_LARGEST_BLUR_px:g} px are used"
+        return f"blurred: edges {blur:.1f} px wide, at most {_LARGEST_BLUR_px:g} px are accepted"
     points, pixels = board.match_corners(image)
     if len(points) < min(LEAST_CORNERS, board.point_count):
-        return f"only {len(points)} corners of the board are to be seen, {LEAST_CORNERS} are needed"
+        return f"only {len(points)} corners of the board are visible, {LEAST_CORNERS} are needed"
     size = (image.shape[1], image.shape[0])
     return BoardView(name, points, pixels, size, max(board.size_m) * board.scale)
 

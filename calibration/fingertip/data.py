@@ -61,7 +61,7 @@ def load_fingertip_data(path: Path, here: Installation) -> FingertipData:
     """Read wrenches of this rig. Raises ConfigurationError."""
     data = validate(load(path), FingertipData, where=str(path))
     if data.rig != here.rig:
-        hint = "Name the rig they are of with --rig"
+        hint = "Give the rig of the recording with --rig"
         raise ConfigurationError(f"was recorded on rig {data.rig}, not on {here.rig}", where=str(path), hint=hint)
     return data
 

@@ -31,10 +31,12 @@ def load_untouched(path: Path) -> Array:
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
         ) from error
     except ValueError as error:
-        hint = "Give a line a sample and a column an electrode, numbers alone"
-        raise ConfigurationError("is no table of counts", where=str(path), hint=hint) from error
+        hint = "Give one line per sample and one column per electrode, numbers only"
+        raise ConfigurationError("is not a table of counts", where=str(path), hint=hint) from error
     if counts.ndim != 2 or not np.isfinite(counts).all():
-        raise ConfigurationError("is no table of counts", where=str(path), hint="Give as many numbers in each line")
+        raise ConfigurationError(
+            "is not a table of counts", where=str(path), hint="Give the same number of values in each line"
+        )
     return counts
 
 
@@ -50,13 +52,15 @@ def faulty_electrodes(untouched: Array) -> dict[int, str]:
         )
     drift = np.abs(untouched[: len(untouched) // 2].mean(axis=0) - untouched[len(untouched) // 2 :].mean(axis=0))
     if np.median(drift) > LARGEST_DRIFT:
-        raise ConfigurationError("the sensor was touched, or still warms up", where="BioTac", hint="Leave it alone")
+        raise ConfigurationError(
+            "the sensor was touched, or is still warming up", where="BioTac", hint="Do not touch it, and record again"
+        )
     found, spread, mean = {}, untouched.std(axis=0), untouched.mean(axis=0)
     for index in range(untouched.shape[1]):
         if not _RANGE[0] < mean[index] < _RANGE[1]:
             found[index] = f"reads {mean[index]:.0f} counts, at the end of its range: open or short"
         elif spread[index] == 0.0:
-            found[index] = "does not move at all: dead"
+            found[index] = "never changes: dead"
         elif spread[index] > _NOISY * max(float(np.median(spread)), 1.0):
-            found[index] = f"is noisy: {spread[index]:.0f} counts against {np.median(spread):.0f} of the others"
+            found[index] = f"is noisy: {spread[index]:.0f} counts, the others {np.median(spread):.0f}"
     return found

@@ -131,7 +131,7 @@ def _spread(directions: Array, rank: int) -> float:
 
 def _check_spread(directions: Array, least: int, what: str, where: str, rank: int = 3) -> None:
     if len(directions) < least:
-        raise ConfigurationError(f"{len(directions)} {what}, {least} needed", where=where, hint="Record more")
+        raise ConfigurationError(f"{len(directions)} {what}, but {least} are needed", where=where, hint="Record more")
     if _spread(directions, rank) < LEAST_SPREAD:
         hint = "Turn the hand so that the fingertip points down, level and sideways"
         raise ConfigurationError(f"the {what} are all in nearly the same orientation", where=where, hint=hint)
@@ -169,10 +169,10 @@ def _mounting(forces: Array, up: Array, weights: Array, down: Array, where: str)
     rotation, mirrored = nearest_rotation(aligned), nearest_rotation(-aligned)
     angles, opposite = _angles(forces, up @ rotation.T), _angles(-forces, up @ mirrored.T)
     if np.linalg.det(aligned) < 0.0 and opposite.mean() < angles.mean():  # no rotation turns all directions over
-        hint = "The sensor reports what the tip does to the finger: set its tool transformation, or swap the sign"
+        hint = "The sensor reports the force of the tip on the finger: set its tool transformation, or swap the sign"
         raise ConfigurationError("forces have the opposite sign", where=where, hint=hint)
     if angles.mean() > LARGEST_TILT_rad:
-        what = f"forces are {np.degrees(angles.mean()):.0f} deg from the plate's normal, whatever the mounting"
+        what = f"forces are {np.degrees(angles.mean()):.0f} deg off the plate's normal for every mounting"
         raise ConfigurationError(what, where=where, hint="Press without sliding, on a level plate")
     return rotation
 

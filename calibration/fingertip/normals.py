@@ -75,8 +75,8 @@ def normals_record(
     fingers: dict[str, StoredNormals] = {}
     if before is not None:
         if before.kind != "normals" or before.rig != rig:
-            what = f"holds {before.kind} of rig {before.rig}, not normals of {rig}"
-            raise ConfigurationError(what, where=str(earlier), hint="Name another file with --out")
+            what = f"contains {before.kind} of rig {before.rig}, not normals of {rig}"
+            raise ConfigurationError(what, where=str(earlier), hint="Choose another file with --out")
         fingers = dict(validate(before.parameters, NormalsFile, where=str(earlier)).normals)
     fingers[finger] = as_stored(found.learned)
     return new_record(

@@ -149,8 +149,8 @@ class BoardProblem:
     def _camera_T_board(self, view: View) -> Pose3:
         found = board_pose(view.board_m, view.board_px, self._camera)
         if found is None:
-            hint = "Leave the picture out"
-            raise ConfigurationError("a board's corners allow no pose", where="marker method", hint=hint)
+            hint = "Remove the picture"
+            raise ConfigurationError("no pose fits the board's corners", where="marker method", hint=hint)
         return found.camera_T_board
 
     # --- factors -----------------------------------------------------------------------------------------------
@@ -241,13 +241,13 @@ def standing_corners(views: Sequence[View], moved_px: float) -> tuple[Array, int
     """
     numbers = [index for index, view in enumerate(views) if view.world_px is not None]
     if not numbers:
-        hint = "Move the hand aside until the camera sees it, in some of the pictures at least"
-        raise ConfigurationError("the world marker is in none of the pictures", where="marker method", hint=hint)
+        hint = "Move the hand aside so that the camera sees it in at least some of the pictures"
+        raise ConfigurationError("the world marker is not visible in any picture", where="marker method", hint=hint)
     corners = np.array([views[index].world_px for index in numbers])
     away = np.abs(corners - np.median(corners, axis=0)).max(axis=(1, 2))
     if away.max() > moved_px:
         worst = numbers[int(np.argmax(away))] + 1
-        what = f"the world marker or the camera was bumped: {away.max():.1f} px from its place in picture {worst}"
+        what = f"the world marker or the camera was moved: {away.max():.1f} px off in picture {worst}"
         raise ConfigurationError(what, where="marker method", hint="Fasten both and take the pictures again")
     return np.asarray(corners.mean(axis=0)), len(numbers)
 

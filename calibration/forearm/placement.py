@@ -45,7 +45,7 @@ class ForearmCalibration(StrictModel):
         matrix = np.array(value)
         scale = float(np.abs(matrix).max())
         if np.abs(matrix - matrix.T).max() > _ASYMMETRY * scale or np.linalg.eigvalsh(matrix).min() < -1e-9 * scale:
-            raise ValueError("is no covariance: it has to be symmetric, with no negative variance")
+            raise ValueError("is not a covariance: it must be symmetric, without negative variances")
         return value
 
     @classmethod

@@ -22,7 +22,7 @@ from drivers.core.fingertip import RigidTransform
 
 def check_origin(data: ForearmData, here: Installation, where: str) -> None:
     """Refuse observations that were recorded on another rig or with other devices. Raises ConfigurationError."""
-    hint = f"Record the poses on {here.rig}, or name the rig they are of with --rig"
+    hint = f"Record the poses on {here.rig}, or give the rig of the recording with --rig"
     if data.rig and data.rig != here.rig:
         raise ConfigurationError(f"was recorded on rig {data.rig}, not on {here.rig}", where=where, hint=hint)
     for device, serial in data.devices.items():

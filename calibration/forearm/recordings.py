@@ -139,10 +139,10 @@ def load_data(path: Path) -> ForearmData:
         return ForearmData(pairs=_pairs(validate(content, _Pairs, where=str(path)).root, str(path)))
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         hint = f"Give a file with format {FORMAT}, or a list of pairs of 4 x 4 matrices"
-        raise ConfigurationError("holds no observations that are known", where=str(path), hint=hint)
+        raise ConfigurationError("contains no known kind of observations", where=str(path), hint=hint)
     file = validate(content, DataFile, where=str(path))
     if bool(file.touches) == bool(file.views):
-        raise ConfigurationError("needs touches, or views, and not both", where=str(path))
+        raise ConfigurationError("needs either touches or views", where=str(path))
     if file.views and (file.camera is None or file.markers is None):
         raise ConfigurationError("views need camera and markers", where=str(path))
     return ForearmData(
@@ -197,7 +197,7 @@ def _rigid(matrix: Array, where: str) -> Pose3:
     rotation = nearest_rotation(matrix[:3, :3])
     if np.abs(rotation - matrix[:3, :3]).max() > _SKEWED or np.abs(matrix[3] - [0, 0, 0, 1]).max() > _SKEWED:
         hint = "Give 4 x 4 matrices of a rotation and a translation in metres"
-        raise ConfigurationError("a matrix is no rigid motion", where=where, hint=hint)
+        raise ConfigurationError("a matrix is not a rigid motion", where=where, hint=hint)
     return Pose3(Rot3(rotation), matrix[:3, 3])
 
 
@@ -239,7 +239,7 @@ def _touch_entry(touch: Touch) -> TouchEntry:
         normal = _three(target.normal_world)
         entry = PlaneEntry(name=target.name, point_world_m=place, normal_world=normal, sigma_m=target.sigma_m)
     if touch.finger not in FINGERS:
-        raise ConfigurationError(f"no finger called {touch.finger}")
+        raise ConfigurationError(f"unknown finger {touch.finger}")
     return TouchEntry.model_validate(
         {
             "finger": touch.finger,

@@ -37,8 +37,8 @@ def load_block(path: Path) -> Block:
     """The block of a geometry file. Raises ConfigurationError."""
     block = load_geometry(path).block
     if block is None:
-        hint = "State its size and place: block: {size_m: [...], world_T_block: {...}}"
-        raise ConfigurationError("names no block", where=str(path), hint=hint)
+        hint = "Give its size and pose: block: {size_m: [...], world_T_block: {...}}"
+        raise ConfigurationError("does not describe a block", where=str(path), hint=hint)
     return block
 
 

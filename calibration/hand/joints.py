@@ -89,7 +89,7 @@ def load_poses(path: Path, here: Installation) -> JointPoses:
     """Read a file of poses of this rig. Raises ConfigurationError."""
     poses = validate(load(path), JointPoses, where=str(path))
     if poses.rig != here.rig:
-        hint = "Name the rig they are of with --rig"
+        hint = "Give the rig of the recording with --rig"
         raise ConfigurationError(f"was recorded on rig {poses.rig}, not on {here.rig}", where=str(path), hint=hint)
     for index, pose in enumerate(poses.poses):
         names = set(pose.known_deg) | set(pose.measured_deg)
@@ -119,7 +119,7 @@ def from_contacts(offsets: Mapping[str, JointOffset]) -> dict[str, JointCorrecti
     }
     if not found:
         hint = "Press with several fingers, in several postures, with the hand turned"
-        raise ConfigurationError("no joint's offset can be told from these contacts", where="joints", hint=hint)
+        raise ConfigurationError("these contacts do not determine the offset of any joint", where="joints", hint=hint)
     return found
 
 
@@ -170,7 +170,7 @@ def _faults(found: JointCorrection, limits: JointLimits) -> Iterator[str]:
     if 0 < found.poses < limits.poses:
         yield f"{found.poses} pose, {limits.poses} needed"
     if not found.rms_deg <= limits.left_deg:
-        yield f"{found.rms_deg:.2f} deg left, limit {limits.left_deg:.2f}"
+        yield f"residual {found.rms_deg:.2f} deg, limit {limits.left_deg:.2f}"
     if not found.sigma_deg <= limits.sigma_deg:
         yield f"sigma {found.sigma_deg:.2f} deg, limit {limits.sigma_deg:.2f}"
 
@@ -240,7 +240,7 @@ def _refuse_large(corrections: Mapping[str, JointCorrection]) -> None:
     for joint, found in corrections.items():
         if abs(found.shift_deg) > LARGEST_deg or abs(found.gain - 1.0) > LARGEST_GAIN:
             what = f"the correction of {joint} is {found.shift_deg:+.1f} deg and a gain of {found.gain:.2f}"
-            hint = "Check the joint's name, the pose and the table; a correction is at most 15 deg and 20 %"
+            hint = "Check the joint's name, the pose and the table; a correction may be at most 15 deg and 20 %"
             raise ConfigurationError(what, where="joints", hint=hint)
 
 

@@ -68,7 +68,8 @@ class KnownGeometry(StrictModel):
     def _something_beside_the_top(self) -> KnownGeometry:
         if self.table is None and self.block is None and len(self.points_world_m) < 3:
             raise ValueError(
-                "needs the table's edges, a block, or three or more points: a top alone tells no place on it"
+                "needs the table's edges, a block, or at least three points: a table top alone does not determine a "
+                "position on it"
             )
         return self
 

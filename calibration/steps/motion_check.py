@@ -125,7 +125,7 @@ def check_rotations(poses: Sequence[Pose3], what: str, needs: MotionNeeds) -> Mo
                 float(np.degrees(second)),
                 float(np.degrees(needs.second_axis_rad)),
                 "deg",
-                f"nearly all turns are about one axis, {about} of the hand; turn it about another too",
+                f"nearly all rotations are about one axis, {about} of the hand; also turn it about another axis",
             ),
         )
     )
@@ -148,21 +148,21 @@ def check_touches(touches: Sequence[Touch], needs: MotionNeeds | None = None) ->
                 shares,
                 needs.direction,
                 "of 1",
-                f"no or few touches tell the place along {_direction(weakest)}; press faces that look that way",
+                f"too few touches determine the position along {_direction(weakest)}; press faces in that direction",
             ),
             Check(
                 "lever of the weakest turn",
                 1e3 * lever,
                 1e3 * needs.lever_m,
                 "mm",
-                f"turns about {_direction(axis)} are hardly told; press places farther apart",
+                f"rotations about {_direction(axis)} are hardly determined; press points farther apart",
             ),
             Check(
                 "turns of the hand between touches",
                 turn,
                 float(np.degrees(needs.turn_rad)),
                 "deg",
-                "press with the hand turned about the finger, to tell joint offsets from the mount",
+                "press with the hand turned about the finger, to separate joint offsets from the mount's pose",
             ),
         )
     )

@@ -92,7 +92,7 @@ def check_record(record: CalibrationRecord, here: Installation, now: datetime) -
     if record.is_expired(now):
         return f"is valid until {record.valid_until_utc}", f"Calibrate again: tactile-lab calibrate {_command(record)}"
     if record.valid_until_utc is not None and (record.created - now).total_seconds() > _CLOCK_SLACK_s:
-        return f"was made in the future, {record.created_utc}", "Set the computer's clock"
+        return f"was created in the future, {record.created_utc}", "Set the computer's clock"
     if record.verdict != "PASS":
         return "did not pass its limits", f"Calibrate again: tactile-lab calibrate {_command(record)}"
     return None
@@ -114,10 +114,10 @@ def refuse_foreign(path: Path, here: Installation) -> None:
 def _foreign(record: CalibrationRecord, here: Installation) -> tuple[str, str] | None:
     """How a record belongs to another rig or device, and what to do; None when it does not."""
     if record.rig != here.rig:
-        return f"is of rig {record.rig}, not of {here.rig}", f"Name a calibration of {here.rig}"
+        return f"belongs to rig {record.rig}, not to {here.rig}", f"Use a calibration of {here.rig}"
     for device, serial in record.devices.items():
         if here.devices.get(device, serial) != serial:
-            reason = f"is of {device} with serial number {serial}, not {here.devices[device]}"
+            reason = f"belongs to the {device} with serial number {serial}, not {here.devices[device]}"
             return reason, f"Calibrate with the present {device}"
     return None
 
@@ -135,6 +135,6 @@ def _objection(role: str, path: Path, here: Installation, now: datetime) -> Obje
         return Objection(role, str(path), error.what, error.hint)
     kinds = {"fingertips": ("fingertips", "biotacs")}.get(role, (role,))
     if record.kind not in kinds:
-        return Objection(role, str(path), f"is a calibration of {record.kind}", f"Name one of {role}")
+        return Objection(role, str(path), f"is a calibration of {record.kind}", f"Use a calibration of {role}")
     refusal = check_record(record, here, now)
     return None if refusal is None else Objection(role, str(path), *refusal)

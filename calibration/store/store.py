@@ -66,9 +66,9 @@ def _time(value: str) -> str:
     try:
         stamp = datetime.fromisoformat(value)
     except ValueError as error:
-        raise ValueError("must be a time like 2026-11-21T09:30:00+00:00") from error
+        raise ValueError("must be a time such as 2026-11-21T09:30:00+00:00") from error
     if stamp.tzinfo is None:
-        raise ValueError("must name its time zone, for instance +00:00")
+        raise ValueError("must include its time zone, for instance +00:00")
     return value
 
 
@@ -191,7 +191,7 @@ def read_record(path: Path) -> CalibrationRecord:
     """
     content = load(path)
     if not is_stored(content):
-        hint = "Calibrate with tactile-lab calibrate; a file of plain figures does not say where they come from"
+        hint = "Calibrate with tactile-lab calibrate: plain values do not say where they come from"
         raise ConfigurationError("is not a stored calibration", where=str(path), hint=hint)
     check_seal(content, str(path))
     del content[SEAL]

@@ -179,7 +179,7 @@ class Nano17(ForceTip):
         if self.stamp_jumps:
             problems.append(f"stamps went back {self.stamp_jumps} times: the computer's clock was set")
         if self.foreign_datagrams:
-            problems.append(f"{self.foreign_datagrams} messages that are none of this sensor")
+            problems.append(f"{self.foreign_datagrams} messages that are not from this sensor")
         if self.tare_record and (age := (now_ns - self.tare_record.stamp_ns) / _MINUTE_ns) > self._box.tare_minutes:
             problems.append(f"tared {age:.0f} minutes ago")
         return tuple(problems)
@@ -189,7 +189,7 @@ class Nano17(ForceTip):
         told = self.wire.ranges_SI
         if told is not None and np.any(self._range > told * (1 + 1e-6)):
             raise DeviceError(
-                f"the sensor's calibrated range is {_in_words(told)}, the settings say {_in_words(self._range)}",
+                f"the sensor's calibrated range is {_in_words(told)}, but the settings say {_in_words(self._range)}",
                 where=self._transport.name,
                 hint="Correct nano17.force_range_N and nano17.torque_range_Nm in the rig file",
             )

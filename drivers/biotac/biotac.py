@@ -57,7 +57,10 @@ class BioTac:
         normals: LearnedNormals | None = None,
     ) -> None:
         if normals is not None and normals.electrodes != calibration.electrodes:
-            what = f"normals learned with {normals.electrodes} electrodes, on a sensor with {calibration.electrodes}"
+            what = (
+                f"the normals were learned with {normals.electrodes} electrodes, but the sensor has "
+                f"{calibration.electrodes}"
+            )
             hint = "Train with a recording of this sensor"
             raise ConfigurationError(what, where=f"BioTac {finger}", hint=hint)
         self.finger = finger
@@ -84,7 +87,7 @@ class BioTac:
             return
         stride, odd = divmod(len(sample.tactile), SLOTS)
         if odd or stride not in PALM_SLOT_BYTES:
-            raise CodecError(f"{len(sample.tactile)} bytes of tactile data where {SLOTS * SLOT_BYTES} belong")
+            raise CodecError(f"{len(sample.tactile)} bytes of tactile data instead of {SLOTS * SLOT_BYTES}")
         start = self._slot * stride
         self.take(decode_slot(sample.tactile[start : start + SLOT_BYTES], sample.tactile_type), sample.stamp_ns)
 
@@ -192,7 +195,7 @@ class BioTac:
             return (_NOT_FITTED,)
         problems = [] if self._tare_pdc is not None else ["not tared"]
         if silent := self.channels.older_than(self._settings.stale_ms):
-            problems.append(f"{silent} channels not heard for more than {self._settings.stale_ms:.0f} ms")
+            problems.append(f"{silent} channels not received for more than {self._settings.stale_ms:.0f} ms")
         return tuple(problems)
 
     def _pdc_rise(self) -> float:
@@ -207,14 +210,14 @@ class BioTac:
     def _tare_complaint(self) -> str:
         needed = (Channel.PDC, *self._electrodes)
         if any(len(self.channels.recent(channel)) < self._settings.tare_samples for channel in needed):
-            return "not every channel has been heard often enough"
+            return "not every channel has been received often enough"
         if not self.channels.fitted:
             return "no sensor is fitted"
         spread = {channel: float(np.ptp(self.channels.recent(channel))) for channel in needed}
         if (pdc := spread.pop(Channel.PDC)) > self._settings.tare_pdc_spread:
-            return f"the pressure moves by {pdc:.0f} counts"
+            return f"the pressure varies by {pdc:.0f} counts"
         if (worst := max(spread.values())) > self._settings.tare_electrode_spread:
-            return f"an electrode moves by {worst:.0f} counts"
+            return f"an electrode varies by {worst:.0f} counts"
         return ""
 
     def _in_distal_frame(self, point_m: Array, normal: Array, sigma_rad: float, force_N: float) -> TipContact:

@@ -85,10 +85,12 @@ def decode_log(text: str, where: str = "Cheetah log") -> CheetahLog:
         if line.strip():
             rows.append(_sample(line, f"{where}, line {number}"))
             if len(rows[-1]) != len(rows[0]):
-                what = f"{(len(rows[-1]) - _FIXED) // 2} sensors, and {(len(rows[0]) - _FIXED) // 2} before"
+                what = f"{(len(rows[-1]) - _FIXED) // 2} sensors, but {(len(rows[0]) - _FIXED) // 2} before"
                 raise CodecError(what, where=f"{where}, line {number}")
     if not rows:
-        raise CodecError("no samples", where=where, hint="Give a log of the maker's program for the Cheetah adapter")
+        raise CodecError(
+            "no samples", where=where, hint="Give a log of the manufacturer's program for the Cheetah adapter"
+        )
     return _log(header, np.array(rows))
 
 
@@ -122,7 +124,9 @@ def _sample(line: str, where: str) -> list[float]:
         numbers = []
     pairs = len(numbers) - _FIXED
     if pairs < 2 or pairs % 2 or not 0.0 <= numbers[0] < 1e9 or not _possible(numbers):
-        raise CodecError(f"is no sample: {line[:_LONGEST]!r}", where=where, hint="The line may be damaged: cut it out")
+        raise CodecError(
+            f"is not a sample: {line[:_LONGEST]!r}", where=where, hint="The line may be damaged: remove it"
+        )
     return numbers
 
 

@@ -202,8 +202,8 @@ def _unpack(text: str, shape: tuple[int, int], where: str) -> Array:
     except (binascii.Error, ValueError) as error:
         hint = "Train again with tactile-lab calibrate biotac"
         raise ConfigurationError(
-            f"does not hold {shape[0]} rows of {shape[1]} numbers", where=where, hint=hint
+            f"does not have {shape[0]} rows of {shape[1]} numbers", where=where, hint=hint
         ) from error
     if not np.isfinite(values).all():
-        raise ConfigurationError("holds values that are no numbers", where=where, hint="Train again")
+        raise ConfigurationError("contains values that are not numbers", where=where, hint="Train again")
     return values

@@ -111,11 +111,11 @@ def train(
 
 def _check(presses: Presses, electrodes: int) -> None:
     if len(presses) < FEWEST:
-        what = f"{len(presses)} presses with a known normal, and {FEWEST} are needed"
-        raise ConfigurationError(what, where="BioTac normals", hint="Record more presses, all over the finger")
+        what = f"{len(presses)} presses with a known normal, but {FEWEST} are needed"
+        raise ConfigurationError(what, where="BioTac normals", hint="Record more presses, all over the fingertip")
     if presses.changes.shape[1] != electrodes:
         what = f"the presses have {presses.changes.shape[1]} electrodes, not {electrodes}"
-        raise ConfigurationError(what, where="BioTac normals", hint="Name the right number of electrodes")
+        raise ConfigurationError(what, where="BioTac normals", hint="Give the right number of electrodes")
 
 
 def _predict_left_out(presses: Presses, usual: Array, kernel: KernelSettings) -> tuple[Array, Array]:

@@ -44,8 +44,8 @@ def read_presses(path: Path, normals: Path | None = None) -> PressRecording:
     changes, directions = _table(path) if normals is None else (_matrix(path), _matrix(normals))
     where = str(path if normals is None else normals)
     if directions.shape[1] != 3 or len(directions) != len(changes):
-        what = f"{len(changes)} samples of electrodes and normals of shape {directions.shape[::-1]}"
-        raise ConfigurationError(what, where=where, hint="One normal of three numbers belongs to each sample")
+        what = f"{len(changes)} samples of electrodes, but normals of shape {directions.shape[::-1]}"
+        raise ConfigurationError(what, where=where, hint="Give one normal of three numbers for each sample")
     electrodes = next((count for count in _COUNTS if count == changes.shape[1]), None)
     if electrodes is None:
         hint = "A BioTac has 19, a BioTac SP 24"
@@ -56,8 +56,8 @@ def read_presses(path: Path, normals: Path | None = None) -> PressRecording:
 def _units(directions: Array, where: str) -> Array:
     length = np.linalg.norm(directions, axis=1)
     if bad := np.flatnonzero(~(np.abs(length - 1.0) < 0.05)).tolist():
-        what = f"the normal of sample {bad[0] + 1} has the length {length[bad[0]]:.3g}, not 1"
-        raise ConfigurationError(what, where=where, hint="Write unit vectors")
+        what = f"the normal of sample {bad[0] + 1} has length {length[bad[0]]:.3g}, not 1"
+        raise ConfigurationError(what, where=where, hint="Give unit vectors")
     return np.asarray(directions / length[:, None])
 
 
@@ -70,10 +70,10 @@ def _matrix(path: Path) -> Array:
     try:
         values = np.loadtxt(path, ndmin=2)
     except (OSError, ValueError) as error:
-        hint = "Give a text file of numbers, one column a sample"
+        hint = "Give a text file of numbers, one column per sample"
         raise ConfigurationError(f"cannot be read ({_reason(error)})", where=str(path), hint=hint) from error
     if not np.isfinite(values).all():
-        raise ConfigurationError("holds values that are no numbers", where=str(path), hint="Leave those samples out")
+        raise ConfigurationError("contains values that are not numbers", where=str(path), hint="Remove those samples")
     return np.asarray(values.T)
 
 
@@ -87,8 +87,8 @@ def _table(path: Path) -> tuple[Array, Array]:
     electrodes = len(rows[0]) - len(_NORMAL) if rows else 0
     names = [f"e{number}" for number in range(1, electrodes + 1)]
     if not rows or [name.strip().lower() for name in rows[0]] != [*names, *_NORMAL]:
-        hint = "Its first line must be e1,e2,...,nx,ny,nz; two plain files of numbers are given with --normals"
-        raise ConfigurationError("is no table of presses", where=str(path), hint=hint)
+        hint = "Its first line must be e1,e2,...,nx,ny,nz; for two plain files of numbers use --normals"
+        raise ConfigurationError("is not a table of presses", where=str(path), hint=hint)
     values = np.array([_row(row, number, electrodes, path) for number, row in enumerate(rows[1:], 2)])
     values = values.reshape(-1, electrodes + len(_NORMAL))
     touched = np.isfinite(values[:, electrodes:]).all(axis=1)
@@ -103,6 +103,6 @@ def _row(cells: list[str], number: int, electrodes: int, path: Path) -> list[flo
     except ValueError:
         counts, normal = [], []
     if len(counts) != electrodes or len(normal) != len(_NORMAL) or not np.isfinite(counts).all():
-        hint = "Each line holds the electrodes' counts and a normal, or three empty cells when nothing is touched"
-        raise ConfigurationError("is no sample", where=f"{path}, line {number}", hint=hint)
+        hint = "Each line needs the electrodes' counts and a normal, or three empty cells if nothing is touched"
+        raise ConfigurationError("is not a sample", where=f"{path}, line {number}", hint=hint)
     return counts + normal

@@ -63,7 +63,7 @@ def decode_slot(payload: bytes, request: int) -> Slot:
         CodecError: wrong length.
     """
     if len(payload) != SLOT_BYTES:
-        raise CodecError(f"{len(payload)} bytes where a slot has {SLOT_BYTES}", where="BioTac slot")
+        raise CodecError(f"{len(payload)} bytes instead of the {SLOT_BYTES} of a slot", where="BioTac slot")
     if request > LAST_CHANNEL:
         return Slot((), {})
     pac0, pac1, first, valid, second = _SLOT.unpack(payload)
@@ -84,7 +84,7 @@ def encode_slot(slot: Slot, request: int) -> bytes:
     """
     pacs, first, second = slot.vibration, slot.values.get(request), slot.values.get(request + 1)
     if len(pacs) > 2:
-        raise CodecError(f"{len(pacs)} vibration readings where a slot holds two", where="BioTac slot")
+        raise CodecError(f"{len(pacs)} vibration readings instead of the two of a slot", where="BioTac slot")
     valid = (_PAC0 | _PAC1) >> (2 - len(pacs)) if pacs else 0
     valid |= (_FIRST if first is not None else 0) | (_SECOND if second is not None else 0)
     padded = (*pacs, 0, 0)

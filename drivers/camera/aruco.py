@@ -102,7 +102,7 @@ class ObjectTracker:
         """The object in a frame whose world marker has been taken; ``problem`` is what came of that."""
         marker = found.markers.get(self._settings.object_id)
         if not problem and marker is None:
-            problem = f"the object's marker {self._settings.object_id} is not to be seen"
+            problem = f"the object's marker {self._settings.object_id} is not visible"
         if problem or marker is None:
             return Observation(stamp_ns, None, problem)
         if problem := self._blur_problem(self._settings.object_id, marker.blur_px):
@@ -122,22 +122,24 @@ class ObjectTracker:
 
     def _picture_problem(self, found: Detection) -> str:
         if found.dictionary != self._settings.dictionary:
-            return f"markers of {found.dictionary} were looked for, not of {self._settings.dictionary}"
+            return f"markers of {found.dictionary} were detected, not of {self._settings.dictionary}"
         if self._camera.size_px is not None and found.size_px != self._camera.size_px:
             made, seen = (" x ".join(map(str, size)) for size in (self._camera.size_px, found.size_px))
-            return f"the picture has {seen} pixels, the lens was calibrated with {made}"
+            return f"the picture has {seen} pixels, but the lens was calibrated with {made}"
         return ""
 
     def _blur_problem(self, number: int, blur_px: float) -> str:
         largest = self._settings.largest_blur_px
         if blur_px <= largest:
             return ""
-        return f"blurred: the edges of marker {number} are {blur_px:.1f} px wide, at most {largest:g} px are trusted"
+        return f"blurred: the edges of marker {number} are {blur_px:.1f} px wide, at most {largest:g} px are accepted"
 
     def _check(self, sighting: ObjectSighting | None, stamp_ns: int) -> Observation:
         if sighting is None:
             seen = self.world.frames > 0
-            problem = "the marker's corners cannot lie on the table" if seen else "the world marker was not seen yet"
+            problem = (
+                "the marker's corners cannot lie on the table" if seen else ("the world marker has not been seen yet")
+            )
         elif self._settings.freedom == "spatial":
             problem = _ambiguity(sighting) if sighting.ambiguous else ""
         else:

@@ -45,7 +45,9 @@ class Printed(StrictModel):
     def _true_to_scale(cls, value: float | None) -> float | None:
         if value is not None and abs(value / CHECK_BAR_mm - 1.0) > LARGEST_SCALE_ERROR:
             share = 100.0 * (value / CHECK_BAR_mm - 1.0)
-            problem = f"the bar of {CHECK_BAR_mm:g} mm measures {value:g} mm: {share:+.1f} %, at most 0.5 % are allowed"
+            problem = (
+                f"the {CHECK_BAR_mm:g} mm check bar measures {value:g} mm: {share:+.1f} %, at most 0.5 % are allowed"
+            )
             raise ValueError(f"{problem}. Print at 100 % (actual size), without fitting to the page")
         return value
 
@@ -217,5 +219,7 @@ def load_board(path: Path) -> AnyBoard:
     """Read a board's description as ``tactile-lab markers`` wrote it. Raises ConfigurationError."""
     content = load(path)
     if not isinstance(content, dict):
-        raise ConfigurationError("is no description of a board", where=str(path), hint="Make one: tactile-lab markers")
+        raise ConfigurationError(
+            "is not a description of a board", where=str(path), hint="Create one with: tactile-lab markers"
+        )
     return validate(content, _BoardFile, where=str(path)).root

@@ -38,14 +38,14 @@ class CameraCalibration(StrictModel):
     @classmethod
     def _positive(cls, value: tuple[float, float]) -> tuple[float, float]:
         if min(value) <= 0.0:
-            raise ValueError("focal lengths are greater than 0")
+            raise ValueError("focal lengths must be greater than 0")
         return value
 
     @field_validator("distortion")
     @classmethod
     def _known_length(cls, value: tuple[float, ...]) -> tuple[float, ...]:
         if len(value) not in _DISTORTION_LENGTHS:
-            raise ValueError(f"{len(value)} distortion coefficients; OpenCV knows {_DISTORTION_LENGTHS}")
+            raise ValueError(f"{len(value)} distortion coefficients; OpenCV supports {_DISTORTION_LENGTHS}")
         return value
 
     @property
@@ -111,7 +111,7 @@ def _opencv(path: Path) -> CameraCalibration:
         matrix, distortion = storage.getNode("camera_matrix").mat(), storage.getNode("distortion_coefficients").mat()
         size = [int(storage.getNode(name).real()) for name in ("image_width", "image_height")]
     except (cv2.error, SystemError) as error:
-        raise ConfigurationError("is no OpenCV file", where=str(path)) from error
+        raise ConfigurationError("is not an OpenCV file", where=str(path)) from error
     if matrix is None or distortion is None or matrix.shape != (3, 3):
         raise ConfigurationError("has no camera_matrix and distortion_coefficients", where=str(path))
     content = {

@@ -66,7 +66,7 @@ class Camera:
             CodecError: the picture cannot be decoded.
         """
         if self._asked_ns is None:
-            raise DeviceError("no picture was asked for", where=self._transport.name, hint="Ask first")
+            raise DeviceError("no picture was requested", where=self._transport.name, hint="Request one first")
         self.poll()
         arrived, self._arrived = self._arrived, []
         frames = [self.receive(datagram) for datagram in arrived]

@@ -57,7 +57,7 @@ class CameraProcess:
     def send(self, payload: bytes) -> None:
         """Ask for a picture. Raises CodecError for another message, DeviceError when the process is gone."""
         if payload != TRIGGER:
-            raise CodecError(f"{len(payload)} bytes that are no trigger", where=self.name)
+            raise CodecError(f"{len(payload)} bytes that are not a trigger", where=self.name)
         self._child.give({"pictures": 1})
 
     def receive(self) -> list[Datagram]:

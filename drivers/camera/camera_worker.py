@@ -20,6 +20,7 @@ from drivers.camera.packet import encode_packet
 from drivers.camera.pictures import Picture, Source
 from drivers.camera.source_settings import CameraSourceSettings
 from drivers.camera.sources import open_source
+from drivers.core.child_process import failure
 from drivers.core.clock import NANOSECONDS, MonotonicClock
 from drivers.core.configuration import validate
 from drivers.core.errors import DeviceError, TactileLabError
@@ -64,9 +65,7 @@ class CameraWorker:
 
     def _begin_again(self) -> None:
         if not self._settings.repeat or self._frames == self._frames_before:
-            raise DeviceError(
-                "the video or folder has ended", where="camera", hint="Say repeat: true to begin it again"
-            )
+            raise DeviceError("the video or folder has ended", where="camera", hint="Set repeat: true to play it again")
         self._frames_before = self._frames
         self._source.close()
         self._source.open()
@@ -118,6 +117,9 @@ def main() -> None:
     except TactileLabError as error:
         pipe.put(RecordKind.ERROR, clock.now_ns(), str(error).encode())
         sys.exit(error.exit_code)
+    except Exception as error:
+        pipe.put(RecordKind.ERROR, clock.now_ns(), failure(error).encode())
+        raise
     finally:
         pipe.close()
 

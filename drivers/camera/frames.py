@@ -18,6 +18,7 @@ LARGEST_PIXELS = 40_000_000
 """A header that promises more is damaged or hostile."""
 
 _PNG_HEAD, _PNG_TAIL = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB\x60\x82"
+_CHUNK_FRAME = 12  # bytes of a chunk of a PNG besides its data: length, type, checksum
 _JPEG_HEAD, _JPEG_TAIL = b"\xff\xd8", b"\xff\xd9"
 _JPEG_SIZES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
@@ -91,14 +92,25 @@ def _size(payload: bytes) -> tuple[int, int]:
     """Width and height that the head promises; refuses what is no picture or lacks its end."""
     if payload.startswith(_PNG_HEAD):
         if not payload.endswith(_PNG_TAIL) or len(payload) < 33:
-            raise _error("PNG cut short")
+            raise _error("PNG truncated")
+        _check_chunks(payload)
         width, height = struct.unpack(">II", payload[16:24])
         return width, height
     if payload.startswith(_JPEG_HEAD):
         if not payload.rstrip(b"\0").endswith(_JPEG_TAIL):
-            raise _error("JPEG cut short")
+            raise _error("JPEG truncated")
         return _jpeg_size(payload)
     raise _error(f"{len(payload)} bytes that are neither JPEG nor PNG")
+
+
+def _check_chunks(payload: bytes) -> None:
+    """Refuse a PNG whose chunks end elsewhere than its data: OpenCV makes room first for whatever length they state."""
+    at = len(_PNG_HEAD)
+    while at + _CHUNK_FRAME <= len(payload):
+        (length,) = struct.unpack_from(">I", payload, at)
+        at += _CHUNK_FRAME + length
+    if at != len(payload):
+        raise _error("PNG whose parts are longer than it is")
 
 
 def _jpeg_size(payload: bytes) -> tuple[int, int]:
@@ -113,4 +125,4 @@ def _jpeg_size(payload: bytes) -> tuple[int, int]:
 
 
 def _error(what: str) -> CodecError:
-    return CodecError(what, where="camera frame", hint="Check the camera's link and its picture format")
+    return CodecError(what, where="camera frame", hint="Check the camera's connection and its picture format")

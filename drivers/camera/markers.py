@@ -94,7 +94,7 @@ class MarkerSettings(StrictModel):
 def known_dictionary(name: str) -> str:
     """The name, if OpenCV has a dictionary called so. Raises ValueError."""
     if name not in DICTIONARIES:
-        raise ValueError(f"{name!r} is no dictionary of OpenCV")
+        raise ValueError(f"{name!r} is not an OpenCV dictionary")
     return name
 
 
@@ -116,9 +116,9 @@ def opencv_dictionary(name: str) -> Any:
         storage = cv2.FileStorage(name, cv2.FILE_STORAGE_READ)
         good = storage.isOpened() and dictionary.readDictionary(storage.root())
     except (cv2.error, SystemError) as error:
-        raise ValueError(f"{name!r} holds no dictionary in OpenCV's form") from error
+        raise ValueError(f"{name!r} contains no dictionary in OpenCV's format") from error
     if not good:
-        raise ValueError(f"{name!r} holds no dictionary in OpenCV's form")
+        raise ValueError(f"{name!r} contains no dictionary in OpenCV's format")
     return dictionary
 
 

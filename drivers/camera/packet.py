@@ -64,7 +64,7 @@ def decode_packet(datagram: Datagram, *, largest_pixels: int = LARGEST_PIXELS) -
         raise _error(f"{len(payload)} bytes instead of {rows_end + picture}")
     rows = np.frombuffer(payload, _MARKER, markers, _HEAD.size)
     if not (np.isfinite(rows["corners_px"]).all() and (rows["blur_px"] >= 0.0).all()):
-        raise _error("corners that are no numbers")
+        raise _error("corners that are not numbers")
     found = Detection(DICTIONARIES[dictionary], (width, height), {int(row["number"]): _marker(row) for row in rows})
     promised = min(largest_pixels, width * height)  # a picture that says it is larger is not even decoded
     image = decode_image(payload[rows_end:], largest_pixels=promised) if picture else None
@@ -96,4 +96,4 @@ def _marker(row: np.void) -> SeenMarker:
 
 
 def _error(what: str) -> CodecError:
-    return CodecError(what, where="camera", hint="Check the camera's link and its version")
+    return CodecError(what, where="camera", hint="Check the camera's connection and its version")

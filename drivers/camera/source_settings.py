@@ -78,5 +78,5 @@ def place_of(source: str) -> Place:
         return Place("folder", source)
     if path.is_file():
         return Place("video", source)
-    hint = "Name a camera (0, /dev/video0), a folder of pictures, a video, gstreamer:PIPELINE or simulated"
+    hint = "Give a camera (0, /dev/video0), a folder of pictures, a video, gstreamer:PIPELINE or simulated"
     raise ConfigurationError("no such camera, folder or file", where=source, hint=hint)

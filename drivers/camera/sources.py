@@ -46,7 +46,7 @@ class OpenCvSource:
         """Open the device and fix what can be fixed. Raises DeviceError."""
         kind, name = self._settings.place()
         if kind == "gstreamer" and "GStreamer:                   YES" not in cv2.getBuildInformation():
-            hint = "Install an OpenCV with it, or use the camera's device file"
+            hint = "Install an OpenCV with GStreamer, or use the camera's device file"
             raise DeviceError("this OpenCV was built without GStreamer", where="camera", hint=hint)
         number: int | str = int(name) if name.isdigit() else name
         back_end = {"device": cv2.CAP_V4L2, "gstreamer": cv2.CAP_GSTREAMER}.get(kind, cv2.CAP_ANY)
@@ -99,15 +99,17 @@ class OpenCvSource:
         taken = self._capture.set(key, value)
         now = self._capture.get(key)
         if not taken or abs(now - value) > 0.01 * max(abs(value), 1.0):
-            self._notes.append(f"the driver does not take {what} {value:g} (it stays {now:g})")
+            self._notes.append(f"the driver does not accept {what} {value:g} (it stays {now:g})")
 
     def _check_size(self, image: Any) -> None:
         size = image.shape[:2]
         expected = self._size or (self._settings.size_px[::-1] if self._settings.place().kind == "device" else size)
         if size != expected:
             shown = [f"{width} x {height}" for height, width in (expected, size)]
-            what = f"gives pictures of {shown[1]} pixels instead of {shown[0]}"
-            raise DeviceError(what, where="camera", hint="State the size it was calibrated with, and calibrate for it")
+            what = f"delivers pictures of {shown[1]} pixels instead of {shown[0]}"
+            raise DeviceError(
+                what, where="camera", hint="Set the size for which it was calibrated, or calibrate it for this size"
+            )
         self._size = size
 
     def _count(self, stamp_ns: int) -> None:
@@ -123,7 +125,7 @@ class OpenCvSource:
     def _check_end(self) -> None:
         """A video ends; a camera does not. Raises DeviceError."""
         if self._settings.place().kind != "video":
-            raise DeviceError("gives no more pictures", where="camera", hint="Check its cable and power")
+            raise DeviceError("delivers no more pictures", where="camera", hint="Check its cable and power")
 
 
 class FolderSource:
@@ -140,7 +142,7 @@ class FolderSource:
         folder = Path(self._settings.place().name)
         self._files = sorted(file for file in folder.iterdir() if file.suffix.lower() in PICTURES)
         if not self._files:
-            hint = f"Pictures end in {', '.join(PICTURES)}"
+            hint = f"Supported suffixes are {', '.join(PICTURES)}"
             raise ConfigurationError("no picture in the folder", where=str(folder), hint=hint)
         self._next = 0
 
@@ -153,12 +155,12 @@ class FolderSource:
         self._counter += 1
         image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
         if image is None:
-            raise DeviceError("is no picture that can be read", where=str(file), hint="Take it out of the folder")
+            raise DeviceError("is not a readable picture", where=str(file), hint="Remove it from the folder")
         self._size = self._size or image.shape
         if image.shape != self._size:
             shown = [f"{width} x {height}" for height, width in (image.shape, self._size)]
-            what = f"has {shown[0]} pixels, the pictures before it {shown[1]}"
-            raise DeviceError(what, where=str(file), hint="Keep to pictures of one camera at one resolution")
+            what = f"has {shown[0]} pixels, but the previous pictures {shown[1]}"
+            raise DeviceError(what, where=str(file), hint="Use pictures of one camera at one resolution")
         return Picture(self._clock.now_ns(), self._counter, 0, np.asarray(image, np.uint8))
 
     def close(self) -> None:

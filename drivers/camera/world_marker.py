@@ -109,7 +109,7 @@ class WorldMarker:
         agree = float(np.ptp(self._strange, axis=0).max()) <= self._settings.moved_px
         if len(self._strange) == _AGREEING and agree:
             self._move(np.mean(self._strange, axis=0), f"the world marker or the camera was moved: {away_px:.1f} px")
-        return self.moved or f"the world marker is {away_px:.1f} px from where it was"
+        return self.moved or f"the world marker is {away_px:.1f} px from its first position"
 
     def _creeping(self) -> str:
         """Steps too small for one picture add up."""
@@ -118,7 +118,7 @@ class WorldMarker:
         recent_px = np.mean(self._recent, axis=0)
         away_px = float(np.abs(recent_px - self._first_px).max())
         if away_px > self._settings.moved_px / 2:
-            self._move(recent_px, f"the world marker or the camera creeps: {away_px:.1f} px so far")
+            self._move(recent_px, f"the world marker or the camera drifts: {away_px:.1f} px so far")
         return self.moved
 
     def _move(self, corners_px: Array, words: str) -> None:

@@ -12,7 +12,9 @@ from drivers.core.errors import WriteError
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
-def write_whole(path: Path, content: str | bytes, hint: str = "Choose another folder, or check its rights") -> None:
+def write_whole(
+    path: Path, content: str | bytes, hint: str = "Choose another folder, or check its permissions"
+) -> None:
     """Write a file, and its folder where there is none, whole or not at all.
 
     Args:
@@ -33,7 +35,7 @@ def write_whole(path: Path, content: str | bytes, hint: str = "Choose another fo
     except OSError as error:
         advice = "Free some space on it, then try again" if disk_full(error) else hint
         in_the_way = isinstance(error, (FileExistsError, NotADirectoryError))
-        what = f"cannot be written ({path.parent} is no folder)" if in_the_way else write_failure(error)
+        what = f"cannot be written ({path.parent} is not a folder)" if in_the_way else write_failure(error)
         raise WriteError(what, where=str(path), hint=advice) from error
     finally:  # after an interruption too; nothing is left of it when all went well
         with suppress(OSError):  # where the folder is none, either

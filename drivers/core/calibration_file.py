@@ -42,10 +42,10 @@ def check_seal(content: Mapping[str, Any], where: str) -> None:
     """
     if content.get("format") != FORMAT:
         hint = "Use the version of tactile-lab that wrote it, or calibrate again"
-        raise ConfigurationError(f"has the form {content.get('format')}, not {FORMAT}", where=where, hint=hint)
+        raise ConfigurationError(f"has the format {content.get('format')}, not {FORMAT}", where=where, hint=hint)
     if content.get(SEAL) != seal_of(content):
-        hint = "Restore the file, or calibrate again (a known pose: calibrate forearm --method manual)"
-        raise ConfigurationError("was changed by hand: its content does not fit its hash", where=where, hint=hint)
+        hint = "Restore the file, or calibrate again (for a known pose: calibrate forearm --method manual)"
+        raise ConfigurationError("was changed by hand: its content does not match its hash", where=where, hint=hint)
 
 
 def load_parameters(path: Path, model: type[Model]) -> Model:

@@ -10,11 +10,14 @@ from __future__ import annotations
 
 import json
 import os
+import runpy
 import select
 import subprocess
 import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 from drivers.core.clock import NANOSECONDS, MonotonicClock
@@ -23,6 +26,32 @@ from drivers.core.orders import Order, OrderWriter
 
 _READ_BYTES = 1_048_576
 _ENDING_s = 1.0
+_PACKAGES = Path(__file__).resolve().parents[2]
+_INSTALLED = ("site-packages", "dist-packages")
+"""Folders that Python looks into by itself, behind its own library."""
+
+_SHOWN = 80
+
+
+def child_command(module: str, *words: str) -> list[str]:
+    """The command that runs a module of ours as a program, without the current folder on its import path.
+
+    Python puts that folder first for ``-m``, and would execute a ``drivers.py`` or ``numpy.py`` that lies there.
+    """
+    return [sys.executable, "-P", "-m", "drivers.core.child_process", module, *words]
+
+
+def child_environment() -> dict[str, str]:
+    """The environment for such a command: this one, with our packages where this process has them from.
+
+    Of the entries of ``PYTHONPATH``, made absolute, those that mean the current folder, as an empty one does, are left
+    out. So it is the same whether the packages are installed, installed as a checkout, or found by ``PYTHONPATH``.
+    """
+    entries = [Path(entry).resolve() for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
+    ours = [] if _PACKAGES.name in _INSTALLED else [_PACKAGES]
+    kept = dict.fromkeys(map(str, [*ours, *(entry for entry in entries if entry != Path.cwd())]))
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    return environment | ({"PYTHONPATH": os.pathsep.join(kept)} if kept else {})
 
 
 class ChildProcess:
@@ -47,9 +76,14 @@ class ChildProcess:
         Raises:
             DeviceError: it ended at once.
         """
-        assert self._process is None, f"{self.name} has been started"
-        command = [sys.executable, "-m", self._module]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
+        assert self._process is None, f"{self.name} has been started already"
+        self._process = subprocess.Popen(
+            child_command(self._module),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            process_group=0,
+            env=child_environment(),
+        )
         assert self._process.stdin is not None
         self._orders, self._rest = OrderWriter(self._process.stdin.fileno(), self.name), b""
         try:
@@ -96,7 +130,7 @@ class ChildProcess:
         if not (data := os.read(process.stdout.fileno(), _READ_BYTES)):
             with suppress(subprocess.TimeoutExpired):  # it says nothing more a moment before it has ended
                 process.wait(_ENDING_s)
-            raise DeviceError("its process has ended", where=self.name, hint="See its last error, and connect again")
+            raise DeviceError("its process has ended", where=self.name, hint="Check its last error, and connect again")
         return data
 
     def ready(self, patience_s: float) -> dict[str, Any]:
@@ -125,7 +159,7 @@ class ChildProcess:
         """The next line of JSON it says; None when none comes in this time.
 
         Raises:
-            DeviceError: it has ended, or the line is an error of :func:`errors_said`: in its own words.
+            DeviceError: it has ended, the line is an error of :func:`errors_said`, in its own words, or no answer.
         """
         clock = MonotonicClock()
         until_ns = clock.now_ns() + round(patience_s * NANOSECONDS)
@@ -134,7 +168,7 @@ class ChildProcess:
                 return None
             self._rest += data
         line, self._rest = self._rest.split(b"\n", 1)
-        content: dict[str, Any] = json.loads(line)
+        content = read_answer(line, self.name)
         if "error" in content:
             raise DeviceError(content["error"], where=self.name)
         return content
@@ -167,6 +201,19 @@ class ChildProcess:
         return self._process
 
 
+def read_answer(line: bytes, where: str) -> dict[str, Any]:
+    """What a child says in a line of JSON.
+
+    Raises:
+        DeviceError: it is something else; a library of the child's may have printed it.
+    """
+    with suppress(ValueError):
+        if isinstance(content := json.loads(line), dict):
+            return content
+    shown = line[:_SHOWN].decode(errors="replace")
+    raise DeviceError(f"its process says what is no answer: {shown!r}", where=where, hint="Start it again")
+
+
 # --- the child's side ----------------------------------------------------------------------------------------------
 
 
@@ -178,9 +225,35 @@ def say(content: dict[str, Any]) -> None:
 
 @contextmanager
 def errors_said() -> Iterator[None]:
-    """Errors of this package are said as an answer, and end the process with their exit code."""
+    """Errors are said as an answer, and end the process: those of this package with their exit code."""
     try:
         yield
     except TactileLabError as error:
         say({"error": str(error)})
         sys.exit(error.exit_code)
+    except Exception as error:
+        say({"error": failure(error)})
+        sys.exit(1)
+
+
+def failure(error: Exception) -> str:
+    """An error that nobody foresaw, in one line: what it was, and where it happened."""
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f", in {frames[-1].filename}, line {frames[-1].lineno}" if frames else ""
+    words = " ".join(str(error).split())
+    return f"the program itself failed ({type(error).__name__}: {words}{place}). Please report this line"
+
+
+def main() -> None:
+    """How every child begins: run the module that the first word names, with the other words; errors are one line."""
+    module, sys.argv[1:] = sys.argv[1], sys.argv[2:]
+    try:
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    except Exception as error:
+        sys.exit(f"{module}: {failure(error)}")
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -51,13 +51,13 @@ class StrictModel(BaseModel):
             if key not in current:
                 continue
             if new in current:
-                raise ValueError(f"{key} is the former name of {new}: keep {new} alone")
+                raise ValueError(f"{key} is the former name of {new}: remove {key}")
             current[new] = current.pop(key)
             warnings.warn(RenamedKeyWarning(f"{_reading.get()}{key} is now called {new}"), stacklevel=2)
         for key in cls.retired:
             if key in current:
                 del current[key]
-                warnings.warn(RenamedKeyWarning(f"{_reading.get()}{key} has no effect any more"), stacklevel=2)
+                warnings.warn(RenamedKeyWarning(f"{_reading.get()}{key} no longer has any effect"), stacklevel=2)
         return current
 
 
@@ -73,10 +73,10 @@ def recorded_keys() -> Iterator[None]:
         yield
 
 
-_reading: ContextVar[str] = ContextVar("what is being read", default="")
+_reading: ContextVar[str] = ContextVar("the file being read", default="")
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(yaml.CSafeLoader):
     """Safe loader with its own implicit resolvers (the parent's table is shared: copy it)."""
 
 
@@ -94,6 +94,7 @@ _Loader.add_implicit_resolver(
 )
 
 
+_DEEPEST = 100
 _MERGE = "tag:yaml.org,2002:merge"
 
 
@@ -137,11 +138,23 @@ def loads(content: bytes, where: str) -> Any:
         ConfigurationError: it is not strict YAML in UTF-8.
     """
     try:
-        return yaml.load(content.decode("utf-8"), Loader=_Loader)
+        text = content.decode("utf-8")
+        _check_depth(text)
+        return yaml.load(text, Loader=_Loader)
     except UnicodeDecodeError as error:
-        raise ConfigurationError("is not a text file", where=where, hint="Name a YAML file in UTF-8") from error
+        raise ConfigurationError("is not a text file", where=where, hint="Give a YAML file in UTF-8") from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date or number out of its range
         raise ConfigurationError(f"is not valid YAML: {_yaml_problem(error)}", where=where, hint=_RETRY) from error
+
+
+def _check_depth(text: str) -> None:
+    """Refuse what is nested so deep that composing it would overflow the stack. The parser itself does not recurse."""
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.CSafeLoader):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST:
+            problem = f"nested deeper than {_DEEPEST} levels"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=cast(yaml.Mark, event.start_mark))
 
 
 def load_model(path: Path, model: type[Model]) -> Model:

@@ -63,7 +63,7 @@ def unload_extension(path: Path) -> None:
 def blamed(error: BaseException) -> str:
     """The extension that an unforeseen error comes out of, with what it says; empty where none is to blame."""
     files = {frame.filename for frame in traceback.extract_tb(error.__traceback__)}
-    return next((f"{file}: this extension fails: {explain(error, file)}" for file in _named() if file in files), "")
+    return next((f"{file}: this extension failed: {explain(error, file)}" for file in _named() if file in files), "")
 
 
 def _import(path: Path, name: str) -> None:
@@ -71,7 +71,7 @@ def _import(path: Path, name: str) -> None:
         raise ConfigurationError("no such extension", where=str(path), hint="Check its path")
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise ConfigurationError("is no Python file", where=str(path), hint="Name a .py file")
+        raise ConfigurationError("is not a Python file", where=str(path), hint="Give a .py file")
     sys.modules[name] = module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
@@ -79,8 +79,8 @@ def _import(path: Path, name: str) -> None:
         unload_extension(path)
         if isinstance(error, TactileLabError) or not isinstance(error, Exception):
             raise
-        what = f"this extension fails when it is loaded: {explain(error, str(path))}"
-        raise ConfigurationError(what, where=str(path), hint="Correct it, or leave it out") from error
+        what = f"this extension could not be loaded: {explain(error, str(path))}"
+        raise ConfigurationError(what, where=str(path), hint="Correct it, or remove it") from error
 
 
 def _named() -> list[str]:

@@ -67,4 +67,4 @@ class OrderWriter:
         except BlockingIOError:
             written = 0
         if written < len(line):
-            raise DeviceError("its process takes no orders", where=self._where, hint="Connect again")
+            raise DeviceError("its process accepts no commands", where=self._where, hint="Connect again")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any
 
-from drivers.core.child_process import ChildProcess
+from drivers.core.child_process import ChildProcess, read_answer
 from drivers.core.clock import NANOSECONDS, MonotonicClock
 from drivers.core.errors import DeviceError
 from drivers.core.orders import Order
@@ -58,8 +57,7 @@ class RecordProcess(ChildProcess):
                     aside(record)
         if wanted is None:
             raise DeviceError("its process does not answer", where=self.name, hint="Connect again")
-        content: dict[str, Any] = json.loads(wanted.payload)
-        return content
+        return read_answer(wanted.payload, self.name)
 
     def last_records(self, patience_s: float) -> list[Record]:
         """Close it, as :meth:`ChildProcess.close`; the records it said last."""

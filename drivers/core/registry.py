@@ -55,10 +55,10 @@ class Registry(Generic[Item]):
         """
         file = sys._getframe(1).f_code.co_filename
         if not _NAME.fullmatch(name):
-            what, hint = f"registers a {self.kind} as {name!r}", "Use small letters, digits, _ and -"
+            what, hint = f"registers a {self.kind} as {name!r}", "Use lower-case letters, digits, _ and -"
             raise ConfigurationError(what, where=file, hint=hint)
         if name in self._entries:
-            what = f"registers the {self.kind} {name!r}, a name that {self.file(name)} has taken"
+            what = f"registers the {self.kind} {name!r}, a name already used by {self.file(name)}"
             raise ConfigurationError(what, where=file, hint="Choose another name")
         self._entries[name] = _Entry(item, file)
 
@@ -94,7 +94,7 @@ class Registry(Generic[Item]):
 
     def unknown(self, name: str) -> str:
         """That there is no entry of this name, in words."""
-        return f"no {self.kind} is called {name!r}"
+        return f"there is no {self.kind} {name!r}"
 
     def listed(self) -> str:
         """The names, in words."""

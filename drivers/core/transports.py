@@ -85,7 +85,7 @@ class MemoryTransport:
 
     def _check_open(self) -> None:
         if not self._open:
-            raise DeviceError("link is not open", where=self.name, hint="Connect the device first")
+            raise DeviceError("the transport is not open", where=self.name, hint="Connect the device first")
 
 
 class ReplayTransport:

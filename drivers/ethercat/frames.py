@@ -148,7 +148,7 @@ def decode_frame(frame: bytes) -> tuple[Telegram, ...]:
     start = _ETHERNET.size + _LENGTH.size
     end = start + (length & _LENGTH_MASK)
     if end > len(frame):
-        raise CodecError(f"{end - len(frame)} bytes short of its stated length", where="EtherCAT frame")
+        raise CodecError(f"{end - len(frame)} bytes shorter than its stated length", where="EtherCAT frame")
     return _decode_telegrams(frame, start, end)
 
 
@@ -156,12 +156,12 @@ def _decode_telegrams(frame: bytes, at: int, end: int) -> tuple[Telegram, ...]:
     telegrams, more = [], True
     while more:
         if at + _OVERHEAD > end:
-            raise CodecError("a telegram is cut off", where="EtherCAT frame")
+            raise CodecError("a telegram is truncated", where="EtherCAT frame")
         command, index, address, flags, interrupt = _HEAD.unpack_from(frame, at)
         data_at, size, more = at + _HEAD.size, flags & _LENGTH_MASK, bool(flags & _MORE)
         at = data_at + size + _COUNTER.size
         if at > end:
-            raise CodecError("a telegram is cut off", where="EtherCAT frame")
+            raise CodecError("a telegram is truncated", where="EtherCAT frame")
         (counter,) = _COUNTER.unpack_from(frame, data_at + size)
         data, circulated = frame[data_at : data_at + size], bool(flags & _CIRCULATED)
         telegrams.append(Telegram(_known_command(command), address, data, index, counter, interrupt, circulated))

@@ -17,7 +17,7 @@ from drivers.core.configuration import StrictModel
 from drivers.core.errors import CodecError, DeviceError
 from drivers.ethercat.frames import Command, Telegram, decode_frame, encode_frame, physical, source_of
 from drivers.ethercat.ports import Port
-from drivers.ethercat.registers import AL_ERROR, AlState, AlStatus, Register
+from drivers.ethercat.registers import AL_ERROR, DEVICE_EMULATION, AlState, AlStatus, Register
 
 _INDICES, _NUMBERS = 0x100, 0x10000
 _EEPROM_READ, _EEPROM_BUSY, _EEPROM_ERRORS = 0x0100, 0x8000, 0x7800
@@ -197,7 +197,7 @@ class EtherCatMaster:
         raise self._eeprom_error(slave, "stays busy")
 
     def _eeprom_error(self, slave: Slave, what: str) -> DeviceError:
-        hint = "Switch the hand off and on; if it stays, the board needs service"
+        hint = "Switch the hand off and on; if the error remains, the board needs service"
         return DeviceError(f"the EEPROM of slave {slave.position} {what}", where=self.where, hint=hint)
 
     def al_status(self, slave: Slave) -> AlStatus:
@@ -205,12 +205,16 @@ class EtherCatMaster:
         return AlStatus.decode(self.read(slave, Register.AL_STATUS, AlStatus.SIZE))
 
     def change_state(self, slave: Slave, state: AlState) -> None:
-        """Bring a slave to a state, acknowledging an error that stands.
+        """Bring a slave to a state, acknowledging an error only where one is shown, as Shadow's master does.
+
+        A slave in device emulation copies the request into its status (protocols: Slave registers): an acknowledge
+        would look like an error from then on, and what looks like one goes with any request.
 
         Raises:
             DeviceError: it refuses, with its reason in words, or never gets there.
         """
-        acknowledge = AL_ERROR if state == AlState.INIT or self.al_status(slave).error else 0
+        stands = self.al_status(slave).error and not self._copies_requests(slave)
+        acknowledge = AL_ERROR if stands else 0
         self.write(slave, Register.AL_CONTROL, struct.pack("<H", state | acknowledge))
         for _ in range(self.settings.state_tries):
             self.wait(_SETTLING_s)
@@ -218,8 +222,12 @@ class EtherCatMaster:
                 return
             if status.error:
                 break
-        what = f"slave {slave.position} does not go to {state.name}: it is in {status}"
+        what = f"slave {slave.position} does not enter {state.name}: it is in {status}"
         raise DeviceError(what, where=self.where, hint="Switch the hand off and on, and connect again")
+
+    def _copies_requests(self, slave: Slave) -> bool:
+        """Whether a slave is in device emulation."""
+        return bool(self.read(slave, Register.ESC_CONFIGURATION, 1)[0] & DEVICE_EMULATION)
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,9 @@ class RawPort:
     def _check_name(self) -> None:
         present = [name for _, name in socket.if_nameindex()]
         if self.name not in present:
-            raise DeviceError("no such network interface", where=self.name, hint=f"Present are {', '.join(present)}")
+            raise DeviceError(
+                "no such network interface", where=self.name, hint=f"Available interfaces: {', '.join(present)}"
+            )
 
     def _raw_socket(self) -> socket.socket:
         try:
@@ -113,7 +115,7 @@ class RawPort:
         except PermissionError as error:
             raise DeviceError("no permission for raw sockets", where=self.name, hint=_NEEDS_RIGHT) from error
         except (AttributeError, OSError) as error:
-            raise DeviceError(f"no raw sockets here ({error})", where=self.name, hint="Use Linux") from error
+            raise DeviceError(f"raw sockets are not available ({error})", where=self.name, hint="Use Linux") from error
 
     def _failure(self, error: OSError) -> DeviceError:
         if error.errno in (errno.ENETDOWN, errno.ENXIO, errno.ENODEV):

@@ -24,7 +24,9 @@ class Register(IntEnum):
     AL_CONTROL = 0x0120
     AL_STATUS = 0x0130
     AL_STATUS_CODE = 0x0134
+    ESC_CONFIGURATION = 0x0141
     ERROR_COUNTERS = 0x0300
+    LOST_LINKS = 0x0310
     WATCHDOG_DIVIDER = 0x0400
     WATCHDOG_TIME_PDI = 0x0410
     WATCHDOG_TIME = 0x0420
@@ -54,6 +56,9 @@ class AlState(IntEnum):
 
 AL_STATE_MASK, AL_ERROR = 0x0F, 0x10
 """In the status bit 4 reports an error; in the control it acknowledges one."""
+
+DEVICE_EMULATION = 0x01
+"""Bit of :attr:`Register.ESC_CONFIGURATION`: no processor, AL control is copied into AL status, bit 4 and all."""
 
 
 class AlCode(IntEnum):
@@ -89,6 +94,7 @@ class AlCode(IntEnum):
 
 
 _CODE_WORDS = {
+    AlCode.NONE: "no reason given",
     AlCode.UNSPECIFIED: "no reason given",
     AlCode.NO_MEMORY: "out of memory",
     AlCode.INVALID_STATE_CHANGE: "the requested change of state is not allowed",
@@ -99,14 +105,14 @@ _CODE_WORDS = {
     AlCode.INVALID_MAILBOX_PREOP: "mailbox set up wrongly",
     AlCode.INVALID_SYNC_MANAGER: "SyncManagers set up wrongly",
     AlCode.NO_VALID_INPUTS: "has no valid inputs",
-    AlCode.NO_VALID_OUTPUTS: "got no valid outputs",
+    AlCode.NO_VALID_OUTPUTS: "received no valid outputs",
     AlCode.SYNCHRONISATION: "lost synchronisation",
-    AlCode.WATCHDOG: "watchdog: no process data came in time",
+    AlCode.WATCHDOG: "watchdog: no process data arrived in time",
     AlCode.INVALID_SYNC_MANAGER_TYPES: "SyncManager types are wrong",
     AlCode.INVALID_OUTPUTS: "output SyncManagers have a wrong address or length",
     AlCode.INVALID_INPUTS: "input SyncManagers have a wrong address or length",
     AlCode.INVALID_WATCHDOG: "watchdog set up wrongly",
-    AlCode.NEEDS_COLD_START: "needs its power switched off and on",
+    AlCode.NEEDS_COLD_START: "needs a power cycle",
     AlCode.NEEDS_INIT: "has to go through INIT",
     AlCode.NEEDS_PREOP: "has to go through PREOP",
     AlCode.NEEDS_SAFEOP: "has to go through SAFEOP",

@@ -119,6 +119,6 @@ def _other_rates(settings: Serial, rates: Iterable[int]) -> tuple[Serial, ...]:
 def _own_calibration(path: Path, serial: str) -> cal_file.AtiCalibration:
     calibration = cal_file.load(path)
     if serial and calibration.serial != serial:
-        what = f"is the calibration of {calibration.serial}, and the sensor is {serial}"
-        raise ConfigurationError(what, where=str(path), hint="Name the file that came with this sensor")
+        what = f"is the calibration of {calibration.serial}, but the sensor is {serial}"
+        raise ConfigurationError(what, where=str(path), hint="Give the file that came with this sensor")
     return calibration

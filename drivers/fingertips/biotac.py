@@ -56,8 +56,10 @@ class BioTacKind(PalmKind[KnownBioTac]):
     def body(self, finger: str, calibration: KnownBioTac) -> TipBody:
         surface = self.surface(calibration)
         if surface is None:
-            what, hint = f"the BioTac of {finger} has no ellipsoid skin", "State the skin as an ellipsoid"
-            raise ConfigurationError(what, where="simulated hand", hint=f"{hint}: the physics knows no other")
+            what, hint = f"the BioTac of {finger} has no ellipsoid skin", "Describe the skin as an ellipsoid"
+            raise ConfigurationError(
+                what, where="simulated hand", hint=f"{hint}: the simulation supports no other shape"
+            )
         semi_axes_m, distal_T_skin = surface
         x, y, z = distal_T_skin.translation().tolist()
         return TipBody(calibration.calibration.distal_T_sensor.pose(), distal_T_skin, semi_axes_m, _MASS_kg, (x, y, z))
@@ -91,12 +93,14 @@ def contradictions(
     """
     kind, told = names.kind(finger), names.serial(finger)
     if kind not in (None, TactileProtocol.BIOTAC):
-        return ["is no BioTac: correct the fingertips in the rig file, or plug the sensor in"]
+        return ["is not a BioTac: correct the fingertips in the rig file, or plug the sensor in"]
     problems = []
     if told and electrodes not in (None, electrodes_of(told)):
-        problems.append(f"has {electrodes_of(told)} electrodes by its serial number, {electrodes} by its calibration")
+        problems.append(
+            f"has {electrodes_of(told)} electrodes by its serial number, but {electrodes} by its calibration"
+        )
     if told and serial not in ("", told):
-        problems.append(f"its serial number is {told}, not {serial}: are fingertips exchanged?")
+        problems.append(f"its serial number is {told}, not {serial}: were two fingertips swapped?")
     return problems
 
 

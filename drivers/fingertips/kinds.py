@@ -37,5 +37,5 @@ def palm_kind(tactile: str) -> str | None:
 def as_palm_kind(name: str) -> PalmKind[Any]:
     """The kind of this name, which sends through the palm."""
     kind = FINGERTIPS[name]
-    assert isinstance(kind, PalmKind), f"{name} fingertips have links of their own"
+    assert isinstance(kind, PalmKind), f"{name} fingertips have their own transports"
     return kind

@@ -70,5 +70,5 @@ class Nano17Kind(LinkedKind[FingertipCalibration]):
             f"{figures['lost']:.0f} lost, noise {noise_mN:.1f} mN (expected {expected_mN:.1f}), "
             f"bias {figures['bias_N']:.2f} N"
         )
-        noisy = "noisier than its calibration says: is it touched, or is a cable loose?"
+        noisy = "noisier than its calibration says: is it being touched, or is a cable loose?"
         return TipReport((noisy,) if noise_mN > _NOISY * expected_mN else (), (words,), figures)

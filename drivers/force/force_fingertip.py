@@ -32,7 +32,7 @@ AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 CAPTURE_LIMIT = 1000
 """Samples a capture keeps, the newest: a capture that nobody ends must not grow without bound."""
 
-_STUCK = "the sensor has stopped measuring: its readings do not move"
+_STUCK = "the sensor has stopped measuring: its readings do not change"
 
 
 class ForceTip:
@@ -87,8 +87,8 @@ class ForceTip:
         """
         if self.newest is None or len(self._recent) < self._settings.tare_samples:
             raise self._refusal(
-                f"{len(self._recent)} usable samples where {self._settings.tare_samples} are needed",
-                "Wait for samples; see the sensor's health",
+                f"{len(self._recent)} usable samples, but {self._settings.tare_samples} are needed",
+                "Wait for samples; check the sensor: tactile-lab rig check",
             )
         window = np.array(self._recent)
         spread = np.ptp(window, axis=0)
@@ -125,7 +125,7 @@ class ForceTip:
         if self._newest_usable:
             return self.overload
         told = [*self._reports(self.newest), *([_STUCK] if self.sequences.stuck else []), self.overload]
-        return "; ".join(filter(None, told)) or "its readings are no numbers"
+        return "; ".join(filter(None, told)) or "its readings are not numbers"
 
     @property
     def overload(self) -> str:
@@ -175,7 +175,7 @@ class ForceTip:
         elif overload := self.overload:
             problems.append(overload)
         if self._void:
-            problems.append(f"{self._void} void samples left out")
+            problems.append(f"{self._void} invalid samples ignored")
         if self.tare_record is None:
             problems.append("not tared")
         return (*problems, *self._sequence_problems(), *filter(None, [self._drift(), self._judge.fault]))
@@ -197,11 +197,11 @@ class ForceTip:
         if monitor.lost > self._settings.lost_share * (monitor.seen + monitor.lost):
             problems.append(f"{monitor.lost} of {monitor.seen + monitor.lost} records lost")
         if monitor.skipped > self._settings.lost_share * (monitor.seen + monitor.skipped):
-            problems.append(f"the sensor left out {monitor.skipped} records that its rate asks for")
+            problems.append(f"the sensor skipped {monitor.skipped} records")
         if monitor.restarts:
-            problems.append(f"the stream began again {monitor.restarts} times")
+            problems.append(f"the stream restarted {monitor.restarts} times")
         if monitor.disordered:
-            problems.append(f"{monitor.disordered} records out of order or twice")
+            problems.append(f"{monitor.disordered} records out of order or repeated")
         return problems
 
     @staticmethod

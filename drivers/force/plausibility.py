@@ -80,4 +80,4 @@ class WrenchMonitor:
             return ""
         usual = Counter(objections).most_common(1)[0][0]
         share = f"{len(objections)} of {len(self._verdicts)} loaded captures"
-        return f"the torque does not fit the force in {share}: {usual}; check cable, mounting and calibration file"
+        return f"the torque does not match the force in {share}: {usual}; check cable, mounting and calibration file"

@@ -38,7 +38,7 @@ def encode_frame(frame: CanFrame) -> bytes:
 def decode_frame(payload: bytes) -> CanFrame:
     """A message of a transport as a frame. Raises CodecError for what can be none."""
     if not 2 <= len(payload) <= 10:
-        raise CodecError(f"{len(payload)} bytes where a CAN frame has 2 to 10", where="CAN frame")
+        raise CodecError(f"{len(payload)} bytes, a CAN frame has 2 to 10", where="CAN frame")
     (identifier,) = _IDENTIFIER.unpack_from(payload)
     if identifier >= 1 << 11:
         raise CodecError(f"identifier 0x{identifier:x} does not fit 11 bits", where="CAN frame")
@@ -88,7 +88,9 @@ class CanTransport:
             bus.send(message, timeout=_SEND_TIMEOUT_S)
         except (can.CanError, OSError) as error:
             raise DeviceError(
-                f"the CAN bus takes no frame ({error})", where=self.name, hint="Check wiring, termination and bit rate"
+                f"the CAN bus does not accept frames ({error})",
+                where=self.name,
+                hint="Check wiring, termination and bit rate",
             ) from error
 
     def receive(self) -> list[Datagram]:
@@ -101,7 +103,7 @@ class CanTransport:
                 self.damaged += 1
                 continue
             except (can.CanError, OSError) as error:
-                gone = f"the CAN bus is gone ({error})"
+                gone = f"the CAN bus was disconnected ({error})"
                 raise DeviceError(gone, where=self.name, hint="Check the adapter") from error
             if message is None:
                 break
@@ -114,7 +116,7 @@ class CanTransport:
         """What was left out, in words; empty when nothing was."""
         counts = {
             "error frames on the bus": self.error_frames,
-            "frames of another kind left out": self.foreign,
+            "frames of another kind ignored": self.foreign,
             "damaged readings of the adapter": self.damaged,
         }
         return tuple(f"{count} {text}" for text, count in counts.items() if count)
@@ -127,5 +129,5 @@ class CanTransport:
 
     def _open_bus(self) -> can.BusABC:
         if self._bus is None:
-            raise DeviceError("link is not open", where=self.name, hint="Connect the device first")
+            raise DeviceError("the transport is not open", where=self.name, hint="Connect the device first")
         return self._bus

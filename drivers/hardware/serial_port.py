@@ -66,12 +66,12 @@ class SerialTransport:
 
     def _open_port(self) -> Any:
         if self._serial is None:
-            raise DeviceError("link is not open", where=self.name, hint="Connect the device first")
+            raise DeviceError("the transport is not open", where=self.name, hint="Connect the device first")
         return self._serial
 
     def _lost_error(self, error: Exception) -> DeviceError:
         return DeviceError(
-            f"the serial port {self.port} is gone ({error})", where=self.name, hint="Check plug and adapter"
+            f"the serial port {self.port} was disconnected ({error})", where=self.name, hint="Check plug and adapter"
         )
 
 
@@ -86,8 +86,8 @@ def _open_failure(name: str, port: str, baud: int, parity: str, error: Exception
         return DeviceError(f"{port} is in use by another program", where=name, hint="Close the other program")
     if number == errno.EINVAL:
         return DeviceError(
-            f"{port} cannot work at {baud} baud with parity {parity}",
+            f"{port} does not support {baud} baud with parity {parity}",
             where=name,
-            hint="Use an adapter that can, or another rate",
+            hint="Use another adapter or another rate",
         )
     return DeviceError(f"{port} cannot be opened ({error})", where=name, hint="Is it the sensor's serial port?")

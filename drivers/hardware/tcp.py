@@ -68,7 +68,7 @@ class TcpTransport:
         try:
             self._socket = socket.create_connection((self._host, self._port), _CONNECT_s)
         except OSError as error:
-            what = f"nobody listens at {self._host}:{self._port} ({error.strerror or error})"
+            what = f"cannot connect to {self._host}:{self._port} ({error.strerror or error})"
             raise self._failure(what) from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._reader = MessageReader()
@@ -96,7 +96,7 @@ class TcpTransport:
             while data := self._read(wire):
                 messages += self._cut(data)
             if not messages:
-                raise self._lost_error("it closed the connection")
+                raise self._lost_error("the device closed the connection")
         now_ns = self._clock.now_ns()
         return [Datagram(message, now_ns) for message in messages]
 
@@ -116,11 +116,11 @@ class TcpTransport:
 
     def _open(self) -> socket.socket:
         if self._socket is None:
-            raise DeviceError("link is not open", where=self.name, hint="Connect the device first")
+            raise DeviceError("the transport is not open", where=self.name, hint="Connect the device first")
         return self._socket
 
     def _lost_error(self, why: str) -> DeviceError:
-        return self._failure(f"lost {self._host}:{self._port} ({why})")
+        return self._failure(f"lost the connection to {self._host}:{self._port} ({why})")
 
     def _failure(self, what: str) -> DeviceError:
         return DeviceError(

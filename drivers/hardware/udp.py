@@ -75,7 +75,9 @@ class UdpTransport:
         except OSError as error:
             if made is not None:
                 made.close()
-            raise self._failure(f"no UDP socket to {self._host}:{self._port} ({error.strerror or error})") from error
+            raise self._failure(
+                f"cannot open a UDP socket to {self._host}:{self._port} ({error.strerror or error})"
+            ) from error
         self._socket, self._newest_ns = made, self._clock.now_ns()
         self._batches = BatchReceiver(made) if can_batch() else None
         self.foreign = self.dropped = 0
@@ -101,7 +103,7 @@ class UdpTransport:
             try:
                 batch = self._batches.receive() if self._batches else _singly(wire)
             except OSError as error:
-                raise self._failure(f"lost {self._host}:{self._port} ({error.strerror})") from error
+                raise self._failure(f"lost the connection to {self._host}:{self._port} ({error.strerror})") from error
             if not batch.payloads:
                 break
             taken += self._take(batch, behind_ns)
@@ -111,7 +113,7 @@ class UdpTransport:
         """Strangers and drops, in words; empty when there were none."""
         found = []
         if self.foreign:
-            found.append(f"{self.foreign} datagrams from other addresses than {self._address[0]} left out")
+            found.append(f"{self.foreign} datagrams from other addresses than {self._address[0]} ignored")
         if self.dropped:
             found.append(f"{self.dropped} datagrams dropped by the kernel: the program reads too slowly")
         return tuple(found)
@@ -137,7 +139,7 @@ class UdpTransport:
 
     def _open_socket(self) -> socket.socket:
         if self._socket is None:
-            raise DeviceError("link is not open", where=self.name, hint="Connect the device first")
+            raise DeviceError("the transport is not open", where=self.name, hint="Connect the device first")
         return self._socket
 
     def _failure(self, what: str) -> DeviceError:

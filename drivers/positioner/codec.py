@@ -60,7 +60,7 @@ def encode_command(command: PositionerCommand) -> bytes:
         CodecError: a value does not fit.
     """
     if (command.targets is None) != (command.sequence == QUESTION):
-        raise CodecError("a question has sequence number 0 and no targets", where="positioner")
+        raise CodecError("a request for the position has sequence number 0 and no targets", where="positioner")
     return _pack(command.sequence, np.zeros(6) if command.targets is None else command.targets)
 
 

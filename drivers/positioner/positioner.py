@@ -95,7 +95,7 @@ class Positioner:
                 return
             self._clock.sleep_until_ns(self._clock.now_ns() + round(self._settings.cycle_s * NANOSECONDS))
         raise DeviceError(
-            f"no answer to {self._settings.connect_tries} questions",
+            f"no answer to {self._settings.connect_tries} requests",
             where=self._transport.name,
             hint="Check the positioner's power and cable",
         )
@@ -214,7 +214,7 @@ class Positioner:
     def _check_following(self, sample: PositionerSample) -> None:
         behind = np.abs(self._sent - sample.q) / self._following
         if behind.max() > 1.0 and self._fault is None:
-            self._hold(f"stopped: {AXES[behind.argmax()]} does not follow, something may be in its way")
+            self._hold(f"stopped: {AXES[behind.argmax()]} does not follow, something may block it")
             self._sent = self._target = sample.q
 
     def _hold(self, what: str) -> None:
@@ -234,7 +234,7 @@ class Positioner:
         if self._counters.lost:
             problems.append(f"{self._counters.lost} of {self._counters.cycles} cycles lost")
         if self._counters.malformed:
-            problems.append(f"{self._counters.malformed} messages were no status of a positioner")
+            problems.append(f"{self._counters.malformed} messages were not a positioner status")
         if self._counters.late:
-            problems.append(f"{self._counters.late} statuses came behind newer ones")
+            problems.append(f"{self._counters.late} statuses arrived after newer ones")
         return tuple(problems)

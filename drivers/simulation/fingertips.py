@@ -67,5 +67,5 @@ def tactile_section(
 ) -> TactileSection:
     """The palm's tactile section with fingertips of a kind that sends through it. Raises ConfigurationError."""
     made = SIMULATED_FINGERTIPS[kind](plant, tips, settings, rng)
-    assert not isinstance(made, SimulatedLinks), f"fingertips of kind {kind} have links of their own"
+    assert not isinstance(made, SimulatedLinks), f"fingertips of kind {kind} have their own transports"
     return made

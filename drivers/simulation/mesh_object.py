@@ -88,7 +88,7 @@ def _read(path: Path) -> trimesh.Trimesh:
             f"cannot be read as a mesh ({error})", where=str(path), hint="Give a PLY, STL, OBJ or GLB file"
         ) from error
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        raise ShapeError("holds no triangles", where=str(path), hint="Export the object as a triangle mesh")
+        raise ShapeError("contains no triangles", where=str(path), hint="Export the object as a triangle mesh")
     return mesh
 
 
@@ -98,15 +98,15 @@ def _check(mesh: trimesh.Trimesh, where: str) -> None:
     largest = float(mesh.extents.max())
     if largest > LARGEST_m:
         raise ShapeError(
-            f"is {largest:.3g} m long where {LARGEST_m} m is the most the hand's workspace takes",
+            f"is {largest:.3g} m long, but at most {LARGEST_m} m fit the hand's workspace",
             where=where,
-            hint="The unit is the metre: is the mesh given in millimetres?",
+            hint="The unit must be the metre: is the mesh in millimetres?",
         )
     if largest < SMALLEST_m:
         raise ShapeError(
-            f"is only {largest * 1e3:.3g} mm long where the fingertips need {SMALLEST_m * 1e3:.0f} mm to hold",
+            f"is only {largest * 1e3:.3g} mm long, but the fingertips need {SMALLEST_m * 1e3:.0f} mm to hold it",
             where=where,
-            hint="The unit is the metre: was the mesh scaled from millimetres twice?",
+            hint="The unit must be the metre: was the mesh scaled from millimetres twice?",
         )
     if not mesh.is_watertight or mesh.volume <= 0:
         raise ShapeError(

@@ -114,7 +114,7 @@ def object_model(name: str) -> ObjectModel:
         return _scan(name)
     if name not in CATALOGUE:
         known = ", ".join([*CATALOGUE, f"{MESH_PREFIX}<path>"])
-        raise ConfigurationError(f"no object called {name!r}", where="object", hint=f"Objects are {known}")
+        raise ConfigurationError(f"there is no object {name!r}", where="object", hint=f"Available objects: {known}")
     return CATALOGUE[name](name)
 
 

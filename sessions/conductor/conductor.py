@@ -1,6 +1,6 @@
-"""The conductor: a session, grasp after grasp, until there are enough or a reason to end.
+"""The conductor runs a session, grasp after grasp, until there are enough or there is a reason to end.
 
-Who decides about the grasps and who does them is a :class:`~sessions.conductor.decisions.SessionRoles`.
+:class:`~sessions.conductor.decisions.SessionRoles` decide about the grasps and execute them.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ class Conductor:
     """Runs a session on a connected rig runtime.
 
     Args:
-        rig runtime: connected; the caller closes it.
+        runtime: connected; the caller closes it.
         settings: of the session.
-        roles: who decides about the grasps and does them; the caller opens its estimator.
-        progress: is told what happens.
+        roles: decide about the grasps and execute them; the caller opens their estimator.
+        progress: receives what happens.
     """
 
     def __init__(
@@ -53,9 +53,10 @@ class Conductor:
     # --- the session -------------------------------------------------------------------------------------------
 
     def run(self) -> SessionOutcome:
-        """Grasp until done. However it ends, the hand is without demand and the positioner holds.
+        """Grasp until done.
 
-        Ctrl+C once finishes the step in hand and ends the session, twice raises KeyboardInterrupt at once.
+        In every case the hand ends without demands and the positioner holds. Ctrl+C once finishes the current step and
+        ends the session, twice raises KeyboardInterrupt immediately.
         """
         try:
             with self._guard:
@@ -68,7 +69,7 @@ class Conductor:
             raise
 
     def _feel_bounding_box(self) -> tuple[Ending, str] | None:
-        """The phase before the first grasp, where the session has one; why to end when there is no object."""
+        """The bounding box phase before the first grasp, if enabled. Returns why to end if there is no object."""
         if self._survey is None:
             return None
         self._phase("bounding box")
@@ -77,7 +78,7 @@ class Conductor:
         self._tell(Level.INFO, box.in_words())
         if box.is_found or self._guard.requested:
             return None
-        return Ending.OBJECT_LOST, f"nothing was felt where the object is expected; {box.in_words()}"
+        return Ending.OBJECT_LOST, f"no object was found where it is expected; {box.in_words()}"
 
     def _grasp_until_done(self) -> tuple[Ending, str]:
         if ended := self._feel_bounding_box():
@@ -92,7 +93,7 @@ class Conductor:
                 self._survive(error)
 
     def _follow_decision(self, index: int) -> tuple[Ending, str] | None:
-        """Ask what to do next, and do it."""
+        """Ask for the next decision, and execute it."""
         self._number = index + 1
         self._consider(index)
         if self._guard.requested:
@@ -124,11 +125,11 @@ class Conductor:
             self._tell(Level.INFO, f"paused: {wanted.reason}")
         elif wanted is None and self._paused:
             self._runtime.resume()
-            self._tell(Level.INFO, "goes on")
+            self._tell(Level.INFO, "the session continues")
         self._paused = wanted is not None
 
     def _survive(self, error: TactileLabError) -> None:
-        """Stop everything and go on, if whoever decides wants to. Raises the error otherwise."""
+        """Stop everything, and continue if the decision maker wants to. Raises the error otherwise."""
         if not self._decisions.on_failure(error):
             raise error
         problems = self._supervisor.stop(error)
@@ -174,7 +175,7 @@ class Conductor:
         wanted = self._choose_reorientation(grasp)
         if isinstance(wanted, Veto):
             self._runtime.undo()
-            self._tell(Level.INFO, f"grasp {self._number} does not count: {wanted.reason}")
+            self._tell(Level.INFO, f"grasp {self._number} was discarded: {wanted.reason}")
             self._let_go()
             return
         self._grasps.append(grasp)
@@ -190,7 +191,7 @@ class Conductor:
         self._progress.grasp_done(self._report(grasp, plan, estimate, missing))
 
     def _choose_reorientation(self, grasp: Grasp) -> Reorientation | Veto | None:
-        """What is to become of a captured grasp; None where something failed meanwhile and the session goes on."""
+        """How to continue after a captured grasp; None if something failed meanwhile and the session continues."""
         try:
             return self._decisions.on_capture(grasp, self._cycle.plan)
         except TactileLabError as error:
@@ -198,7 +199,7 @@ class Conductor:
             return None
 
     def _measure(self, plan: GraspPlan) -> Grasp | None:
-        """Down to the captured grasp; None when the hand did not get there, or is not to go on."""
+        """Descend, close and capture. Returns None if the hand did not get there, or must not continue."""
         cycle = self._cycle
         self._phase("descend")
         if not self._arrive(plan):
@@ -213,16 +214,16 @@ class Conductor:
         return cycle.capture()
 
     def _undo(self, reason: str) -> None:
-        """Forget the last grasp; the next one has its number, and what the hand carried is not forgotten."""
+        """Undo the last grasp; the next one gets its number, and the hand odometry is kept."""
         if not self._grasps:
-            self._tell(Level.WARNING, "there is no grasp to take back")
+            self._tell(Level.WARNING, "there is no grasp to undo")
             return
         undone = self._runtime.undo()
         self._grasps.pop()
         self._estimation.undo(self._runtime.perception.hand_motion_world)
         self._decisions.on_undo()
         self._prepared = None
-        self._tell(Level.INFO, f"grasp {undone.index + 1} is taken back: {reason}")
+        self._tell(Level.INFO, f"grasp {undone.index + 1} undone: {reason}")
 
     def _arrive(self, plan: GraspPlan) -> bool:
         arrived = self._cycle.descend(plan)
@@ -230,11 +231,11 @@ class Conductor:
         self._misses = 0 if arrived else self._misses + 1
         if not arrived:
             landings = len(self._cycle.landings_world_m)
-            self._tell(Level.WARNING, f"the hand came down on the object {landings} times: another grasp")
+            self._tell(Level.WARNING, f"the hand landed on the object {landings} times: trying another grasp")
         return arrived
 
     def _carry(self, grasp: Grasp, wanted: Reorientation) -> None:
-        """Squeeze, and re-orient the object, unless it is to stay, too few fingers hold it or no grasp will follow."""
+        """Squeeze, and re-orient the object, unless it stays in place, too few fingers hold it or no grasp follows."""
         cycle, touching = self._cycle, grasp.touching
         self._supervisor.count_contacts(len(touching))
         hand_motion = Pose3()

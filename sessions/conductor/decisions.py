@@ -1,7 +1,7 @@
-"""Who decides what a session does next: the planner of an autonomous session, or a person.
+"""Decision makers of a session: the planner of an autonomous session, or a person.
 
-The conductor asks a decision maker before every grasp and tells it what came of it. Whoever decides moves nothing:
-the grasps are done by a performer, which follows the plan by itself or leads a person through it.
+The conductor asks a decision maker before every grasp and reports the outcome to it. A decision maker moves nothing:
+grasps are executed by a performer, which follows the plan by itself or guides a person through it.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from sessions.motion.safety import InterruptGuard, SafetySupervisor
 
 @dataclass(frozen=True)
 class DoGrasp:
-    """Do this grasp."""
+    """Execute this grasp."""
 
     plan: GraspPlan
 
 
 @dataclass(frozen=True)
 class UndoGrasp:
-    """Take the last grasp back: the estimate is what it was before it, and it is no part of the session."""
+    """Undo the last grasp: the estimate returns to the one before, and the grasp does not count."""
 
     reason: str
 
 
 @dataclass(frozen=True)
 class Wait:
-    """Nothing is decided yet: run a cycle and ask again."""
+    """No decision yet: run a cycle and ask again."""
 
 
 @dataclass(frozen=True)
 class Pause:
-    """The hand is without demand and the positioner holds for as long as this is the answer."""
+    """While this is the answer, the hand has no demands and the positioner holds."""
 
     reason: str
 
@@ -65,34 +65,34 @@ class Veto:
 
 
 class GraspAbandonedError(Exception):
-    """Raised by a performer: whoever decides has given up the grasp in hand before it was captured."""
+    """Raised by a performer: the decision maker gave up the current grasp before it was captured."""
 
 
 class DecisionMaker(Protocol):
-    """Asked before each grasp, told after it. Grasps are numbered from 0."""
+    """Asked before each grasp, and hears its outcome. Grasps are numbered from 0."""
 
     @property
     def centre_m(self) -> Array:
-        """Where the middle of the object is thought to be, world x, y."""
+        """Estimated centre of the object, world x, y."""
 
     @property
     def suggested(self) -> GraspPlan | None:
-        """The grasp that comes next, as far as it is planned."""
+        """The next grasp, if it is planned already."""
 
     def prepare(self, index: int) -> None:
-        """Prepare the decision about grasp ``index``; may take its time while cycles run."""
+        """Prepare the decision about grasp ``index``; may take long while cycles run."""
 
     def decide(self, index: int) -> Decision:
-        """What to do now that grasp ``index`` is next; at once."""
+        """What to do now that grasp ``index`` is next; answers immediately."""
 
     def on_bounding_box(self, box: BoundingBox) -> None:
-        """The object's bounding box was felt."""
+        """The object's bounding box was measured."""
 
     def on_arrival(self, landings_world_m: list[Array]) -> None:
-        """The approach has ended; fingertips stood on the object at these places, (3,) each."""
+        """The approach has ended; fingertips landed on the object at these points, (3,) each."""
 
     def on_capture(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
-        """A grasp was measured, where ``plan`` says: how to carry the object now, or why the grasp does not count."""
+        """A grasp was measured at ``plan``. Returns how to carry the object now, or why the grasp is discarded."""
 
     def on_carry(self, hand_motion_world: Pose3) -> None:
         """The hand carried the object since the grasp."""
@@ -101,14 +101,16 @@ class DecisionMaker(Protocol):
         """The estimation has taken the grasp."""
 
     def on_undo(self) -> None:
-        """The last grasp was taken back."""
+        """The last grasp was undone."""
 
     def on_failure(self, error: TactileLabError) -> bool:
-        """A device failed or a limit was passed, and everything stops: whether the session waits and goes on."""
+        """A device failed or a limit was exceeded, and everything stops. Returns whether the session waits and
+        continues.
+        """
 
 
 class Performer(Protocol):
-    """Does grasps: the verbs of one, in the order in which they are called. See :class:`GraspCycle`."""
+    """Executes grasps: the steps of one, in the order in which they are called. See :class:`GraspCycle`."""
 
     landings_world_m: list[Array]
     jammed: tuple[str, ...]
@@ -128,16 +130,16 @@ class Performer(Protocol):
 
 @dataclass(frozen=True)
 class SessionRoles:
-    """The roles of a session: who supervises, who performs grasps, who decides about them, who estimates.
+    """The roles of a session: supervisor, performer, decision maker, estimator client.
 
     Attributes:
-        supervisor: looks at every cycle.
-        performer: does the grasps.
+        supervisor: checks every cycle.
+        performer: executes the grasps.
         decisions: decides about them.
-        estimator: where estimation and planner are asked; open while the session runs.
-        survey: feels the object's bounding box before the first grasp; asked in between whether to leave the rest out.
-            None for a session that begins without.
-        guard: hears Ctrl+C while the session runs; whoever waits for a person looks at it.
+        estimator: client of estimator and planner; open while the session runs.
+        survey: measures the object's bounding box before the first grasp; its argument tells whether to skip the rest.
+            None for a session without it.
+        guard: receives Ctrl+C while the session runs; code that waits for a person checks it.
     """
 
     supervisor: SafetySupervisor
@@ -152,14 +154,14 @@ class AutonomousDecisions:
     """The planner decides, and every grasp counts.
 
     Attributes:
-        estimator: where the planner is asked.
+        estimator: client of the planner.
     """
 
     def __init__(self, estimator: EstimatorClient) -> None:
         self.estimator = estimator
         self._planned: PlannedGrasp | None = None
         self._centre_m: Array | None = None
-        """As the planner said it; None when it has heard something since."""
+        """The planner's decision; None after new information has reached it."""
 
     @property
     def centre_m(self) -> Array:

@@ -1,4 +1,4 @@
-"""The estimation beside a running session: a step for each grasp, recorded."""
+"""Estimation during a session: one recorded step per grasp."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from sessions.rig_runtime.rig_runtime import RigRuntime
 
 
 class Estimation:
-    """Has grasps estimated one after the other, and records each step.
+    """Estimates grasps one after the other, and records each step.
 
     Args:
-        rig runtime: of the session.
-        estimator: where it is estimated.
+        runtime: of the session.
+        estimator: client of the estimator.
     """
 
     def __init__(self, runtime: RigRuntime, estimator: EstimatorClient) -> None:
         self._runtime, self._estimator = runtime, estimator
         self._known = 0
-        """Estimates that are recorded and have not been taken back."""
+        """Recorded estimates that have not been undone."""
 
     def step(self, grasp: Grasp) -> Estimate:
         """One step of the estimation."""
@@ -32,7 +32,7 @@ class Estimation:
         return estimates[-1]
 
     def undo(self, hand_motion_world: Pose3) -> None:
-        """Back to before the last step; the hand carried the object so far since the grasp before it."""
+        """Undo the last step. ``carried`` is how the hand carried the object since the grasp before it."""
         self._estimator.ask(EstimatorService.undo, hand_motion_world)
         self._known -= 1
 

@@ -1,8 +1,8 @@
-"""What a session asks of an estimator and of whoever plans grasps: protocols, and the values that pass between.
+"""Protocols of the estimator and the grasp planner of a session, and the values they exchange.
 
-A session records, replays and conducts whichever estimator and planner it is given; :mod:`tactile_lab.autonomy` has the
-program's own. Nothing behind these protocols touches a device: the session asks one question after the other (see
-:mod:`sessions.conductor.estimator_client`), so that the answers may come from its own process or from another one.
+A session works with any estimator and planner; :mod:`tactile_lab.autonomy` has the program's own. Implementations touch
+no device: the session asks one question after the other (see :mod:`sessions.conductor.estimator_client`), so that the
+answers may come from its own process or from another one.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ class Reorientation:
 
     @property
     def moves(self) -> bool:
-        """Whether it is carried at all; else the hand opens and leaves it where it is."""
+        """Whether it is carried at all; otherwise the hand opens and leaves it in place."""
         return bool(self.turn_rad != 0.0 or np.any(self.shift_world_m != 0.0))
 
 
 class PoseStep(Protocol):
-    """What one grasp told about the object's pose."""
+    """The object's pose as estimated from one grasp."""
 
     @property
     def index(self) -> int:
@@ -40,19 +40,19 @@ class PoseStep(Protocol):
 
     @property
     def world_T_object(self) -> Pose3 | None:
-        """The pose after this grasp; None before the object frame is born."""
+        """The pose after this grasp; None before the object frame is defined."""
 
     @property
     def covariance(self) -> Array | None:
-        """Of (x m, y m, yaw rad) in the world, shape (3, 3); None as the pose."""
+        """Of (x m, y m, yaw rad) in the world, shape (3, 3); None if there is no pose."""
 
     @property
     def verdict(self) -> str:
-        """One word: whether the grasp could be placed on the object."""
+        """One word: whether the grasp could be registered to the object."""
 
     @property
     def reason(self) -> str:
-        """The verdict in words."""
+        """The verdict as a sentence."""
 
     @property
     def seconds(self) -> float:
@@ -61,11 +61,11 @@ class PoseStep(Protocol):
 
 @dataclass(frozen=True)
 class Estimate:
-    """What has come of one grasp.
+    """The estimate after one grasp.
 
     Attributes:
-        step: the pose, with the object where the surface is told to be.
-        surface: the shape as plain data, as it is recorded and shown (topic ``/slam/surface``).
+        step: the pose, consistent with the surface.
+        surface: the shape as plain data for recording and display (topic ``/slam/surface``).
         explored: share of the surface that is known, 0..1; None before there is one.
     """
 
@@ -75,29 +75,29 @@ class Estimate:
 
 
 class Estimator(Protocol):
-    """A grasp in, an estimate out; the last grasp can be taken back."""
+    """Takes grasps, returns estimates, and can undo the last grasp."""
 
     def estimate(self, grasp: Grasp, known: int) -> tuple[Estimate, ...]:
         """Take the next grasp.
 
         Args:
             grasp: the next one.
-            known: so many estimates have reached the session.
+            known: number of estimates that have reached the session.
 
         Returns:
-            the estimates that have not reached it, the newest last: more than one where an earlier question was
+            the estimates that have not reached it, the newest last: more than one if an earlier question was
             interrupted by a failing device.
         """
 
     def undo(self, hand_motion_world: Pose3) -> None:
-        """Forget the last grasp; the hand carried the object so far since the grasp before it."""
+        """Undo the last grasp. ``carried`` is how the hand carried the object since the grasp before it."""
 
     def describe_unknown(self) -> str:
-        """Which part of the object is still unknown, in words for a person at the table."""
+        """Which part of the object is still unknown, as a sentence for the operator."""
 
 
 class PolicyChoice(Protocol):
-    """A policy's decision about the next grasp, as far as a session records and tells it."""
+    """A policy's decision about the next grasp, as a session records and shows it."""
 
     @property
     def is_over(self) -> bool:
@@ -105,11 +105,11 @@ class PolicyChoice(Protocol):
 
     @property
     def reason(self) -> str:
-        """Why it decided so."""
+        """The reason for the decision."""
 
     @property
     def failure(self) -> str:
-        """What is wrong with the policy itself, in words; empty while its answers can be followed."""
+        """What is wrong with the policy itself; empty while its answers are valid."""
 
     def as_plain(self) -> dict[str, Any]:
         """The whole decision as plain data, for the recording (topic ``/policy/decision``)."""
@@ -120,11 +120,11 @@ class PolicyChoice(Protocol):
 
 @dataclass(frozen=True)
 class PlannedGrasp:
-    """The grasp that comes next.
+    """The next grasp.
 
     Attributes:
-        plan: it.
-        choice: the policy's decision about it; None where no policy was asked.
+        plan: the grasp.
+        choice: the policy's decision about it; None if no policy was asked.
     """
 
     plan: GraspPlan
@@ -132,29 +132,29 @@ class PlannedGrasp:
 
 
 class GraspPlanner(Protocol):
-    """Chooses every grasp of a session, and hears what came of it. Grasps are numbered from 0."""
+    """Chooses every grasp of a session, and hears its outcome. Grasps are numbered from 0."""
 
     def plan(self, index: int) -> PlannedGrasp:
-        """The grasp number ``index``."""
+        """Plan grasp number ``index``."""
 
     def replan(self, index: int) -> PlannedGrasp:
-        """Another plan for the same grasp, after a person has refused the last one."""
+        """Another plan for the same grasp, after a person has vetoed the last one."""
 
     def centre_m(self) -> Array:
-        """Where the middle of the object is thought to be, world x, y, shape (2,)."""
+        """Estimated centre of the object, world x, y, shape (2,)."""
 
     def on_bounding_box(self, box: BoundingBox) -> None:
-        """The object's bounding box was felt."""
+        """The object's bounding box was measured."""
 
     def on_landings(self, points_world_m: list[Array]) -> None:
-        """Fingertips came down on the object at these places, (3,) each."""
+        """Fingertips landed on the object at these points, (3,) each."""
 
     def on_grasp(self, grasp: Grasp, plan: GraspPlan) -> Reorientation:
-        """A grasp was measured where ``plan`` says; how to carry the object from there."""
+        """A grasp was measured at ``plan``. Returns how to carry the object now."""
 
     def on_carry(self, hand_motion_world: Pose3) -> None:
         """The hand carried the object since the last grasp."""
 
 
 class EstimatorService(Estimator, GraspPlanner, Protocol):
-    """All of a session that takes its time: the estimation, and the planner that chooses grasps by it."""
+    """The expensive parts of a session: the estimator, and the planner that uses its estimate."""

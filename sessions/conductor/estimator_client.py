@@ -1,6 +1,6 @@
-"""Questions of a session to its estimator service, and how they are answered without starving devices.
+"""Questions of a session to its estimator service, answered while the devices keep cycling.
 
-On a simulated rig time waits: the answer is computed on the spot. On real clocks another process computes it
+On a simulated rig time waits: the answer is computed immediately. On real clocks another process computes it
 (:mod:`tactile_lab.autonomy.estimator_process`), and the session runs cycles until it comes. The answers are the same,
 bit for bit.
 """
@@ -26,19 +26,19 @@ Question = Callable[Concatenate[Any, Arguments], Answer]
 
 
 class EstimatorClient(Protocol):
-    """Where the estimator service is asked; a context while a session asks."""
+    """Client of the estimator service; a context manager that is open while a session uses it."""
 
     def ask(self, question: Question[Arguments, Answer], *args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
         """The answer.
 
         Raises:
             EstimationError: the question failed.
-            SessionError: the service is gone.
-            TactileLabError: as the question itself, or as a cycle that was run meanwhile.
+            SessionError: the service has ended.
+            TactileLabError: raised by the question itself, or by a cycle that was run meanwhile.
         """
 
     def wait_for_person(self, question: Callable[[], Answer]) -> Answer:
-        """The answer of a person, who takes his time; cycles run meanwhile."""
+        """The answer of a person; cycles run meanwhile."""
 
     def __enter__(self) -> Self: ...
     def __exit__(
@@ -47,10 +47,10 @@ class EstimatorClient(Protocol):
 
 
 class LocalClient:
-    """The service lives in this process, and time waits for it.
+    """The service runs in this process, while time waits.
 
     Args:
-        service: of the session.
+        service: the session's.
     """
 
     def __init__(self, service: EstimatorService) -> None:
@@ -70,17 +70,17 @@ class LocalClient:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Nothing to end."""
+        """Nothing to close."""
 
 
 def answer(service: Any, question: Callable[..., Answer], args: Any, kwargs: Any) -> Answer:
     """The answer to one question.
 
-    A method is looked up on the service itself, so that a question may name it by the protocol.
+    A method is looked up on the service itself, so that a question may refer to the protocol's method.
 
     Raises:
-        EstimationError: the program itself failed; where it did stands in the error's notes.
-        TactileLabError: as the question.
+        EstimationError: a program error; the error's notes say where.
+        TactileLabError: raised by the question.
     """
     ask: Callable[..., Answer] = getattr(service, question.__name__, None) or partial(question, service)
     try:
@@ -88,15 +88,15 @@ def answer(service: Any, question: Callable[..., Answer], args: Any, kwargs: Any
     except TactileLabError:
         raise
     except Exception as error:
-        what = f"failed in {question.__name__} ({type(error).__name__}: {error})"
-        hint = "What was recorded is kept; its last event says where the program failed"
+        what = f"program error in {question.__name__} ({type(error).__name__}: {error})"
+        hint = "The recording is kept; its last event says where the program failed"
         failure = EstimationError(what, where="estimation", hint=hint)
         failure.add_note("".join(traceback.format_exception(error)))
         raise failure from error
 
 
 def wait_with_cycles(question: Callable[[], Answer], idle: Callable[[], None]) -> Answer:
-    """The answer of a question that waits rather than computes; cycles run meanwhile."""
+    """The answer of a question that waits instead of computing; cycles run meanwhile."""
     future: Future[Answer] = Future()
 
     def wait() -> None:

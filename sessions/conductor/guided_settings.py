@@ -1,4 +1,4 @@
-"""Settings of a guided session, as they stand in a rig file."""
+"""Settings of a guided session, as written in a rig file."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from drivers.core.configuration import StrictModel
 
 
 class GuidedSettings(StrictModel):
-    """What a guided session asks of the person, and when it acts by itself.
+    """How a person leads a session, and what the program does automatically.
 
     Attributes:
-        led_by: "keys": the hand has to be driven, in steps, on request; "hand": the person guides arm and fingers
-            with his own hands (thesis section 3.6), and the program only watches.
+        led_by: "keys": the program moves the hand in steps on request; "hand": the person moves arm and fingers by hand
+            (thesis section 3.6), and the program only measures.
         automatic: capture as soon as the contacts are steady.
-        least_contacts: fingers that have to touch before a grasp can be steady.
-        steady_s: how long everything has to stay within the next three before a grasp is steady.
+        least_contacts: fingers that must touch for a steady grasp.
+        steady_s: time for which the next three must stay within limits for a steady grasp.
         steady_force_N: range of each fingertip's force.
         steady_m: movement of the palm.
         steady_rad: movement of any joint.
-        finger_step_m: way of a fingertip for one key.
-        jog_m, jog_rad: way and turn of the hand for one key.
+        finger_step_m: travel of a fingertip per key press.
+        jog_m, jog_rad: translation and rotation of the hand per key press.
         jog_m_s, jog_rad_s: its speeds.
-        silent_s: a fingertip that sends nothing for so long counts as unplugged.
-        attention_s: without any sign of the person for so long the session is closed in order.
-        session_limit_s: the longest session, in place of the one of an autonomous session.
-        panel_s: how often the panel is renewed.
+        silent_s: a fingertip that sends nothing for this long counts as unplugged.
+        attention_s: after this long without any input the session is closed properly.
+        session_limit_s: longest session, replacing the limit of an autonomous session.
+        panel_s: update interval of the panel.
     """
 
     led_by: Literal["keys", "hand"] = "keys"

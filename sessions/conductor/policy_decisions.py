@@ -1,4 +1,4 @@
-"""Decisions of a session that follows a policy: each is recorded with all it was about, and a person may veto it."""
+"""Decisions of a session that follows a policy: each is recorded completely, and a person may veto it."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from sessions.rig_runtime.rig_runtime import RigRuntime
 
 @dataclass(frozen=True)
 class Proposal:
-    """The grasp that would come next.
+    """The proposed next grasp.
 
     Attributes:
         number: from 1.
-        plan: what would be done, and why.
-        vetoed: how many plans for this grasp have been refused already.
-        withdrawn: whether the answer does not matter any more: Ctrl+C ends the session.
+        plan: the grasp and its reason.
+        vetoed: number of plans for this grasp vetoed so far.
+        withdrawn: whether the answer no longer matters because Ctrl+C ends the session.
     """
 
     number: int
@@ -32,11 +32,11 @@ class Proposal:
 
 
 Approve = Callable[[Proposal], bool]
-"""Whether a person lets a grasp be done; asked before each."""
+"""Asks a person before each grasp whether to execute it."""
 
 
 def approve_everything(proposal: Proposal) -> bool:
-    """Nobody is asked."""
+    """Asks nobody."""
     return True
 
 
@@ -44,10 +44,10 @@ class PolicyDecisions(AutonomousDecisions):
     """The planner's policy decides.
 
     Args:
-        estimator: where a planner with or without a policy is asked.
-        tell: told every decision of the policy once.
-        approve: asked before every grasp; what it refuses is replaced by the next best.
-        guard: hears Ctrl+C, which withdraws what was asked.
+        estimator: client of a planner with or without a policy.
+        tell: receives every decision of the policy once.
+        approve: asked before every grasp; a vetoed grasp is replaced by the next best.
+        guard: receives Ctrl+C, which withdraws the question.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class PolicyDecisions(AutonomousDecisions):
         self._untold = self._choice
 
     def _is_approved(self, index: int, vetoed: int) -> bool:
-        """Whether a person, where one is asked, lets the grasp be done that is planned."""
+        """Whether the person, if one is asked, approves the planned grasp."""
         if self._planned is None or self._approve is approve_everything:
             return True
         proposal = Proposal(index + 1, self._planned.plan, vetoed, lambda: self._guard.requested)
@@ -85,17 +85,17 @@ class PolicyDecisions(AutonomousDecisions):
 
     @property
     def _choice(self) -> PolicyChoice | None:
-        """The policy's, about the grasp that comes next."""
+        """The policy's decision about the next grasp."""
         return None if self._planned is None else self._planned.choice
 
     @property
     def _is_over(self) -> bool:
-        """Whether the policy has nothing more to gain."""
+        """Whether the policy expects no further gain."""
         return self._choice is not None and self._choice.is_over
 
 
 def record_choices(runtime: RigRuntime) -> Callable[[PolicyChoice], None]:
-    """Puts decisions into a rig runtime's recording, whole for programs and in a sentence for people."""
+    """Writes decisions into a rig runtime's recording: complete for programs, and as a sentence for people."""
 
     def tell(choice: PolicyChoice) -> None:
         now_ns = runtime.clock.now_ns()

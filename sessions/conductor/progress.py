@@ -1,4 +1,4 @@
-"""What a running session tells whoever watches it."""
+"""Progress of a running session, for display."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Protocol
 
 @dataclass(frozen=True)
 class GraspReport:
-    """One grasp, as told live.
+    """One grasp, as shown live.
 
     Attributes:
         number: from 1.
-        planned: grasps the session was asked for.
+        planned: number of grasps requested.
         closing: how the hand closed.
         reason: why this grasp was chosen.
-        forces_N: contact force of each finger that has a contact.
+        forces_N: contact force of each finger with a contact.
         missing: fingers without a contact, and why.
-        landings: how often the hand came down on the object before it found its way.
-        position_sigma_m: uncertainty of the object's place in the table plane, None where nothing is estimated.
+        landings: number of landings on the object during the approach.
+        position_sigma_m: uncertainty of the object's position in the table plane, None if there is no estimate.
         yaw_sigma_rad: uncertainty of the object's rotation.
         explored: share of the surface that is known, 0..1.
-        verdict: what the estimation says about the grasp.
+        verdict: the estimator's verdict on the grasp.
         stamp_ns: session clock.
     """
 
@@ -46,32 +46,32 @@ class GraspReport:
 
 
 class Progress(Protocol):
-    """Whoever watches."""
+    """Receives progress."""
 
     def phase(self, number: int, name: str) -> None:
-        """Grasp ``number`` has come to a step of its cycle."""
+        """Grasp ``number`` has reached a step of its cycle."""
 
     def grasp_done(self, report: GraspReport) -> None:
         """A grasp has been captured and estimated."""
 
     def on_message(self, message: str) -> None:
-        """Something a person should know at once."""
+        """Something a person should know immediately."""
 
     def on_interrupt(self) -> None:
-        """Ctrl+C was pressed, in the midst of anything: only to be noted here."""
+        """Ctrl+C was pressed, at any point of the program: only note it here."""
 
 
 class NullProgress:
-    """Nobody watches."""
+    """Ignores progress."""
 
     def phase(self, number: int, name: str) -> None:
-        """Not told to anyone."""
+        """Ignored."""
 
     def grasp_done(self, report: GraspReport) -> None:
-        """Not told to anyone."""
+        """Ignored."""
 
     def on_message(self, message: str) -> None:
-        """Not told to anyone."""
+        """Ignored."""
 
     def on_interrupt(self) -> None:
-        """Not told to anyone."""
+        """Ignored."""

@@ -1,4 +1,4 @@
-"""How a session of grasps ended, and what came of it."""
+"""How a session ended, and its grasps."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ class Ending(StrEnum):
 
 @dataclass(frozen=True)
 class SessionOutcome:
-    """What came of a session.
+    """Outcome of a session.
 
     Attributes:
         ending: how it ended.
-        reason: the same in words.
-        grasps: everything captured, in order.
-        dropped: how often each reason kept a finger's contact out.
-        error: what stopped it, for an ending of that kind.
+        reason: the same as a sentence.
+        grasps: all captured grasps, in order.
+        dropped: how often a finger's contact was rejected, by reason.
+        error: what stopped the session, if something did.
     """
 
     ending: Ending

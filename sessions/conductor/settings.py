@@ -1,4 +1,4 @@
-"""What a session of grasps is asked to do, and with what limits."""
+"""Settings and limits of a session."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class ConductorSettings(StrictModel):
     """A session.
 
     Attributes:
-        grasps: how many.
-        fixed_grasps: how many of them follow the fixed rule before the estimate chooses.
-        missed_approaches: this many approaches in a row that are blocked end the session.
+        grasps: number of grasps.
+        fixed_grasps: number of first grasps that follow the fixed rule instead of the estimate.
+        missed_approaches: number of blocked approaches in a row that ends the session.
         cycle, probing, safety, guided: see there.
     """
 

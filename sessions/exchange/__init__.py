@@ -1,1 +1,1 @@
-"""Sessions and contacts in the forms of other programs."""
+"""Sessions and contacts in formats for other programs."""

@@ -1,7 +1,8 @@
-"""A session as one ZIP file, and back. An archive from elsewhere is not trusted: not its names, links or sizes.
+"""A session as one ZIP file, and back.
 
-Only plain files come out of it, only under names that a session has, only into a new folder, and never more than the
-limits say, whatever the archive claims of itself. Nothing in it is executed or unpickled.
+An archive's names, links and sizes are not trusted. Only regular files are extracted, only under names that a session
+has, only into a new folder, and never beyond the limits, whatever sizes the archive declares. Nothing in it is executed
+or unpickled.
 """
 
 from __future__ import annotations
@@ -25,12 +26,12 @@ _ADVICE = "Nothing was imported"
 
 @dataclass(frozen=True)
 class ArchiveLimits:
-    """What an archive may hold.
+    """Limits of an archive.
 
     Attributes:
         files: number of files.
-        total_bytes: all files unpacked.
-        ratio: unpacked over packed size of one file of more than a megabyte.
+        total_bytes: total unpacked size.
+        ratio: largest ratio of unpacked to packed size of a file above a megabyte.
     """
 
     files: int = 10_000
@@ -39,7 +40,7 @@ class ArchiveLimits:
 
 
 def export_archive(session: Session, path: Path) -> int:
-    """Write a session's files into a new ZIP file; gives their number. Links are left out.
+    """Write a session's files into a new ZIP file and return their number. Links are skipped.
 
     Raises:
         SessionError: the file exists or cannot be written.
@@ -63,11 +64,11 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
     """Unpack a session from a ZIP file into a new folder under ``root``.
 
     Args:
-        name: of the new session; by default the name of the one folder in the archive.
+        name: name of the new session; by default the name of the only folder in the archive.
 
     Raises:
-        SessionError: no ZIP file, one with unsafe names, links or sizes, no session in it, or a session of that name
-            is there already; nothing is left behind then.
+        SessionError: not a ZIP file, unsafe names, links or sizes, no session in it, or a session of that name exists
+            already; then nothing is left behind.
     """
     limits = limits or ArchiveLimits()
     try:
@@ -84,14 +85,14 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
 def _checked_entries(archive: zipfile.ZipFile, path: Path, limits: ArchiveLimits) -> list[zipfile.ZipInfo]:
     entries = [entry for entry in archive.infolist() if not entry.is_dir()]
     if len(entries) > limits.files:
-        raise _refusal(path, f"holds {len(entries)} files, more than {limits.files}")
+        raise _refusal(path, f"contains {len(entries)} files, more than {limits.files}")
     for entry in entries:
         _check_entry(entry, path, limits)
     if (total := sum(entry.file_size for entry in entries)) > limits.total_bytes:
-        raise _refusal(path, f"holds {total} bytes, more than {limits.total_bytes}")
+        raise _refusal(path, f"contains {total} bytes, more than {limits.total_bytes}")
     names = [entry.filename for entry in entries]
     if len(set(names)) < len(names):
-        raise _refusal(path, "holds two files of one name")
+        raise _refusal(path, "contains two files of the same name")
     return entries
 
 
@@ -99,20 +100,20 @@ def _check_entry(entry: zipfile.ZipInfo, path: Path, limits: ArchiveLimits) -> N
     name = entry.filename
     parts = PurePosixPath(name).parts
     if name.startswith("/") or "\\" in name or ":" in name or "\0" in name or ".." in parts or not 2 <= len(parts) <= 6:
-        raise _refusal(path, f"holds the unsafe name {name!r}")
+        raise _refusal(path, f"contains the unsafe name {name!r}")
     mode = entry.external_attr >> 16
     if mode and not stat.S_ISREG(mode) and stat.S_IFMT(mode):
-        raise _refusal(path, f"{name!r} is no plain file but a link or a device")
+        raise _refusal(path, f"{name!r} is a link or a device, not a regular file")
     if entry.flag_bits & 1:
         raise _refusal(path, f"{name!r} is encrypted")
     if entry.file_size > _BLOCK_BYTES and entry.file_size > limits.ratio * max(1, entry.compress_size):
-        raise _refusal(path, f"{name!r} would unpack to {entry.file_size} bytes, out of all proportion")
+        raise _refusal(path, f"{name!r} would unpack to {entry.file_size} bytes, which is implausible")
 
 
 def _common_folder(entries: list[zipfile.ZipInfo], path: Path) -> str:
     folders = {PurePosixPath(entry.filename).parts[0] for entry in entries}
     if len(folders) != 1:
-        raise _refusal(path, f"holds {len(folders)} folders, not one session")
+        raise _refusal(path, f"contains {len(folders)} folders instead of one session")
     return folders.pop()
 
 
@@ -120,12 +121,12 @@ def _unpack(
     archive: zipfile.ZipFile, entries: list[zipfile.ZipInfo], folder: Path, path: Path, limits: ArchiveLimits
 ) -> Session:
     if len({PurePosixPath(entry.filename).parts[0] for entry in entries}) != 1:
-        raise _refusal(path, "does not hold one session")
+        raise _refusal(path, "does not contain exactly one session")
     try:
         folder.mkdir(parents=True)
     except FileExistsError as error:
         hint = f"{_ADVICE}; choose another name with --name"
-        raise SessionError("a session of that name is there already", where=str(folder), hint=hint) from error
+        raise SessionError("a session of that name exists already", where=str(folder), hint=hint) from error
     try:
         left = limits.total_bytes
         for entry in entries:
@@ -140,20 +141,20 @@ def _unpack(
 
 
 def _copy(source: BinaryIO, out: BinaryIO, most: int, path: Path) -> int:
-    """Copy, whatever size the archive claims; gives the number of bytes."""
+    """Copy up to a limit, whatever size the archive declares. Returns the number of bytes."""
     copied = 0
     while block := source.read(_BLOCK_BYTES):
         copied += len(block)
         if copied > most:
-            raise _refusal(path, "unpacks to more than it says")
+            raise _refusal(path, "unpacks to more bytes than it declares")
         out.write(block)
     return copied
 
 
 def _as_session(folder: Path, path: Path) -> Session:
-    """The unpacked folder, if it is a session whose recording and calibration are the recorded ones."""
+    """Check that the unpacked folder is a session with a readable recording and unchanged calibration."""
     if not (folder / MANIFEST).is_file() or not (folder / TRAFFIC).is_file():
-        raise _refusal(path, f"holds no session ({MANIFEST} and {TRAFFIC} side by side in one folder)")
+        raise _refusal(path, f"contains no session (a folder with {MANIFEST} and {TRAFFIC})")
     manifest = read_manifest(folder)
     session = Session(folder, manifest)
     for role in manifest.calibration:

@@ -1,4 +1,4 @@
-"""The exchange form ``tactile-contacts/1`` as a document: its keys, and what makes no sense in them."""
+"""The exchange format ``tactile-contacts/1`` as a document: its keys, and checks of their values."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from drivers.core.contacts import Array, LARGEST_GRASP_m
 FORMAT = "tactile-contacts/1"
 
 _LARGEST_OBJECT_m = 2.0
-"""Larger outlines, and motions of the hand between two grasps, are in millimetres."""
+"""Larger outlines, and larger motions of the hand between two grasps, must be in millimetres."""
 
 _LARGEST_WORKSPACE_m = 20.0
-"""Contacts of one session farther apart are in millimetres."""
+"""Contacts of one session that are farther apart must be in millimetres."""
 
 
 def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     length = float(np.linalg.norm(vector))
     if abs(length - 1.0) > 0.01:
-        raise ValueError(f"a normal has length 1, this one {length:.3g}")
+        raise ValueError(f"a normal must have length 1, not {length:.3g}")
     return vector
 
 
@@ -45,7 +45,7 @@ def _covariance(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...],
 
 
 def _short(limit: float, unit: str) -> AfterValidator:
-    """A standard deviation beyond the limit was not written in our unit."""
+    """A standard deviation above the limit must be in another unit."""
 
     def check(sigma: float) -> float:
         if sigma > limit:
@@ -72,7 +72,7 @@ class MotionSigma(StrictModel):
 
 
 class ObjectTruth(StrictModel):
-    """The true object in its own coordinates: an outline, or the name of a mesh file beside the log."""
+    """The true object in its own coordinates: an outline, or the name of a mesh file next to the log."""
 
     name: str = "object"
     polygon_m: tuple[tuple[float, float], ...] | None = Field(default=None, min_length=3)
@@ -81,12 +81,12 @@ class ObjectTruth(StrictModel):
     @model_validator(mode="after")
     def _in_metres(self) -> Self:
         if self.polygon_m and (extent := float(np.ptp(self.polygon_m, axis=0).max())) > _LARGEST_OBJECT_m:
-            raise ValueError(f"its polygon is {extent:.4g} m wide, as if its lengths were in millimetres")
+            raise ValueError(f"its polygon is {extent:.4g} m wide; are its lengths in millimetres?")
         return self
 
 
 class ContactEntry(StrictModel):
-    """One contact. What is known of it alone goes before the log's own sigmas."""
+    """One contact. Its own sigmas take precedence over those of the log."""
 
     finger: FingerName
     point_world_m: Vector
@@ -98,7 +98,7 @@ class ContactEntry(StrictModel):
 
 
 class LineEntry(StrictModel):
-    """The way of one fingertip while it closed."""
+    """The approach path of one fingertip while it closed."""
 
     finger: FingerName
     start_world_m: Vector
@@ -144,17 +144,17 @@ class Document(StrictModel):
 
 
 def _check_sizes(grasps: Sequence[GraspEntry]) -> None:
-    """Lengths that no hand and no workspace has are in another unit."""
+    """Check for lengths that no hand or workspace has, and that must be in another unit."""
     for index, grasp in enumerate(grasps):
         if len(grasp.contacts) and (extent := _extent_m(grasp.points_m)) > LARGEST_GRASP_m:
-            raise ValueError(f"contacts of grasp {index} lie {extent:.4g} m apart, as if lengths were in millimetres")
+            raise ValueError(f"contacts of grasp {index} are {extent:.4g} m apart; are lengths in millimetres?")
     together = np.concatenate([grasp.points_m for grasp in grasps])
     if (extent := _extent_m(together)) > _LARGEST_WORKSPACE_m:
-        raise ValueError(f"the grasps lie {extent:.4g} m apart, as if lengths were in millimetres")
+        raise ValueError(f"the grasps are {extent:.4g} m apart; are lengths in millimetres?")
     for index, (before, grasp) in enumerate(pairwise(grasps), start=1):
         if (carried := _carried_m(before, grasp)) > _LARGEST_OBJECT_m:
             moved = f"the hand moved by {carried:.4g} m before grasp {index}"
-            raise ValueError(f"{moved}, as if lengths were in millimetres")
+            raise ValueError(f"{moved}; are lengths in millimetres?")
 
 
 def _extent_m(points_m: Array) -> float:

@@ -1,8 +1,8 @@
-"""The exchange form ``tactile-contacts/1``: grasps as one JSON file, for other people's data and programs.
+"""The exchange format ``tactile-contacts/1``: grasps as one JSON file, for other data and programs.
 
 Lengths in metres, angles in radians; dimension 2 keeps three-component vectors with z = 0. One point and one normal
-uncertainty hold for all contacts that do not state their own; truth (the object and its poses) is optional and meant
-for evaluation only. What is written is read back as it was, to the last bit.
+uncertainty apply to all contacts that do not state their own; ground truth (the object and its poses) is optional and
+for evaluation only. Reading a written log returns the same values, bit for bit.
 """
 
 from __future__ import annotations
@@ -40,17 +40,16 @@ _FLAT = np.array([1.0, 1.0, 0.0])
 
 @dataclass(frozen=True)
 class ContactLog:
-    """A log in the program's own terms.
+    """A log in the program's own types.
 
     Attributes:
         dimension: 2 or 3.
         point_sigma_m, normal_sigma_rad: standard deviation of all points and normals, per axis, where a contact does
             not state its own.
-        motion_sigma: of one re-orientation; None where it is not known.
-        grasps: a force that is not given is read as 0, a palm that is not given as being at the contacts' centre with
-            its axes along the world's.
+        motion_sigma: of one re-orientation; None if unknown.
+        grasps: a missing force is read as 0, a missing palm pose as the contacts' centre with the world's axes.
         truth: the object, or None; for evaluation only.
-        true_poses: world_T_object at each grasp, None where not given; for evaluation only.
+        true_poses: world_T_object at each grasp, None if not given; for evaluation only.
     """
 
     dimension: Literal[2, 3]
@@ -66,15 +65,15 @@ def read_contact_log(path: Path) -> ContactLog:
     """Read a log.
 
     Raises:
-        SessionError: the file cannot be read or is no JSON.
-        ConfigurationError: its content does not fit the form, or its normals point into the object; the message names
+        SessionError: the file cannot be read or is not JSON.
+        ConfigurationError: its content does not fit the format, or its normals point into the object; the message names
             each entry.
     """
     content = _load_json(path)
     tag = content.get("format") if isinstance(content, dict) else None
     if tag != FORMAT:
         raise ConfigurationError(
-            f"its format is {tag!r}, not {FORMAT!r}", where=str(path), hint="Name a contact log of this form"
+            f"its format is {tag!r}, not {FORMAT!r}", where=str(path), hint="Give a contact log of this format"
         )
     document = validate(content, Document, where=str(path))
     grasps = tuple(_grasp(index, entry, document) for index, entry in enumerate(document.grasps))
@@ -93,11 +92,11 @@ def read_contact_log(path: Path) -> ContactLog:
 def write_contact_log(path: Path, log: ContactLog) -> None:
     """Write a log; the same checks as for reading.
 
-    A log of dimension 2 is written as the horizontal part of its contacts and motions; contacts whose normal is
-    vertical have none and are left out.
+    A log of dimension 2 holds the horizontal part of its contacts and motions; contacts with a vertical normal have
+        none and are left out.
 
     Raises:
-        ConfigurationError: the log is empty or does not make sense.
+        ConfigurationError: the log is empty or inconsistent.
         WriteError: the file cannot be written.
     """
     poses = log.true_poses or (None,) * len(log.grasps)
@@ -137,7 +136,7 @@ def _check_normals(grasps: Sequence[Grasp], path: Path) -> None:
     found = opposing_pairs(grasps)
     if found.point_in:
         what = f"normals point into the object, in {found.inward} of {found.pairs} pairs of opposing contacts"
-        raise ConfigurationError(what, where=str(path), hint="The form wants normals that point out of it: negate them")
+        raise ConfigurationError(what, where=str(path), hint="Normals must point out of the object: negate them")
 
 
 def _grasp(index: int, entry: GraspEntry, document: Document) -> Grasp:
@@ -153,7 +152,7 @@ def _grasp(index: int, entry: GraspEntry, document: Document) -> Grasp:
 
 
 def _assumed_palm(points_m: Array) -> Pose3:
-    """The palm where it is not given: at the contacts' centre, its axes along the world's."""
+    """The palm if it is not given: at the contacts' centre, with the world's axes."""
     matrix = np.eye(4)
     matrix[:3, 3] = points_m.mean(axis=0) if len(points_m) else 0.0
     return Pose3(matrix)
@@ -207,12 +206,12 @@ def _grasp_entry(grasp: Grasp, world_T_object: Pose3 | None, log: ContactLog) ->
 
 
 def _horizontal(contact: Contact) -> float:
-    """Length of the normal's horizontal part; of little it says nothing about the horizontal outline."""
+    """Length of the normal's horizontal part; if it is small the contact says nothing about the horizontal outline."""
     return float(np.linalg.norm(contact.normal_world[:2]))
 
 
 def _contact_entry(contact: Contact, log: ContactLog, scale: Array) -> dict[str, Any]:
-    """A contact; what the log says of all of them is left out."""
+    """A contact, without the values that the log states for all contacts."""
     steep = 1.0 if scale[2] else _horizontal(contact)
     covariance = contact.point_covariance_m2 * np.outer(scale, scale)
     normal_sigma_rad = contact.normal_sigma_rad / steep

@@ -1,4 +1,4 @@
-"""A piece of a session as a session of its own: some transports, some seconds; for tests, and for showing others."""
+"""Extracts part of a session (some transports, a time span) as a new session, for tests and for sharing."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from sessions.recording.traffic.writer import TrafficWriter
 
 @dataclass(frozen=True)
 class Piece:
-    """What is to be cut out.
+    """What to extract.
 
     Attributes:
         from_s, to_s: seconds since the session's first message; None for its beginning and end.
         transports: names of the transports whose bytes are kept; None for all.
-        samples: keep what viewers show (samples, events, estimates, truth) too; the bytes say all of it again.
-        attachments: keep the calibration inside the recording too, and not only beside it.
+        samples: also keep the topics for viewers (samples, events, estimates, truth), which can be computed again from
+        the bytes. attachments: keep the calibration inside the recording too, and not only next to it.
     """
 
     from_s: float | None = None
@@ -37,13 +37,13 @@ class Piece:
 
 
 def extract(session: Session, into: Path, piece: Piece) -> dict[str, int]:
-    """Cut a piece out of a session, into a new folder; gives the number of messages by topic.
+    """Extract part of a session into a new folder.
 
-    Session events are kept, so that the piece can be understood as far as it goes.
+    Returns the number of messages by topic. Session events are kept, so that the extract can be replayed.
 
     Raises:
-        SessionError: the recording cannot be read, the folder exists, or nothing is in the piece.
-        ConfigurationError: a transport that the recording does not have.
+        SessionError: the recording cannot be read, the folder exists, or the extract would be empty.
+        ConfigurationError: the recording does not have a transport.
     """
     check_id(into.name, str(into))
     try:
@@ -93,10 +93,12 @@ def _is_wanted(topic: str, at_s: float, piece: Piece) -> bool:
 
 def _check(piece: Piece, transports: Collection[str], counts: Mapping[str, int], where: str) -> None:
     if unknown := set(piece.transports or ()) - set(transports):
-        hint = f"Its links are {', '.join(sorted(transports))}"
-        raise ConfigurationError(f"no link called {', '.join(sorted(unknown))}", where=where, hint=hint)
+        hint = f"Its transports are {', '.join(sorted(transports))}"
+        raise ConfigurationError(f"no transport called {', '.join(sorted(unknown))}", where=where, hint=hint)
     if not any(counts.values()):
-        raise SessionError("nothing was recorded in that piece", where=where, hint="Choose other seconds or links")
+        raise SessionError(
+            "nothing was recorded in that part", where=where, hint="Choose another time span or other transports"
+        )
 
 
 def _copy_calibration(session: Session, into: Path) -> None:

@@ -20,10 +20,10 @@ _POSE, _PICTURE, _TEXT = "geometry_msgs/msg/PoseStamped", "sensor_msgs/msg/Compr
 
 
 def write_ros_bag(tables: SampleTables, folder: Path) -> int:
-    """Write a bag into a new folder; gives the number of messages.
+    """Write a bag into a new folder. Returns the number of messages.
 
     Joints and base become ``JointState``, wrenches ``WrenchStamped``, poses ``PoseStamped``, pictures
-    ``CompressedImage``; what ROS has no type for (BioTac counts, contacts, session events, events) becomes JSON in a
+    ``CompressedImage``; data without a ROS type (BioTac counts, contacts, session events, log events) become JSON in a
     ``String``.
 
     Raises:
@@ -50,7 +50,7 @@ def write_ros_bag(tables: SampleTables, folder: Path) -> int:
 
 
 class _Messages:
-    """ROS messages of samples."""
+    """Converts samples to ROS messages."""
 
     def __init__(self, types: Any) -> None:
         self._types = types

@@ -1,8 +1,7 @@
-"""Everything a session measured, as plain tables: decoded from the raw bytes by the session's own drivers.
+"""All measurements of a session as plain tables, decoded from the raw bytes by the session's own drivers.
 
 The tables are filled from an :class:`~sessions.perception.interpreter.Interpreter` that reads the recording, so that
-they hold what the session understood, at full rate, and not the thinned samples that viewers get. Truth has tables of
-its own.
+they hold the session's data at full rate, and not the thinned samples for viewers. Ground truth has separate tables.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ CONTACT_COLUMNS = ("grasp", "finger", "x_m", "y_m", "z_m", "nx", "ny", "nz", "fo
 
 @dataclass
 class Table:
-    """Rows with a stamp each: reception, session clock, nanoseconds."""
+    """Rows with one stamp each: reception time, session clock, nanoseconds."""
 
     columns: tuple[str, ...]
     stamps_ns: list[int] = field(default_factory=list)
@@ -45,13 +44,13 @@ class Table:
 
 @dataclass
 class SampleTables:
-    """Tables by name, and the pictures as they came."""
+    """Tables by name, and the pictures as received."""
 
     tables: dict[str, Table] = field(default_factory=dict)
     pictures: list[tuple[int, bytes]] = field(default_factory=list)
 
     def table(self, name: str, columns: Sequence[str]) -> Table:
-        """The table of that name, made when there is none yet."""
+        """The table of that name, created if needed."""
         return self.tables.setdefault(name, Table(tuple(columns)))
 
 
@@ -119,4 +118,4 @@ _OTHERS: Mapping[str, Any] = {
     schemas.LOG_TOPIC: _take_event,
     schemas.CONTACTS_TOPIC: _take_contacts,
 }
-"""What else goes into tables, by topic."""
+"""Other messages that go into tables, by topic."""

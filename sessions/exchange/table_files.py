@@ -16,7 +16,7 @@ PICTURES = "pictures"
 
 
 def write_csv(tables: SampleTables, folder: Path) -> int:
-    """A CSV file for each table in a new folder, pictures as files in a folder of their own; gives the rows written.
+    """Write a CSV file per table into a new folder, and pictures as files into a subfolder. Returns the number of rows.
 
     Raises:
         SessionError: the folder exists or cannot be written.
@@ -35,9 +35,10 @@ def write_csv(tables: SampleTables, folder: Path) -> int:
 
 
 def write_hdf5(tables: SampleTables, path: Path) -> int:
-    """A group for each table with ``stamp_ns`` and one dataset for each column; gives the rows written.
+    """Write a group per table with ``stamp_ns`` and one dataset per column.
 
-    Names of columns carry their units. Pictures are encoded as they came, as arrays of bytes in ``pictures/encoded``.
+    Returns the number of rows. Names of columns carry their units. Pictures stay encoded as received, as arrays of
+    bytes in ``pictures/encoded``.
 
     Raises:
         SessionError: the file exists or cannot be written.

@@ -1,7 +1,7 @@
-"""Contacts that others recorded, a line for each: a CSV table or the same as JSON, turned into a contact log.
+"""Converts contacts from other sources, one per line of a CSV table or a JSON file, into a contact log.
 
 The columns are described in ``docs/sessions.md``. A column's name carries its unit, so that a table in millimetres or
-degrees is refused by name instead of being understood wrongly (see :mod:`sessions.exchange.timed_table`).
+degrees is refused by name instead of being misread (see :mod:`sessions.exchange.timed_table`).
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from sessions.exchange.timed_table import Row, TimedTable, as_numbers, check_col
 
 @dataclass(frozen=True)
 class ImportSettings:
-    """What a table does not say.
+    """Values that a table does not contain.
 
     Attributes:
         point_sigma_m: standard deviation of the points, per axis.
-        normal_sigma_rad: of the normals; None takes 0.1, or 0.35 where they are directions of forces: friction tilts
-            a force by as much.
-        gap_s: where no column says so, contacts farther apart in time belong to different grasps.
-        object_name: of the true object.
-        mesh: its closed mesh beside the log, or None.
+        normal_sigma_rad: of the normals; None: 0.1, or 0.35 for directions of forces, which friction tilts by this
+            much.
+        gap_s: without a grasp column, a longer pause starts a new grasp.
+        object_name: name of the true object.
+        mesh: its closed mesh next to the log, or None.
     """
 
     point_sigma_m: float = 0.002
@@ -45,11 +45,11 @@ class ImportSettings:
 
 
 def read_timed_contacts(path: Path, settings: ImportSettings | None = None) -> ContactLog:
-    """Read a table of contacts, CSV or JSON by the file's name.
+    """Read a table of contacts, CSV or JSON by the file's suffix.
 
     Raises:
-        SessionError: the file cannot be read, or is no CSV or JSON.
-        ConfigurationError: a column or a line that does not fit; names it.
+        SessionError: the file cannot be read, or is not CSV or JSON.
+        ConfigurationError: an invalid column or line; names it.
     """
     settings = settings or ImportSettings()
     truth = None if settings.mesh is None else ObjectTruth(name=settings.object_name, mesh=settings.mesh)
@@ -135,7 +135,7 @@ def _contact(row: Row, table: TimedTable, point_sigma_m: float, normal_sigma_rad
 
 
 def _pose(row: Row, prefix: str, table: TimedTable) -> Pose3 | None:
-    """The pose with that prefix; None where there is none. Raises ConfigurationError for half a pose."""
+    """The pose with that prefix; None if there is none. Raises ConfigurationError for an incomplete pose."""
     given = {name.removeprefix(prefix): value for name, value in row.items() if name.startswith(prefix)}
     if not given:
         return None
@@ -143,7 +143,7 @@ def _pose(row: Row, prefix: str, table: TimedTable) -> Pose3 | None:
     quaternion = [given.get(name) for name in ("qw", "qx", "qy", "qz")]
     if "x_m" not in given or "y_m" not in given or ("yaw_rad" in given) == (None not in quaternion):
         hint = f"Give {prefix}x_m, {prefix}y_m ({prefix}z_m) and {prefix}yaw_rad or {prefix}qx, qy, qz, qw"
-        raise refusal(table.path, number, f"half a pose ({prefix}...)", hint)
+        raise refusal(table.path, number, f"incomplete pose ({prefix}...)", hint)
     place = np.array([given["x_m"], given["y_m"], given.get("z_m", 0.0)])
     if "yaw_rad" in given:
         if abs(given["yaw_rad"]) > 4 * math.pi:
@@ -155,7 +155,7 @@ def _pose(row: Row, prefix: str, table: TimedTable) -> Pose3 | None:
 def _rotation(quaternion: Sequence[Any], path: Path, number: int) -> Rot3:
     length = float(np.linalg.norm(quaternion))
     if abs(length - 1.0) > 0.01:
-        raise refusal(path, number, f"a quaternion has length 1, this one {length:.3g}", "Correct the line")
+        raise refusal(path, number, f"a quaternion must have length 1, not {length:.3g}", "Correct the line")
     return Rot3.Quaternion(*(value / length for value in quaternion))
 
 

@@ -1,4 +1,4 @@
-"""Tables of timed contacts, CSV or JSON: read and checked, line by line, before anything is made of them."""
+"""Tables of timed contacts, CSV or JSON: read and checked line by line before they are converted."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def read_csv(path: Path) -> list[dict[str, str]]:
     except (UnicodeDecodeError, csv.Error) as error:
         raise SessionError(f"is not a CSV table ({error})", where=str(path)) from error
     if len(set(names)) < len(names):
-        raise ConfigurationError("two columns have one name", where=str(path), hint="Name every column once")
+        raise ConfigurationError("two columns have the same name", where=str(path), hint="Name every column once")
     check_columns(set(names), path)
     for number, row in enumerate(rows, start=1):
         if "None" in row or None in row.values():
@@ -68,7 +68,7 @@ def read_json(path: Path) -> dict[str, Any]:
     form = document.get("format") if isinstance(document, dict) else None
     if form == "tactile-contacts/1":
         hint = f"It needs no import: tactile-lab reconstruct {path}"
-        raise ConfigurationError("is a contact log already", where=str(path), hint=hint)
+        raise ConfigurationError("is already a contact log", where=str(path), hint=hint)
     if form != FORMAT:
         hint = "docs/sessions.md describes the form"
         raise ConfigurationError(f"its format is {form!r}, not {FORMAT!r}", where=str(path), hint=hint)
@@ -85,13 +85,13 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def check_columns(names: Iterable[str], path: Path) -> None:
-    """Raises ConfigurationError for a column that is not known, in another unit, or missing."""
+    """Raises ConfigurationError for a column that is unknown, in another unit, or missing."""
     for name in sorted(names):
         if name in COLUMNS:
             continue
         stem = _WRONG_UNIT.sub("", name)
         proper = [column for column in COLUMNS if stem != name and column.startswith(stem + "_")]
-        hint = f"Convert it and call it {proper[0]}" if proper else f"Columns are {', '.join(COLUMNS)}"
+        hint = f"Convert it and name it {proper[0]}" if proper else f"Columns are {', '.join(COLUMNS)}"
         if ";" in name or "\t" in name:
             hint = "Separate the columns by commas, and write decimals with a point"
         what = f"column {name!r} is in another unit" if proper else f"unknown column {name!r}"
@@ -104,7 +104,7 @@ def check_columns(names: Iterable[str], path: Path) -> None:
 
 
 def as_numbers(row: Row, number: int, path: Path) -> dict[str, Any]:
-    """A line with its numbers as numbers. Raises ConfigurationError."""
+    """A line with its values as numbers. Raises ConfigurationError."""
     found: dict[str, Any] = {}
     for name, value in row.items():
         if name in _TEXTS:
@@ -113,14 +113,14 @@ def as_numbers(row: Row, number: int, path: Path) -> dict[str, Any]:
         try:
             found[name] = float(value)
         except (TypeError, ValueError):
-            raise refusal(path, number, f"{name} is {value!r}, no number", "Correct the line") from None
+            raise refusal(path, number, f"{name} is {value!r}, not a number", "Correct the line") from None
         if not math.isfinite(found[name]):
-            raise refusal(path, number, f"{name} is {value!r}, no finite number", "Leave the line out")
+            raise refusal(path, number, f"{name} is {value!r}, not a finite number", "Remove the line")
     return found
 
 
 def refusal(path: Path, number: int, what: str, hint: str) -> ConfigurationError:
-    """What is wrong with a contact, by its number in the table."""
+    """The error for a contact, with its number in the table."""
     return ConfigurationError(f"contact {number}: {what}", where=str(path), hint=hint)
 
 
@@ -133,31 +133,35 @@ class TimedTable:
 
     @property
     def dimension(self) -> Literal[2, 3]:
-        """3 where a column says how high."""
+        """3 if there is a height column, otherwise 2."""
         return 3 if any("z_m" in row for row in self.rows) else 2
 
     @property
     def by_force(self) -> bool:
-        """The directions are those of forces."""
+        """Whether the directions are those of forces."""
         return not any("nx" in row for row in self.rows)
 
     def check(self) -> None:
         """Raises ConfigurationError for lines that are incomplete or out of order."""
         if not self.rows:
-            raise ConfigurationError("holds no contact", where=str(self.path))
+            raise ConfigurationError("contains no contact", where=str(self.path))
         for number, row in enumerate(self.rows, start=1):
             self._check_row(number, row)
         for number, (before, row) in enumerate(pairwise(self.rows), start=2):
             if row["time_s"] < before["time_s"]:
-                what = f"its time {row['time_s']:g} s is before that of the contact before, {before['time_s']:g} s"
+                what = (
+                    f"its time {row['time_s']:g} s is earlier than that of the previous contact, {before['time_s']:g} s"
+                )
                 raise refusal(self.path, number, what, "Sort the lines by time_s")
             if row.get("grasp", 0) < before.get("grasp", 0):
-                raise refusal(self.path, number, "its grasp comes before that of the contact before", "Sort the lines")
+                raise refusal(
+                    self.path, number, "its grasp number is lower than that of the previous contact", "Sort the lines"
+                )
 
     def _check_row(self, number: int, row: Row) -> None:
         needed = ["time_s", "x_m", "y_m", *(["z_m"] if self.dimension == 3 else [])]
         if missing := [name for name in needed if name not in row]:
-            raise refusal(self.path, number, f"has no {missing[0]}", "Give every contact a time and a place")
+            raise refusal(self.path, number, f"has no {missing[0]}", "Give every contact a time and a position")
         for name in SIGMAS:
             if row.get(name, 1.0) <= 0.0:
                 raise refusal(self.path, number, f"{name} is {row[name]:g}", "Give a number above 0, or nothing")
@@ -166,9 +170,11 @@ class TimedTable:
         if self.by_force and not 0.0 < length < _LARGEST_FORCE_N:
             raise refusal(self.path, number, f"its force is {length:g} N", "Give a normal, or the force in newtons")
         if not self.by_force and abs(length - 1.0) > 0.01:
-            raise refusal(self.path, number, f"a normal has length 1, this one {length:.3g}", "Give unit normals")
+            raise refusal(self.path, number, f"a normal must have length 1, not {length:.3g}", "Give unit normals")
         if row.get("held") and not any(name.startswith("tool_") for name in row):
-            raise refusal(self.path, number, "the object was held, but nothing says by what", "Give the tool's pose")
+            raise refusal(
+                self.path, number, "the object was held, but the tool's pose is missing", "Give the tool's pose"
+            )
 
     def direction(self, row: Row) -> Array:
         """The normal as given, or the force, shape (3,)."""

@@ -1,1 +1,1 @@
-"""Sessions that a person leads."""
+"""Sessions led by a person."""

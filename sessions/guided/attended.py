@@ -1,4 +1,4 @@
-"""An autonomous session with someone at the page: between grasps he may pause it, take a grasp back, or end it."""
+"""An autonomous session with an operator on the page, who may pause it, undo a grasp or end it between grasps."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from sessions.motion.safety import InterruptGuard
 
 
 class AttendedDecisions(PolicyDecisions):
-    """The planner's decisions, recorded and approved as ever, unless the person asks for something else.
+    """The planner's decisions, recorded and approved as usual, unless the operator requests something else.
 
     Args:
-        estimator: where a planner with or without a policy is asked.
-        tell: told every decision of the policy that is not overtaken by what the person asks for.
+        estimator: client of a planner with or without a policy.
+        tell: receives every decision of the policy that no request overrides.
         approve: asked before every grasp.
-        operator: the person; is heard between grasps.
-        guard: hears Ctrl+C.
+        operator: the person; requests are read between grasps.
+        guard: receives Ctrl+C.
         wait: called in every cycle of a pause; makes a simulated rig wait for the person.
     """
 
@@ -42,10 +42,10 @@ class AttendedDecisions(PolicyDecisions):
             if request.ask is Ask.PAUSE:
                 self._paused = not self._paused
             elif request.ask is Ask.UNDO:
-                return UndoGrasp("by the person at the page")
+                return UndoGrasp("by the operator on the page")
             elif request.ask is Ask.END:
-                return End(f"ended by the person at the page after {index} grasps")
+                return End(f"ended by the operator on the page after {index} grasps")
         if not self._paused:
             return super().decide(index)
         self._wait()
-        return Pause("by the person at the page")
+        return Pause("by the operator on the page")

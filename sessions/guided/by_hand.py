@@ -1,4 +1,4 @@
-"""A grasp led by hand: a person moves arm and fingers, the program watches and measures (thesis section 3.6)."""
+"""A grasp led by hand: a person moves arm and fingers, the program only measures (thesis section 3.6)."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from sessions.recording.recorder import Level
 
 
 class GraspByHand:
-    """The verbs of a grasp as prompts; the hand is without demand, the positioner stays or is moved by hand.
+    """The steps of a grasp as prompts; the hand has no demands, the positioner stays or is moved by hand.
 
     Args:
-        motion: supervised cycles that listen to the person; nothing is moved.
+        motion: supervised cycles that read the operator's requests; nothing is moved.
         settings: the length of a capture.
-        console: where the person sits.
+        console: the operator's console.
         tip: shape of the fingertips.
     """
 
@@ -37,7 +37,7 @@ class GraspByHand:
 
     @property
     def plan(self) -> GraspPlan:
-        """The grasp as the person does it: the frame is where the palm's pose puts it."""
+        """The grasp as the person does it: its frame follows from the palm's pose."""
         assert self._plan is not None
         table = closing(self._plan.closing, self._plan.height_m, self._tip)
         world_T_grasp = self._motion.runtime.perception.world_T_palm * table.grasp_T_palm.inverse()
@@ -47,7 +47,7 @@ class GraspByHand:
     def descend(self, plan: GraspPlan) -> bool:
         self._plan = plan
         self._motion.runtime.stop()
-        prompt = "Guide the open hand around the object, touching nothing; SPACE: zero the fingertips there"
+        prompt = "Guide the open hand around the object without touching it. SPACE: zero the fingertips"
         self._console.enter(Stage.GUIDE, prompt, Ask.NEXT, Ask.GIVE_UP)
         for request in self._motion.requests():
             if request.ask in (Ask.NEXT, Ask.GO) and self._zero():
@@ -62,7 +62,7 @@ class GraspByHand:
         return not refused
 
     def close(self) -> None:
-        prompt = "Close the fingers around the object by hand; SPACE: they touch"
+        prompt = "Close the fingers around the object by hand. SPACE: fingers touch"
         self._console.enter(Stage.CLOSE, prompt, Ask.NEXT, Ask.GIVE_UP)
         self._motion.runtime.begin_closing()
         for request in self._motion.requests():
@@ -70,7 +70,7 @@ class GraspByHand:
                 return
 
     def settle(self) -> None:
-        self._console.enter(Stage.HOLD, "Hold still; SPACE: capture; x: give up", Ask.CAPTURE, Ask.GIVE_UP)
+        self._console.enter(Stage.HOLD, "Hold still. SPACE: capture; x: give up", Ask.CAPTURE, Ask.GIVE_UP)
         while not self._console.wants_capture():
             self._motion.tick()
 
@@ -82,7 +82,7 @@ class GraspByHand:
         """The person squeezes."""
 
     def reorient(self, turn_rad: float, shift_world_m: Array, touching: frozenset[str]) -> Pose3:
-        prompt = f"Squeeze, turn the object about {np.degrees(turn_rad):+.0f}° and put it down; SPACE: it rests"
+        prompt = f"Squeeze, turn the object by about {np.degrees(turn_rad):+.0f}° and put it down. SPACE: done"
         self._console.enter(Stage.ROTATE, prompt, Ask.NEXT, Ask.UNDO)
         runtime = self._motion.runtime
         world_T_before = runtime.perception.world_T_palm
@@ -94,7 +94,9 @@ class GraspByHand:
         return runtime.perception.world_T_palm * world_T_before.inverse()
 
     def release(self) -> None:
-        self._console.enter(Stage.RELEASE, "Open the hand and take it away; SPACE: nothing touches any more", Ask.NEXT)
+        self._console.enter(
+            Stage.RELEASE, "Open the hand and move it away. SPACE: no finger touches any more", Ask.NEXT
+        )
         for request in self._motion.requests():
             if request.ask in (Ask.NEXT, Ask.GO):
                 return

@@ -1,7 +1,7 @@
-"""A grasp led by keys: for a hand that cannot be moved by hand, and for the simulated one.
+"""A grasp led by keys: for a hand that cannot be moved by hand, and for the simulated hand.
 
-The hand moves only on request: a step at a time, or a whole step of the grasp by itself. Whatever moves, it stops
-where a fingertip meets something.
+The hand moves only on request: by one increment, or a whole stage of the grasp automatically. Every motion stops if a
+fingertip touches something.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from sessions.motion.grasp_plan import GraspPlan
 from sessions.recording.recorder import Level
 
 AROUND_m = 0.001
-"""The hand is around the object when it is no higher than this over the height of its grasp."""
+"""The hand counts as around the object up to this height above its grasp height."""
 
 
 class GraspByKeys(GraspCycle):
-    """The verbs of a grasp, each done on request.
+    """The steps of a grasp, each executed on request.
 
     Args:
-        motion: supervised motion that listens to the person.
+        motion: supervised motion that reads the operator's requests.
         settings: speeds, forces, times.
-        console: where the person sits.
+        console: the operator's console.
         tip: shape of the fingertips.
-        yaw_window_rad: yaws the arm can take up.
+        yaw_window_rad: yaws the arm can reach.
     """
 
     def __init__(
@@ -47,13 +47,13 @@ class GraspByKeys(GraspCycle):
         super().__init__(motion, settings, tip, yaw_window_rad)
         self._guided, self._console = motion, console
         self._above_m: float | None = None
-        """Height over the grasp's own; None where the hand has not been sent to this grasp."""
+        """Height above the grasp height; None if the hand has not been sent to this grasp."""
 
     # --- down --------------------------------------------------------------------------------------------------
 
     def descend(self, plan: GraspPlan) -> bool:
         self._free_the_hand()
-        prompt = "Guide the hand around the object. g: go as suggested; arrows, r, f, comma, full stop: steps"
+        prompt = "Move the hand around the object. g: go as suggested; arrows, r, f, comma, full stop: steps"
         self._console.enter(Stage.GUIDE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.GIVE_UP)
         self._plan, self.landings_world_m, self._above_m = plan, [], None
         for request in self._guided.requests():
@@ -72,11 +72,11 @@ class GraspByKeys(GraspCycle):
         if self._above_m is not None and self._above_m <= AROUND_m:
             return True
         height = "not over the object yet" if self._above_m is None else f"{1e3 * self._above_m:.0f} mm too high"
-        self._console.tell(f"the hand is {height}: lower it with f, or g goes by itself")
+        self._console.tell(f"the hand is {height}. f: lower it; g: go as suggested")
         return False
 
     def _move_step(self, request: Request) -> None:
-        """One step of the hand; the first one takes it over the suggested place."""
+        """Move the hand by one step; the first one moves it above the suggested grasp."""
         if self._above_m is None:
             self._move_above()
             self._above_m = self.settings.lift_m
@@ -87,10 +87,10 @@ class GraspByKeys(GraspCycle):
         start = self._motion.base_joints(self.plan.frame, self._table(), self._above_m)
         if self._go_with_care(start, self._motion.base_joints(frame, self._table(), above_m)):
             self._plan, self._above_m = replace(self.plan, frame=frame), above_m
-            self._console.tell(f"tips {1e3 * above_m:.0f} mm over their grasp")
+            self._console.tell(f"tips {1e3 * above_m:.0f} mm above their grasp height")
 
     def _go_with_care(self, start: Array, end: Array) -> bool:
-        """Straight to ``end``; back to ``start`` where a fingertip meets something."""
+        """Move straight to ``end``; back to ``start`` if a fingertip touches something."""
         jog = self._console.settings
         way_m, turn_rad = float(np.linalg.norm((end - start)[:3])), float(np.abs((end - start)[3:]).max())
         for share in self._motion.shares(max(way_m / jog.jog_m_s, turn_rad / jog.jog_rad_s)):
@@ -99,12 +99,12 @@ class GraspByKeys(GraspCycle):
             if met := self._pressed_fingers(self.settings.landing_force_N):
                 self._motion.set_base(start)
                 self._motion.wait(self.settings.rest_s)
-                self._console.tell(f"{', '.join(met)} met something: back by one step", Level.WARNING)
+                self._console.tell(f"{', '.join(met)} touched something: moved back by one step", Level.WARNING)
                 return False
         return True
 
     def _free_the_hand(self) -> None:
-        """After a failure the hand may still be around the object: open and up before anything else."""
+        """After a failure the hand may still be around the object: open and lift it first."""
         self._guided.begin_anew()
         if self._above_m is not None:
             super().release()
@@ -113,7 +113,7 @@ class GraspByKeys(GraspCycle):
     # --- close and measure -------------------------------------------------------------------------------------
 
     def close(self) -> None:
-        prompt = "Close the fingers. g: all by themselves; 1-5 close, 6-0 open one finger; c, o all; SPACE: done"
+        prompt = "Close the fingers. g: close automatically; 1-5 close, 6-0 open one finger; c, o all; SPACE: done"
         self._console.enter(Stage.CLOSE, prompt, Ask.GO, Ask.FINGERS, Ask.NEXT, Ask.GIVE_UP)
         self._progress, begun = self._open_progress(), False
         for request in self._guided.requests():
@@ -130,7 +130,7 @@ class GraspByKeys(GraspCycle):
                 return
 
     def _step_fingers(self, request: Request) -> None:
-        """Close or open fingers by steps along their lines; each stops at its touch."""
+        """Close or open fingers by steps along their paths; each stops when it touches."""
         table = self._table()
         way_m = self._console.settings.finger_step_m * request.steps
         moving = set(request.fingers)

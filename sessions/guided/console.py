@@ -1,4 +1,4 @@
-"""The operator's console: reads what is asked for, keeps notes, watches the sensors, and shows it all."""
+"""The operator's console: reads requests, stores notes, watches the sensors, and shows the state."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ BEFORE_CAPTURE = frozenset({Stage.GUIDE, Stage.CLOSE, Stage.HOLD, Stage.CAPTURE}
 
 
 class OperatorConsole:
-    """Between the person and the session.
+    """Connects the operator and the session.
 
     Args:
-        rig runtime: connected.
+        runtime: connected.
         operator: the person.
         settings: of the guided session.
-        attachments: where notes, pictures and files go.
-        touch_force_N: force from which a finger touches.
-        guard: hears Ctrl+C, which ends the session as the person may, even where he is waited for.
+        attachments: stores notes, pictures and files.
+        touch_force_N: force above which a finger touches.
+        guard: receives Ctrl+C, which ends the session even while waiting for the operator.
         pace: called with the session clock after every cycle; makes a simulated rig wait for the person.
     """
 
@@ -50,7 +50,7 @@ class OperatorConsole:
         self.grasp = 1
         self.suggestion, self.unknown = "", "the whole object is unknown"
         self.paused = ""
-        """Why the session pauses; "" when it does not."""
+        """Why the session is paused; "" if it is not."""
         self.end_wanted = self.undo_wanted = False
         self._given_up = ""
         self._end_asked = False
@@ -75,40 +75,40 @@ class OperatorConsole:
     # --- for whoever leads through a grasp ---------------------------------------------------------------------
 
     def enter(self, stage: Stage, prompt: str, *asks: Ask) -> None:
-        """A new step: what was asked for before it is void."""
+        """Start a new step; earlier requests are discarded."""
         self._stage, self._prompt, self._asks = stage, prompt, asks
         self._waiting.clear()
         self._given_up = self._given_up if stage in BEFORE_CAPTURE else ""
         self._show(self._runtime.clock.now_ns())
 
     def take(self) -> list[Request]:
-        """What was asked for in this step since the last call."""
+        """Requests in this step since the last call."""
         requests = list(self._waiting)
         self._waiting.clear()
         return requests
 
     def wants_capture(self) -> bool:
-        """The person asks for the capture, or it is automatic and the grasp is steady."""
+        """Whether the operator requests the capture, or it is automatic and the grasp is steady."""
         asked = any(request.ask in (Ask.NEXT, Ask.CAPTURE) for request in self.take())
         return asked or (self.automatic and self.view.is_steady)
 
     @property
     def moves_on(self) -> bool:
-        """The person wants to be done with this step whatever it is."""
+        """Whether the operator wants to leave this step."""
         return self.end_wanted or self.undo_wanted
 
     def tell(self, message: str, level: Level = Level.INFO) -> None:
-        """Something the person should know; recorded too."""
+        """Show a message to the operator, and record it."""
         self._message = message
         self._runtime.log(level, "guide", message)
 
     @property
     def holds(self) -> bool:
-        """The session pauses in the middle of a grasp: the hand stays as it is."""
+        """Whether the session is paused within a grasp: the hand stays as it is."""
         return bool(self.paused) and self._stage not in (Stage.PLACE, Stage.ESTIMATE)
 
     def check_given_up(self) -> None:
-        """Raises GraspAbandonedError when the person has given up the grasp in hand."""
+        """Raises GraspAbandonedError if the operator has given up the current grasp."""
         if self._given_up and self._stage in BEFORE_CAPTURE:
             reason, self._given_up = self._given_up, ""
             self._stage = Stage.RELEASE
@@ -117,7 +117,7 @@ class OperatorConsole:
     # --- every cycle -------------------------------------------------------------------------------------------
 
     def cycle(self) -> None:
-        """Look, listen, show."""
+        """Read sensors and requests, and update the display."""
         now_ns = self._runtime.clock.now_ns()
         self._watcher.take(now_ns)
         for request in self._operator.requests():
@@ -127,13 +127,13 @@ class OperatorConsole:
             self._leave("interrupted by the operator")
         self._heard_ns = now_ns if self._heard_ns is None else self._heard_ns
         if now_ns - self._heard_ns > self.settings.attention_s * NANOSECONDS:
-            self._leave(f"nobody there for {self.settings.attention_s:g} s")
+            self._leave(f"no input from the operator for {self.settings.attention_s:g} s")
         if now_ns >= self._next_panel_ns:
             self._show(now_ns)
         self._pace(now_ns)
 
     def rest(self) -> None:
-        """One cycle of a pause; what fails is shown."""
+        """One cycle of a pause; errors are shown."""
         try:
             self._runtime.cycle()
         except TactileLabError as error:
@@ -142,7 +142,7 @@ class OperatorConsole:
         self.cycle()
 
     def fail(self, reason: str) -> bool:
-        """Everything has stopped; whether someone is there to mend it and go on."""
+        """Everything has stopped. Returns whether an operator is present to fix the problem and resume."""
         self._waiting.clear()
         self._stage, self._asks = Stage.PLACE, ()
         self.paused = reason
@@ -157,7 +157,7 @@ class OperatorConsole:
         self._runtime.recorder.guide(now_ns, panel.content())
 
     def panel(self, now_ns: int) -> Panel:
-        """What is shown now."""
+        """The current panel."""
         return Panel(
             stamp_ns=now_ns,
             grasp=self.grasp,
@@ -176,13 +176,13 @@ class OperatorConsole:
     def _until_capture(self) -> str:
         missing = self.settings.least_contacts - len(self.view.touching)
         if missing > 0:
-            return "1 more finger has to touch" if missing == 1 else f"{missing} more fingers have to touch"
+            return "1 more finger must touch" if missing == 1 else f"{missing} more fingers must touch"
         if not self.view.is_steady:
             return f"hold still: steady for {self.view.steady_s:.1f} of {self.settings.steady_s:g} s"
         return "steady"
 
     def _watch_sensors(self) -> None:
-        """A sensor that falls silent is told, and with a person there the session pauses."""
+        """Report a sensor that falls silent, and pause the session if an operator is present."""
         silent = frozenset(self.view.silent)
         fallen, back = silent - self._known_silent, self._known_silent - silent
         self._known_silent = silent
@@ -191,7 +191,7 @@ class OperatorConsole:
             if self._operator.attended:
                 self._pause(self._message)
         if back:
-            self.tell(f"{', '.join(sorted(back))} can be read again")
+            self.tell(f"readings from {', '.join(sorted(back))} are back")
 
     # --- what can always be asked for --------------------------------------------------------------------------
 
@@ -200,12 +200,12 @@ class OperatorConsole:
         if act := self._common.get(request.ask):
             act(request)
         elif self.paused:
-            self._message = "paused: p goes on"
+            self._message = "paused. p: resume"
         elif request.ask is Ask.GIVE_UP or (request.ask is Ask.UNDO and self._stage in BEFORE_CAPTURE):
             self._give_up("given up by the operator")
         elif request.ask is Ask.UNDO and self._stage is not Stage.PLACE:
             self.undo_wanted = True
-            self.tell("this grasp will be taken back")
+            self.tell("this grasp will be undone")
         else:
             self._waiting.append(request)
 
@@ -213,7 +213,7 @@ class OperatorConsole:
         if self._stage in BEFORE_CAPTURE:
             self._given_up = reason
         else:
-            self._message = "there is no closing to give up; u takes back the last grasp"
+            self._message = "there is no closing to give up. u: undo the last grasp"
 
     def _toggle_pause(self, request: Request) -> None:
         if self.paused:
@@ -227,7 +227,7 @@ class OperatorConsole:
         self._next_panel_ns = 0
 
     def _go_on(self) -> None:
-        """Start silent sensors again; one that cannot be started keeps the session paused."""
+        """Restart silent sensors; if one cannot be restarted the session stays paused."""
         for finger in self._known_silent:
             try:
                 self._runtime.restart_fingertip(finger)
@@ -242,7 +242,7 @@ class OperatorConsole:
         if self._end_asked or request.text:
             self._leave("ended by the operator")
         else:
-            self._end_asked, self._message = True, "once more to end the session"
+            self._end_asked, self._message = True, "press again to end the session"
 
     def _leave(self, reason: str) -> None:
         if not self.end_wanted:

@@ -14,15 +14,15 @@ from sessions.guided.words import plan_in_words
 from sessions.motion.grasp_plan import GraspPlan
 
 GOOD_OBSERVABILITY = 0.15
-"""Smallest eigenvalue of (3.18) from which a grasp tells the whole pose on the table."""
+"""Smallest eigenvalue of (3.18) above which a grasp determines the whole pose on the table."""
 
 
 class GuidedDecisions(AutonomousDecisions):
-    """What the person asks for at the console.
+    """The operator's decisions at the console.
 
     Args:
-        estimator: where the planner is asked, which suggests.
-        console: where the person sits.
+        estimator: client of the planner, which makes suggestions.
+        console: the operator's console.
     """
 
     def __init__(self, estimator: EstimatorClient, console: OperatorConsole) -> None:
@@ -83,9 +83,9 @@ class GuidedDecisions(AutonomousDecisions):
 
 
 def _in_words(grasp: Grasp) -> str:
-    """What was captured, and whether it tells the pose."""
+    """What was captured, and whether it determines the pose."""
     if not grasp.contacts:
-        return "captured, but no finger has a contact"
+        return "captured, but no finger is in contact"
     value = planar_observability(grasp.points_world_m, grasp.normals_world).smallest
-    worth = "tells the whole pose" if value >= GOOD_OBSERVABILITY else "leaves a motion of the object open"
+    worth = "determines the whole pose" if value >= GOOD_OBSERVABILITY else "does not determine the whole pose"
     return f"captured {len(grasp.contacts)} contacts: observability {value:.2f}, {worth}"

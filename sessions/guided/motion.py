@@ -1,4 +1,4 @@
-"""Motion with a person looking on: every cycle shows what is seen and hears what is asked for."""
+"""Motion with an operator: every cycle updates the display and reads requests."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class GuidedMotion(Motion):
     """As :class:`Motion`; a pause holds it, and giving up a grasp ends it.
 
     Args:
-        rig runtime: connected.
-        supervisor: looks at every cycle.
-        console: where the person sits.
+        runtime: connected.
+        supervisor: checks every cycle.
+        console: the operator's console.
     """
 
     def __init__(self, runtime: RigRuntime, supervisor: SafetySupervisor, console: OperatorConsole) -> None:
@@ -25,10 +25,10 @@ class GuidedMotion(Motion):
         self._console = console
 
     def tick(self) -> None:
-        """One supervised cycle, and as many more as the person wants the hand to stay where it is.
+        """One supervised cycle, and further ones for as long as the operator pauses.
 
         Raises:
-            GraspAbandonedError: the person has given up this grasp.
+            GraspAbandonedError: the operator has given up this grasp.
             SafetyError, DeviceError: as :meth:`Motion.tick`.
         """
         super().tick()
@@ -39,17 +39,17 @@ class GuidedMotion(Motion):
         self._console.check_given_up()
 
     def requests(self, each: Callable[[], None] = lambda: None) -> Iterator[Request]:
-        """What the person asks for in this step, until he wants to be elsewhere; ``each`` acts before every cycle."""
+        """The operator's requests in this step, until one leaves it; ``each`` is called before every cycle."""
         while not self._console.moves_on:
             each()
             self.tick()
             yield from self._console.take()
 
     def rest(self) -> None:
-        """One cycle while the session pauses: a failing device is shown, and fails nothing."""
+        """One cycle while the session is paused: a device failure is shown, but not raised."""
         self._console.rest()
 
     def begin_anew(self) -> None:
-        """After a stop: the next motion begins where everything stands."""
+        """After a stop: the next motion starts at the present position."""
         self._base_q = self.runtime.perception.base_q.copy()
         self._targets_rad = {}

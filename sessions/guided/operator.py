@@ -1,4 +1,4 @@
-"""The person of a guided session, as the program sees him: what he asks for, and what he is shown."""
+"""The operator interface of a guided session: requests and the panel shown."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from sessions.guided.operator_view import OperatorView
 
 
 class Ask(StrEnum):
-    """What a person can ask for."""
+    """Requests of an operator."""
 
     NEXT = "next"
-    """This step is done; while the hand holds: capture."""
+    """Finish this step; while the hand holds: capture."""
     GO = "go"
-    """Let the rig do this step."""
+    """Let the rig do this step automatically."""
     CAPTURE = "capture"
     """Measure this grasp now."""
     UNDO = "undo"
-    """Take the last grasp back; before a grasp is captured: give it up."""
+    """Undo the last grasp; before a grasp is captured: give it up."""
     GIVE_UP = "give up"
-    """Open the hand and lift, without a capture."""
+    """Give up: open the hand and lift without a capture."""
     PAUSE = "pause"
-    """Nothing moves until it is asked for again."""
+    """Pause, or resume."""
     END = "end"
     """Finish the session."""
     AUTOMATIC = "automatic"
@@ -34,24 +34,24 @@ class Ask(StrEnum):
     FINGERS = "fingers"
     """Close or open fingers a step."""
     NOTE = "note"
-    """Keep a remark."""
+    """Store a note."""
     MARKER = "marker"
     """Number this instant in the recording."""
     PHOTO = "photo"
-    """Keep a picture of the camera."""
+    """Store a picture from the camera."""
     ATTACH = "attach"
-    """Keep a file with the session."""
+    """Attach a file to the session."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """One thing asked for.
+    """One request.
 
     Attributes:
-        ask: what.
-        text: of a note; the name of a file.
-        fingers: which, for steps of fingers.
-        steps: how many steps to close, negative to open.
+        ask: its kind.
+        text: text of a note; name of a file.
+        fingers: fingers that move by steps.
+        steps: number of steps to close, negative to open.
         x, y, z, turn: steps of the hand along the world's axes and about its z axis.
     """
 
@@ -66,7 +66,7 @@ class Request:
 
 
 class Stage(StrEnum):
-    """Steps of a guided grasp, in their order."""
+    """Stages of a guided grasp, in order."""
 
     PLACE = "place"
     GUIDE = "guide"
@@ -80,21 +80,21 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True)
 class Panel:
-    """What a person is shown.
+    """The state shown to the operator.
 
     Attributes:
         stamp_ns: session clock.
-        grasp: number of the grasp in hand, from 1.
-        stage: where the grasp is.
+        grasp: number of the current grasp, from 1.
+        stage: stage of the grasp.
         prompt: what to do now.
-        sight: what the sensors say.
-        capture: what stands between now and a capture, in words.
+        sight: current sensor readings.
+        capture: what is missing for a capture.
         suggestion: the suggested next grasp.
         unknown: which part of the object is still unknown.
-        message: the last thing that happened.
-        paused: why the session pauses; "" when it does not.
-        automatic: captures are taken automatically.
-        asks: what can be asked for now, beside what can always be asked for.
+        message: the last message.
+        paused: why the session is paused; "" if it is not.
+        automatic: captures are automatic.
+        asks: requests possible now, besides those that always are.
     """
 
     stamp_ns: int
@@ -118,23 +118,23 @@ class Panel:
 
 
 class Operator(Protocol):
-    """The person, or what stands in for one.
+    """The operator, or a substitute.
 
     Attributes:
-        attended: someone is there who can mend things; without, a failure ends the session.
+        attended: a person is present who can fix problems; otherwise a failure ends the session.
     """
 
     attended: bool
 
     def requests(self) -> Sequence[Request]:
-        """What was asked for since the last call; at once."""
+        """Requests since the last call, without waiting."""
 
     def show(self, panel: Panel) -> None:
-        """Show this; at once."""
+        """Show the panel, without waiting."""
 
 
 class Together:
-    """Several operators at one session: a terminal and a page. Everyone is shown everything."""
+    """Several operators of one session: a terminal and a page. Each sees everything."""
 
     def __init__(self, *operators: Operator) -> None:
         self._operators = operators
@@ -149,8 +149,8 @@ class Together:
 
 
 def request_of(content: Mapping[str, Any]) -> Request:
-    """A request from plain data. Raises ValueError for anything that is none."""
+    """A request from plain data. Raises ValueError if it is not a valid request."""
     text = content.get("text", "")
     if not isinstance(text, str):
-        raise ValueError("a request's text is a string")
+        raise ValueError("a request's text must be a string")
     return Request(Ask(str(content.get("ask"))), text=text[:2000])

@@ -1,4 +1,4 @@
-"""What the sensors see while a person guides the hand: contacts, forces, steadiness, and what the grasp would tell."""
+"""Sensor readings while a person guides the hand: contacts, forces, steadiness and observability of the grasp."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from sessions.perception.perception import Perception
 
 @dataclass(frozen=True)
 class OperatorView:
-    """What is seen at one instant.
+    """Readings at one instant.
 
     Attributes:
-        forces_N: contact force on each fingertip; None where its sensor says nothing usable or is not zeroed yet.
+        forces_N: contact force on each fingertip; None if its sensor has no usable reading or is not zeroed yet.
         touching: fingers in contact.
-        steady_s: how long contacts and hand have not changed.
+        steady_s: time for which contacts and hand have not changed.
         is_steady: long enough, with enough fingers.
-        observability: smallest eigenvalue of (3.18) of the contacts as they are; None where it cannot be told.
-        silent: fingers whose sensor sends nothing, or nothing usable.
-        problems: what sensors say about themselves.
+        observability: smallest eigenvalue of (3.18) of the current contacts; None if unknown.
+        silent: fingers whose sensor sends nothing usable.
+        problems: problems reported by sensors.
     """
 
     forces_N: Mapping[str, float | None]
@@ -41,7 +41,7 @@ class OperatorView:
     problems: tuple[str, ...] = ()
 
     def words(self) -> str:
-        """The contacts in a sentence."""
+        """The contacts as a sentence."""
         if not self.touching:
             return "no finger touches"
         forces = ", ".join(f"{finger} {self.forces_N[finger] or 0.0:.2f} N" for finger in self.touching)
@@ -58,22 +58,22 @@ class _Instant:
 
 
 class Watcher:
-    """Looks at every cycle and says what is seen.
+    """Evaluates every cycle.
 
     Args:
         perception: the live session's.
-        settings: when a grasp is steady, and when a sensor is silent.
-        touch_force_N: force from which a finger touches.
+        settings: criteria for a steady grasp and a silent sensor.
+        touch_force_N: force above which a finger touches.
     """
 
     def __init__(self, perception: Perception, settings: GuidedSettings, touch_force_N: float) -> None:
         self._seen, self._settings, self._touch_force_N = perception, settings, touch_force_N
         self._begun_ns: int | None = None
         self._since: _Instant | None = None
-        """From here on nothing has changed."""
+        """Restart the measurement of steadiness."""
 
     def take(self, stamp_ns: int) -> None:
-        """Note one cycle: where it differs from what was, steadiness begins anew."""
+        """Add one cycle; a change restarts the measurement of steadiness."""
         self._begun_ns = stamp_ns if self._begun_ns is None else self._begun_ns
         loads_N = self._seen.loads_N()
         forces_N = np.array([min(load_N, 1e6) for load_N in loads_N.values()])
@@ -92,7 +92,7 @@ class Watcher:
         )
 
     def view(self, stamp_ns: int) -> OperatorView:
-        """What is seen now."""
+        """The current readings."""
         loads_N = self._seen.loads_N()
         silent = tuple(f for f in loads_N if not np.isfinite(loads_N[f]) or self._is_silent(f, stamp_ns))
         usable = [finger for finger in loads_N if finger not in silent and self._is_zeroed(finger)]
@@ -121,7 +121,7 @@ class Watcher:
         return not isinstance(tip, ForceTip) or tip.tare_record is not None
 
     def _observability(self, touching: tuple[str, ...]) -> float | None:
-        """Of contacts computed from the newest samples alone; a capture will average."""
+        """Observability of contacts computed from the newest samples only; a capture will average."""
         points_m, normals = [], []
         for finger in touching:
             touch = _touch_distal(self._seen.fingertips[finger], self._seen.world_R_distal(finger))

@@ -5,15 +5,15 @@ from __future__ import annotations
 from drivers.core.clock import NANOSECONDS, Clock
 
 _GIVEN_UP_ns = NANOSECONDS // 5
-"""A simulation that is so far behind stays behind: it does not hurry afterwards."""
+"""Beyond this delay the simulation stays behind instead of catching up."""
 
 
 class Pace:
     """Called with the simulated time after every cycle; waits while that is ahead.
 
     Args:
-        clock: the real one.
-        factor: simulated seconds for a real one.
+        clock: the real clock.
+        factor: simulated seconds per real second.
     """
 
     def __init__(self, clock: Clock, factor: float = 1.0) -> None:

@@ -1,4 +1,4 @@
-"""An operator without a person: does what the prompts ask for, and what a script puts in between."""
+"""A simulated operator: follows the prompts, and a script."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _ANSWERS = {
 
 @dataclass(frozen=True)
 class Cue:
-    """What a script does, once, as soon as it fits.
+    """One scripted action, executed once when its condition holds.
 
     Attributes:
-        fits: whether it is time, by what is shown.
-        requests: what is asked for then.
-        act: done then, before the requests.
+        fits: condition on the panel.
+        requests: requests to send.
+        act: called before the requests.
     """
 
     fits: Callable[[Panel], bool]
@@ -37,8 +37,8 @@ class SimulatedOperator:
     """Answers every prompt by letting the rig do the step, and captures when the grasp is steady.
 
     Args:
-        script: cues in their order; while the next one fits, it is played instead of an answer.
-        attended: plays a person who mends what has failed and then goes on.
+        script: cues in order; when the next one fits, it is played instead of an answer.
+        attended: play a person who fixes problems and resumes.
     """
 
     def __init__(self, script: Iterable[Cue] = (), *, attended: bool = False) -> None:
@@ -70,7 +70,7 @@ class SimulatedOperator:
             self._waiting.append(Request(Ask.PAUSE))
 
     def _answer(self, panel: Panel) -> None:
-        """One answer to each prompt; in the hold only once the grasp is steady, or after it cannot become so."""
+        """One answer per prompt; while holding only once the grasp is steady, or cannot become steady."""
         answer = _ANSWERS.get(panel.stage)
         if answer is None or not panel.prompt:
             return

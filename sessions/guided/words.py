@@ -1,4 +1,4 @@
-"""Plans in words, as a person at the table says them."""
+"""Plans in words for the operator."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from sessions.motion.grasp_plan import GraspPlan
 
 
 def plan_in_words(plan: GraspPlan) -> str:
-    """A grasp as a person would do it."""
+    """A grasp as an instruction for a person."""
     frame = plan.frame
     place = f"{1e3 * frame.x_m:+.0f}, {1e3 * frame.y_m:+.0f} mm"
     turn = math.degrees(frame.yaw_rad)

@@ -1,7 +1,7 @@
-"""A rig as the place where a calibration's touches and pictures are made.
+"""Makes a calibration's touches and pictures with a rig.
 
-The positioner carries the hand, one finger stretched, before a face and presses it softly; or it shows the board on the
-hand to the camera. Every cycle is looked at by the safety supervisor.
+The positioner moves the hand, one finger stretched, in front of a face and presses it softly; or it shows the board on
+the hand to the camera. The safety supervisor checks every cycle.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ Board = SingleMarker | GridBoard | CharucoBoard
 
 
 class MeasurerSettings(StrictModel):
-    """How the hand moves while it is calibrated.
+    """How the hand moves during calibration.
 
     Attributes:
-        travel_m_s, turn_rad_s: between the poses.
-        press_m_s: toward a face.
-        fingers_rad_s: of the joints between postures.
-        lift_m: how high above a place the hand arrives and leaves.
-        stand_off_m: from here on it presses; more than the mount may be off.
-        beyond_m: how far behind the expected face the search ends.
-        back_m: way back after the first touch, before it is touched again, slowly.
+        travel_m_s, turn_rad_s: speeds between poses.
+        press_m_s: speed toward a face.
+        fingers_rad_s: joint speed between postures.
+        lift_m: height above a place at which the hand arrives and leaves.
+        stand_off_m: distance at which the press starts; more than the mount's error.
+        beyond_m: distance behind the expected face at which the search ends.
+        back_m: retreat after the first touch, before the slow second touch.
         again_m_s: speed of the second touch.
         press_N: force at which it stops.
-        settle_s, capture_s: rest before, and length of, a measurement.
-        tares: how often a fingertip that still swings is given a rest.
-        safety: limits; the edges of a table lie far out, and a stretched finger keeps the palm high.
+        settle_s, capture_s: rest before a measurement, and its length.
+        tares: how often to wait for a fingertip that still swings.
+        safety: limits; wide, since the edges of a table are far out and a stretched finger keeps the palm high.
     """
 
     travel_m_s: float = Field(default=0.25, gt=0.0)
@@ -68,12 +68,12 @@ class MeasurerSettings(StrictModel):
 
 
 class PressingHand:
-    """A connected rig runtime whose hand is carried about and presses faces; what all calibration stations share.
+    """A connected rig runtime whose hand is moved and presses faces; shared by all measurers.
 
     Args:
-        rig runtime: connected.
-        world_T_mount: roughly where the mount stands.
-        tips: shape of each finger's tip.
+        runtime: connected.
+        world_T_mount: approximate pose of the mount.
+        tips: shape of each fingertip.
         settings: see there.
     """
 
@@ -94,7 +94,7 @@ class PressingHand:
     # --- pressing ----------------------------------------------------------------------------------------------
 
     def _press_and_observe(self, planned: PlannedTouch, captured: Callable[[PlannedTouch], ObservedT]) -> ObservedT:
-        """Press what is planned, observe, and go back before the face."""
+        """Press as planned, observe, and move back in front of the face."""
         tip, joints = self._tips[planned.finger], planned.joints_rad
         before = planned.base_q(self._world_T_mount, joints, tip, self.settings.stand_off_m)
         behind = planned.base_q(self._world_T_mount, joints, tip, -self.settings.beyond_m)
@@ -109,7 +109,9 @@ class PressingHand:
             self._move(before, self.settings.travel_m_s)
 
     def _press(self, planned: PlannedTouch, before: Array, behind: Array) -> None:
-        """Find the face, go back a little, and touch it again slowly: the softer the press, the less the tip yields."""
+        """Find the face, move back a little, and touch it again slowly: the softer the press,
+        the less the tip yields.
+        """
         self._search(planned, behind, self.settings.press_m_s)
         back = self.settings.back_m / float(np.linalg.norm(before[:3] - behind[:3]))
         self._move(self._q + back * (before - behind), self.settings.travel_m_s)
@@ -122,8 +124,8 @@ class PressingHand:
             self._go(q)
             if self._motion.loads_N()[planned.finger] >= self.settings.press_N:
                 return
-        hint = "Check that it is where the geometry says, and the guess of the mount's place"
-        raise DeviceError(f"{planned.finger} met nothing at {planned.patch.target.name}", where="touch", hint=hint)
+        hint = "Check its pose in the geometry file, and the initial guess of the mount's pose"
+        raise DeviceError(f"{planned.finger} touched nothing at {planned.patch.target.name}", where="touch", hint=hint)
 
     def _tare(self, finger: str) -> None:
         if refused := self._motion.tare(self.settings.settle_s, (finger,), self.settings.tares):
@@ -140,7 +142,7 @@ class PressingHand:
         self._move(self._q + np.array([0, 0, self.settings.lift_m, 0, 0, 0]), self.settings.travel_m_s)
 
     def _arrive(self, q: Array) -> None:
-        """Over a place first, then down."""
+        """Move above a place first, then down."""
         self._move(q + np.array([0, 0, self.settings.lift_m, 0, 0, 0]), self.settings.travel_m_s)
         self._move(q, self.settings.travel_m_s)
 
@@ -167,7 +169,7 @@ class PressingHand:
         self._targets_rad = wanted
 
     def _mean_pose(self, duration_s: float, each: Callable[[], object] = lambda: None) -> HandPose:
-        """Where hand and positioner stand, mean over a time; ``each`` is called every cycle of it."""
+        """Joints of hand and positioner, averaged over a time; ``each`` is called in every cycle."""
         seen, joints, base = self.runtime.perception, [], []
         for _ in range(self._motion.cycles(duration_s)):
             self._motion.tick()
@@ -181,8 +183,8 @@ class CalibrationMeasurer(PressingHand):
     """A rig that makes planned touches and pictures.
 
     Args:
-        rig runtime, world_T_mount, tips, settings: see :class:`PressingHand`.
-        board: on the hand, for pictures; None for touches.
+        runtime, world_T_mount, tips, settings: see :class:`PressingHand`.
+        board: board on the hand, for pictures; None for touches.
         markers: the world marker, for pictures.
     """
 
@@ -202,8 +204,8 @@ class CalibrationMeasurer(PressingHand):
         """Make one planned touch or picture.
 
         Raises:
-            DeviceError: nothing was met, no contact was felt, or the board is not in the picture.
-            SafetyError: a limit was passed; the rig was stopped.
+            DeviceError: nothing was touched, no contact was measured, or the board is not in the picture.
+            SafetyError: a limit was exceeded; the rig was stopped.
         """
         observation = (
             self._press_and_observe(planned, self._capture)
@@ -222,7 +224,7 @@ class CalibrationMeasurer(PressingHand):
         pose = self._mean_pose(self.settings.capture_s)
         contact = sensor.contact(seen.world_R_distal(finger))
         if contact is None:
-            hint = "Press again, elsewhere; see tactile-lab rig check"
+            hint = "Press again at another place; see tactile-lab rig check"
             raise DeviceError(f"{finger} felt no valid contact", where="touch", hint=hint)
         return Touch(
             finger=finger,
@@ -247,6 +249,6 @@ class CalibrationMeasurer(PressingHand):
         image = self.runtime.picture(self._motion.tick).image
         board_m, board_px = board.match_corners(image)
         if len(board_m) < 4:
-            hint = "Move it into the picture, and see that nothing hides it"
+            hint = "Move it into the picture, and make sure that nothing hides it"
             raise DeviceError("the board on the hand is not in the picture", where="camera", hint=hint)
         return View(pose, board_m, board_px, detect(image, markers.dictionary).get(markers.world_id))

@@ -1,4 +1,4 @@
-"""A rig as the place where a force fingertip's wrenches are measured: free in many orientations, and pressed."""
+"""Measures a force fingertip's wrenches with a rig: free in many orientations, and pressed."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _HELD = 0.7
 
 
 class FingertipMeasurerSettings(MeasurerSettings):
-    """As :class:`MeasurerSettings`, with a firmer press, as the lever of its force is wanted.
+    """As :class:`MeasurerSettings`, with a firmer press, to measure the lever of its force.
 
     Attributes:
-        holds: how often the hand follows a finger that gives way under the press.
+        holds: how often the hand follows a finger that yields under the press.
     """
 
     lift_m: float = Field(default=0.12, gt=0.0)
@@ -42,11 +42,11 @@ class FingertipMeasurer(PressingHand):
     _untouched: WrenchPose
 
     def measure(self, planned: PlannedWrench) -> tuple[WrenchPose, ...]:
-        """Take one mean wrench; of a press also the one just before it, which tells the drift and the weight.
+        """Take one mean wrench; for a press also the one just before it, for drift and weight.
 
         Raises:
-            DeviceError: the sensor gives no usable readings, or nothing was met.
-            SafetyError: a limit was passed; the rig was stopped.
+            DeviceError: the sensor gives no usable readings, or nothing was touched.
+            SafetyError: a limit was exceeded; the rig was stopped.
         """
         if isinstance(planned, PlannedFree):
             taken: tuple[WrenchPose, ...] = (self._free(planned),)
@@ -66,7 +66,7 @@ class FingertipMeasurer(PressingHand):
         return self._feel(planned)
 
     def _press(self, planned: PlannedTouch, before: Array, behind: Array) -> None:
-        """As for a touch, with a free wrench first; then down again while the finger gives way and the force falls."""
+        """As for a touch, with a free wrench first; then down again while the finger yields and the force drops."""
         self._untouched = self._feel(planned)
         super()._press(planned, before, behind)
         for _ in range(self.settings.holds):
@@ -76,7 +76,7 @@ class FingertipMeasurer(PressingHand):
             self._motion.wait(self.settings.settle_s)
 
     def _feel(self, planned: PlannedFree | PlannedTouch) -> WrenchPose:
-        """Mean wrench as the sensor gives it, bias and weight included, and the orientation of the distal frame."""
+        """Mean raw wrench, bias and weight included, and the orientation of the distal frame."""
         sensor = self.runtime.perception.fingertips[planned.finger]
         if not isinstance(sensor, ForceTip):
             raise DeviceError("has no force sensor", where=planned.finger, hint="BioTacs: tactile-lab calibrate biotac")
@@ -95,17 +95,17 @@ class _Readings:
 
     @property
     def newest_ns(self) -> int:
-        """When the newest was taken, ns; 0 without any."""
+        """Stamp of the newest reading, ns; 0 if there is none."""
         return max(self._found, default=0)
 
     def take(self, load_N: float) -> None:
-        """The newest reading, unless it is void (an infinite load) or known already."""
+        """The newest reading, unless it is invalid (an infinite load) or not new."""
         newest = self._sensor.newest
         if newest is not None and math.isfinite(load_N):
             self._found[newest.stamp_ns] = newest.wrench
 
     def mean(self) -> Array:
-        """Their mean, shape (6,). Raises DeviceError when they are too few."""
+        """Their mean, shape (6,). Raises DeviceError if there are too few."""
         if len(self._found) < LEAST_READINGS:
             what = f"{len(self._found)} usable readings, {LEAST_READINGS} needed"
             raise DeviceError(what, where=f"force sensor {self._sensor.finger}", hint="See tactile-lab rig check")

@@ -1,4 +1,4 @@
-"""A hand that a person holds in a known pose: it is read, and moves nothing by itself."""
+"""Reads a hand that a person holds in a known pose; nothing moves by itself."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from sessions.rig_runtime.rig_runtime import RigRuntime
 
 _READ_s = 0.5
 _STILL_deg = 1.5
-"""More than the noise of a joint's sensor: the hand slips, or is not held."""
+"""Above the noise of a joint sensor: the hand slips, or is not held."""
 
 
 class HeldHand:
-    """Where known poses are read.
+    """Reads known poses.
 
     Args:
-        rig runtime: connected; nothing on it moves from here on.
+        runtime: connected; nothing on it moves from now on.
     """
 
     def __init__(self, runtime: RigRuntime) -> None:
@@ -28,10 +28,10 @@ class HeldHand:
         runtime.stop()
 
     def measure(self, planned: PlannedPose) -> JointPose:
-        """The pose with the angles that its joints show, mean over half a second.
+        """The pose with the measured joint angles, averaged over half a second.
 
         Raises:
-            DeviceError: a joint moves meanwhile, or a device failed.
+            DeviceError: a joint moved meanwhile, or a device failed.
         """
         joints = list(planned.pose.known_deg)
         columns, seen = [JOINT_INDEX[joint] for joint in joints], []

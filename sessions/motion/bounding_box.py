@@ -1,11 +1,11 @@
-"""The bounding box of an unknown object, felt side by side before the first grasp (thesis figure 4.2).
+"""The bounding box of an unknown object, measured by touch before the first grasp (thesis figure 4.2).
 
 The order is the figure's: top, left, front, right, back. The top is tapped. A side is raked: the four fingers hang in a
-row, the thumb held up, and come toward the object in lanes until one meets it. The back, the side toward the arm, can
-not be raked where the arm does not turn round: there the thumb closes alone, the fingers open beyond the front.
-
-A side that is not found (nothing in any lane, no way down) is assumed as far away as was searched, and is told. From
-then on open fingertips keep out of the box and its margin, so that the hand grasps across the side it can span.
+row, the thumb held up, and come toward the object in lanes until one meets it. The back, the side toward the arm,
+cannot be raked if the arm cannot turn around: there only the thumb closes, with the fingers open beyond the front. A
+side that is not found (nothing in any lane, descent blocked) is assumed to be as far away as was searched, and is
+reported. Afterwards open fingertips keep out of the box and its margin, so that the hand grasps across the side it can
+span.
 """
 
 from __future__ import annotations
@@ -23,33 +23,34 @@ from sessions.motion.motion import GraspFrame
 from sessions.motion.touching import Toucher
 
 SIDES = ("left", "front", "right", "back")
-"""Beside the top, in the figure's order, the front away from the arm, the back toward it."""
+"""Sides besides the top, in the figure's order; the front faces away from the arm."""
 
 _ASSUMED_m = 0.030
-"""From the middle to a side that was not found."""
+"""Distance from the middle to a side that was not found."""
 
 _BEYOND_m = -0.040
 """From the front to the grasp frame in which the open fingers stand 25 mm clear of it."""
 
 _THUMB_ASIDE_m = 0.014
-"""Of the thumb's way from the middle of the grasp frame, toward its +y."""
+"""Offset of the thumb's path from the middle of the grasp frame, toward its +y."""
 
 _SHORT_OF_ENDS_m = 0.005
-"""The thumb comes no nearer to the ends of the width than this: it would pass beside the object."""
+"""Least distance of the thumb from the ends of the width: nearer, it would pass beside the object."""
 
 _TURNS_rad = {"left": np.pi / 2, "front": 0.0, "right": -np.pi / 2, "back": np.pi}
 
 
 class ProbingSettings(StrictModel):
-    """How the bounding box is felt.
+    """How the bounding box is measured.
 
     Attributes:
-        enabled: feel it before the first grasp.
-        search_m: how far from where the object is expected the search begins on every side.
-        lanes_m: offsets of the lanes across the direction of a rake; two lie no farther apart than the row is wide.
-        thumb_lane_m: distance of the lanes in which the thumb feels the back.
+        enabled: measure it before the first grasp.
+        search_m: distance from the object's expected position at which the search starts on every side.
+        lanes_m: offsets of the lanes across the direction of a rake; neighbouring ones no farther apart than the row is
+            wide.
+        thumb_lane_m: spacing of the lanes in which the thumb touches the back.
         margin_m: added on every side: contacts are few, and the corner may lie between lanes.
-        tallest_m: over objects higher than this the palm does not pass: their sides are not felt.
+        tallest_m: the palm does not pass over higher objects: their sides are not measured.
     """
 
     enabled: bool = False
@@ -62,12 +63,12 @@ class ProbingSettings(StrictModel):
 
 @dataclass(frozen=True)
 class BoundingBox:
-    """What was felt.
+    """The measured box.
 
     Attributes:
         world_T_box: its axes: x away from the arm. It moves with the object.
         low_m, high_m: its extent there, without margin, shape (2,).
-        margin_m: to keep besides.
+        margin_m: additional margin.
         top_m: height of the top; None if it was not found.
         missing: the sides that were not found, and why.
     """
@@ -81,7 +82,7 @@ class BoundingBox:
 
     @property
     def is_found(self) -> bool:
-        """Whether anything was felt at all."""
+        """Whether anything was found."""
         return self.top_m is not None or len(self.missing) < len(SIDES)
 
     @property
@@ -108,13 +109,13 @@ class BoundingBox:
 
 
 class BoxProber:
-    """Feels the bounding box.
+    """Measures the bounding box.
 
     Args:
-        toucher: the hand's way of touching.
+        toucher: touches with the hand.
         settings: see there.
         yaw_window_rad: of the arm.
-        start_m: where the object is expected, world x, y.
+        start_m: expected position of the object, world x, y.
     """
 
     def __init__(
@@ -128,7 +129,7 @@ class BoxProber:
         self._axes = Pose2(start_m[0], start_m[1], float(np.mean(yaw_window_rad)))
 
     def feel(self, stop: Callable[[], bool] = lambda: False) -> BoundingBox:
-        """Top, left, front, right, back; ``stop`` is asked before each whether to leave the rest out."""
+        """Top, left, front, right, back; ``stop`` is asked before each whether to skip the rest."""
         found: dict[str, Array] = {}
         missing: dict[str, str] = {}
         top_m = None if stop() else self._top_m()
@@ -146,7 +147,7 @@ class BoxProber:
         return self._box(found, missing, top_m)
 
     def _top_m(self) -> float | None:
-        """Height of the highest fingertip that met something when they were laid on."""
+        """Height of the highest fingertip that touched something when they were laid on."""
         points = self._toucher.tap(GraspFrame(self._axes.x(), self._axes.y(), self._axes.theta()))
         return float(points[:, 2].max()) if len(points) else None
 
@@ -155,7 +156,7 @@ class BoxProber:
         return side == "back" and high - low < 2 * np.pi - 0.1
 
     def _rake(self, side: str) -> Array | str:
-        """Where fingertips met the object, shape (n, 2), box frame; why not, else."""
+        """Where fingertips touched the object, shape (n, 2), box frame; otherwise the reason."""
         low, high = self._window_rad
         yaw = float(np.clip(self._axes.theta() + _TURNS_rad[side], low, high))
         landed, found = 0, []
@@ -171,7 +172,7 @@ class BoxProber:
             return self._in_box_frame(np.vstack(found))
         if landed:
             return f"something stands {1e3 * self._settings.search_m:.0f} mm from where the object is expected"
-        return f"nothing met in {len(self._settings.lanes_m)} lanes"
+        return f"nothing touched in {len(self._settings.lanes_m)} lanes"
 
     def _by_closing(self, found: Mapping[str, Array]) -> Array | str:
         """The back, by the thumb in lanes: the fingers stand open beyond the front, or where that would be.
@@ -190,10 +191,10 @@ class BoxProber:
                 met.append(points)
         if met:
             return self._in_box_frame(np.vstack(met))
-        return "the thumb has no way down beside the object" if landed else "the thumb met nothing"
+        return "the thumb cannot descend beside the object" if landed else "the thumb touched nothing"
 
     def _thumb_lanes_m(self, found: Mapping[str, Array]) -> Array:
-        """Where the thumb comes, from the middle outwards, box frame y: over the width found, short of its ends."""
+        """Lanes of the thumb, from the middle outwards, box frame y: over the measured width, short of its ends."""
         sides_m = [points[:, 1] for side, points in found.items() if side in ("left", "right")]
         every_m = np.concatenate([*sides_m, *([np.zeros(1)] if not sides_m else [])])
         half_m = np.ptp(every_m) / 2 - _SHORT_OF_ENDS_m
@@ -205,7 +206,9 @@ class BoxProber:
         return np.array([self._axes.transformTo(point[:2]) for point in points_m])
 
     def _box(self, found: Mapping[str, Array], missing: Mapping[str, str], top_m: float | None) -> BoundingBox:
-        """Around all places felt; toward a side that was not found at least as far as objects typically reach."""
+        """The box around all touched points; toward a side that was not found, at least the
+        typical extent of objects.
+        """
         every = np.vstack(list(found.values())) if found else np.zeros((1, 2))
         low, high = every.min(axis=0), every.max(axis=0)
         middle = (low + high) / 2

@@ -1,4 +1,4 @@
-"""Speeds, forces and times of the grasp cycle, as they stand in a rig file."""
+"""Speeds, forces and times of the grasp cycle, as written in a rig file."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ class TouchSettings(StrictModel):
         tap_m_s: speed of the hand coming down on the top.
         met_N: force on a fingertip that ends the approach.
         force_N: force that every fingertip is then brought to.
-        most_N: force on any fingertip at which the hand itself moves on no more.
-        reach_m: how far a fingertip moves on for that; what is farther away is not met.
-        gain: speed of that per force error, m/s per N.
-        sink_m: how far the hand itself moves on.
+        most_N: force on any fingertip at which the hand stops moving.
+        reach_m: how far a fingertip moves to reach that force.
+        gain: its speed per force error, m/s per N.
+        sink_m: how far the hand itself keeps moving.
         press_s: time for both.
         capture_s: length of the capture.
         rake_height_m: height of the fingertips' centres in a rake.
         rake_m_s: speed of a rake.
-        rake_N: force that fingertips are brought to on a side: all together less than moves the object.
+        rake_N: force that fingertips are brought to on a side: the sum must not move the object.
         row_m: x of the fingertips in the row's own grasp frame.
         beyond_m: how far beyond the middle a rake goes.
         lowest_m: height of the fingertips over the table where a tap has missed the object.
@@ -57,22 +57,22 @@ class CycleSettings(StrictModel):
         landing_tries: descents before the grasp is given up.
         closing_m_s: speed of the fingertips; it sets how far the object is pushed.
         touch_force_N: contact force at which a finger stops.
-        touch_cycles: cycles in a row with that force: a lone jerk of the finger's own mass is no touch.
-        held_up_rad: angle by which a joint falls behind where something holds the finger.
-        closing_most_N: force on a fingertip at which all fingers stop: links that feel nothing push the object.
+        touch_cycles: cycles in a row with that force: a single jerk of the finger's own mass is not a touch.
+        held_up_rad: angle by which a joint falls behind if something holds the finger.
+        closing_most_N: force on a fingertip at which all fingers stop: links without sensors may be pushing the object.
         contact_force_N: force that each touching finger settles to for the capture; the thumb takes the others' sum.
         settle_s: time for that.
-        rest_s: rest after every motion that something is measured after.
+        rest_s: rest after every motion that precedes a measurement.
         capture_s: length of the capture (20 samples at 100 Hz).
         squeeze_force_N: force of each finger while the object is carried; the thumb holds against their sum.
         squeeze_s: time to build the squeeze up.
         squeeze_gain: fingertip speed per force error, m/s per N.
-        pressed_N: force on a fingertip that no other finger adds to.
-        pressed_cycles: cycles in a row with that force after which the object is carried no farther.
+        pressed_N: force on a fingertip above which no other finger presses harder.
+        pressed_cycles: cycles in a row with that force after which re-orientation stops.
         carry_turn_rad_s, carry_m_s: speeds while the object is held.
-        finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind leave the path.
+        finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind would leave the path.
         touch: taps on the top and probes from the side.
-        finger_gap_m: the thumb stops this far from another tip's centre: they would touch each other.
+        finger_gap_m: the thumb stops at this distance from another tip's centre, before they touch each other.
     """
 
     lift_m: float = Field(default=0.10, gt=0.0)

@@ -16,17 +16,17 @@ from sessions.motion.motion import GraspFrame, Motion
 from sessions.motion.touching import Toucher
 
 _HASTE_N, _FLIGHT_N = 1.0, 3.0
-"""Largest force errors that count in force control: toward the object, and away from it."""
+"""Limits of the force error in force control: toward the object, and away from it."""
 
 
 class GraspCycle:
-    """The verbs of one grasp, in the order in which they are meant to be called.
+    """The steps of one grasp, in the order in which they are called.
 
     Args:
         motion: supervised motion.
         settings: speeds, forces, times.
         tip: shape of the fingertips.
-        yaw_window_rad: yaws the arm can take up.
+        yaw_window_rad: yaws the arm can reach.
     """
 
     def __init__(
@@ -43,27 +43,27 @@ class GraspCycle:
         self._progress = dict.fromkeys(FINGERS, 0.0)
         self._touching: frozenset[str] = frozenset()
         self.landings_world_m: list[Array] = []
-        """Where the tips' centres stood, (3,) each, at each landing on the object in the last approach."""
+        """Centres of the tips, (3,) each, at each landing on the object in the last approach."""
 
         self.jammed: tuple[str, ...] = ()
-        """The fingertips that were pressed so hard in the last re-orientation that it was broken off."""
+        """The fingertips that were pressed so hard in the last re-orientation that it stopped early."""
 
     @property
     def plan(self) -> GraspPlan:
-        """The grasp in hand, where it really is (a landing or a re-orientation shifts it)."""
+        """The current grasp at its actual position (a landing or a re-orientation shifts it)."""
         assert self._plan is not None
         return self._plan
 
     # --- down --------------------------------------------------------------------------------------------------
 
     def descend(self, plan: GraspPlan) -> bool:
-        """Move above, tap on the top if the plan says so, tare, and come down with care.
+        """Move above, tap on the top if the plan says so, tare, and descend guarded.
 
-        A fingertip that meets something on the way down stands on the object: lift, shift the grasp toward that
-        finger and try again. When thumb and fingers have both landed, the object is too long that way: turn.
+        A fingertip that touches something on the way down has landed on the object: lift, shift the grasp toward that
+        finger and try again. If thumb and fingers have both landed, the object is too long in that direction: turn.
 
         Returns:
-            Whether the hand is down around the object, fingers open.
+            Whether the hand has descended around the object, fingers open.
         """
         self._plan, self.landings_world_m = plan, []
         landed: set[str] = set()
@@ -90,7 +90,9 @@ class GraspCycle:
         self._motion.tare(s.rest_s)
 
     def _come_down(self) -> list[str]:
-        """Guarded descent; the fingers that landed on something, by their tips or, which bends them, by other links."""
+        """Guarded descent. Returns the fingers that landed on something, with their tips or with other links, which
+        bends them.
+        """
         s = self.settings
         down = self._motion.base_joints(self.plan.frame, self._table())
         hit: list[str] = []
@@ -110,10 +112,10 @@ class GraspCycle:
     # --- close and measure -------------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Close every finger along its line until it touches, meets the thumb, or comes to the line's end.
+        """Close every finger along its path until it touches, meets the thumb, or reaches the end of the path.
 
-        Links above the fingertips feel nothing. A finger that is held up by one stops, and all do where the object is
-        pushed hard against a fingertip.
+        Links above the fingertips have no sensors. A finger that one of them holds up stops, and all stop if the object
+        is pushed hard against a fingertip.
         """
         s, table = self.settings, self._table()
         step_m = s.closing_m_s * self._motion.supervisor.speed_scale * self._motion.cycle_s
@@ -147,7 +149,7 @@ class GraspCycle:
         self._motion.wait(self.settings.rest_s)
 
     def capture(self) -> Grasp:
-        """Gather samples, make a grasp of them, and take a picture of the object as it is held."""
+        """Collect samples, compute a grasp from them, and take a picture of the held object."""
         return self._motion.capture(self.settings.capture_s)
 
     # --- carry -------------------------------------------------------------------------------------------------
@@ -157,7 +159,8 @@ class GraspCycle:
         self._build_up(self._balanced_forces_N(touching, self.settings.squeeze_force_N), self.settings.squeeze_s)
 
     def reorient(self, turn_rad: float, shift_world_m: Array, touching: frozenset[str]) -> Pose3:
-        """Turn about the grasp's vertical axis and shift, holding the object, unless it is jammed (:attr:`jammed`).
+        """Turn about the grasp's vertical axis and shift while holding the object, unless it is jammed
+        (:attr:`jammed`).
 
         Args:
             turn_rad: about world z.
@@ -165,7 +168,7 @@ class GraspCycle:
             touching: fingers that hold.
 
         Returns:
-            The palm's motion in the world as measured: what carries the object along (eq. 3.8).
+            The measured motion of the palm in the world, which carries the object (eq. 3.8).
         """
         motion, table, start = self._motion, self._table(), self.plan.frame
         targets_N = self._balanced_forces_N(touching, self.settings.squeeze_force_N)
@@ -200,7 +203,7 @@ class GraspCycle:
         return motion.runtime.perception.world_T_palm * world_T_before.inverse()
 
     def _balanced_forces_N(self, touching: frozenset[str], force_N: float) -> dict[str, float]:
-        """Force of each finger; the thumb takes the sum of what the others push along the grasp's x axis."""
+        """Force of each finger; the thumb balances the others' forces along the grasp's x axis."""
         table = self._table()
         forces_N = dict.fromkeys(sorted(touching - {"TH"}), force_N)
         if "TH" in touching:
@@ -214,10 +217,10 @@ class GraspCycle:
             self._motion.tick()
 
     def _servo_forces(self, targets_N: dict[str, float]) -> None:
-        """One cycle of force control: a fingertip moves along its line in proportion to its force error.
+        """One cycle of force control: a fingertip moves along its path in proportion to its force error.
 
-        It gives way faster than it presses. One that is held up presses no farther, and none does while another is
-        pressed hard. Strained fingers without a force to keep give way.
+        It retreats faster than it presses. A fingertip that is held up presses no further, and none does while another
+        is pressed hard. Overloaded fingers without a target force retreat.
         """
         s, table, loads_N = self.settings, self._table(), self._motion.loads_N()
         pressed, held_up = self._pressed_fingers(s.pressed_N), self._motion.bent(s.held_up_rad)
@@ -232,7 +235,7 @@ class GraspCycle:
         self._motion.set_fingers(table, self._progress)
 
     def _pressed_fingers(self, force_N: float) -> tuple[str, ...]:
-        """The fingertips that feel more than a force."""
+        """The fingertips with more than this force."""
         return tuple(finger for finger, load_N in self._motion.loads_N().items() if load_N > force_N)
 
     def _overloaded_fingers(self) -> set[str]:
@@ -242,9 +245,9 @@ class GraspCycle:
     # --- and away ----------------------------------------------------------------------------------------------
 
     def release(self) -> None:
-        """Open the hand, every tip back along its line: a short cut through the joints would dip into the table.
+        """Open the hand, every tip back along its path: a straight joint motion would dip into the table.
 
-        Strained fingers are freed first, the others wait for them.
+        Overloaded fingers are released first, the others wait for them.
         """
         table, closed, opened = self._table(), self._progress, self._open_progress()
         step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))

@@ -1,4 +1,4 @@
-"""What a grasp is to be, and what becomes of it where the hand lands on the object."""
+"""Grasp plans, and how they change if the hand lands on the object."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ ContactHeight: TypeAlias = Annotated[float, Field(ge=LOWEST_m, le=HIGHEST_m)]
 
 @dataclass(frozen=True)
 class GraspPlan:
-    """One grasp to do.
+    """One grasp to execute.
 
     Attributes:
         frame: the grasp frame in the world.
         closing: one of :data:`drivers.shadow.closing.closing.CLOSINGS`.
         height_m: height of the fingertip centres above the table.
-        tap: lay the fingertips on the top first.
-        reason: why this one, for people.
+        tap: tap on the top first.
+        reason: why this grasp was chosen, for people.
     """
 
     frame: GraspFrame
@@ -35,7 +35,7 @@ class GraspPlan:
     tap: bool = False
 
     def as_plain(self, index: int) -> dict[str, Any]:
-        """The plan of grasp number ``index``, from 0, as viewers are told of it; metres and radians on the table."""
+        """The plan of grasp number ``index``, from 0, as plain data for viewers; metres and radians on the table."""
         return {
             "index": index,
             "closing": self.closing,
@@ -59,12 +59,12 @@ def evade(
     """The plan after a landing: shifted toward the fingers that landed, or turned when both sides did.
 
     Args:
-        wanted, now: the plan as it was chosen, and what has become of it so far.
+        wanted, now: the plan as chosen, and its current form.
         hit: fingers that landed just now.
-        landed: those that landed since the hand was turned, ``hit`` among them; emptied when it turns.
+        landed: those that landed since the hand was turned, including ``hit``; cleared when it turns.
         table: the plan's closing.
-        shift_m: how far to shift.
-        yaw_window_rad: yaws the arm can take up.
+        shift_m: distance to shift.
+        yaw_window_rad: yaws the arm can reach.
     """
     if "TH" in landed and landed - {"TH"}:
         landed.clear()

@@ -1,7 +1,7 @@
 """Motion: moves the hand and the positioner along paths, one supervised cycle of the rig runtime at a time.
 
 Nothing else in a session moves anything. Every cycle goes through :meth:`Motion.tick`, where the safety supervisor
-looks at it; so no verb of the grasp cycle can forget to be supervised.
+checks it; so no step of the grasp cycle can be unsupervised.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from drivers.shadow.closing.closing import Closing
 from drivers.shadow.closing.posture import TipEllipsoid
 from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm
 from sessions.motion.safety import SafetySupervisor
+from sessions.recording.recorder import Level
 from sessions.rig_runtime.rig_runtime import RigRuntime
 
 _STRAIGHT_WRIST = forearm_T_palm(np.zeros(len(JOINTS)))
@@ -30,7 +31,7 @@ _HOLD_WRIST = {"WRJ1": 0.0, "WRJ2": 0.0}
 
 @dataclass(frozen=True)
 class GraspFrame:
-    """A grasp frame on the table: world x, y of its origin and its yaw. Height is the closing's affair."""
+    """A grasp frame on the table: world x, y of its origin and its yaw. The height is given by the closing."""
 
     x_m: float
     y_m: float
@@ -53,11 +54,11 @@ class GraspFrame:
 
 
 class Motion:
-    """The hand and the positioner as one thing that moves.
+    """Moves hand and positioner together.
 
     Args:
-        rig runtime: connected before anything moves.
-        supervisor: looks at every cycle.
+        runtime: connected before anything moves.
+        supervisor: checks every cycle.
     """
 
     def __init__(self, runtime: RigRuntime, supervisor: SafetySupervisor) -> None:
@@ -68,7 +69,7 @@ class Motion:
 
     @cached_property
     def _base_q(self) -> Array:
-        """The positioner's last target, shape (6,); before the first one, where it is."""
+        """The positioner's last target, shape (6,); before the first one, its position."""
         return self.runtime.perception.base_q.copy()
 
     # --- time --------------------------------------------------------------------------------------------------
@@ -79,29 +80,47 @@ class Motion:
         return self.runtime.cycle_ns / NANOSECONDS
 
     def tick(self) -> None:
-        """One cycle, looked at by the supervisor.
+        """One cycle, checked by the supervisor; as many more as a hand whose link is gone needs to come back.
+
+        So nothing goes on along its path while the hand cannot follow.
 
         Raises:
-            SafetyError: a limit is passed.
+            SafetyError: a limit is exceeded.
             DeviceError: a device failed.
         """
+        self._watched_cycle()
+        if self.supervisor.hand_is_silent:
+            self._await_hand()
+
+    def _await_hand(self) -> None:
+        self._log("the hand is not heard: everything waits where it is")
+        began_ns = self.runtime.clock.now_ns()
+        while self.supervisor.hand_is_silent:
+            self._watched_cycle()
+        waited_s = (self.runtime.clock.now_ns() - began_ns) / NANOSECONDS
+        self._log(f"the hand is heard again after {waited_s:.1f} s: the session goes on")
+
+    def _log(self, words: str) -> None:
+        self.runtime.log(Level.WARNING, "hand", words)
+
+    def _watched_cycle(self) -> None:
         self.runtime.cycle()
         snapshot = self.runtime.snapshot()
         self._loads_N = dict(snapshot.loads_N)
         self.supervisor.check(snapshot)
 
     def wait(self, duration_s: float) -> None:
-        """Cycles for a time."""
+        """Run cycles for a time."""
         for _ in range(self.cycles(duration_s)):
             self.tick()
 
     def tare(self, rest_s: float, fingers: Sequence[str] = FINGERS, tries: int = _TARES) -> Mapping[str, str]:
-        """Rest, and take fingertips as untouched; again where one refuses because the hand still moves.
+        """Rest, and tare the fingertips; retry if one refuses because the hand still moves.
 
-        What a fingertip shows that refuses to the end counts as nothing from here on: see :meth:`loads_N`.
+        The reading of a fingertip that keeps refusing is subtracted from now on: see :meth:`loads_N`.
 
         Returns:
-            The reasons of those that refused to the end, by finger.
+            The reasons of those that kept refusing, by finger.
         """
         self._resting_N, refused = {}, dict[str, str]()
         for _ in range(tries):
@@ -112,7 +131,7 @@ class Motion:
         return refused
 
     def capture(self, seconds: float) -> Grasp:
-        """Gather samples for so long, make a grasp of them, and take a picture of the object as it is held."""
+        """Collect samples for a time, compute a grasp from them, and take a picture of the held object."""
         self.runtime.begin_capture()
         self.wait(seconds)
         grasp = self.runtime.end_capture()
@@ -124,7 +143,7 @@ class Motion:
         return max(1, round(duration_s / self.cycle_s))
 
     def shares(self, duration_s: float) -> Iterator[float]:
-        """One growing share of a motion for each of its cycles, the last one 1; slower while moves have to be slow."""
+        """The progress of a motion in each of its cycles, up to 1; slower while motions must be slow."""
         count = self.cycles(duration_s / self.supervisor.speed_scale)
         for step in range(1, count + 1):
             yield step / count
@@ -144,28 +163,28 @@ class Motion:
         self.runtime.base.set_target(self._base_q)
 
     def move_base(self, q: Array, speed_m_s: float, turn_rad_s: float) -> None:
-        """Straight, smooth move of the positioner's joints to ``q``, shape (6,); the slower of both speeds paces it."""
+        """Straight, smooth move of the positioner's joints to ``q``, shape (6,), limited by both speeds."""
         start = self._base_q
         for share in self.shares(self._base_time_s(q, speed_m_s, turn_rad_s)):
             self.set_base(start + smooth(share) * (q - start))
             self.tick()
 
     def rise(self, height_m: float, speed_m_s: float) -> None:
-        """Straight up from where the positioner was sent last."""
+        """Move straight up from the positioner's last target."""
         q = self._base_q.copy()
         q[:3] += self.runtime.world_T_mount.rotation().unrotate(np.array([0.0, 0.0, height_m]))
         self.move_base(q, speed_m_s, np.inf)
 
     def probe_base(self, q: Array, speed_m_s: float, met: Callable[[], bool]) -> bool:
-        """Even move toward ``q`` that turns back where something is met.
+        """Move toward ``q`` at constant speed, and turn back if something is touched.
 
         Args:
-            q: where to, shape (6,).
-            speed_m_s: even speed.
+            q: target, shape (6,).
+            speed_m_s: constant speed.
             met: asked after every cycle.
 
         Returns:
-            Whether ``q`` was reached. If not, the positioner is on its way back to where it was a moment before.
+            Whether ``q`` was reached. If not, the positioner is moving back to its previous position.
         """
         start = self._base_q
         steps = [start + share * (q - start) for share in self.shares(self._base_time_s(q, speed_m_s, np.inf))]
@@ -179,7 +198,7 @@ class Motion:
         return True
 
     def line(self, q: Array, speed_m_s: float) -> Iterator[Array]:
-        """Targets on the even way from where the positioner was sent last to ``q``, one a cycle."""
+        """Targets at constant speed from the positioner's last target to ``q``, one per cycle."""
         start = self._base_q
         for share in self.shares(self._base_time_s(q, speed_m_s, np.inf)):
             yield start + share * (q - start)
@@ -189,12 +208,12 @@ class Motion:
         return max(travel_s, float(np.max(np.abs(q[3:] - self._base_q[3:]))) / turn_rad_s)
 
     def follow(self, pose_at: Callable[[float], Array], duration_s: float, each: Callable[[], bool]) -> float:
-        """Positioner joints as a function of smooth progress 0..1.
+        """Move along positioner joints given as a function of smooth progress 0..1.
 
         Args:
             pose_at: the joints, shape (6,).
-            duration_s: of the whole way.
-            each: acts before every cycle, and says whether to go on.
+            duration_s: of the whole path.
+            each: called before every cycle; returns whether to continue.
 
         Returns:
             The progress made.
@@ -213,12 +232,12 @@ class Motion:
     def set_fingers(
         self, closing: Closing, progress: Mapping[str, float], aside_rad: Mapping[str, float] | None = None
     ) -> None:
-        """Targets of the fingers at their progress on the closing's lines; the wrist stays straight.
+        """Set the fingers' targets by their progress on the closing's paths; the wrist stays straight.
 
         Args:
-            closing: whose lines.
+            closing: its paths.
             progress: of each finger.
-            aside_rad: what single motors turn beyond that.
+            aside_rad: additional angles of single motors.
         """
         targets = dict(_HOLD_WRIST)
         for finger in FINGERS:
@@ -235,7 +254,7 @@ class Motion:
         speed_rad_s: float,
         aside_rad: Mapping[str, float] | None = None,
     ) -> None:
-        """From the present targets to those at ``progress``, straight in joint space."""
+        """Move from the present targets to those at ``progress``, straight in joint space."""
         start = self._present_targets(closing, progress)
         self.set_fingers(closing, progress, aside_rad)
         end = self._targets_rad
@@ -245,7 +264,7 @@ class Motion:
             self.tick()
 
     def finger_time_s(self, closing: Closing, progress: Mapping[str, float], speed_rad_s: float) -> float:
-        """How long the joint with the longest way takes to the targets at ``progress``."""
+        """Time that the joint with the longest travel needs to reach the targets at ``progress``."""
         start = self._present_targets(closing, progress)
         end = {name: angle for finger in FINGERS for name, angle in closing.joints(finger, progress[finger]).items()}
         return max(abs(angle - start[name]) for name, angle in end.items()) / speed_rad_s
@@ -254,28 +273,32 @@ class Motion:
         return self._targets_rad or self._measured_targets(closing, progress)
 
     def _measured_targets(self, closing: Closing, progress: Mapping[str, float]) -> dict[str, float]:
-        """Where the motors stand now, for the names that ``progress`` will command."""
+        """Present angles of the motors that ``progress`` will command."""
         measured = self._measured_rad()
         names = [*_HOLD_WRIST, *(name for finger in FINGERS for name in closing.joints(finger, progress[finger]))]
         return {name: measured[name] for name in names}
 
     def _measured_rad(self) -> dict[str, float]:
-        """Where joints stand now, and what the coupled ones are together."""
+        """Present joint angles, and the sums of the coupled ones."""
         joints = dict(zip(JOINTS, self.runtime.perception.joints_rad.tolist(), strict=True))
         return joints | {f"{finger}J0": joints[f"{finger}J1"] + joints[f"{finger}J2"] for finger in FINGERS[:4]}
 
     def bent(self, least_rad: float) -> tuple[str, ...]:
-        """Fingers with a joint that is farther off its target: something holds it, felt by the fingertip or not."""
+        """Fingers with a joint farther off its target than this: something holds it, whether the fingertip measures it
+        or not.
+        """
         measured = self._measured_rad()
         off = [name for name, angle in self._targets_rad.items() if abs(measured[name] - angle) > least_rad]
         return tuple(finger for finger in FINGERS if any(name.startswith(finger) for name in off))
 
     def loads_N(self) -> dict[str, float]:
-        """Contact force on each fingertip at the end of the last cycle, beyond what it showed at rest untared."""
+        """Contact force on each fingertip at the end of the last cycle, minus its reading at rest if it could not be
+        tared.
+        """
         return {finger: load_N - self._resting_N.get(finger, 0.0) for finger, load_N in self._loads_N.items()}
 
     def tip_centre_world_m(self, finger: str, tip: TipEllipsoid) -> Array:
-        """Where a fingertip's centre is now, world frame, shape (3,)."""
+        """Centre of a fingertip now, world frame, shape (3,)."""
         return np.asarray(self.runtime.perception.world_T_distal[finger].transformFrom(np.array(tip.centre_distal_m)))
 
 

@@ -1,10 +1,10 @@
-"""What may not happen to the hand, and what happens when it does.
+"""Safety limits, and the stop when one is exceeded.
 
-The supervisor looks at every cycle. A limit that is passed raises :class:`SafetyError`; whoever runs the session then
-calls :meth:`SafetySupervisor.stop`, which is also the way out of every other failure: zero demands to the hand, the
-positioner held where it is, for several cycles (the hand's own motors halt 20 ms after the last demand). The reason
-goes into the recording with the last cycles. What the hand itself and its process watch, and how soon each cause leads
-to zero demands, stands in docs/real-laboratory.md.
+The supervisor checks every cycle. An exceeded limit raises :class:`SafetyError`; the session's runner then calls
+:meth:`SafetySupervisor.stop`, as after every other failure: zero demands to the hand and the positioner held in place,
+for several cycles (the hand's own motors halt 20 ms after the last demand). The reason goes into the recording with the
+last cycles. docs/real-laboratory.md says what the hand and its process monitor, and how soon each cause leads to zero
+demands.
 """
 
 from __future__ import annotations
@@ -32,26 +32,29 @@ class SafetySettings(StrictModel):
     Attributes:
         force_limit_N: largest contact force on any fingertip.
         force_share: largest contact force as a share of the sensor's calibrated range on its smallest axis; the smaller
-            of both limits holds for a finger.
+            of both limits applies.
         force_cycles: cycles in a row over the limit that stop the rig: a fingertip that slips along the object jerks.
-        stale_s: without a fresh hand status for this long the rig stops; never less than ``stale_cycles`` cycles.
-        stale_cycles: see ``stale_s`` and ``tip_stale_s``.
-        tip_stale_s: the same for the readings of a fingertip that has a link of its own.
-        warm_C: from this temperature of the warmest motor on everything moves at ``warm_scale`` of its speed.
+        hold_s: without a new hand status for this long everything waits where it is, the hand's own demands being
+            gone; never less than ``stale_cycles`` cycles.
+        stale_s: without one for this long the rig stops; a little more than the hand's own patience with its link.
+        stale_cycles: see ``hold_s``, ``stale_s`` and ``tip_stale_s``.
+        tip_stale_s: the same for the readings of a fingertip with its own transport.
+        warm_C: above this temperature of the warmest motor everything moves at ``warm_scale`` of its speed.
         warm_scale: see ``warm_C``.
         palm_minimum_height_m: lowest height of the palm's origin above the table.
         workspace_radius_m: largest horizontal distance of the palm's origin from the workspace centre.
         workspace_centre_m: centre of the workspace on the table, world x, y.
         object_radius_m: an object estimated farther than this from the workspace centre is lost.
         empty_grasps: this many grasps in a row without any contact mean that the object is gone.
-        session_limit_s: the longest session, on the session's clock.
-        first_moves_scale: speed of the first approach as a share of the ordinary one.
+        session_limit_s: longest session, by the session's clock.
+        first_moves_scale: speed of the first approach as a share of the normal speed.
     """
 
     force_limit_N: float = Field(default=6.0, gt=0.0)
     force_share: float = Field(default=0.5, gt=0.0, le=0.8)
     force_cycles: int = Field(default=3, ge=1)
-    stale_s: float = Field(default=0.010, gt=0.0)
+    hold_s: float = Field(default=0.05, gt=0.0)
+    stale_s: float = Field(default=2.5, gt=0.0)
     stale_cycles: int = Field(default=5, ge=1)
     tip_stale_s: float = Field(default=0.2, gt=0.0)
     warm_C: float = Field(default=50.0, gt=0.0)
@@ -85,9 +88,12 @@ class SafetySupervisor:
     """Checks each cycle against the limits and knows how to stop.
 
     Args:
-        rig runtime: what to stop.
+        runtime: what to stop.
         settings: the limits.
         cycle_ns: length of a cycle.
+
+    Attributes:
+        hand_is_silent: at the last look the hand had not been heard for so long that everything has to wait.
     """
 
     def __init__(self, runtime: Stoppable, settings: SafetySettings, cycle_ns: int) -> None:
@@ -95,6 +101,8 @@ class SafetySupervisor:
         patience_ns = settings.stale_cycles * cycle_ns
         self._stale_ns = max(round(settings.stale_s * NANOSECONDS), patience_ns)
         self._tip_stale_ns = max(round(settings.tip_stale_s * NANOSECONDS), patience_ns)
+        self._hold_ns = max(round(settings.hold_s * NANOSECONDS), patience_ns)
+        self.hand_is_silent = False
         self._flight_recorder = FlightRecorder()
         self._warm = False
         self._start_ns: int | None = None
@@ -108,7 +116,7 @@ class SafetySupervisor:
         """Compare one cycle with the limits.
 
         Raises:
-            SafetyError: a limit is passed.
+            SafetyError: a limit is exceeded.
         """
         if self._start_ns is None:
             self._start_ns = snapshot.stamp_ns
@@ -120,13 +128,15 @@ class SafetySupervisor:
             self._check_workspace(snapshot.palm_world_m)
 
     def _check_freshness(self, snapshot: CycleSnapshot) -> None:
-        if (silent_ns := self._silent_ns(snapshot, snapshot.hand_stamp_ns)) > self._stale_ns:
+        silent_ns = self._silent_ns(snapshot, snapshot.hand_stamp_ns)
+        self.hand_is_silent = silent_ns > self._hold_ns
+        if silent_ns > self._stale_ns:
             raise SafetyError(
-                f"no fresh status for {silent_ns / 1e6:.0f} ms", where="hand", hint="Check cable, power and the bus"
+                f"no new status for {silent_ns / 1e6:.0f} ms", where="hand", hint="Check cable, power and the bus"
             )
         for finger, stamp_ns in snapshot.tip_stamps_ns.items():
             if (silent_ns := self._silent_ns(snapshot, stamp_ns)) > self._tip_stale_ns:
-                what = f"no reading of the fingertip for {silent_ns / 1e6:.0f} ms"
+                what = f"no reading from the fingertip for {silent_ns / 1e6:.0f} ms"
                 raise SafetyError(what, where=finger, hint="Check the sensor's box, power and cable")
 
     def _silent_ns(self, snapshot: CycleSnapshot, heard_ns: int | None) -> int:
@@ -141,14 +151,14 @@ class SafetySupervisor:
             if cycles < self.settings.force_cycles:
                 continue
             if not isfinite(over[finger]):
-                what = f"its readings tell no force: {snapshot.void_tips.get(finger) or 'they are no numbers'}"
-                hint = "Take the hand off the object, then look at the sensor: tactile-lab rig check"
+                what = f"its readings are invalid: {snapshot.void_tips.get(finger) or 'not numbers'}"
+                hint = "Take the hand off the object, then check the sensor: tactile-lab rig check"
                 raise SafetyError(what, where=finger, hint=hint)
             what = f"fingertip force {over[finger]:.1f} N is over the limit of {limits_N[finger]:.1f} N"
-            raise SafetyError(what, where=finger, hint="Look at the hand and the object before going on")
+            raise SafetyError(what, where=finger, hint="Check the hand and the object before continuing")
 
     def force_limit_N(self, range_N: float | None) -> float:
-        """Largest force on a fingertip whose sensor has this range; None where it has none."""
+        """Force limit of a fingertip whose sensor has this range; None if it has none."""
         own_N = self.settings.force_limit_N
         return own_N if range_N is None else min(own_N, self.settings.force_share * range_N)
 
@@ -165,7 +175,7 @@ class SafetySupervisor:
         """Why no further grasp should start at this time, or None."""
         if self._start_ns is None or stamp_ns - self._start_ns <= self.settings.session_limit_s * NANOSECONDS:
             return None
-        return f"the session limit of {self.settings.session_limit_s:.0f} s is reached"
+        return f"the session limit of {self.settings.session_limit_s:.0f} s has been reached"
 
     def object_lost(self, x_m: float, y_m: float) -> str | None:
         """Why an object estimated at world x, y counts as lost, or None."""
@@ -177,17 +187,17 @@ class SafetySupervisor:
         return f"the object is {out_m * 100:.0f} cm from the workspace centre"
 
     def count_contacts(self, contacts: int) -> None:
-        """Take note of how many contacts a grasp had."""
+        """Note how many contacts a grasp had."""
         self._empty_grasps = 0 if contacts else self._empty_grasps + 1
 
     @property
     def speed_scale(self) -> float:
-        """Factor on all speeds: slow until the first approach has ended well, and while a motor is warm."""
+        """Factor on all speeds: slow until the first approach has succeeded, and while a motor is warm."""
         usual = 1.0 if self._approached else self.settings.first_moves_scale
         return usual * self.settings.warm_scale if self._warm else usual
 
     def on_approach(self) -> None:
-        """The first approach has ended well: ordinary speed from here on."""
+        """The first approach has succeeded: normal speed from now on."""
         self._approached = True
 
     # --- stopping ----------------------------------------------------------------------------------------------
@@ -196,10 +206,10 @@ class SafetySupervisor:
         """Zero demands and hold the base, for several cycles. Never raises.
 
         Args:
-            cause: why, when it is no ordinary end; recorded with the last cycles.
+            cause: why, unless the session ends normally; recorded with the last cycles.
 
         Returns:
-            What went wrong while stopping, in words; a dead device cannot be exchanged with any more.
+            What went wrong while stopping, as sentences; a dead device does not answer any more.
         """
         self._runtime.stop()
         problems: dict[str, None] = {}
@@ -209,7 +219,7 @@ class SafetySupervisor:
             except TactileLabError as error:
                 problems[str(error)] = None
         if cause is not None:
-            words = str(cause) or "stopped at once by the operator"
+            words = str(cause) or "stopped immediately by the operator"
             with suppress(TactileLabError):  # a recording that is broken has ended the session already
                 self._runtime.report_stop(words, self._flight_recorder.plain())
         return tuple(words for words in problems if cause is None or words != str(cause))
@@ -220,17 +230,17 @@ class SafetySupervisor:
 
 
 class InterruptGuard:
-    """Ctrl+C once: finish the step and close the session. Twice: now.
+    """Ctrl+C once: finish the step and close the session.
 
-    A context; while it is open the first SIGINT only sets :attr:`requested`, every later one does what it did before,
-    or raises KeyboardInterrupt where it did nothing. Signals belong to the main thread: elsewhere the guard does
-    nothing.
+    Twice: stop now. A context manager; while it is open the first SIGINT only sets :attr:`requested`, and every later
+    one does what it did before, or raises KeyboardInterrupt if it was ignored. Signals reach only the main thread:
+    elsewhere the guard does nothing.
     """
 
     def __init__(self) -> None:
         self.requested = False
         self.heard: Callable[[], None] = lambda: None
-        """Called by the first at once, in the midst of whatever goes on: it may note that, and no more."""
+        """Called immediately by the first SIGINT, at any point of the program: it may only note it."""
         self._previous: Callable[[int, FrameType | None], Any] | int | None = None
         self._active = False
 

@@ -1,9 +1,9 @@
 """Touches without a grasp: a tap on the top, a probe from the side.
 
 The hand takes up a posture of one of the closings, fingers partly closed, and the positioner carries it in a straight
-line until something is met; the fingertips then lie against the object, as many as meet it. The contacts wait for
-the next grasp (:attr:`~sessions.recording.session_events.EventKind.TOUCH_END`): it finds the object where the touch
-left it.
+line until something is touched; then as many fingertips as possible are laid on the object. The contacts are kept for
+the next grasp (:attr:`~sessions.recording.session_events.EventKind.TOUCH_END`): the object has not moved since the
+touch.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from sessions.perception.approach_paths import TipSurface
 
 @dataclass(frozen=True)
 class Pattern:
-    """How the fingertips stand to each other in a touch.
+    """Arrangement of the fingertips in a touch.
 
     Attributes:
-        closing: whose lines they are on.
-        progress: how far along them, by finger.
-        held_rad: joint angles of fingers that are held out of the way instead, by finger and motor.
+        closing: its paths.
+        progress: position on them, by finger.
+        held_rad: joint angles of fingers that are held out of the way, by finger and motor.
     """
 
     closing: str
@@ -37,7 +37,7 @@ class Pattern:
     held_rad: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def aside(self, table: Closing) -> dict[str, float]:
-        """What motors turn beyond the closing's table to hold those fingers, radians."""
+        """Additional motor angles, relative to the closing's table, to hold those fingers, radians."""
         wanted = {motor: angle for motors in self.held_rad.values() for motor, angle in motors.items()}
         tabled = {m: a for finger in self.held_rad for m, a in table.joints(finger, self.progress[finger]).items()}
         return {motor: wanted[motor] - angle for motor, angle in tabled.items()}
@@ -56,7 +56,7 @@ ROW = Pattern(
 _DOWN, _BACK = np.array([0.0, 0.0, -1.0]), np.array([-1.0, 0.0, 0.0])
 
 TAP_HEIGHT_m = 0.022
-"""Of the closing's table; the positioner does the rest of the height."""
+"""Height of the closing's table; the positioner adds the rest."""
 
 
 class Toucher:
@@ -77,10 +77,10 @@ class Toucher:
         return self._cycle.touch
 
     def tap(self, frame: GraspFrame) -> Array:
-        """Come down on what stands under a grasp frame, lay the fingertips on it, and rise again.
+        """Come down on the object under a grasp frame, lay the fingertips on it, and rise again.
 
         Returns:
-            Where fingertips met something, shape (n, 3), world frame.
+            Where fingertips touched something, shape (n, 3), world frame.
         """
         s, table, motion = self.settings, closing(TAP.closing, TAP_HEIGHT_m, self._tip), self._motion
         self._poise(table, TAP, frame)
@@ -95,14 +95,14 @@ class Toucher:
         return found
 
     def rake(self, frame: GraspFrame, from_m: float) -> Array | None:
-        """Come toward the middle of a grasp frame from its +x side, fingers in a row, until they meet something.
+        """Come toward the middle of a grasp frame from its +x side, fingers in a row, until they touch something.
 
         Args:
             frame: fingers move along its -x axis, over its origin and as far beyond.
-            from_m: where they begin, counted from its origin.
+            from_m: their start, relative to its origin.
 
         Returns:
-            Where fingertips met something, shape (n, 3), world frame; None where they could not come down.
+            Where fingertips touched something, shape (n, 3), world frame; None if they could not descend.
         """
         s, motion = self.settings, self._motion
         table = closing(ROW.closing, s.rake_height_m, self._tip)
@@ -123,11 +123,11 @@ class Toucher:
         return found
 
     def close_thumb(self, frame: GraspFrame) -> Array | None:
-        """Come down around a grasp frame, the hand open, and close the thumb alone.
+        """Come down around a grasp frame, the hand open, and close only the thumb.
 
         Returns:
-            Where the thumb met something, or stood on it on the way down, shape (n, 3), world frame; None where another
-            finger could not come down.
+            Where the thumb touched something, or landed on it on the way down, shape (n, 3), world frame; None if
+            another finger could not descend.
         """
         s, motion = self.settings, self._motion
         table = closing(ROW.closing, s.rake_height_m, self._tip)
@@ -160,14 +160,14 @@ class Toucher:
         return found
 
     def _rise(self) -> None:
-        """Straight up from where the positioner was sent last."""
+        """Move straight up from the positioner's last target."""
         self._motion.rise(self._cycle.lift_m, self._cycle.travel_m_s)
 
     def _is_met(self) -> bool:
         return max(self._motion.loads_N().values(), default=0.0) > self.settings.met_N
 
     def _landing_points(self, direction_grasp: Array, frame: GraspFrame) -> Array:
-        """The foremost places of the fingertips that feel something, shape (n, 3), world frame."""
+        """The foremost points of the fingertips that touch something, shape (n, 3), world frame."""
         ahead = np.asarray(frame.pose.rotation().rotate(direction_grasp))
         met = [finger for finger, load_N in self._motion.loads_N().items() if load_N > self.settings.met_N / 2]
         surface = TipSurface.upright(self._tip.semi_axes_m, self._tip.centre_distal_m)
@@ -179,14 +179,14 @@ class Toucher:
         return self._cycle.travel_m_s, self._cycle.turn_rad_s
 
     def _poise(self, table: Closing, pattern: Pattern, frame: GraspFrame) -> None:
-        """The hand above a grasp frame, fingers as they should touch, its sensors tared."""
+        """Place the hand above a grasp frame, fingers arranged for the touch, and tare the sensors."""
         motion, cycle = self._motion, self._cycle
         motion.blend_fingers(table, pattern.progress, cycle.finger_rad_s, pattern.aside(table))
         motion.move_base(motion.base_joints(frame, table, cycle.lift_m), *self._travel)
         motion.tare(cycle.rest_s)
 
     def _approach(self, goal: Array, speed_m_s: float) -> bool:
-        """Toward ``goal`` until a fingertip meets something; the positioner then stands where it is."""
+        """Move toward ``goal`` until a fingertip touches something; then the positioner stops."""
         motion = self._motion
         for q in motion.line(goal, speed_m_s):
             motion.set_base(q)
@@ -205,10 +205,10 @@ class Toucher:
         force_N: float,
         sink_m: float,
     ) -> None:
-        """Every fingertip moves along a direction until it touches as it should, or has gone as far as it may.
+        """Every fingertip moves along a direction until it has the contact force, or has reached its limit.
 
-        The hand sinks a little meanwhile, and the fingers that touch give way: the thumb hardly moves that way itself.
-        Where a fingertip is pressed hard the hand waits, and goes on from there when the finger has given way.
+        The hand sinks a little meanwhile, and fingers that touch yield: the thumb can hardly move in that direction
+        itself. While a fingertip is pressed hard the hand waits, and continues when the finger has yielded.
         """
         s, motion = self.settings, self._motion
         rates = motor_rates(table, pattern.progress, direction_grasp, self._tip)

@@ -1,8 +1,8 @@
-"""The ways of the fingertips while they closed: space that the object does not fill.
+"""Approach paths of the fingertips while they closed: free space that the object does not fill.
 
-A fingertip's surface is taken as an ellipsoid. A way begins at the point of it that leads along the motion; it ends
-at the contact, or at the leading point where the finger stopped. Begin and end lie on the tip, and a convex tip that
-moves straight covers the straight line between them: no part of that line can be inside the object.
+A fingertip's surface is modelled as an ellipsoid. A path starts at its leading point in the direction of motion, and
+ends at the contact, or at the leading point where the finger stopped. Start and end lie on the tip, and a convex tip
+that moves straight covers the straight line between them: no part of that line can be inside the object.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from gtsam import Pose3
 from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact
 
 _LEAST_WAY_m = 0.002
-"""A finger that hardly moved has no way to tell of."""
+"""A finger that moved less than this has no approach path."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class TipSurface:
 
     @classmethod
     def upright(cls, semi_axes_m: Iterable[float], centre_distal_m: Iterable[float]) -> TipSurface:
-        """One whose axes are those of the distal frame."""
+        """An ellipsoid with the axes of the distal frame."""
         pose = np.eye(4)
         pose[:3, 3] = list(centre_distal_m)
         return cls(np.array(list(semi_axes_m)), Pose3(pose))
@@ -58,10 +58,10 @@ class TipSurface:
 def approach_paths(
     begun: Array, ended: Array, tips: Mapping[str, TipSurface], contacts: Iterable[Contact]
 ) -> tuple[ApproachPath, ...]:
-    """The ways of all fingers that moved, in the order of :data:`FINGERS`.
+    """The approach paths of all fingers that moved, in the order of :data:`FINGERS`.
 
     Args:
-        begun, ended: the distal frames in the world when the closing began and when it had ended, shape (5, 4, 4).
+        begun, ended: the distal frames in the world at the start and end of the closing, shape (5, 4, 4).
         tips: surfaces of the fingertips, by finger.
         contacts: those of the grasp.
     """

@@ -21,7 +21,7 @@ from drivers.core.fingertip import TipContact
 from drivers.shadow.model.kinematics import JOINTS, palm_T_distal_matrices
 
 _STEP_rad = 1e-4
-"""Step of the central differences: error about 1e-9 of a transport length."""
+"""Step of the central differences: error about 1e-9 of a link's length."""
 
 
 def _same_numbered_joints() -> Array:
@@ -56,7 +56,7 @@ class MountUncertainty:
 
 
 class HandGeometry:
-    """Where the palm and the fingertips are, and how that depends on the joints.
+    """Poses of palm and fingertips, and their derivatives by the joints.
 
     Args:
         joints_rad: joint angles, shape (24,), radians.

@@ -1,4 +1,4 @@
-"""What a event completes: a grasp, a picture that shows the truth, a tare, or the last grasp taken back."""
+"""What a session event completes: a grasp, a picture that shows the truth, a tare, or an undo."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class TruthFrame:
     """A camera frame that shows the object at rest.
 
     Attributes:
-        grasp_index: the grasp whose capture is open, else the last one; None before the first.
+        grasp_index: the grasp being captured, otherwise the last one; None before the first.
         frame: the picture.
     """
 
@@ -25,7 +25,7 @@ class TruthFrame:
 
 @dataclass(frozen=True)
 class TareReport:
-    """What came of a tare: the fingers that could not be zeroed, and why."""
+    """Outcome of a tare: the fingers that could not be zeroed, and why."""
 
     stamp_ns: int
     refused: Mapping[str, str]
@@ -33,7 +33,7 @@ class TareReport:
 
 @dataclass(frozen=True)
 class Undone:
-    """The grasp with this number was taken back; the next one has its number."""
+    """The grasp with this number was undone; the next one gets its number."""
 
     index: int
 

@@ -1,4 +1,4 @@
-"""What the fingertips measure, for viewers: wrenches and BioTac readings as they came, before any tare."""
+"""Raw fingertip readings for viewers: wrenches and BioTac readings before any tare."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sessions.recording.recorder import Recorder
 
 
 def record_fingertips(recorder: Recorder, now_ns: int, tips: Mapping[str, FingertipSensor]) -> None:
-    """Write the newest reading of each fingertip that has been heard. Raises SessionError."""
+    """Write the newest reading of each fingertip that has one. Raises SessionError."""
     for finger, tip in tips.items():
         if isinstance(tip, ForceTip) and tip.newest is not None:
             recorder.wrench(now_ns, finger, tip.newest)
@@ -21,7 +21,9 @@ def record_fingertips(recorder: Recorder, now_ns: int, tips: Mapping[str, Finger
 
 
 def biotac_counts(tip: FingertipSensor) -> dict[str, int | None] | None:
-    """The newest counts of a BioTac by channel (PDC, TAC, TDC, E1 ...), None where not heard; None for another tip."""
+    """The newest counts of a BioTac by channel (PDC, TAC, TDC, E1 ...), None if not received; None for another kind of
+    fingertip.
+    """
     if not isinstance(tip, BioTac):
         return None
     names = {"PDC": Channel.PDC, "TAC": Channel.TAC, "TDC": Channel.TDC}

@@ -1,4 +1,4 @@
-"""How the palm has carried the object from grasp to grasp."""
+"""Hand odometry: how the palm has carried the object from grasp to grasp."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from drivers.core.errors import SessionError
 
 
 class HandOdometry:
-    """Adds up the palm's motion while it holds the object; each grasp takes what has come together before it."""
+    """Accumulates the palm's motion while it holds the object; each grasp takes the motion since the last one."""
 
     def __init__(self) -> None:
         self._hold_start: Pose3 | None = None
@@ -17,30 +17,30 @@ class HandOdometry:
 
     @property
     def is_holding(self) -> bool:
-        """A hold has begun and not ended."""
+        """Whether a hold has begun and not ended."""
         return self._hold_start is not None
 
     @property
     def motion_world(self) -> Pose3:
-        """Since the last grasp, as far as that is complete."""
+        """Motion of the completed holds since the last grasp."""
         return self._motion_world
 
     @property
     def grasp_count(self) -> int:
-        """Grasps that count."""
+        """Number of grasps without undone ones."""
         return len(self._taken)
 
     def begin(self, world_T_palm: Pose3) -> None:
-        """From here on the object moves with the palm."""
+        """From now on the object moves with the palm."""
         self._hold_start = world_T_palm
 
     def end(self, world_T_palm: Pose3) -> None:
-        """From here on the object stays where it is. Raises SessionError without a beginning."""
+        """From now on the object stays in place. Raises SessionError without a beginning."""
         self._add(world_T_palm)
         self._hold_start = None
 
     def take(self, world_T_palm: Pose3) -> Pose3:
-        """The motion that led to a grasp; a hold that has not ended goes on from here."""
+        """The motion that led to a grasp; an open hold continues from here."""
         if self._hold_start is not None:
             self._add(world_T_palm)
             self._hold_start = world_T_palm
@@ -49,12 +49,14 @@ class HandOdometry:
         return motion
 
     def undo(self) -> None:
-        """Give the last grasp's motion back to the next one. Raises SessionError when there is none."""
+        """Return the last grasp's motion to the next one. Raises SessionError if there is no grasp."""
         if not self._taken:
-            raise SessionError("undo without a grasp", where="/marks", hint="The marks are out of order")
+            raise SessionError("undo without a grasp", where="/marks", hint="The session events are out of order")
         self._motion_world = self._motion_world * self._taken.pop()
 
     def _add(self, world_T_palm: Pose3) -> None:
         if self._hold_start is None:
-            raise SessionError("hold_end without hold_begin", where="/marks", hint="The marks are out of order")
+            raise SessionError(
+                "hold_end without hold_begin", where="/marks", hint="The session events are out of order"
+            )
         self._motion_world = world_T_palm * self._hold_start.inverse() * self._motion_world

@@ -1,4 +1,4 @@
-"""Where the hand is in the world, by the newest joints of the hand and of the positioner."""
+"""Pose of the hand in the world from the newest joints of hand and positioner."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sessions.perception.contact_world import HandGeometry
 
 
 class HandPlacement:
-    """Keeps the newest joints; works out the hand's geometry when it is asked for, once.
+    """Keeps the newest joints, and computes the hand's geometry once when requested.
 
     Args:
         mount_T_forearm: the positioner's kinematics, from its joint vector (6,).
@@ -29,16 +29,16 @@ class HandPlacement:
 
     @property
     def ready(self) -> bool:
-        """The hand and the positioner have both been heard."""
+        """Whether the hand and the positioner have both sent samples."""
         return self._joints_rad is not None and self._base_q is not None
 
     def take_joints(self, joints_rad: Array) -> Array:
-        """Newest joint angles, shape (24,), radians; gives them as an array."""
+        """Newest joint angles, shape (24,), radians, as an array."""
         self._joints_rad, self._geometry = np.asarray(joints_rad, dtype=float), None
         return self._joints_rad
 
     def take_base(self, base_q: Array) -> Array:
-        """Newest positioner joints, shape (6,), metres and radians; gives them as an array."""
+        """Newest positioner joints, shape (6,), metres and radians, as an array."""
         self._base_q, self._geometry = np.asarray(base_q, dtype=float), None
         return self._base_q
 
@@ -51,12 +51,12 @@ class HandPlacement:
         return self._joints_rad, self._base_q
 
     def current(self) -> HandGeometry:
-        """The hand by the newest joints. Raises DeviceError before the first."""
+        """Geometry from the newest joints. Raises DeviceError before the first."""
         if self._geometry is None:
             self._geometry = self.place(*self.latest())
         return self._geometry
 
     def place(self, joints_rad: Array, base_q: Array) -> HandGeometry:
-        """The hand by these joints."""
+        """Geometry from these joints."""
         world_T_forearm = self._world_T_mount * self._mount_T_forearm(base_q)
         return HandGeometry(joints_rad, world_T_forearm.matrix() @ forearm_T_palm_matrix(joints_rad))

@@ -1,7 +1,7 @@
-"""What the session layer asks of devices, samples and fingertips: structural types, met by the drivers.
+"""Protocols that the sessions package expects of devices, samples and fingertips, implemented by the drivers.
 
 An *instrument* is a live device with a transport. A *decoder* is the half of a device that turns one received datagram
-into a sample and does nothing else; live and in replay the session's understanding comes from decoders alone.
+into a sample and does nothing else; live and in a replay the session's samples come only from decoders.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ class HandReading(Protocol):
 
 @runtime_checkable
 class MotorTemperatures(Protocol):
-    """Temperatures near the motors, shape (20,), degrees Celsius; NaN where none is known."""
+    """Temperatures near the motors, shape (20,), degrees Celsius; NaN if unknown."""
 
     @property
     def temperature_C(self) -> Array: ...
 
 
 def warmest_C(reading: object) -> float | None:
-    """Temperature of the warmest motor in a sample of the hand; None while none is known."""
+    """Temperature of the warmest motor in a sample of the hand; None while unknown."""
     motors = getattr(reading, "motor", None)
     if not isinstance(motors, MotorTemperatures) or not (known := np.isfinite(motors.temperature_C)).any():
         return None
@@ -66,16 +66,16 @@ class FrameReading(Protocol):
 class Decoder(Protocol[Sample_co]):
     """The receiving half of a device.
 
-    ``receive`` may keep state of its own transport (sequence numbers, the newest motor readings) and may ask its clock;
-    it must use nothing else, or a replay differs from the session.
+    ``receive`` may keep state of its own transport (sequence numbers, the newest motor readings) and may read its
+    clock; it must use nothing else, or a replay would differ from the session.
     """
 
     def receive(self, datagram: Datagram) -> Sample_co | None:
-        """The sample in a datagram; None when it holds none. Raises CodecError for bytes of another protocol."""
+        """The sample in a datagram; None if it has none. Raises CodecError for bytes of another protocol."""
 
 
 class WrenchFingertip(FingertipSensor, Protocol):
-    """A fingertip fed by a transport of its own."""
+    """A fingertip with its own transport."""
 
     def update(self, samples: Sequence[Any], /) -> None:
         """Take the samples of one datagram."""
@@ -89,10 +89,10 @@ class SlotFingertip(FingertipSensor, Protocol):
 
 
 class Instrument(Protocol):
-    """Something that is connected and closed."""
+    """Something that can be connected and closed."""
 
     def connect(self) -> None:
-        """All or nothing, repeatable. Raises DeviceError."""
+        """Connect completely or not at all; can be repeated. Raises DeviceError."""
 
     def close(self) -> None:
         """Idempotent."""
@@ -102,91 +102,91 @@ class HandInstrument(Instrument, Protocol):
     """The live hand."""
 
     def set_targets(self, targets_rad: Mapping[str, float], /) -> None:
-        """Joint targets by motor name, J0 for a coupled pair; motors not named keep theirs."""
+        """Set joint targets by motor name, J0 for a coupled pair; other motors keep theirs."""
 
     def exchange(self) -> object:
         """One cycle: send demands, receive and decode."""
 
     def stop(self) -> None:
-        """No demand from now on; never raises."""
+        """Send no demands from now on; never raises."""
 
     def resume(self) -> None:
-        """Take back a stop or a fault; nothing moves before new targets are set."""
+        """Reset a stop or a fault; nothing moves before new targets are set."""
 
     def health(self) -> tuple[str, ...]:
-        """What is wrong, in words; empty when all is well."""
+        """What is wrong, as sentences; empty if all is well."""
 
     def losses(self) -> Mapping[str, int]:
-        """What is missing of its traffic since connecting, by kind. Raises DeviceError when nobody knows."""
+        """Missing traffic since connecting, by kind. Raises DeviceError if unknown."""
 
 
 class BaseInstrument(Instrument, Protocol):
     """The live positioner."""
 
     def set_target(self, q: Array, /) -> None:
-        """Joint targets, shape (6,), metres and radians."""
+        """Set joint targets, shape (6,), metres and radians."""
 
     def exchange(self) -> object:
         """One cycle: send targets, receive and decode."""
 
     def stop(self) -> None:
-        """Stay here; never raises."""
+        """Hold the present position; never raises."""
 
     def resume(self) -> None:
-        """Take back a stop or a fault; the target is where it stands."""
+        """Reset a stop or a fault; the target becomes the present position."""
 
 
 @runtime_checkable
 class WatchedInstrument(Protocol):
-    """A device that knows what is wrong with itself."""
+    """A device that reports its problems."""
 
     def health(self) -> tuple[str, ...]:
         """In words; empty when all is well."""
 
 
 class PolledInstrument(Instrument, Protocol):
-    """A device that sends by itself and is emptied once a cycle."""
+    """A device that sends by itself and is read once per cycle."""
 
     def poll(self) -> object:
-        """Take everything that has arrived."""
+        """Read everything that has arrived."""
 
 
 @runtime_checkable
 class AskedInstrument(Protocol):
-    """A device that may send only when it is asked."""
+    """A device that may send only on request."""
 
     def ask(self) -> None:
-        """Ask for the next reading where the device needs it. Raises DeviceError."""
+        """Request the next reading, if the device needs it. Raises DeviceError."""
 
 
 @runtime_checkable
 class NamedInstrument(Protocol):
-    """A device that can tell who it is."""
+    """A device that can identify itself."""
 
     @property
     def identity(self) -> str:
-        """Serial number and firmware as it told when it was connected; empty for what it does not tell."""
+        """Serial number and firmware, read when it was connected; empty if unknown."""
 
 
 @runtime_checkable
 class CyclingInstrument(Protocol):
-    """A device that another process keeps cycling, whatever the session does."""
+    """A device whose cycles run in another process, independent of the session."""
 
     def catch_up(self) -> None:
-        """Show the tap what has come since the last look. Raises DeviceError."""
+        """Pass what has arrived since the last call to the tap. Raises DeviceError."""
 
     def description(self) -> str:
-        """What was found when it was connected, in words."""
+        """What was found when it was connected, as sentences."""
 
 
 class CameraInstrument(Instrument, Protocol):
     """The live camera."""
 
     def ask(self) -> None:
-        """Trigger; the picture comes with :meth:`taken`. Raises DeviceError."""
+        """Trigger the camera; :meth:`taken` returns the picture. Raises DeviceError."""
 
     def take_picture(self) -> FrameReading | None:
-        """The picture asked for; None while it is on its way. Raises DeviceError when it stays away."""
+        """The requested picture; None until it arrives. Raises DeviceError if it does not arrive in time."""
 
 
 @runtime_checkable
@@ -194,4 +194,4 @@ class WatchingCamera(Protocol):
     """A camera that sends markers by itself."""
 
     def poll(self) -> None:
-        """Take what it has sent, so that it is recorded in time. Raises DeviceError."""
+        """Read what it has sent, so that it is recorded in time. Raises DeviceError."""

@@ -1,11 +1,11 @@
-"""One path from received bytes to understanding, walked by the live session and by a replay alike.
+"""The single path from received bytes to samples and grasps, shared by live sessions and replays.
 
-Live, every transport is tapped. The tap (:class:`Observer`) first records a datagram and then, still before the device
-that asked for it sees it, hands the same bytes to the :class:`Interpreter`, whose decoders and :class:`Perception`
-are objects apart from the live devices. A replay hands the recorded bytes to an equal Interpreter. The order of
-recording *is* the order of processing, for session events too, and the Interpreter's clock shows the newest stamp that
-is not one transport's word alone (:mod:`sessions.recording.session_clock`), in both cases. So nothing can be understood
-live that the recording does not say.
+Live, every transport is tapped. The tap (:class:`Observer`) first records a datagram and then, before the requesting
+device sees it, passes the same bytes to the :class:`Interpreter`, whose decoders and :class:`Perception` are separate
+from the live devices. A replay passes the recorded bytes to an equal Interpreter. In both cases the order of recording
+*is* the order of processing, for session events too, and the Interpreter's clock shows the newest stamp that is
+confirmed by more than one transport (:mod:`sessions.recording.session_clock`). So a live session cannot know anything
+that is not in its recording.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Interpreter:
         hand, base: decoders of those transports.
         wrenches: decoders of the fingertips' own transports, by finger; empty when the hand carries their data.
         camera: decoder of camera frames, if the rig has a camera.
-        clock: the clock the decoders were built with; it follows the stamps.
+        clock: the clock the decoders were built with; it is set to the stamps.
     """
 
     def __init__(
@@ -66,11 +66,11 @@ class Interpreter:
         self.perception = perception
         self.clock, self.time = clock or VirtualClock(), SessionClock()
         self.newest: dict[str, Heard] = {}
-        """The newest sample of each transport that gave one, and when it came."""
+        """The newest sample of each transport, and its arrival."""
         self.undecodable: Counter[str] = Counter()
         """Datagrams that broke their protocol, by transport."""
         self.listener: Callable[[str, Any], None] | None = None
-        """Is told every sample with the name of its transport, after Perception."""
+        """Receives every sample with the name of its transport, after Perception."""
         self._routes: dict[str, Callable[[Datagram], None]] = {
             HAND_LINK: self._route(HAND_LINK, hand, perception.on_hand),
             BASE_LINK: self._route(BASE_LINK, base, perception.on_base),
@@ -82,7 +82,7 @@ class Interpreter:
             self._routes[CAMERA_LINK] = self._route(CAMERA_LINK, camera, perception.on_frame)
 
     def on_received(self, transport: str, payload: bytes, stamp_ns: int) -> None:
-        """Take one datagram. Bytes that break the protocol are counted; unknown transports are left alone."""
+        """Process one datagram. Bytes that break the protocol are counted; unknown transports are ignored."""
         self.time.on_received(transport, stamp_ns)
         self.clock.sleep_until_ns(self.time.now_ns)
         route = self._routes.get(transport)
@@ -94,7 +94,7 @@ class Interpreter:
             self.undecodable[transport] += 1
 
     def event(self, event: SessionEvent) -> Outcome | None:
-        """Take one event; see :meth:`Perception.event`."""
+        """Process one session event; see :meth:`Perception.event`."""
         self.time.on_stamp(event.stamp_ns)
         self.clock.sleep_until_ns(self.time.now_ns)
         return self.perception.event(event)
@@ -123,7 +123,7 @@ def _for_finger(perception: Perception, finger: str) -> Callable[[Sequence[Any]]
 class Observer:
     """The tap of a live session: record first, then interpret.
 
-    When recording fails, the error is raised once, where it happened, and ends the session. The transports stay usable
+    If recording fails, the error is raised once, where it happened, and ends the session. The transports remain usable
     after that, unrecorded, so that zero demands still reach the hand; session events are refused.
     """
 
@@ -131,12 +131,12 @@ class Observer:
         self.recorder, self.interpreter = recorder, interpreter
 
     def on_transmitted(self, transport: str, payload: bytes, stamp_ns: int) -> None:
-        """The program sends; recorded only."""
+        """The program sent something; it is only recorded."""
         if not self.recorder.broken:
             self.recorder.on_transmitted(transport, payload, stamp_ns)
 
     def on_received(self, transport: str, payload: bytes, stamp_ns: int) -> None:
-        """A device sent."""
+        """A device sent something."""
         if not self.recorder.broken:
             self.recorder.on_received(transport, payload, stamp_ns)
             if transport == CAMERA_LINK and (picture := picture_of(payload)):
@@ -144,6 +144,6 @@ class Observer:
         self.interpreter.on_received(transport, payload, stamp_ns)
 
     def event(self, event: SessionEvent) -> Outcome | None:
-        """The conductor meant something."""
+        """Record and process a session event."""
         self.recorder.event(event)
         return self.interpreter.event(event)

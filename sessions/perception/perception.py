@@ -1,8 +1,7 @@
 """From decoded samples and session events to grasps.
 
-Perception has no clock, no transport and no chance: what it knows depends on the samples and session events it was
-given and on their order, nothing else. So the live session and a replay of its bytes build the same grasps, bit for
-bit.
+Perception has no clock, no transport and no randomness: its state depends only on the samples and session events it was
+given, and on their order. So the live session and a replay of its bytes build the same grasps, bit for bit.
 """
 
 from __future__ import annotations
@@ -31,11 +30,11 @@ from sessions.recording.session_events import EventKind, SessionEvent
 
 
 class PerceptionSettings(StrictModel):
-    """What turns a touch into a contact.
+    """Parameters of contacts.
 
     Attributes:
         joint_sigma_rad: standard deviation of each joint angle that averaging does not remove (0.6 deg).
-        minimum_force_N: a lighter touch is not a contact.
+        minimum_force_N: a lighter touch does not count as a contact.
     """
 
     joint_sigma_rad: float = Field(default=float(np.radians(0.6)), ge=0.0)
@@ -46,12 +45,12 @@ class Perception:
     """State of the hand in the world, and the grasps made of it.
 
     Args:
-        wrench_fingertips: fingertips with a transport of their own, by finger.
+        wrench_fingertips: fingertips with their own transports, by finger.
         slot_fingertips: fingertips whose data come with the hand's samples, by finger.
         mount_T_forearm: the positioner's kinematics, from its joint vector (6,).
         world_T_mount: the forearm-to-world calibration.
-        mount_covariance: its covariance, see :class:`MountUncertainty`; None when not known.
-        tip_surfaces: of the fingertips whose ways are to be told, by finger.
+        mount_covariance: its covariance, see :class:`MountUncertainty`; None if unknown.
+        tip_surfaces: of the fingertips whose approach paths are computed, by finger.
     """
 
     def __init__(
@@ -88,7 +87,7 @@ class Perception:
     # --- samples -----------------------------------------------------------------------------------------------
 
     def on_hand(self, sample: HandReading) -> None:
-        """Joint angles, and the slots of fingertips that come with them."""
+        """Take joint angles, and the fingertip slots that come with them."""
         self._loads_N = None
         for fingertip in self._slots.values():
             fingertip.update(sample)
@@ -100,41 +99,41 @@ class Perception:
             self._capture.joints_rad.append(joints_rad)
 
     def on_base(self, sample: BaseReading) -> None:
-        """The positioner's joints."""
+        """Take the positioner's joints."""
         self._loads_N = None
         base_q = self._placement.take_base(sample.q)
         if self._capture is not None:
             self._capture.base_q.append(base_q)
 
     def on_wrench(self, finger: str, samples: Sequence[Any]) -> None:
-        """Samples of one fingertip's own transport."""
+        """Take samples of one fingertip's own transport."""
         self._loads_N = None
         self._wrench[finger].update(samples)
 
     def on_frame(self, frame: FrameReading) -> None:
-        """A camera frame; kept until the next one."""
+        """Take a camera frame; it is kept until the next one."""
         self._frame = frame
 
     # --- state -------------------------------------------------------------------------------------------------
 
     @property
     def ready(self) -> bool:
-        """The hand and the positioner have both been heard."""
+        """Whether the hand and the positioner have both sent samples."""
         return self._placement.ready
 
     @property
     def grasp_count(self) -> int:
-        """Grasps made so far."""
+        """Number of grasps so far."""
         return self._carried.grasp_count
 
     @property
     def is_holding(self) -> bool:
-        """A hold has begun and not ended."""
+        """Whether a hold has begun and not ended."""
         return self._carried.is_holding
 
     @property
     def hand_motion_world(self) -> Pose3:
-        """How the hand has carried the object since the last grasp, as far as that is complete."""
+        """How the hand has carried the object since the last grasp, in completed holds."""
         return self._carried.motion_world
 
     @property
@@ -167,11 +166,11 @@ class Perception:
         return np.asarray(self._placement.current().world_T_distal[FINGERS.index(finger), :3, :3])
 
     def load_N(self, finger: str) -> float:
-        """Contact force on one fingertip, the tip's own weight taken off, newest sample."""
+        """Contact force on one fingertip, without the tip's own weight, newest sample."""
         return self.loads_N()[finger]
 
     def loads_N(self) -> dict[str, float]:
-        """Contact force on each fingertip of the rig; infinite where the newest sample is void."""
+        """Contact force on each fingertip of the rig; infinite if the newest sample is invalid."""
         if self._loads_N is None:
             rotations = dict(zip(FINGERS, self._placement.current().world_T_distal[:, :3, :3], strict=True))
             told = {finger: tip.load_N(rotations[finger]) for finger, tip in self.fingertips.items()}
@@ -179,13 +178,13 @@ class Perception:
         return dict(self._loads_N)
 
     def void_tips(self) -> dict[str, str]:
-        """Why the newest sample of a fingertip tells no force, in words, by finger; without those that tell one."""
+        """Why the newest sample of a fingertip has no valid force, by finger; without valid ones."""
         void = [finger for finger, load_N in self.loads_N().items() if isinf(load_N)]
-        return {finger: self.fingertips[finger].void() or "its load is no number" for finger in void}
+        return {finger: self.fingertips[finger].void() or "its load is not a number" for finger in void}
 
     @property
     def dropped(self) -> dict[str, str]:
-        """Fingers without a contact in the last grasp, and why; what a sensor says of itself is in problems()."""
+        """Fingers without a contact in the last grasp, and why; problems of the sensors are in problems()."""
         return self._selection.dropped
 
     @property
@@ -194,18 +193,18 @@ class Perception:
         return self._selection.drop_counts
 
     def problems(self) -> tuple[str, ...]:
-        """What is wrong with fingertips, in words, each beginning with the finger's name."""
+        """Problems of fingertips, each beginning with the finger's name."""
         return tuple(f"{finger}: {text}" for finger, tip in self.fingertips.items() for text in tip.health())
 
     # --- session events
     # -------------------------------------------------------------------------------------------------
 
     def event(self, event: SessionEvent) -> Outcome | None:
-        """Take a event; gives the grasp, frame or report it completes.
+        """Process a session event. Returns the grasp, frame or report it completes.
 
         Raises:
-            SessionError: the event has no meaning here (an end without a beginning).
-            DeviceError: the hand or the positioner has not been heard yet.
+            SessionError: the event is not valid here (an end without a beginning).
+            DeviceError: the hand or the positioner has not sent a sample yet.
         """
         match event.kind:
             case EventKind.TARE:
@@ -266,11 +265,11 @@ class Perception:
         )
 
     def _end_capture(self, event: SessionEvent) -> Measured:
-        """What the samples since the capture began say."""
+        """Contacts and geometry from the samples since the capture began."""
         capture, self._capture = self._capture, None
         if capture is None:
             text = f"{event.kind.value} without capture_begin"
-            raise SessionError(text, where="/marks", hint="The marks are out of order")
+            raise SessionError(text, where="/marks", hint="The session events are out of order")
         joints_rad, base_q = self._placement.latest()
         geometry = self._placement.place(capture.joints(joints_rad), capture.base(base_q))
         tips = self._selection.touches(geometry, heard=bool(capture.joints_rad))
@@ -279,7 +278,7 @@ class Perception:
         return Measured(stamp_ns, geometry.world_T_palm, contacts, self._ways(geometry, contacts))
 
     def _ways(self, geometry: HandGeometry, contacts: Sequence[Contact]) -> tuple[ApproachPath, ...]:
-        """How the fingers came to this grasp; of a second capture after one closing nothing is known."""
+        """Approach paths of this grasp; a second capture after the same closing has none."""
         begun, self._closing_start = self._closing_start, None
         if begun is None:
             return ()

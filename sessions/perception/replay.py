@@ -32,7 +32,7 @@ from sessions.recording.traffic.reader import Loss, TrafficReader
 
 
 def kept_grasps(outcomes: Iterable[Outcome]) -> list[Grasp]:
-    """The grasps of a session, without those that were taken back."""
+    """The grasps of a session, without undone ones."""
     grasps: list[Grasp] = []
     for outcome in outcomes:
         if isinstance(outcome, Grasp):
@@ -49,7 +49,7 @@ class Replay:
         source: the session, or its traffic file.
         interpreter: a fresh one, as the session's own was.
         speed: 1 for the original pace, 4 for four times as fast, 0 (the default) as fast as possible.
-        clock: waits where a pace is asked for.
+        clock: waits if a speed is given.
 
     Raises:
         SessionError: the traffic file cannot be used.
@@ -74,7 +74,7 @@ class Replay:
 
     @property
     def factor(self) -> float:
-        """How many times faster than at the original pace the bytes were read; 0 before they were."""
+        """Speed relative to the original pace; 0 before reading."""
         return self._span_ns / self._taken_ns if self._taken_ns else 0.0
 
     def outcomes(self) -> Iterator[Outcome]:

@@ -1,8 +1,8 @@
-"""The replay rig: transports that give a device what a recording holds, so that any device runs on it as on hardware.
+"""The replay rig: transports that play a recording to a device, so that any device runs on it as on hardware.
 
-A device asks its transport for what has arrived; a :class:`RecordedTransport` answers with the recorded messages whose
-time has come by the clock it was given. On a clock of real time that is the original pace, or some times faster; on a
-virtual clock a whole session takes as long as decoding it. What the device sends is compared with what was sent then.
+A device asks its transport for what has arrived; a :class:`RecordedTransport` returns the recorded messages that are
+due by its clock. With a real clock that is the original pace, or a multiple; with a virtual clock a whole session takes
+as long as decoding it. What the device sends is compared with what was sent in the recording.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from sessions.recording.traffic.reader import TrafficReader
 
 
 class RecordedTransport:
-    """A transport to the past.
+    """A transport that plays a recording.
 
     Args:
-        name: of the transport.
-        received: what the device sent then, in order.
-        clock: of the program; the recording begins when the transport is first used.
-        transmitted: what the program sent then, in order.
-        speed: how many times faster than then.
-        first_ns: stamp at which the recording begins; of the first message by default.
+        name: name of the transport.
+        received: what the device sent, in order.
+        clock: the program's; the recording starts when the transport is first used.
+        transmitted: what the program sent, in order.
+        speed: multiple of the original pace.
+        first_ns: stamp at which the recording starts; by default that of the first message.
 
     Attributes:
         sent: what the program sends now.
@@ -60,7 +60,7 @@ class RecordedTransport:
         self.sent.append(payload)
 
     def receive(self) -> list[Datagram]:
-        """What had arrived by now, oldest first, with the stamps of then. Raises DeviceError at the end."""
+        """What has arrived by now, oldest first, with recorded stamps. Raises DeviceError at the end."""
         begun_ns = self._begin()
         if not self._waiting:
             raise DeviceError("the recording has ended", where=self.name, hint="Stop the session here")
@@ -72,7 +72,7 @@ class RecordedTransport:
 
     @property
     def as_then(self) -> bool:
-        """Whether everything sent so far is, byte for byte, what was sent then."""
+        """Whether everything sent so far equals what was sent in the recording, byte for byte."""
         return self.sent == self._then[: len(self.sent)]
 
     def _begin(self) -> int:
@@ -82,7 +82,7 @@ class RecordedTransport:
 
 
 def recorded_links(reader: TrafficReader, clock: Clock, speed: float = 1.0) -> dict[str, RecordedTransport]:
-    """All transports of a recording, on one common time. Raises SessionError."""
+    """All transports of a recording, with a common time. Raises SessionError."""
     received: dict[str, list[Datagram]] = {}
     transmitted: dict[str, list[bytes]] = {}
     stamps_ns = []

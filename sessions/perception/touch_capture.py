@@ -1,4 +1,4 @@
-"""What is gathered while the fingers touch, and which of their touches count."""
+"""Samples collected while the fingers touch, and the selection of valid contacts."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from sessions.perception.contact_world import HandGeometry
 
 
 class TouchSelection:
-    """Tells the touches that count from the others.
+    """Selects valid touches.
 
     Args:
         fingertips: sensors, by finger.
-        minimum_force_N: a lighter touch is not a contact.
+        minimum_force_N: a lighter touch does not count as a contact.
     """
 
     def __init__(self, fingertips: Mapping[str, FingertipSensor], minimum_force_N: float) -> None:
@@ -29,11 +29,11 @@ class TouchSelection:
         """The reasons over the whole session."""
 
     def touches(self, geometry: HandGeometry, *, heard: bool) -> dict[str, TipContact]:
-        """The touches that count; the reasons why others do not go to :attr:`dropped`.
+        """The valid touches; :attr:`dropped` has the reasons for rejected ones.
 
         Args:
             geometry: the hand during the capture.
-            heard: joint angles arrived during it.
+            heard: whether joint angles arrived during it.
         """
         tips, self.dropped = {}, {}
         for finger, fingertip in self._fingertips.items():
@@ -52,7 +52,7 @@ class TouchSelection:
 
 @dataclass(frozen=True)
 class Capture:
-    """What arrived since a capture began."""
+    """Samples since a capture began."""
 
     stamp_ns: int
     joints_rad: list[Array] = field(default_factory=list)
@@ -69,7 +69,7 @@ class Capture:
 
 @dataclass(frozen=True)
 class Measured:
-    """What one capture tells."""
+    """The result of one capture."""
 
     stamp_ns: int
     world_T_palm: Array
@@ -79,7 +79,7 @@ class Measured:
 
 @dataclass
 class Probed:
-    """Contacts and ways of the probes since the object was last moved; they wait for the next grasp."""
+    """Contacts and approach paths of the probes since the object was last moved, kept for the next grasp."""
 
     contacts: list[Contact] = field(default_factory=list)
     ways: list[ApproachPath] = field(default_factory=list)

@@ -1,1 +1,1 @@
-"""A session on the disk: its folder, manifest, events, clock and recorder."""
+"""A session on disk: its folder, manifest, events, clock and recorder."""

@@ -1,4 +1,4 @@
-"""What a person adds to a session: notes, pictures, files, in the folder ``attachments/`` of the session."""
+"""Attachments that a person adds to a session: notes, pictures and files, in its folder ``attachments/``."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from drivers.core.errors import SessionError
 
 FOLDER, NOTES = "attachments", "notes.txt"
 LARGEST_BYTES = 50_000_000
-"""A file that is attached may not be larger."""
+"""Largest file that can be attached."""
 
 
 class Attachments:
-    """The folder of a session for what a person adds.
+    """A session's attachments.
 
     Args:
-        session_folder: of the session; nothing is made before something is added.
+        session_folder: the session's folder; the subfolder is created with the first attachment.
     """
 
     def __init__(self, session_folder: Path) -> None:
         self.folder = session_folder / FOLDER
 
     def note(self, text: str) -> None:
-        """Append a line to the notes, on the disk when this returns. Raises SessionError."""
+        """Append a line to the notes and flush it to disk. Raises SessionError."""
         line = " ".join(text.split())
         try:
             self.folder.mkdir(exist_ok=True)
@@ -37,10 +37,10 @@ class Attachments:
                 notes.flush()
                 os.fsync(notes.fileno())
         except OSError as error:
-            raise SessionError(f"the note cannot be kept ({error.strerror})", where=str(self.folder)) from error
+            raise SessionError(f"the note cannot be stored ({error.strerror})", where=str(self.folder)) from error
 
     def picture(self, name: str, image: Any) -> str:
-        """Keep a picture (rows, columns[, 3], uint8) as PNG; gives its name. Raises SessionError."""
+        """Store a picture (rows, columns[, 3], uint8) as PNG. Returns its name. Raises SessionError."""
         encoded, data = cv2.imencode(".png", image)
         if not encoded:
             raise SessionError("the picture cannot be encoded", where=name)
@@ -48,15 +48,15 @@ class Attachments:
         return name
 
     def file(self, source: str) -> str:
-        """Copy a file in, under its own name or that with a number; gives the name. Raises SessionError."""
+        """Copy a file, under its own name or with a number added. Returns the name. Raises SessionError."""
         path = Path(source).expanduser()
         try:
             status = path.stat()
             if not stat.S_ISREG(status.st_mode):
-                raise SessionError("not a file", where=source, hint="Name one file")
+                raise SessionError("not a file", where=source, hint="Give one file")
             if status.st_size > LARGEST_BYTES:
                 text = f"{status.st_size / 1e6:.0f} MB, more than {LARGEST_BYTES / 1e6:.0f}"
-                raise SessionError(text, where=source, hint="Keep it elsewhere and leave a note")
+                raise SessionError(text, where=source, hint="Store it elsewhere and leave a note")
             self.folder.mkdir(exist_ok=True)
             name = self._free_name(path.name)
             shutil.copyfile(path, self.folder / name)
@@ -76,4 +76,4 @@ class Attachments:
             self.folder.mkdir(exist_ok=True)
             (self.folder / name).write_bytes(data)
         except OSError as error:
-            raise SessionError(f"cannot be kept ({error.strerror})", where=str(self.folder / name)) from error
+            raise SessionError(f"cannot be stored ({error.strerror})", where=str(self.folder / name)) from error

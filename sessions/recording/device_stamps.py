@@ -1,4 +1,4 @@
-"""Reading a device's own counter and clock out of its messages, without decoding the rest."""
+"""Reads a device's counter and clock from its messages, without decoding the rest."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ def rdt_stamp(payload: bytes) -> DeviceStamp:
 
 
 def camera_stamp(payload: bytes) -> DeviceStamp:
-    """A packet of the camera: the number of its frame, which counts those it lost too; a bare picture has none."""
+    """A packet of the camera: the number of its frame, which counts lost frames too; a picture
+    without header has none.
+    """
     return DeviceStamp(counter_of(payload))
 
 
@@ -38,9 +40,7 @@ def positioner_stamp(payload: bytes) -> DeviceStamp:
 
 
 STAMPERS: Registry[Stamper] = Registry("stamper")
-"""What reads a device's counter and clock out of its messages; most have none.
-
-By the name of its wire, on a simulated rig by that of its kind.
+"""Readers of a device's counter and clock; most devices have none. By wire name, on a simulated rig by kind.
 """
 
 STAMPERS.register("net-ft", rdt_stamp)

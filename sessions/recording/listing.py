@@ -1,4 +1,4 @@
-"""Finding sessions and telling what is in them, broken ones included."""
+"""Finds sessions and summarizes them, including damaged ones."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ class SessionSummary:
 
     Attributes:
         status: that of the manifest, where ``open`` means that it is being recorded; or ``damaged``: left open by a
-            crash, torn, or not readable.
-        grasps: number of grasps, when the session was closed.
-        traffic_bytes: size of the traffic file, 0 when there is none.
-        data_loss: something was lost, by the manifest.
-        problem: why it cannot be read, why it failed, or what to do about the damage; else empty.
-        readable: its manifest can be read.
-        left_open: a crash ended it.
-        derived: how it was made of a recorded one (``piece``, ``import``, ``recovered``); empty for a recording.
-        recorded_here: it is a recording, or one's recovery, and may be the last one.
+            crash, truncated, or not readable.
+        grasps: number of grasps, if the session was closed.
+        traffic_bytes: size of the traffic file, 0 if there is none.
+        data_loss: whether the manifest lists losses.
+        problem: why it cannot be read, why it failed, or how to repair it; otherwise empty.
+        readable: whether its manifest can be read.
+        left_open: whether a crash ended it.
+        derived: how it was made from another session (``piece``, ``import``, ``recovered``); empty for a recording.
+        recorded_here: whether it is a recording or the recovery of one, and can be the last one.
     """
 
     name: str
@@ -47,7 +47,7 @@ class SessionSummary:
 
 
 def summarize(folder: Path) -> SessionSummary:
-    """What a session folder holds; a manifest that cannot be read is told, not raised."""
+    """Summary of a session folder; an unreadable manifest is reported, not raised."""
     traffic = folder / TRAFFIC
     size = sum(path.stat().st_size for path in segment_paths(traffic) if path.is_file())
     try:
@@ -73,7 +73,7 @@ def summarize(folder: Path) -> SessionSummary:
 
 
 def _damage(session: Session) -> str:
-    """What is wrong with a recording, as far as a glance at its end shows; empty when nothing is."""
+    """What is wrong with a recording, judged by its end; empty if nothing is."""
     advice = f"tactile-lab session recover {session.folder}"
     if session.manifest.status == "open":
         return "" if session.being_recorded else f"left open by a crash. Recover it: {advice}"
@@ -82,11 +82,11 @@ def _damage(session: Session) -> str:
     last = segment_paths(session.folder / TRAFFIC)[-1]
     if not last.is_file():
         return f"{last.name} is missing"
-    return "" if ends_well(last) else f"{last.name} is cut off. Recover what there is: {advice}"
+    return "" if ends_well(last) else f"{last.name} is truncated. Recover what is readable: {advice}"
 
 
 def left_open(root: Path) -> list[SessionSummary]:
-    """The sessions under ``root`` that a crash left open, without those that were recovered already."""
+    """The sessions under ``root`` that a crash left open, without those that were already recovered."""
     try:
         found = list_sessions(root)
     except SessionError:
@@ -96,12 +96,12 @@ def left_open(root: Path) -> list[SessionSummary]:
 
 
 def list_sessions(root: Path) -> list[SessionSummary]:
-    """All sessions directly under ``root``, by the time of their recording, oldest first; none without the folder.
+    """All sessions directly under ``root``, by time of recording, oldest first; none if the folder does not exist.
 
-    What was made of a recording stands behind it.
+    Derived sessions follow their recording.
 
     Raises:
-        SessionError: ``root`` is not a folder that can be read.
+        SessionError: ``root`` is not a readable folder.
     """
     if not root.exists():
         return []
@@ -117,9 +117,9 @@ def list_sessions(root: Path) -> list[SessionSummary]:
 def find_session(root: Path, name: str) -> Session:
     """A session by its folder's path, by its name under ``root``, or ``last``.
 
-    ``last`` is the session whose recording under ``root`` began last; its recovery stands in for a torn one. Pieces and
-    imports are never meant: they carry the time of a recording made earlier or elsewhere, by another clock, and
-    whoever made one has its name.
+    ``last`` is the session whose recording under ``root`` began last, or its recovery if it is damaged. Extracts and
+    imports are ignored: they carry the time of an earlier recording or of another clock, and their name is known to the
+    person who made them.
 
     Raises:
         SessionError: there is none, or its manifest cannot be read.
@@ -128,7 +128,7 @@ def find_session(root: Path, name: str) -> Session:
 
 
 def session_folder(root: Path, name: str) -> Path:
-    """The folder of a session, which need not be whole; named as for :func:`find_session`. Raises SessionError."""
+    """The folder of a session, which may be damaged; named as for :func:`find_session`. Raises SessionError."""
     if name == "last":
         return _last_recorded(root)
     folder = root / name if (root / name).is_dir() else Path(name)
@@ -144,7 +144,7 @@ def _last_recorded(root: Path) -> Path:
         return recorded[-1].folder
     if readable:
         names = ", ".join(item.folder.name for item in readable[-3:])
-        hint = f"'last' means none of them; name one: {names}"
-        what = "no session was recorded here, there are only pieces and imports"
+        hint = f"'last' ignores extracts and imports; give a name: {names}"
+        what = "no session was recorded here, there are only extracts and imports"
         raise SessionError(what, where=str(root), hint=hint)
     raise SessionError("no session yet", where=str(root), hint="Record one first: tactile-lab run")

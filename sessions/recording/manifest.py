@@ -1,4 +1,4 @@
-"""``session.yaml``: what was done, with what, and how it ended."""
+"""``session.yaml``: devices, settings, and how the session ended."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class CalibrationCopy(StrictModel):
 
 
 class Derivation(StrictModel):
-    """A step by which a session was made of another one.
+    """A step by which a session was derived from another one.
 
     Attributes:
-        how: recovered after an accident, a piece cut out, or brought in from an archive.
+        how: recovered after a crash, extracted, or imported from an archive.
         source: name of the other session, or of the archive's file.
-        made_utc: when, ISO 8601; what was recorded keeps the time at which it was.
+        made_utc: time of this step, ISO 8601; the recording keeps its own times.
     """
 
     how: Making
@@ -53,27 +53,27 @@ class Derivation(StrictModel):
 
     @property
     def words(self) -> str:
-        """For people."""
+        """The step as words for people."""
         told = {"recovered": "recovered from", "piece": "a piece of", "import": "imported from"}
         return f"{told[self.how]} {self.source}, {self.made_utc}"
 
 
 class Manifest(StrictModel):
-    """What ``session.yaml`` says.
+    """The content of ``session.yaml``.
 
     Attributes:
-        status: open while it runs; closed when it ended well; interrupted by a person; failed by an error; recovered
-            when an open one was closed later.
+        status: open while it runs; closed if it ended normally; interrupted by a person; failed with an error;
+            recovered if an open one was closed later.
         rig, rig_description: the rig's name and its complete description.
-        object_name: what lay on the table.
+        object_name: the object on the table.
         calibration: copies of the files used, by their role.
-        versions, seeds, settings: what a repetition needs.
+        versions, seeds, settings: needed to repeat it.
         notes: the operator's.
         started_utc, ended_utc: ISO 8601, of the recording.
-        derived: how it was made of a recorded one, oldest step first; empty for what was recorded.
-        counts: messages by topic, grasps and the like.
+        derived: how it was derived from a recording, oldest step first; empty for a recording.
+        counts: messages by topic, number of grasps and so on.
         streams: for each topic the messages recorded, gaps, late and dropped ones.
-        data_loss: what was not recorded or dropped, by kind; empty when nothing was lost.
+        data_loss: lost or dropped data, by kind; empty if nothing was lost.
         problem: why it failed.
     """
 
@@ -98,11 +98,11 @@ class Manifest(StrictModel):
 
     @property
     def recorded_here(self) -> bool:
-        """Whether it is a recording, or one's recovery, and neither a piece of one nor brought in from elsewhere."""
+        """Whether it is a recording or the recovery of one, and neither an extract nor an import."""
         return all(step.how == "recovered" for step in self.derived)
 
     def derivation(self, how: Making, source: str) -> tuple[Derivation, ...]:
-        """``derived`` of what is made of this session now."""
+        """The ``derived`` list of a session made from this one."""
         return (*self.derived, Derivation(how=how, source=source, made_utc=utc_text(datetime.now(UTC))))
 
 
@@ -118,11 +118,11 @@ def read_manifest(folder: Path) -> Manifest:
     try:
         return _validate(load(folder / MANIFEST), where)
     except ConfigurationError as error:
-        raise SessionError(error.what, where=error.where, hint="The other files of the session are kept") from error
+        raise SessionError(error.what, where=error.where, hint="The session's other files are unchanged") from error
 
 
 def manifest_from(content: bytes, where: str) -> Manifest:
-    """A ``session.yaml`` that is no file of its own. Raises SessionError as :func:`read_manifest`."""
+    """Parse the text of a ``session.yaml``. Raises SessionError as :func:`read_manifest`."""
     try:
         return _validate(loads(content, where), where)
     except ConfigurationError as error:
@@ -134,16 +134,16 @@ def _validate(content: Any, where: str) -> Manifest:
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
-    """Write ``session.yaml`` so that at any moment either the old or the new one is there, whole.
+    """Write ``session.yaml`` atomically: at any moment either the old or the new one exists completely.
 
     Raises:
-        SessionError: it holds something YAML has no word for.
+        SessionError: it has a value that YAML cannot represent.
         WriteError: it cannot be written.
     """
     try:
         text = yaml.dump(manifest.model_dump(), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=120)
     except yaml.YAMLError as error:
-        raise SessionError(f"cannot be put into YAML ({error})", where=str(folder / MANIFEST)) from error
+        raise SessionError(f"cannot be written as YAML ({error})", where=str(folder / MANIFEST)) from error
     write_whole(folder / MANIFEST, text)
 
 
@@ -159,7 +159,7 @@ def installed_versions() -> dict[str, str]:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes every text that a strict reader could take for a number; repeats instead of aliases."""
+    """Quotes every text that a strict reader could take for a number; writes repeated values instead of aliases."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True

@@ -1,4 +1,4 @@
-"""Recorded messages at the pace at which they came, faster, or as fast as possible."""
+"""Plays recorded messages at the original pace, faster, or as fast as possible."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ AS_FAST_AS_POSSIBLE = 0.0
 
 
 def pace(messages: Iterable[TrafficMessage], speed: float, clock: Clock) -> Iterator[TrafficMessage]:
-    """The same messages, each not before its time.
+    """The same messages, each when it is due.
 
     Args:
         speed: 1 for the original pace, 4 for four times as fast, 0 for no waiting.
-        clock: waits. A stamp that goes back is not waited for.
+        clock: waits. There is no waiting for a stamp that goes back.
     """
     if speed == AS_FAST_AS_POSSIBLE:
         yield from messages

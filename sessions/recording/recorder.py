@@ -1,8 +1,8 @@
-"""The recorder: every byte, every event, and samples for the eye.
+"""The recorder: every byte, every event, and samples for viewers.
 
-Bytes and session events are all that a replay needs. The samples beside them (joints, loads, transforms, contacts,
-pictures, poses) are there for viewers and are thinned out; nothing is ever read back from them. Truth has topics of its
-own, which only evaluation reads.
+A replay needs only bytes and session events. The samples (joints, loads, transforms, contacts, pictures, poses) are for
+viewers and thinned out; the program never reads them back. Ground truth has separate topics, which only the evaluation
+reads.
 """
 
 from __future__ import annotations
@@ -45,35 +45,35 @@ class WrenchReading(Protocol):
 
 
 class TrafficSink(Protocol):
-    """Where a recorder's messages go."""
+    """Receives a recorder's messages."""
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        """Take one message. Raises SessionError when it cannot be kept."""
+        """Store one message. Raises SessionError if it cannot be stored."""
 
 
 class NullTraffic:
-    """A sink that keeps nothing, for benches that only look."""
+    """A sink that stores nothing, for rigs that are only observed."""
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        """Not kept."""
+        """Not stored."""
 
 
 class Recorder:
     """A :class:`drivers.core.transports.Tap` that also takes session events, samples, events and truth.
 
-    Every method raises SessionError when the message cannot be kept (a full disk): a session that is not being
-    recorded must not go on.
+    Every method raises SessionError if the message cannot be stored (a full disk): a session that is not recorded must
+    not continue.
     """
 
     def __init__(self, sink: TrafficSink) -> None:
         self.broken = False
-        """A message could not be kept, and its writer was told so: what follows is not recorded."""
+        """Whether a message could not be stored and the error was raised: later messages are not recorded."""
         self._sink = sink
         self._onlooker: TrafficSink = NullTraffic()
         self._next_state_ns: int | None = None
 
     def add_onlooker(self, onlooker: TrafficSink) -> None:
-        """From here on what viewers show goes to ``onlooker`` too; its ``write`` must be quick and never raise."""
+        """From now on viewers' topics also go to ``onlooker``; its ``write`` must be quick and never raise."""
         self._onlooker = onlooker
 
     # --- what a replay needs -----------------------------------------------------------------------------------
@@ -87,13 +87,13 @@ class Recorder:
         self._put(schemas.received_topic(transport), payload, stamp_ns)
 
     def event(self, event: SessionEvent) -> None:
-        """The conductor meant something."""
+        """Record a session event."""
         self._put(schemas.SESSION_EVENTS_TOPIC, event.to_bytes(), event.stamp_ns)
 
     # --- what viewers show -------------------------------------------------------------------------------------
 
     def state_due(self, now_ns: int) -> bool:
-        """Whether it is time for the next state sample; asking and being told yes uses it up."""
+        """Whether it is time for the next state sample; a positive answer counts as the sample."""
         if self._next_state_ns is not None and now_ns < self._next_state_ns:
             return False
         self._next_state_ns = now_ns + STATE_PERIOD_ns
@@ -109,7 +109,7 @@ class Recorder:
         self._put_json(schemas.LOADS_TOPIC, content, stamp_ns)
 
     def frames(self, stamp_ns: int, world_T_frames: Mapping[str, Pose3]) -> None:
-        """Where named frames are in the world."""
+        """Poses of named frames in the world."""
         transforms = [schemas.transform(stamp_ns, "world", name, pose) for name, pose in world_T_frames.items()]
         self._put_json(schemas.TRANSFORMS_TOPIC, {"transforms": transforms}, stamp_ns)
 
@@ -127,7 +127,7 @@ class Recorder:
         self._put_json(schemas.SCENE_TOPIC, foxglove.contact_scene(stamp_ns, grasp.index, grasp.contacts), stamp_ns)
 
     def wrench(self, stamp_ns: int, finger: str, reading: WrenchReading) -> None:
-        """What a fingertip's force sensor measures, in its own frame, as it came."""
+        """A force sensor's raw wrench in its own frame."""
         content = {
             "timestamp": foxglove.time(reading.stamp_ns),
             "frame_id": f"{finger}/sensor",
@@ -140,7 +140,7 @@ class Recorder:
         self._put_json(schemas.wrench_topic(finger), content, stamp_ns)
 
     def biotac(self, stamp_ns: int, finger: str, counts: Mapping[str, int | None], pac: Sequence[int]) -> None:
-        """What a BioTac measures: counts by channel (PDC, TAC, TDC, E1 ...; None: not heard) and of the vibration."""
+        """A BioTac's reading: counts by channel (PDC, TAC, TDC, E1 ...; None: not received) and of the vibration."""
         content = {"timestamp": foxglove.time(stamp_ns), "finger": finger, "counts": dict(counts), "pac": list(pac)}
         self._put_json(schemas.biotac_topic(finger), content, stamp_ns)
 
@@ -150,13 +150,13 @@ class Recorder:
         self._put_json(schemas.CAMERA_TOPIC, content, stamp_ns)
 
     def image(self, stamp_ns: int, encoded: bytes) -> None:
-        """A camera picture as it came, JPEG or PNG."""
+        """A camera picture as received, JPEG or PNG."""
         self._put_json(schemas.IMAGE_TOPIC, schemas.image(stamp_ns, "camera", encoded), stamp_ns)
 
     def slam(
         self, stamp_ns: int, world_T_object: Pose3 | None, state: Mapping[str, Any], covariance: Array | None = None
     ) -> None:
-        """The estimate after a step: the pose for viewers, the rest (plain data) beside it."""
+        """The estimate after a step: the pose for viewers, and the rest as plain data."""
         if world_T_object is not None:
             pose = schemas.pose_in_frame(stamp_ns, "world", world_T_object)
             self._put_json(schemas.SLAM_POSE_TOPIC, pose, stamp_ns)
@@ -170,7 +170,7 @@ class Recorder:
         self._put_json(schemas.SLAM_SURFACE_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)
 
     def plan(self, stamp_ns: int, content: Mapping[str, Any]) -> None:
-        """The grasp that comes next, plain data."""
+        """The next grasp, plain data."""
         self._put_json(schemas.PLAN_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)
 
     def decision(self, stamp_ns: int, content: Mapping[str, Any]) -> None:
@@ -178,7 +178,7 @@ class Recorder:
         self._put_json(schemas.DECISION_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)
 
     def guide(self, stamp_ns: int, content: Mapping[str, Any]) -> None:
-        """What the person of a guided session is shown, plain data."""
+        """The panel of a guided session, plain data."""
         self._put_json(schemas.GUIDE_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)
 
     def safety_stop(self, stamp_ns: int, cause: str, cycles: list[dict[str, Any]]) -> None:
@@ -187,14 +187,14 @@ class Recorder:
         self._put_json(schemas.SAFETY_TOPIC, content, stamp_ns)
 
     def log(self, stamp_ns: int, level: Level, source: str, message: str) -> None:
-        """Something a person should be able to read later."""
+        """A log entry for people."""
         content = {"timestamp": foxglove.time(stamp_ns), "level": int(level), "message": message, "name": source}
         self._put_json(schemas.LOG_TOPIC, {**content, "file": "", "line": 0}, stamp_ns)
 
     # --- truth -------------------------------------------------------------------------------------------------
 
     def truth(self, stamp_ns: int, world_T_object: Pose3, contacts: Iterable[Contact] | None = None) -> None:
-        """The true pose, and true contacts where they are known; for evaluation only."""
+        """The true pose, and true contacts if known; for evaluation only."""
         pose = schemas.pose_in_frame(stamp_ns, "world", world_T_object)
         self._put_json(schemas.TRUTH_POSE_TOPIC, pose, stamp_ns)
         if contacts is not None:
@@ -215,7 +215,7 @@ class Recorder:
 
 
 class NullRecorder(Recorder):
-    """A recorder that keeps nothing, for experiments in memory."""
+    """A recorder that stores nothing, for experiments in memory."""
 
     def __init__(self) -> None:
         super().__init__(NullTraffic())

@@ -1,8 +1,8 @@
-"""What a crash left is made into a whole session again.
+"""Recovers a session after a crash.
 
-A recording that was cut off, or has damaged parts, is read as far as it can be, written into a new session folder and
-counted there. The torn one is never touched. What cannot be brought back is told by topic: messages of damaged parts
-are known from the index behind them; of the last moments only the bound is known, a tenth of a second.
+A recording that is truncated or has damaged parts is read as far as possible and written into a new session folder. The
+damaged session is never changed. Losses are reported by topic: messages in damaged parts are known from their index; of
+the last moments only a bound is known, a tenth of a second.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from sessions.recording.traffic.settings import Attached, TrafficSettings
 from sessions.recording.traffic.writer import TrafficWriter
 
 LAST_MOMENTS_s = 0.1
-"""What a killed program can have recorded without its reaching the file."""
+"""Longest time before a crash whose messages may not have reached the file."""
 
 
 @dataclass(frozen=True)
 class TopicRecovery:
-    """What became of one topic.
+    """Recovery of one topic.
 
     Attributes:
-        read: messages brought back.
+        read: messages recovered.
         lost: messages known to be lost.
-        at_most_more: messages of the last moments that may be lost beside them, by the rate before.
-        last_s: stamp of the last message brought back, session clock, seconds.
+        at_most_more: further messages of the last moments that may be lost, by the previous rate.
+        last_s: stamp of the last recovered message, session clock, seconds.
     """
 
     read: int
@@ -47,15 +47,15 @@ class TopicRecovery:
 
 @dataclass(frozen=True)
 class Recovery:
-    """What became of a session.
+    """Recovery of a session.
 
     Attributes:
         source: the folder that was recovered.
-        folder: the new session; None when the old one was whole and nothing was to be done.
+        folder: the new session; None if the old one was complete.
         topics: by topic.
         loss: what could not be read.
-        left_out: folders of results in the old session, by their names in it: they were made of another recording than
-            the new one, and would pass for its own.
+        left_out: results folders of the old session, by name, which are not copied: they belong to another recording
+            than the new one.
     """
 
     source: Path
@@ -66,24 +66,24 @@ class Recovery:
 
     @property
     def lossy(self) -> bool:
-        """Whether anything is lost."""
+        """Whether anything was lost."""
         return bool(self.loss)
 
 
 def recover(source: Path, root: Path | None = None) -> Recovery:
-    """Make a whole session of a torn one.
+    """Recover a damaged session.
 
     Args:
-        source: a session's folder.
-        root: folder in which the new session is made; the one of the old session by default.
+        source: its folder.
+        root: folder for the new session; by default that of the old one.
 
     Raises:
-        SessionError: it is being recorded at this moment, is no session, holds nothing that can be read, or the new
-            folder cannot be made.
+        SessionError: it is being recorded, is not a session, contains nothing readable, or the new folder cannot be
+            created.
         WriteError: the new folder cannot be written.
     """
     if being_written(source / TRAFFIC):
-        raise SessionError("is being recorded", where=str(source), hint="Wait until that has ended")
+        raise SessionError("is being recorded", where=str(source), hint="Wait until the session has ended")
     reader = TrafficReader(source / TRAFFIC)
     manifest = _manifest(source, reader)
     if manifest.status not in ("open", "failed") and not _read_through(reader):
@@ -100,7 +100,7 @@ def _recover_into(folder: Path, source: Path, manifest: Manifest, reader: Traffi
     _copy_files(source, folder, reader)
     written, topics = _copy_traffic(reader, folder)
     if not written:
-        raise SessionError("holds no message that can be read", where=str(reader.path), hint="Nothing can be recovered")
+        raise SessionError("contains no readable message", where=str(reader.path), hint="Nothing can be recovered")
     _count_again(folder, written)
     recovery = Recovery(source, folder, topics, reader.loss, _result_folders(source))
     write_manifest(folder, _recovered_manifest(manifest, folder, written, recovery))
@@ -108,7 +108,7 @@ def _recover_into(folder: Path, source: Path, manifest: Manifest, reader: Traffi
 
 
 def _manifest(source: Path, reader: TrafficReader) -> Manifest:
-    """The session's description: the folder's, or where that cannot be read the one kept in the recording."""
+    """The session's manifest from the folder, or if that cannot be read from the recording."""
     try:
         return read_manifest(source)
     except SessionError:
@@ -119,13 +119,13 @@ def _manifest(source: Path, reader: TrafficReader) -> Manifest:
 
 
 def _read_through(reader: TrafficReader) -> bool:
-    """Read everything once; whether anything is lost."""
+    """Read everything once. Returns whether anything is lost."""
     deque(reader.messages(), maxlen=0)
     return bool(reader.loss)
 
 
 def _copy_files(source: Path, folder: Path, reader: TrafficReader) -> None:
-    """Everything but recording, description and results; calibrations that are gone come from the recording."""
+    """Copy everything but recording, manifest and results; missing calibrations come from the recording."""
     for item in sorted(source.iterdir()):
         if item.is_symlink() or item.name == MANIFEST or item.suffix in (".mcap", ".part") or _holds_results(item):
             continue
@@ -149,7 +149,7 @@ def _results_among(folder: str, names: list[str]) -> list[str]:
 
 
 def _result_folders(source: Path) -> tuple[str, ...]:
-    """Folders with results in them, wherever they are in a session."""
+    """All results folders in a session."""
     return tuple(sorted(path.parent.relative_to(source).as_posix() for path in source.rglob(TRAJECTORY)))
 
 
@@ -176,7 +176,7 @@ class _Rates:
         self._newest_ns = 0
 
     def watch(self, messages: Iterator[TrafficMessage]) -> Iterator[TrafficMessage]:
-        """The same messages."""
+        """Count messages while passing them on."""
         for message in messages:
             self._counts[message.topic] += 1
             self._newest_ns = max(self._newest_ns, message.stamp_ns)
@@ -187,7 +187,7 @@ class _Rates:
             yield message
 
     def topics(self, loss: Loss) -> dict[str, TopicRecovery]:
-        """What became of each topic."""
+        """The recovery of each topic."""
         since_ns = self._newest_ns - NANOSECONDS
         found = {}
         for topic in sorted(self._counts | Counter(loss.by_topic)):
@@ -204,7 +204,7 @@ def _count_again(folder: Path, written: Counter[str]) -> None:
     reader = TrafficReader(folder / TRAFFIC)
     found = Counter(message.topic for message in reader.messages())
     if found != written or reader.loss:
-        what = f"was written, but reads differently: {sum(found.values())} of {sum(written.values())} messages"
+        what = f"was written, but only {sum(found.values())} of {sum(written.values())} messages can be read back"
         raise SessionError(what, where=str(reader.path), hint="Check the disk, then recover again")
 
 

@@ -1,4 +1,4 @@
-"""The session folder: what was done, with what, and everything that was recorded.
+"""The session folder: settings, calibration, and everything that was recorded.
 
 ::
 
@@ -7,7 +7,7 @@
         calibration/        copies of the calibration files used
         traffic.mcap        bytes, session events, samples, truth; a long one goes on in traffic-2.mcap
         truth/object.ply    the object's true mesh, for evaluation only
-        results/            what was made of it
+        results/            results computed from it
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ from sessions.recording.traffic.writer import TrafficWriter
 TRAFFIC, CALIBRATION, RESULTS, TRUTH_MESH = "traffic.mcap", "calibration", "results", "truth/object.ply"
 
 TRAJECTORY = "trajectory.csv"
-"""The file that every folder of results holds, and no other folder."""
+"""The file that identifies a results folder."""
 
 
 class Session:
-    """A session folder, new or opened."""
+    """A session folder, new or existing."""
 
     def __init__(self, folder: Path, manifest: Manifest) -> None:
         self.folder, self.manifest = folder, manifest
@@ -57,18 +57,18 @@ class Session:
         """Open an existing session.
 
         Raises:
-            SessionError: not a session folder, or its ``session.yaml`` cannot be used.
+            SessionError: not a session folder, or its ``session.yaml`` is invalid.
         """
         return cls(folder, read_manifest(folder))
 
     @property
     def results(self) -> Path:
-        """Folder of results; made when missing. Raises SessionError."""
+        """Folder of results; created if missing. Raises SessionError."""
         folder = self.folder / RESULTS
         try:
             folder.mkdir(exist_ok=True)
         except OSError as error:
-            hint = "Move what stands in its place"
+            hint = "Move the file that is in its place"
             raise SessionError(f"cannot be made ({error.strerror})", where=str(folder), hint=hint) from error
         return folder
 
@@ -82,19 +82,19 @@ class Session:
         """The copy of a calibration file, checked against its hash.
 
         Raises:
-            SessionError: there is none for that role, or it was changed since.
+            SessionError: there is none for that role, or it was changed.
         """
         if role not in self.manifest.calibration:
             raise SessionError(f"no calibration called {role!r}", where=str(self.folder / MANIFEST))
         copy = self.manifest.calibration[role]
         path = self.folder / CALIBRATION / copy.file
         if _sha256(_read(path)) != copy.sha256:
-            raise SessionError("changed since it was recorded", where=str(path), hint="Restore the recorded file")
+            raise SessionError("changed since the recording", where=str(path), hint="Restore the recorded file")
         return path
 
     @property
     def being_recorded(self) -> bool:
-        """Whether a living program is recording into it."""
+        """Whether a running program is recording into it."""
         return self.manifest.status == "open" and being_written(self.folder / TRAFFIC)
 
     def traffic(self) -> TrafficReader:
@@ -103,10 +103,8 @@ class Session:
 
 
 class RunningSession(Session):
-    """A session that is being recorded; a context manager that closes it with the status that fits.
-
-    Leaving the ``with`` block well gives ``closed``, a keyboard interrupt ``interrupted``, another exception
-    ``failed``.
+    """A session that is being recorded; a context manager that closes it with the right status: ``closed`` normally,
+    ``interrupted`` after a keyboard interrupt, ``failed`` after another exception.
     """
 
     def __init__(
@@ -128,11 +126,11 @@ class RunningSession(Session):
 
     @property
     def traffic_sink(self) -> TrafficWriter:
-        """Where its recorder writes."""
+        """The file its recorder writes to."""
         return self._traffic
 
     def settle(self) -> None:
-        """Wait until everything that was handed over to the disk is written, or cannot be."""
+        """Wait until everything queued for the disk is written, or writing has failed."""
         self._traffic.settle()
 
     def close(
@@ -147,9 +145,9 @@ class RunningSession(Session):
         """Finish the traffic file and ``session.yaml``; idempotent, the first call counts.
 
         Args:
-            counts: figures beside those of the messages (grasps, cycles, overruns).
-            data_loss: undecodable messages and the like; zeros are left out. What the recorder itself knows to be
-                lost (gaps, late and dropped messages) is added.
+            counts: counts besides those of the messages (grasps, cycles, overruns).
+            data_loss: undecodable messages and so on; zeros are left out. Losses known to the recorder (gaps, late and
+                dropped messages) are added.
 
         Raises:
             WriteError: the folder cannot be written.
@@ -204,18 +202,18 @@ def create_session(
     stampers: Mapping[str, Stamper] | None = None,
     traffic_settings: TrafficSettings | None = None,
 ) -> RunningSession:
-    """Make a new session folder under ``root`` and begin recording.
+    """Create a new session folder under ``root`` and begin recording.
 
     Args:
         rig_description, settings: plain data (what a YAML file can hold).
         calibration_files: role to file; copied with their hashes.
-        truth_mesh_ply: the true mesh as PLY bytes, where the rig knows it.
-        started: time of the start, UTC; now when not given.
-        stampers: by transport, what reads the device's own counter and clock out of its messages.
-        traffic_settings: how the recording is kept; the usual ones suit a rig whose time waits for the disk.
+        truth_mesh_ply: the true mesh as PLY bytes, if the rig knows it.
+        started: start time, UTC; default: now.
+        stampers: by transport, the reader of the device's own counter and clock.
+        traffic_settings: how the recording is stored; the defaults suit a rig whose time waits for the disk.
 
     Raises:
-        SessionError: the folder cannot be made or a calibration file cannot be read.
+        SessionError: the folder cannot be created or a calibration file cannot be read.
         WriteError: the folder cannot be written.
     """
     started = started or datetime.now(UTC)
@@ -242,13 +240,13 @@ def create_session(
 
 
 def _attachments(folder: Path, manifest: Manifest) -> tuple[Attached, ...]:
-    """What the recording itself keeps, so that it can be understood without the folder."""
+    """Files stored inside the recording, so that it can be read without the folder."""
     names = [CALIBRATION + "/" + copy.file for copy in manifest.calibration.values()]
     return tuple(Attached(name, "application/yaml", _read(folder / name)) for name in (MANIFEST, *names))
 
 
 def new_folder(root: Path, name: str) -> Path:
-    """A folder of that name, or of that name with a number behind it, that was not there. Raises SessionError."""
+    """Create a folder with that name, or with a number added if it exists. Raises SessionError."""
     try:
         root.mkdir(parents=True, exist_ok=True)
         for attempt in range(1, 1000):
@@ -263,7 +261,7 @@ def new_folder(root: Path, name: str) -> Path:
         raise SessionError(
             f"cannot be made ({error.strerror})", where=str(root), hint="Choose another folder"
         ) from error
-    raise SessionError("a thousand sessions of this second exist already", where=str(root / name))
+    raise SessionError("a thousand sessions with this time exist already", where=str(root / name))
 
 
 def _copy_calibration(folder: Path, files: Mapping[str, Path]) -> dict[str, CalibrationCopy]:

@@ -1,7 +1,7 @@
-"""Session events: what the conductor meant, written between the bytes.
+"""Session events: the conductor's intentions, recorded between the bytes.
 
 The bytes of the transports say what the devices measured; session events say what it was measured for. They are
-recorded in order with the bytes, so a replay knows as much as the live session did.
+recorded in order with the bytes, so that a replay has the same information as the live session.
 """
 
 from __future__ import annotations
@@ -16,31 +16,31 @@ from drivers.core.errors import SessionError
 
 
 class EventKind(StrEnum):
-    """The meanings a event can have."""
+    """Kinds of session events."""
 
     TARE = "tare"
-    """The named fingers touch nothing: take this as zero."""
+    """The named fingers touch nothing: tare them."""
     CLOSE_BEGIN = "close_begin"
-    """The open hand stands around the object: from here on the fingers close."""
+    """The open hand is around the object: from now on the fingers close."""
     CAPTURE_BEGIN = "capture_begin"
-    """The grasp has settled: gather samples from here on."""
+    """The grasp has settled: collect samples from now on."""
     CAPTURE_END = "capture_end"
-    """Enough samples: make a grasp of them."""
+    """Enough samples: compute a grasp from them."""
     TOUCH_END = "touch_end"
-    """Enough samples of a probe: its contacts belong to the next grasp, which finds the object at rest there."""
+    """Enough samples of a probe: its contacts belong to the next grasp, for which the object has not moved."""
     HOLD_BEGIN = "hold_begin"
-    """The object is held firmly: from here on it moves with the palm."""
+    """The object is held firmly: from now on it moves with the palm."""
     HOLD_END = "hold_end"
-    """The object is about to be let go: it stays where it is."""
+    """The object is about to be released: it stays in place."""
     TRUTH_FRAME = "truth_frame"
     """The newest camera frame shows the object of the current grasp at rest."""
     UNDO = "undo"
-    """The last grasp does not count: what the hand carried before and after it belongs to the next one."""
+    """The last grasp is undone: the hand odometry before and after it belongs to the next one."""
 
 
 @dataclass(frozen=True)
 class SessionEvent:
-    """One event.
+    """One session event.
 
     Attributes:
         kind: its meaning.
@@ -53,7 +53,7 @@ class SessionEvent:
     fingers: tuple[str, ...] = FINGERS
 
     def to_bytes(self) -> bytes:
-        """The event as JSON, the form in a traffic file."""
+        """The event as JSON, as stored in a traffic file."""
         content: dict[str, Any] = {"kind": self.kind.value, "stamp_ns": self.stamp_ns}
         if self.kind is EventKind.TARE:
             content["fingers"] = list(self.fingers)
@@ -61,10 +61,10 @@ class SessionEvent:
 
     @classmethod
     def from_bytes(cls, data: bytes, *, where: str = "/marks") -> SessionEvent:
-        """Read a event back.
+        """Parse a session event.
 
         Raises:
-            SessionError: the content is not a event of this version.
+            SessionError: the content is not a session event of this version.
         """
         try:
             content = json.loads(data)
@@ -72,8 +72,10 @@ class SessionEvent:
             event = cls(EventKind(content["kind"]), int(content["stamp_ns"]), fingers)
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise SessionError(
-                f"not a mark that this version knows ({error!r})", where=where, hint="Use the version that recorded it"
+                f"not a session event that this version knows ({error!r})",
+                where=where,
+                hint="Use the version that recorded it",
             ) from error
         if unknown := set(fingers) - set(FINGERS):
-            raise SessionError(f"mark names unknown fingers {sorted(unknown)}", where=where)
+            raise SessionError(f"the session event names unknown fingers {sorted(unknown)}", where=where)
         return event

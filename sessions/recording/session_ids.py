@@ -11,7 +11,7 @@ _ID = re.compile(r"[a-z0-9_-]{1,64}")
 
 
 def check_id(name: str, where: str = "") -> str:
-    """The name, if it is a session's id: 1 to 64 of a-z, 0-9, underscore and hyphen.
+    """Check that a name is a session id: 1 to 64 of a-z, 0-9, underscore and hyphen.
 
     Raises:
         SessionError: it is not.
@@ -26,12 +26,12 @@ def check_id(name: str, where: str = "") -> str:
 
 
 def slug(text: str) -> str:
-    """A part of an id; of a path (``mesh:some/part.stl``) its last part without suffix."""
+    """Convert a name to part of an id; of a path (``mesh:some/part.stl``) the file name without suffix."""
     last = re.split(r"[/\\:]", text.strip())[-1]
     return re.sub(r"[^a-z0-9]+", "-", re.sub(r"\.[a-z0-9]+$", "", last.lower())).strip("-") or "unnamed"
 
 
 def recovered_id(name: str) -> str:
-    """The id of what is recovered from a session."""
+    """The id of a session's recovery."""
     end = "-recovered"
     return name[: LONGEST_ID - len(end)] + end

@@ -9,7 +9,7 @@ from drivers.core.clock import Clock
 
 @dataclass
 class CycleCounts:
-    """Cycles run, cycles that ended after their deadline, deadlines left out because of that."""
+    """Cycles run, cycles that ended after their deadline, and deadlines skipped because of that."""
 
     cycles: int = 0
     overruns: int = 0
@@ -17,7 +17,7 @@ class CycleCounts:
 
 
 class CycleTiming:
-    """Keeps the cycle: a slow one does not move the later deadlines, those it missed are left out.
+    """Keeps the cycle: a slow one does not shift later deadlines; missed ones are skipped.
 
     Args:
         clock: the session's.
@@ -28,21 +28,21 @@ class CycleTiming:
         self._clock, self._cycle_ns = clock, cycle_ns
         self.counts = CycleCounts()
         self.begun_ns = clock.now_ns()
-        """When the newest cycle began."""
+        """Start of the newest cycle."""
         self._deadline_ns: int | None = None
 
     def restart(self) -> None:
-        """The grid begins anew with the next cycle."""
+        """Restart the grid with the next cycle."""
         self._deadline_ns = None
 
     def begin(self) -> None:
-        """A cycle begins."""
+        """Begin a cycle."""
         self.begun_ns = self._clock.now_ns()
         if self._deadline_ns is None:
             self._deadline_ns = self.begun_ns
 
     def wait(self) -> None:
-        """The cycle's work is done: wait for its deadline."""
+        """End a cycle: wait for its deadline."""
         before_ns = self.begun_ns if self._deadline_ns is None else self._deadline_ns
         deadline_ns = before_ns + self._cycle_ns
         late_ns = self._clock.now_ns() - deadline_ns

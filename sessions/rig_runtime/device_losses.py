@@ -1,7 +1,7 @@
-"""What a running session's devices lost, by kind, for its record and its exit code.
+"""Data losses of a running session's devices, by kind, for its manifest and exit code.
 
-The recorder knows the gaps of transports whose messages are numbered. A palm's are not: there only the driver knows in
-which cycles no valid status came.
+The recorder knows the gaps of transports with numbered messages. A palm's are not numbered: only its driver knows in
+which cycles no valid status arrived.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class DeviceLosses:
     """Counts over one session.
 
     Args:
-        interpreter: knows what could not be decoded, and whose stamps jumped.
+        interpreter: knows undecodable messages and clock jumps.
         hand: knows its own losses.
     """
 
@@ -31,24 +31,24 @@ class DeviceLosses:
         self._of_hand: dict[str, int] = {}
 
     def look(self) -> None:
-        """Take note of clocks that have jumped; at the end of a cycle, when every transport has been heard."""
+        """Note clock jumps; at the end of a cycle, when every transport has been read."""
         ahead = set(self._interpreter.time.ahead_ns())
         self._jumps.update(ahead - self._ahead)
         self._ahead = ahead
 
     def conclude(self) -> None:
-        """Ask the hand, while it is connected."""
+        """Read the hand's losses, while it is connected."""
         with suppress(DeviceError):  # one that is gone has ended the session
             self._of_hand = dict(self._hand.losses())
 
     def problems(self) -> Iterator[str]:
-        """Clocks that are ahead now, in words, each beginning with its transport."""
+        """Clocks that are ahead now, as sentences beginning with the transport."""
         for transport, ahead_ns in self._interpreter.time.ahead_ns().items():
             ahead_s = ahead_ns / NANOSECONDS
             yield f"{transport}: its stamps are {ahead_s:.1f} s ahead of all others', its clock has jumped"
 
     def counts(self) -> dict[str, int]:
-        """By kind and transport, zeros too."""
+        """Losses by kind and transport, including zeros."""
         return {
             **{f"{kind} {HAND_LINK}": number for kind, number in self._of_hand.items()},
             **{f"undecodable {transport}": number for transport, number in self._interpreter.undecodable.items()},

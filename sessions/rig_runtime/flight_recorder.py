@@ -1,4 +1,4 @@
-"""The last cycles before a stop, kept so that they can be told with it."""
+"""Keeps the last cycles, to record them with a stop."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from typing import Any
 from drivers.core.contacts import Array
 
 LAST_CYCLES = 100
-"""As many are kept."""
+"""Number of cycles kept."""
 
 
 @dataclass(frozen=True)
 class CycleSnapshot:
-    """What one cycle looks like to the supervisor.
+    """One cycle as the supervisor sees it.
 
     Attributes:
-        stamp_ns: when the cycle began to look at its devices, session clock. What came before that has been seen,
-            however long the look took.
-        hand_stamp_ns: arrival of the newest fresh hand status; None before the first.
-        loads_N: contact force on each fingertip; infinite where its readings tell none.
+        stamp_ns: when the cycle began to read its devices, session clock. Everything that arrived before is included,
+            however long reading took.
+        hand_stamp_ns: arrival of the newest hand status; None before the first.
+        loads_N: contact force on each fingertip; infinite if its readings are invalid.
         palm_world_m: origin of the palm, shape (3,), world; None before the first status.
-        tip_stamps_ns: arrival of the newest reading of each fingertip that has a transport of its own; None before it.
+        tip_stamps_ns: arrival of the newest reading of each fingertip with its own transport; None before the first.
         force_ranges_N: calibrated range of the fingertips' sensors, smallest axis.
-        warmest_C: temperature of the hand's warmest motor; None while none is known.
-        void_tips: why fingertips tell no force, in words, by finger.
+        warmest_C: temperature of the hand's warmest motor; None while unknown.
+        void_tips: why readings of fingertips are invalid, by finger.
     """
 
     stamp_ns: int
@@ -61,7 +61,7 @@ class FlightRecorder:
         self._cycles: deque[CycleSnapshot] = deque(maxlen=LAST_CYCLES)
 
     def note(self, snapshot: CycleSnapshot) -> None:
-        """Keep a cycle, and forget the oldest."""
+        """Keep a cycle, and drop the oldest."""
         self._cycles.append(snapshot)
 
     def plain(self) -> list[dict[str, Any]]:

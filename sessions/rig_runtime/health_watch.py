@@ -1,7 +1,7 @@
-"""What devices say to be wrong while a session goes on: told when it begins, and with its newest figures at the end.
+"""Problems that devices report during a session: logged when they begin, and with their final counts at the end.
 
-A driver counts a fault and goes on, or stops. That it counted is recorded here, so that a session in which a wire
-dropped messages can be told from one in which none did.
+A driver counts a fault and continues, or stops. The counted faults are recorded here, so that a session with dropped
+messages can be distinguished from one without.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from collections.abc import Callable, Iterable
 
 _FIGURE = re.compile(r"\b\d[\d.]*\b")
 _AT_REST = ("not tared", "no sample received yet", "no reading received yet", "halted, no demand for 20 ms")
-"""Ends of what fingertips say before they are used, and motors that are told nothing; no faults."""
+"""Endings of messages that are not faults: fingertips not used yet, and motors without demands."""
 
 
 class HealthWatch:
-    """Compares what devices say to be wrong with what they said before.
+    """Compares the problems of devices with earlier ones.
 
     Args:
-        tell: is told each fault once, by device and words, however its figures grow.
+        tell: receives each problem once, by device and words, however its counts grow.
 
     Attributes:
-        listener: is told the same; a person.
+        listener: receives the same, for the operator.
     """
 
     def __init__(self, tell: Callable[[str, str], None]) -> None:
@@ -30,7 +30,7 @@ class HealthWatch:
         self.listener: Callable[[str], None] = lambda words: None
 
     def look(self, problems: Iterable[str]) -> None:
-        """Take note of what is wrong now, each beginning with the device's name."""
+        """Note the present problems, each beginning with the device's name."""
         for words in problems:
             if words.endswith(_AT_REST):
                 continue
@@ -41,12 +41,12 @@ class HealthWatch:
             self._newest[kind] = words
 
     def conclude(self, problems: Iterable[str]) -> None:
-        """Tell everything that is or was wrong once more, with its newest figures, and begin anew."""
+        """Report all problems once more, with their final counts, and start again."""
         self.look(problems)
         found, self._newest = self._newest, {}
         for words in found.values():
             device, text = _device_and_words(words)
-            self._tell(device, f"in all: {text}")
+            self._tell(device, f"total: {text}")
 
 
 def _device_and_words(words: str) -> tuple[str, str]:

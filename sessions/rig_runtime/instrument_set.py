@@ -14,7 +14,7 @@ class InstrumentSet:
 
     Args:
         hand, base, camera: see :class:`~sessions.rig_runtime.rig_runtime.RigRuntime`.
-        wrench_devices: of the fingertips' own transports, by finger; looked up anew each time.
+        wrench_devices: of the fingertips' own transports, by finger; looked up each time.
     """
 
     def __init__(
@@ -28,14 +28,14 @@ class InstrumentSet:
         self._wrench_devices = wrench_devices
 
     def connect(self) -> None:
-        """Connect each. What a hand that cycles by itself sends meanwhile is recorded. Raises DeviceError."""
+        """Connect each device. What a hand in its own process sends meanwhile is recorded. Raises DeviceError."""
         for instrument in self._instruments():
             instrument.connect()
             if isinstance(self._hand, CyclingInstrument):
                 self._hand.catch_up()
 
     def close(self) -> list[TactileLabError]:
-        """Close each, even if another fails; gives what went wrong."""
+        """Close each device, even if another fails. Returns the errors."""
         problems: list[TactileLabError] = []
         for instrument in reversed(self._instruments()):
             try:
@@ -45,10 +45,10 @@ class InstrumentSet:
         return problems
 
     def problems(self, *, ask: bool = False) -> list[str]:
-        """What is wrong with them, in words, each beginning with the device's name.
+        """Problems of the devices, each beginning with the device's name.
 
         Args:
-            ask: ask a hand that cycles by itself, too, which may take as long as its process does.
+            ask: also ask a hand in its own process, which may have to be waited for.
         """
         named = {"hand": self._hand, "base": self._base, **self._wrench_devices, "camera": self._camera}
         if isinstance(self._hand, CyclingInstrument) and not ask:

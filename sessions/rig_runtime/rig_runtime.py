@@ -1,9 +1,9 @@
 """The rig runtime: the connected devices of a rig, run in one common cycle.
 
-A cycle exchanges with the hand and the positioner, empties the fingertips' transports and waits for the next deadline.
-Deadlines lie on a fixed grid, so that a slow cycle does not move the later ones. What the devices received reaches
-:class:`Perception` through the taps of their transports (see :mod:`sessions.perception.interpreter`), before the
-devices decode it for their own control.
+A cycle exchanges data with the hand and the positioner, reads the fingertips' transports and waits for the next
+deadline. Deadlines lie on a fixed grid, so that a slow cycle does not shift later ones. What the devices received
+reaches :class:`Perception` through the taps of their transports (see :mod:`sessions.perception.interpreter`), before
+the devices decode it for their own control.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ class RigRuntime:
         cycle_ns: period of the common cycle.
         hand, base, camera: live devices on tapped transports.
         wrench_devices: live devices of the fingertips' own transports, by finger (see :class:`SensorStream`).
-        observer: the tap of all those transports; its Perception and its recorder are the rig runtime's.
+        observer: the tap of all those transports; it has the Perception and the recorder.
         fingertip_calibrations: by finger.
-        truth: the truth channel of a simulated rig; goes to the recorder and nowhere else.
+        truth: the truth channel of a simulated rig; used only by the recorder.
         force_ranges_N: calibrated range of the fingertips' sensors, smallest axis, by finger.
     """
 
@@ -83,12 +83,12 @@ class RigRuntime:
 
     @property
     def perception(self) -> Perception:
-        """What is known of the hand."""
+        """The state of the hand and its grasps."""
         return self.observer.interpreter.perception
 
     @property
     def recorder(self) -> Recorder:
-        """Where everything is recorded."""
+        """The recorder."""
         return self.observer.recorder
 
     @property
@@ -103,7 +103,7 @@ class RigRuntime:
 
     @property
     def losses(self) -> Mapping[str, int]:
-        """What the devices lost, by kind and transport; complete once the rig runtime is closed."""
+        """Data losses by kind and transport; complete once the rig runtime is closed."""
         return self._losses.counts()
 
     @property
@@ -112,7 +112,7 @@ class RigRuntime:
         return self._timing.counts
 
     def tell_problems_to(self, listener: Callable[[str], None]) -> None:
-        """Whatever goes wrong with a device is recorded, and told to ``listener`` too, once each."""
+        """Problems of devices are recorded, and from now on also passed to ``listener``, once each."""
         self._state.watch.listener = listener
 
     # --- lifecycle ---------------------------------------------------------------------------------------------
@@ -120,7 +120,7 @@ class RigRuntime:
     def connect(self) -> None:
         """Connect every device and run cycles until the hand and the positioner have answered.
 
-        All or nothing: when anything fails, everything is closed again. Raises DeviceError.
+        If anything fails, everything is closed again. Raises DeviceError.
         """
         try:
             self._devices.connect()
@@ -133,7 +133,7 @@ class RigRuntime:
             raise
 
     def close(self) -> None:
-        """Stop and close every device, each even if another fails; idempotent. Raises the first one's error."""
+        """Stop and close every device, even if another fails; idempotent. Raises the first error."""
         self.stop()
         try:
             self._state.conclude()
@@ -143,18 +143,18 @@ class RigRuntime:
             raise problems[0]
 
     def stop(self) -> None:
-        """No motion from now on: zero demands on the hand, the positioner stays. Never raises."""
+        """Stop all motion: zero demands to the hand, the positioner holds. Never raises."""
         self.hand.stop()
         self.base.stop()
 
     def restart_fingertip(self, finger: str) -> None:
-        """Close and start the sensor of a fingertip with a transport of its own again. Raises DeviceError."""
+        """Restart the sensor of a fingertip with its own transport. Raises DeviceError."""
         if device := self.wrench_devices.get(finger):
             device.close()
             device.connect()
 
     def resume(self) -> None:
-        """Motion is possible again after :meth:`stop`; nothing moves before new targets are set."""
+        """Allow motion again after :meth:`stop`; nothing moves before new targets are set."""
         self.hand.resume()
         self.base.resume()
 
@@ -186,7 +186,7 @@ class RigRuntime:
         self._timing.wait()
 
     def snapshot(self) -> CycleSnapshot:
-        """What the last cycle looks like to a safety supervisor."""
+        """The last cycle as the safety supervisor sees it."""
         seen, newest = self.perception, self.observer.interpreter.newest
         tips = {finger: newest.get(fingertip_link(finger)) for finger in self.wrench_devices}
         hand = newest.get(HAND_LINK)
@@ -212,7 +212,7 @@ class RigRuntime:
     # -------------------------------------------------------------------------------------------------
 
     def tare(self, fingers: Iterable[str] = FINGERS) -> TareReport:
-        """Take the named, idle fingertips as untouched; refusals are reported and recorded as warnings."""
+        """Tare the named, untouched fingertips; refusals are reported and recorded as warnings."""
         report = self._record_event(EventKind.TARE, tuple(fingers))
         assert isinstance(report, TareReport)
         for finger, reason in report.refused.items():
@@ -220,15 +220,15 @@ class RigRuntime:
         return report
 
     def begin_closing(self) -> None:
-        """The open hand stands around the object; from here on the fingers close."""
+        """The open hand is around the object; from now on the fingers close."""
         self._record_event(EventKind.CLOSE_BEGIN)
 
     def begin_capture(self) -> None:
-        """Gather samples from here on."""
+        """Collect samples from now on."""
         self._record_event(EventKind.CAPTURE_BEGIN)
 
     def end_capture(self) -> Grasp:
-        """Make a grasp of the samples since :meth:`begin_capture`."""
+        """Compute a grasp from the samples since :meth:`begin_capture`."""
         grasp = self._record_event(EventKind.CAPTURE_END)
         assert isinstance(grasp, Grasp)
         self.recorder.grasp(self.clock.now_ns(), grasp, self.perception.dropped)
@@ -240,18 +240,18 @@ class RigRuntime:
         self._record_event(EventKind.TOUCH_END)
 
     def begin_hold(self) -> None:
-        """From here on the object moves with the palm."""
+        """From now on the object moves with the palm."""
         self._record_event(EventKind.HOLD_BEGIN)
 
     def end_hold(self) -> None:
-        """From here on the object stays where it is."""
+        """From now on the object stays in place."""
         self._record_event(EventKind.HOLD_END)
 
     def picture(self, cycle: Callable[[], None] | None = None) -> FrameReading:
-        """A new picture; the cycles go on while it is on its way.
+        """Take a picture; cycles continue until it arrives.
 
         Args:
-            cycle: runs one, for who looks at each; :meth:`cycle` unless given.
+            cycle: runs one cycle, for supervised callers; default :meth:`cycle`.
 
         Raises:
             DeviceError: there is no camera, or it gave no picture.
@@ -282,7 +282,7 @@ class RigRuntime:
         return outcome
 
     def undo(self) -> Undone:
-        """Take the last grasp back. Raises SessionError when there is none."""
+        """Undo the last grasp. Raises SessionError if there is none."""
         undone = self._record_event(EventKind.UNDO)
         assert isinstance(undone, Undone)
         return undone
@@ -293,7 +293,7 @@ class RigRuntime:
         self.log(Level.ERROR, "safety", f"stopped: {cause}")
 
     def log(self, level: Level, source: str, message: str) -> None:
-        """Record something a person should be able to read later."""
+        """Record a log entry for people."""
         self.recorder.log(self.clock.now_ns(), level, source, message)
 
     def _record_event(self, kind: EventKind, fingers: tuple[str, ...] = FINGERS) -> Outcome | None:

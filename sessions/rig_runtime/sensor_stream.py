@@ -1,4 +1,4 @@
-"""A sensor that sends by itself, on a transport that is tapped."""
+"""A sensor that sends by itself, on a tapped transport."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from sessions.perception.instruments import AskedInstrument, Instrument, NamedIn
 
 
 class SensorStream:
-    """A device that sends by itself, emptied without decoding: the tap of its transport has fed Perception already.
+    """A device that sends by itself, read without decoding: the tap of its transport already feeds Perception.
 
     Args:
-        device: what starts and ends the stream.
-        transport: the tapped transport it was built on.
+        device: starts and ends the stream.
+        transport: its tapped transport.
     """
 
     def __init__(self, device: Instrument, transport: Transport) -> None:
@@ -27,7 +27,7 @@ class SensorStream:
         self._device.close()
 
     def poll(self) -> None:
-        """Take what waits on the transport, and ask for more where the device needs it. Raises DeviceError."""
+        """Read what has arrived on the transport, and request more if the device needs it. Raises DeviceError."""
         self._transport.receive()
         if self._asked is not None:
             self._asked.ask()
@@ -38,5 +38,5 @@ class SensorStream:
         return self._device.identity if isinstance(self._device, NamedInstrument) else ""
 
     def health(self) -> tuple[str, ...]:
-        """What the transport knows to be wrong; of the readings, the decoder that Perception has knows."""
+        """Problems of the transport; those of the readings are known to Perception's decoder."""
         return link_health(self._transport)

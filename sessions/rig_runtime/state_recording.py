@@ -1,4 +1,4 @@
-"""The state of a running session, recorded for whoever looks at it later: joints, loads, frames, truth."""
+"""Records the state of a running session for viewers: joints, loads, frames, truth."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BASE_JOINTS = ("x_m", "y_m", "z_m", "yaw_rad", "pitch_rad", "roll_rad")
 
 
 class TruthReading(Protocol):
-    """What the truth channel of a simulated rig says."""
+    """Data of the truth channel of a simulated rig."""
 
     @property
     def world_T_object(self) -> Pose3: ...
@@ -30,17 +30,17 @@ class TruthReading(Protocol):
 
 
 class StateRecording:
-    """Records what is known of the hand as often as the recorder wants it, and the truth with it.
+    """Records the hand's state at the recorder's rate, together with the truth.
 
     Args:
-        observer: has the recorder, and what is known.
+        observer: has recorder and Perception.
         clock: the session's.
         truth: the truth channel of a simulated rig.
-        devices: know what is wrong with them.
-        losses: what they lost; looked after here.
+        devices: report their problems.
+        losses: their data losses; updated here.
 
     Attributes:
-        watch: tells what goes wrong with devices and fingertips.
+        watch: reports problems of devices and fingertips.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class StateRecording:
         self.watch = HealthWatch(self._warn)
 
     def record(self) -> None:
-        """Everything, where it is due. Raises SessionError."""
+        """Record everything that is due. Raises SessionError."""
         now_ns, recorder, seen = self._clock.now_ns(), self._observer.recorder, self._observer.interpreter.perception
         if not (seen.ready and recorder.state_due(now_ns)):
             return
@@ -70,13 +70,13 @@ class StateRecording:
         self.watch.look([*self._devices.problems(), *self._losses.problems(), *seen.problems()])
 
     def record_truth(self) -> None:
-        """Where the object really is, on a simulated rig. Raises SessionError."""
+        """The object's true pose, on a simulated rig. Raises SessionError."""
         if self._truth is not None:
             reading = self._truth()
             self._observer.recorder.truth(self._clock.now_ns(), reading.world_T_object, reading.contacts)
 
     def conclude(self) -> None:
-        """What went wrong with the devices, with its last figures. Raises SessionError."""
+        """Record the problems of the devices with their final counts. Raises SessionError."""
         self._losses.conclude()
         if not self._observer.recorder.broken:
             tips = self._observer.interpreter.perception.problems()

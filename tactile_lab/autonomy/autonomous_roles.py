@@ -40,7 +40,7 @@ def autonomous_roles(
     """The roles of a session without a person: the hand moves by itself, the planner decides.
 
     Args:
-        rig runtime, slam, settings: of the session.
+        runtime, slam, settings: of the session.
         seed: of what is left to chance.
         dimension: of the estimation.
         approve: asked before every grasp; refuses what a person does not want.

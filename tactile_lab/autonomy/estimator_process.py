@@ -112,7 +112,7 @@ class EstimatorProcess:
         return answer
 
     def _gone_error(self) -> SessionError:
-        hint = "What was recorded is kept and is estimated anew; see whether memory was short"
+        hint = "The recording is kept and will be estimated again; check whether memory ran out"
         return SessionError("its process has ended", where=NAME, hint=hint)
 
 

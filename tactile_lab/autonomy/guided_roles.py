@@ -41,7 +41,7 @@ def guided_roles(
     """The roles of a guided session.
 
     Args:
-        rig runtime: connected.
+        runtime: connected.
         slam: the estimation.
         settings: of the session.
         operator: the person.

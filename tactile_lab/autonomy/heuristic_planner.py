@@ -51,7 +51,7 @@ class PlanSettings(StrictModel):
     @model_validator(mode="after")
     def _sensible(self) -> PlanSettings:
         if unknown := sorted(set(self.closings) - set(PRESHAPES)):
-            raise ValueError(f"closings {unknown} are not known; choose from {', '.join(PRESHAPES)}")
+            raise ValueError(f"unknown closings {unknown}; choose from {', '.join(PRESHAPES)}")
         if not self.yaw_window_rad[0] < self.yaw_window_rad[1]:
             raise ValueError("the yaw window's first value must be the smaller one")
         if not 0.0 <= self.turn_rad[0] <= self.turn_rad[1]:

@@ -32,9 +32,9 @@ def describe_unknown(known: KnownShape | None, world_T_object: Pose2 | None) -> 
     if known.explored >= KNOWN_WELL:
         return f"{known.explored:.0%} of the surface is known"
     if known.surface is None:
-        return "the contacts enclose nothing yet"
+        return "no closed shape yet"
     worst = _worst_sector(known.surface, known.centre_m, world_T_object)
-    return f"{known.explored:.0%} of the surface is known; least the {SECTORS[worst]} side"
+    return f"{known.explored:.0%} of the surface is known; least known is the {SECTORS[worst]} side"
 
 
 def _worst_sector(surface: Surface, centre_m: Array, world_T_object: Pose2) -> int:

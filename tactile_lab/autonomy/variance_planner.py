@@ -74,7 +74,7 @@ class ExplorationSettings(StrictModel):
     @classmethod
     def _are_known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         if unknown := sorted(set(names) - set(LEANING)):
-            raise ValueError(f"closings {unknown} are not known; choose from {', '.join(LEANING)}")
+            raise ValueError(f"unknown closings {unknown}; choose from {', '.join(LEANING)}")
         return names
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from drivers.core.child_process import child_command, child_environment
 from drivers.core.errors import SessionError
 from sessions.recording.session import TRAFFIC, Session
 from sessions.recording.traffic.reader import segment_paths
@@ -94,8 +94,9 @@ def _run(
     folder: Path, settings: LoadSettings, waiting: Callable[[float], None]
 ) -> tuple[float, list[tuple[float, float]]]:
     """CPU seconds of the load itself, and its memory over time: seconds and megabytes."""
-    words = [sys.executable, "-m", "tactile_lab.experiments.data.recorder_load", str(folder), str(folder / "status")]
-    process = subprocess.Popen([*words, json.dumps(asdict(settings))], stderr=subprocess.PIPE, text=True)
+    words = (str(folder), str(folder / "status"), json.dumps(asdict(settings)))
+    command = child_command("tactile_lab.experiments.data.recorder_load", *words)
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=child_environment())
     begun, memory = time.monotonic(), []
     try:
         while process.poll() is None:

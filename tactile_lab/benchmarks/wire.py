@@ -111,7 +111,7 @@ class Trial:
 
     def losses(self) -> WireRow:
         """Lose one frame in a hundred, and count."""
-        with self._emulator("mapped") as emulator, self._hand(lost_limit=1000) as (hand, _):
+        with self._emulator("mapped") as emulator, self._hand() as (hand, _):
             before, counted = emulator.order(cable={"drop_share": LOSS_SHARE}), hand.counters
             longest_ns = fresh_ns = began_ns = self._clock.now_ns()
             longest_ns = 0
@@ -144,11 +144,12 @@ class Trial:
     def watchdog(self) -> WireRow:
         """Let the palm's watchdog trip: by a pause where the master sets it, else the palm falls as if it had."""
         own = self._master == "own"
-        with self._emulator("mapped") as emulator, self._hand(watchdog_s=WATCHDOG_s if own else None) as (hand, _):
+        with self._emulator("mapped") as emulator, self._hand(watchdog_s=WATCHDOG_s if own else None) as (hand, wire):
             if own:
                 self._clock.sleep_until_ns(self._clock.now_ns() + round(3 * WATCHDOG_s * NANOSECONDS))
-            else:
-                emulator.order(fall=[_SAFEOP, _WATCHDOG_CODE])
+                back_ms = self._until(lambda: self._cycle(hand))
+                return WireRow(self._master, "watchdog of the palm", None, back_ms, "; ".join(wire.health()))
+            emulator.order(fall=[_SAFEOP, _WATCHDOG_CODE])
             noticed_ms, words = self._time_to_notice(hand)
             back_ms = self._back(hand)
         return WireRow(self._master, "watchdog of the palm", noticed_ms, back_ms, words)

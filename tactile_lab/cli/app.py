@@ -17,7 +17,8 @@ from tactile_lab.cli.sessions import evaluate, reconstruct, report, session, vie
 app = typer.Typer(
     cls=Commands,
     help="Tactile SLAM in the laboratory: the shape and pose of an unknown object from a few fingertip contacts.",
-    epilog="Exit codes: 0 done, 1 failed, 2 usage, 3 done with data loss or outside a limit, 4 hardware not ready, "
+    epilog="Exit codes: 0 success, 1 failure, 2 usage error, 3 finished with data loss or outside a limit, 4 "
+    "hardware not ready, "
     "130 interrupted.",
     no_args_is_help=True,
     add_completion=False,
@@ -63,9 +64,9 @@ def options(
             callback=_load_extensions,
             is_eager=True,
             metavar="FILE",
-            help="Python file that registers policies, shape models, fingertips, figures or commands of your own "
-            "(docs/extending.md); again for more.",
+            help="Python file that registers your own policies, shape models, fingertips, metrics or commands "
+            "(docs/extending.md). Can be repeated.",
         ),
     ] = None,
 ) -> None:
-    """Options of the program itself."""
+    """Global options."""

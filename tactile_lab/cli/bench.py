@@ -1,4 +1,4 @@
-"""``tactile-lab bench``: speed and memory, beside the reference."""
+"""``tactile-lab bench``: speed and memory, compared with the reference."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Part(StrEnum):
-    """What can be measured by itself."""
+    """Benchmarks that can be run separately."""
 
     PATHS = "paths"
     CAMERA = "camera"
@@ -26,42 +26,46 @@ class Part(StrEnum):
 
 
 Table: TypeAlias = tuple[str, Sequence[str], Sequence[Sequence[str]]]
-"""Title, head and rows."""
+"""Title, header and rows."""
 _PAGES = {
-    Part.PATHS: ("speed", "How long the costly parts of a step take."),
-    Part.CAMERA: ("speed-camera", "How long markers take to be found, in a process of their own."),
+    Part.PATHS: ("speed", "Time taken by the expensive parts of a step."),
+    Part.CAMERA: ("speed-camera", "Time taken by marker detection, in its own process."),
     Part.ETHERCAT: (
         "hand-on-ethercat",
         "The emulated two-slave hand on a virtual cable at 1 kHz, both EtherCAT masters.",
     ),
-    Part.LOAD: ("full-load", "Five force sensors at 7 kHz and the hand at 1 kHz, all at once."),
-    Part.RECORDER: ("recorder", "A recording at full load: what is dropped, and what it costs."),
+    Part.LOAD: ("full-load", "Five force sensors at 7 kHz and the hand at 1 kHz at the same time."),
+    Part.RECORDER: ("recorder", "Recording at full load: dropped messages and processor time."),
 }
-"""Name and sentence of the stored result of each part."""
+"""Name and description of each benchmark's stored result."""
 
 
 def bench(
     only: Annotated[
         Part,
         typer.Option(
-            help="paths: costly parts of a step; camera: markers found in its own process; "
-            "ethercat: both masters on the emulated hand, and their recoveries; "
+            help="paths: the expensive parts of a step; camera: marker detection in its own process; "
+            "ethercat: both masters on the emulated hand, and how they recover; "
             "load: five force sensors at 7 kHz and the hand at 1 kHz; "
-            "recorder: hand and five force sensors at 1 kHz and 30 pictures a second, recorded."
+            "recorder: recording the hand and five force sensors at 1 kHz, and 30 images per second."
         ),
     ] = Part.PATHS,
-    seconds: Annotated[float, typer.Option(min=1.0, help="Duration of camera, ethercat, load and recorder.")] = 30.0,
-    with_hand: Annotated[bool, typer.Option("--hand/--no-hand", help="With load: the hand too.")] = True,
+    seconds: Annotated[
+        float, typer.Option(min=1.0, help="Duration of the camera, ethercat, load and recorder benchmarks.")
+    ] = 30.0,
+    with_hand: Annotated[bool, typer.Option("--hand/--no-hand", help="With --only load: include the hand.")] = True,
     store: Annotated[
-        bool, typer.Option("--store", help="Keep the tables in the repository, write their page.")
+        bool, typer.Option("--store", help="Store the tables in the repository and write their page.")
     ] = False,
-    docs: Annotated[Path, typer.Option(help="Documents that keep stored results and pages.")] = Path("docs"),
+    docs: Annotated[Path, typer.Option(help="Documentation folder with the stored results and pages.")] = Path("docs"),
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Measure the hot paths in one run, beside the thesis's figures and a plain implementation; or the wires.
+    """Benchmark the hot paths, compared with the thesis's figures and a simple implementation, or the device
+    connections.
 
-    The wires need the right to make virtual network interfaces: root, or  unshare -Urn sh -c 'ip link set lo up; ...'
+    The connection benchmarks create virtual network interfaces, which needs root, or  unshare -Urn sh -c 'ip link set
+    lo up; ...'
     """
     del no_input
     match only:
@@ -83,7 +87,7 @@ def bench(
 
 
 def _store(docs: Path, part: Part, command: str, tables: list[Table]) -> None:
-    """Keep the tables of a part in place of those that were kept of it."""
+    """Store the tables of a benchmark, replacing older ones."""
     from tactile_lab.cli.console import say
     from tactile_lab.experiments.reporting import made_here
     from tactile_lab.experiments.results import stored_result
@@ -131,7 +135,7 @@ def _ethercat(seconds: float, as_json: bool) -> list[Table]:
     from tactile_lab.cli.console import emit_json, show_table
 
     rows = measure_ethercat(seconds)
-    title, head = "Hand on EtherCAT", ["master", "what", "noticed ms", "back ms", "detail"]
+    title, head = "Hand on EtherCAT", ["master", "what", "detected ms", "recovered ms", "detail"]
     cells = [[row.master, row.what, _ms(row.noticed_ms), _ms(row.back_ms), row.detail] for row in rows]
     if as_json:
         emit_json([asdict(row) for row in rows])
@@ -147,11 +151,14 @@ def _load(seconds: float, with_hand: bool, as_json: bool) -> list[Table]:
     from tactile_lab.cli.console import emit_json, say, show_table
 
     result = measure_load(seconds, with_hand=with_hand)
-    title, head = f"All at once for {result.seconds:g} s", ["device", "sent", "received", "lost", "detail"]
+    title, head = (
+        f"All devices at the same time for {result.seconds:g} s",
+        ["device", "sent", "received", "lost", "detail"],
+    )
     cells = [[row.device, str(row.sent), str(row.received), str(row.lost), row.detail] for row in result.rows]
     facts = [
-        ["processor", f"reading {result.reader_share:.0%} of a core, emulated boxes {result.boxes_share:.0%}"],
-        ["memory", f"{result.memory_MB:.0f} MB, growing by {result.memory_slope_MB_per_min:.2f} MB a minute"],
+        ["processor", f"reader {result.reader_share:.0%} of a core, emulated boxes {result.boxes_share:.0%}"],
+        ["memory", f"{result.memory_MB:.0f} MB, growing by {result.memory_slope_MB_per_min:.2f} MB per minute"],
         *([["hand", str(result.hand)]] if result.hand else []),
     ]
     if as_json:

@@ -1,4 +1,4 @@
-"""The commands of ``tactile-lab`` by name: ours, and those of extensions, which are found when they are asked for."""
+"""The commands of ``tactile-lab`` by name: built-in ones, and those of extensions, looked up when they are used."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from typer.core import TyperGroup
 from drivers.core.registry import Registry
 
 COMMANDS: Registry[Callable[..., None] | typer.Typer] = Registry("command")
-"""A function that typer makes a command of, or a :class:`typer.Typer` with commands of its own, by the command's word.
+"""By command name: a function that typer makes a command, or a :class:`typer.Typer` with subcommands.
 
 See ``docs/extending.md`` for adding one.
 """
 
 
 class Commands(TyperGroup):
-    """Looks commands up in :data:`COMMANDS` when they are needed: extensions register theirs while options are read."""
+    """Looks up commands in :data:`COMMANDS` lazily: extensions register theirs while options are parsed."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """All names, in the order in which they were registered."""
+        """All names in order of registration."""
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """The command of a name; None when there is none."""
+        """The command with this name; None if there is none."""
         if cmd_name not in COMMANDS:
             return None
         if cmd_name not in self.commands:

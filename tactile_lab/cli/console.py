@@ -1,4 +1,4 @@
-"""Where words go: people's text to standard error, one JSON document to standard output."""
+"""Output: text for people to standard error, one JSON document to standard output."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from rich.text import Text
 from tactile_lab.cli.table_forms import facts_form, table_form
 
 people = Console(stderr=True, highlight=False)
-"""For people: standard error, colours only on a terminal and without NO_COLOR."""
+"""Text for people: standard error, in colour only on a terminal and without NO_COLOR."""
 
 
 class Onlooker(Protocol):
-    """Somewhere else that people are told the same, such as a wizard's page."""
+    """Another place that shows the same text, such as a wizard's page."""
 
     def line(self, text: str, style: str = "") -> None: ...
     def table(
@@ -31,7 +31,7 @@ _onlookers: list[Onlooker] = []
 
 @contextmanager
 def tell_also(onlooker: Onlooker) -> Iterator[None]:
-    """Within the block, whatever people are told here is told there too."""
+    """Within the block, everything printed for people is also shown there."""
     _onlookers.append(onlooker)
     try:
         yield
@@ -40,12 +40,12 @@ def tell_also(onlooker: Onlooker) -> Iterator[None]:
 
 
 def say(text: str, style: str = "") -> None:
-    """One line for people, shown as it is (no markup, never broken)."""
+    """One line for people, printed literally (no markup, no wrapping)."""
     _tell(Text(text, style=style), style)
 
 
 def count(number: int, noun: str) -> str:
-    """A number of things: "1 grasp", "3 grasps"."""
+    """A number with its noun: "1 grasp", "3 grasps"."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
@@ -66,17 +66,17 @@ def _tell(line: Text, style: str) -> None:
 
 
 def emit_json(document: Any) -> None:
-    """The one machine-readable document of a command. NaN is not JSON and is refused."""
+    """Print the command's single JSON document. NaN is not JSON and is refused."""
     text = json.dumps(document, indent=2, allow_nan=False)
     sys.stdout.write(text + "\n")
     sys.stdout.flush()
 
 
 def show_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[int] = ()) -> None:
-    """A table with a rule below its head; ``right`` lists the columns that hold numbers.
+    """A table with a rule below its header; ``right`` lists the columns that hold numbers.
 
-    Cells are shown as they are. The last column takes what room is left and wraps; on a terminal that is too narrow
-    for the others each row is a block of lines.
+    Cells are printed literally. The last column takes the remaining width and wraps; on a terminal too narrow for the
+    other columns each row becomes a block of lines.
     """
     shown = list(rows)
     people.print(table_form(people, title, columns, shown, right), crop=False)
@@ -85,7 +85,7 @@ def show_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]
 
 
 def show_facts(title: str, facts: Iterable[tuple[str, str]]) -> None:
-    """Names with values; facts without a value are left out."""
+    """Names with values; empty values are left out."""
     shown = [(name, value) for name, value in facts if value]
     people.print(Text(title, style="bold"), soft_wrap=True)
     people.print(facts_form(people, shown), crop=False)

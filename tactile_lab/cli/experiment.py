@@ -1,4 +1,4 @@
-"""``tactile-lab experiment``: the figures of the thesis and the tables of methods, from simulated contacts."""
+"""``tactile-lab experiment``: the thesis's figures and tables of methods, from simulated contacts."""
 
 from __future__ import annotations
 
@@ -23,36 +23,42 @@ def experiment(
     name: Annotated[
         str,
         typer.Argument(
-            help="Name of the experiment. 'list' shows them all, 'pages' writes the pages of the stored results, "
-            "'commands' shows what made these."
+            help="Name of the experiment. 'list' lists all experiments, 'pages' writes the pages of stored results, "
+            "'commands' prints the commands that made them."
         ),
     ],
-    seeds: Annotated[str, typer.Option(help="Seeds, for example 0-2,7. Those from 1000 on are for reports.")] = (
-        "1000-1029"
-    ),
-    jobs: Annotated[int, typer.Option(min=0, help="Runs side by side; 0 takes all cores.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="Folder of the results (runs/experiments/NAME).")] = None,
+    seeds: Annotated[
+        str, typer.Option(help="Random seeds, for example 0-2,7. Seeds from 1000 on are reserved for reported results.")
+    ] = ("1000-1029"),
+    jobs: Annotated[int, typer.Option(min=0, help="Number of parallel runs; 0 uses all cores.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Folder for the results (default: runs/experiments/NAME).")] = None,
     only: Annotated[
         list[str] | None,
-        typer.Option(help="Limit a setting: method=joint,icp (; where values have commas)."),
+        typer.Option(
+            help="Restrict a setting: method=joint,icp (separate values that contain commas by ;). Can be repeated."
+        ),
     ] = None,
-    grasps: Annotated[int | None, typer.Option(min=1, help="Other number of grasps, for a quick look.")] = None,
-    keep: Annotated[bool, typer.Option("--keep", help="Keep the results of another version of the program.")] = False,
-    store: Annotated[
-        bool, typer.Option("--store", help="Keep the outcome in the repository, write its pages.")
+    grasps: Annotated[int | None, typer.Option(min=1, help="Use another number of grasps, for a quick check.")] = None,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep finished runs that were made by another version of the program.")
     ] = False,
-    forget: Annotated[bool, typer.Option("--forget", help="With --store: drop what older versions made.")] = False,
-    docs: Annotated[Path, typer.Option(help="Documents that keep stored results and pages.")] = Path("docs"),
+    store: Annotated[
+        bool, typer.Option("--store", help="Store the result in the repository and write its pages.")
+    ] = False,
+    forget: Annotated[bool, typer.Option("--forget", help="With --store: discard results of older versions.")] = False,
+    docs: Annotated[Path, typer.Option(help="Documentation folder with the stored results and pages.")] = Path("docs"),
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Run an experiment over its seeds; one that was broken off goes on where it stopped."""
+    """Run an experiment over its seeds. An interrupted experiment resumes where it stopped."""
     del no_input
     if name in _WORDS:
         _WORDS[name](docs, as_json)
         return
     if store and keep:
-        raise typer.BadParameter("a result of several versions is not stored: leave out --keep", param_hint="'--store'")
+        raise typer.BadParameter(
+            "a result made by several versions cannot be stored: leave out --keep", param_hint="'--store'"
+        )
     from tactile_lab.cli.console import emit_json, say, show_table, warn
     from tactile_lab.cli.experiment_progress import ExperimentProgress
     from tactile_lab.experiments.catalogue import experiment
@@ -83,7 +89,7 @@ def experiment(
 
 
 def _command(name: str, seeds: str, only: Sequence[str], grasps: int | None, jobs: int) -> str:
-    """The command that runs this again."""
+    """The command that repeats this run."""
     words = ["tactile-lab", "experiment", name, "--seeds", seeds]
     words += [word for text in only for word in ("--only", text)]
     words += [] if grasps is None else ["--grasps", str(grasps)]
@@ -91,7 +97,7 @@ def _command(name: str, seeds: str, only: Sequence[str], grasps: int | None, job
 
 
 def _of_study(study: Experiment, rows: Sequence[Row], grasps: int | None) -> list[Row]:
-    """The runs with this number of grasps, in the order of the settings: parts may have been run one by one."""
+    """The runs with this number of grasps, ordered by settings: parts may have been run separately."""
     seeds = sorted({row.cell.seed for row in rows})
     places = {cell.key: place for place, cell in enumerate(study.cells(seeds, None, grasps))}
     return sorted((row for row in rows if row.cell.key in places), key=lambda row: places[row.cell.key])
@@ -113,7 +119,7 @@ def _write_pages(docs: Path, as_json: bool = False) -> None:
     changed = publish(docs)
     for path in changed:
         say(f"page  {path}")
-    say(f"{len(changed)} pages and pictures are new")
+    say(f"{len(changed)} pages and pictures changed")
 
 
 def _show_commands(docs: Path, as_json: bool) -> None:
@@ -144,14 +150,14 @@ def _list(docs: Path, as_json: bool) -> None:
 
 
 _WORDS: Mapping[str, Callable[[Path, bool], None]] = {"list": _list, "pages": _write_pages, "commands": _show_commands}
-"""Words in place of a name, and what they do with the documents."""
+"""Keywords accepted in place of a name, and what they do."""
 
 
 def _end(rows: Sequence[Row]) -> None:
     if all(row.figures is None for row in rows):
         from tactile_lab.cli.console import complain
 
-        complain(f"every run failed; the first: {rows[0].problem}")
+        complain(f"every run failed; first error: {rows[0].problem}")
         raise typer.Exit(1)
 
 
@@ -161,16 +167,16 @@ def _seeds(text: str) -> list[int]:
     for part in text.split(","):
         low, _, high = part.strip().partition("-")
         if not low.isdigit() or (high and not high.isdigit()) or part.strip().endswith("-"):
-            problem = f"{text!r} is not a list of seeds like 0-2,7"
+            problem = f"{text!r} is not a list of seeds such as 0-2,7"
             raise typer.BadParameter(problem, param_hint="'--seeds'")
         seeds += range(int(low), int(high or low) + 1)
     if not seeds:
-        raise typer.BadParameter(f"{text!r} has no seed in it", param_hint="'--seeds'")
+        raise typer.BadParameter(f"{text!r} contains no seed", param_hint="'--seeds'")
     return list(dict.fromkeys(seeds))
 
 
 def _limits(only: list[str]) -> dict[str, list[str]]:
-    """Values by the name of their setting. Raises BadParameter."""
+    """Values by setting. Raises BadParameter."""
     limits = {}
     for text in only:
         name, equals, values = text.partition("=")

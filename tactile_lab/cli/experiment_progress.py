@@ -1,4 +1,4 @@
-"""How far an experiment is: a bar on a terminal, now and then a line elsewhere; failed runs always get a line."""
+"""Progress of an experiment: a bar on a terminal, occasional lines elsewhere; a failed run always gets a line."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from tactile_lab.cli.console import people, say
 from tactile_lab.experiments.cells import Row
 
 _LINES = 20
-"""Where there is no terminal, progress is told so many times."""
+"""Number of progress lines if there is no terminal."""
 
 
 class ExperimentProgress:
-    """Told about finished runs, tells people."""
+    """Shows finished runs to people."""
 
     def __init__(self, name: str, total: int) -> None:
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
@@ -34,7 +34,7 @@ class ExperimentProgress:
         self._bar.stop()
 
     def on_finished(self, row: Row, done: int, total: int) -> None:
-        """A run has ended."""
+        """A run has finished."""
         self._bar.update(self._task, completed=done)
         if row.problem:
             say(f"{row.cell.words()}: {row.problem}", "yellow")

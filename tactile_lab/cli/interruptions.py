@@ -1,8 +1,8 @@
-"""No Ctrl+C is lost, whatever the program is doing when it comes.
+"""Makes sure that no Ctrl+C is lost, whatever the program is doing.
 
-Python raises KeyboardInterrupt wherever it happens to be, and some places forget it: trimesh takes any exception of an
-import for a library that is not there, and what is raised in a finaliser or in a callback of the garbage collector is
-printed and dropped. There the interruption is put off, or comes once more, until it meets a place that heeds it.
+Python raises KeyboardInterrupt wherever it happens to be, and some code swallows it: trimesh takes any exception of an
+import for a missing library, and exceptions in a finaliser or a garbage collector callback are printed and dropped. In
+such places the interruption is delayed or raised again until the code outside can handle it.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from typing import Any
 Unraisable = Callable[["sys.UnraisableHookArgs"], Any]
 
 _AGAIN_s = 0.05
-"""How soon it comes once more."""
+"""Delay before it is raised again."""
 _IMPORTS = "<frozen importlib"
 _FORGETFUL = {"trimesh", "networkx"}
-"""Libraries that catch every exception and go on."""
+"""Libraries that catch every exception and continue."""
 
 
 @contextmanager
 def interruptions_heeded() -> Iterator[None]:
-    """Within the block Ctrl+C and SIGTERM end what runs by KeyboardInterrupt; where Ctrl+C is ignored it stays so."""
+    """Within the block Ctrl+C and SIGTERM raise KeyboardInterrupt; if Ctrl+C was ignored it stays ignored."""
     before = {number: signal.signal(number, _like_ctrl_c) for number in (signal.SIGTERM, signal.SIGALRM)}
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         before[signal.SIGINT] = signal.signal(signal.SIGINT, _on_interrupt)
@@ -47,7 +47,7 @@ def _on_interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _like_ctrl_c(number: int, frame: FrameType | None) -> None:
-    """Whoever asks the program to end gets the same careful ending as a person at the keyboard."""
+    """SIGTERM ends the program as carefully as Ctrl+C."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         _on_interrupt(number, frame)
     else:
@@ -55,7 +55,7 @@ def _like_ctrl_c(number: int, frame: FrameType | None) -> None:
 
 
 def _remembering(told: Unraisable) -> Unraisable:
-    """Hears of exceptions where none can be raised: an interruption comes again, others are told as ever."""
+    """Called for exceptions that cannot be raised: an interruption is raised again, others are reported as usual."""
 
     def remembered(dropped: sys.UnraisableHookArgs) -> None:
         if isinstance(dropped.exc_value, KeyboardInterrupt):
@@ -71,7 +71,7 @@ def _come_again() -> None:
 
 
 def _would_be_forgotten(frame: FrameType | None) -> bool:
-    """Whether something on the way out of this frame may catch the exception and go on."""
+    """Whether a caller of this frame may catch the exception and continue."""
     while frame is not None:
         library = str(frame.f_globals.get("__name__", "")).partition(".")[0]
         if library in _FORGETFUL or frame.f_code.co_filename.startswith(_IMPORTS):

@@ -1,7 +1,7 @@
-"""``tactile-lab``: the entry point and the meaning of its exit codes.
+"""``tactile-lab``: the entry point and its exit codes.
 
-0 done, 1 failed, 2 usage, 3 done with data loss or outside a calibration limit, 4 hardware not
-ready, 130 interrupted.
+0 success, 1 failure, 2 usage error, 3 finished with data loss or outside a calibration limit, 4 hardware not ready, 130
+interrupted.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; every error that a person or an extension can cause ends here as one line.
+    """Run the command line; every error that a user or an extension can cause is printed here as one line.
 
     Args:
-        arguments: the words behind ``tactile-lab``; those of the process when None.
+        arguments: the words after ``tactile-lab``; those of the process if None.
 
     Raises:
         SystemExit: always, with the exit code.
@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    """What Python's own warnings mechanism has to say, in the program's form: a line and no source text."""
+    """Show Python warnings in the program's format: one line, without source text."""
     from tactile_lab.cli.console import warn
 
     warn(str(message))

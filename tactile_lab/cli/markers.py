@@ -1,4 +1,4 @@
-"""``tactile-lab markers``: sheets of markers and boards to print, at true size."""
+"""``tactile-lab markers``: printable sheets of markers and boards at true size."""
 
 from __future__ import annotations
 
@@ -21,41 +21,48 @@ KINDS = {
     "charuco": {"dictionary", "columns", "rows", "square_m", "marker_m"},
     "rig": set[str](),
 }
-"""What can be printed, and which options say how; a rig's file says it all."""
+"""What can be printed, and the options of each; for rig markers the rig file has them."""
 
 
 def markers(
     what: Annotated[
         str,
-        typer.Argument(metavar="WHAT", help="single, grid, charuco, rig; or the .yaml of a print, to store its bar."),
+        typer.Argument(
+            metavar="WHAT",
+            help="single, grid, charuco or rig; or the .yaml file of a print, to store its measured check bar.",
+        ),
     ],
-    number: Annotated[list[int] | None, typer.Option(help="Number of a single marker; again for more.")] = None,
-    side_mm: Annotated[float | None, typer.Option(help="Side of a marker's black square (single, grid).")] = None,
-    columns: Annotated[int | None, typer.Option(help="Columns of a grid or ChArUco board.")] = None,
-    rows: Annotated[int | None, typer.Option(help="Rows of a grid or ChArUco board.")] = None,
+    number: Annotated[list[int] | None, typer.Option(help="Number (ID) of a single marker. Can be repeated.")] = None,
+    side_mm: Annotated[
+        float | None, typer.Option(help="Side length of a marker's black square (single, grid).")
+    ] = None,
+    columns: Annotated[int | None, typer.Option(help="Number of columns of a grid or ChArUco board.")] = None,
+    rows: Annotated[int | None, typer.Option(help="Number of rows of a grid or ChArUco board.")] = None,
     gap_mm: Annotated[float | None, typer.Option(help="Gap between the markers of a grid.")] = None,
-    square_mm: Annotated[float | None, typer.Option(help="Side of a ChArUco board's squares.")] = None,
-    marker_mm: Annotated[float | None, typer.Option(help="Side of a ChArUco board's markers.")] = None,
-    dictionary: Annotated[str | None, typer.Option(help="OpenCV's name of the dictionary (DICT_4X4_50).")] = None,
-    rig: Annotated[str, typer.Option(help="Rig whose two markers 'rig' prints.")] = "sim",
-    paper: Annotated[str, typer.Option(help="A4, A3, A2 or letter.")] = "A4",
-    out: Annotated[Path, typer.Option(help="Folder of the files.")] = Path("markers"),
+    square_mm: Annotated[float | None, typer.Option(help="Side length of a ChArUco board's squares.")] = None,
+    marker_mm: Annotated[float | None, typer.Option(help="Side length of a ChArUco board's markers.")] = None,
+    dictionary: Annotated[
+        str | None, typer.Option(help="OpenCV name of the marker dictionary, such as DICT_4X4_50.")
+    ] = None,
+    rig: Annotated[str, typer.Option(help="With 'rig': the rig whose two markers are printed.")] = "sim",
+    paper: Annotated[str, typer.Option(help="Paper size: A4, A3, A2 or letter.")] = "A4",
+    out: Annotated[Path, typer.Option(help="Folder to write the files to.")] = Path("markers"),
     measured_mm: Annotated[
-        float | None, typer.Option(help="Length of the print's check bar (100 mm), measured on the paper.")
+        float | None, typer.Option(help="Length of the print's check bar (nominally 100 mm), measured on the paper.")
     ] = None,
     as_json: Json = False,
-    no_input: Annotated[bool, typer.Option("--no-input", help="Never ask for the measured bar.")] = False,
+    no_input: Annotated[bool, typer.Option("--no-input", help="Never ask for the measured check bar.")] = False,
 ) -> None:
-    """Write markers or a board as PDF and SVG at true size, with a check bar, and a description for the detection.
+    """Write markers or a board as PDF and SVG at true size, with a check bar, and a description for marker detection.
 
-    Print at 100 % (actual size), measure the bar of 100 mm, and tell it: the detection then uses the true size. A
-    print more than 0.5 % off is refused.
+    Print at 100 % (actual size), measure the 100 mm check bar and enter its length: detection then uses the true size.
+    A print that is more than 0.5 % off is refused.
     """
     if what.endswith((".yaml", ".yml")):
         _store(Path(what), measured_mm, as_json, no_input)
         return
     if what not in KINDS:
-        problem = f"{what!r} is none of {', '.join(KINDS)}, and no .yaml file"
+        problem = f"{what!r} is neither one of {', '.join(KINDS)} nor a .yaml file"
         raise typer.BadParameter(problem, param_hint="'WHAT'")
     typed: dict[str, Any] = {
         "number": number,
@@ -85,10 +92,10 @@ def markers(
 
 
 def _refuse_others(what: str, given: Mapping[str, object]) -> None:
-    """A size that would not be printed must not be taken in silence. Raises BadParameter."""
+    """Refuse a size option that would have no effect. Raises BadParameter."""
     for name in given.keys() - KINDS[what]:
         option = "--" + name.removesuffix("_m") + ("-mm" if name.endswith("_m") else "")
-        raise typer.BadParameter(f"does not belong to {what}", param_hint=f"'{option}'")
+        raise typer.BadParameter(f"has no effect for {what}", param_hint=f"'{option}'")
 
 
 def _rig_sheet(rig: str, out: Path, paper: str, measured_mm: float | None) -> PrintedSheet:
@@ -98,7 +105,9 @@ def _rig_sheet(rig: str, out: Path, paper: str, measured_mm: float | None) -> Pr
 
     files = load_rig(rig).files
     if "markers" not in files:
-        raise ConfigurationError("has no camera, so no markers", where=rig, hint="Name another rig with --rig")
+        raise ConfigurationError(
+            "has no camera and therefore no markers", where=rig, hint="Choose another rig with --rig"
+        )
     return print_rig_markers(files["markers"], out, paper, measured_mm)
 
 
@@ -129,7 +138,7 @@ def _store(description: Path, measured_mm: float | None, as_json: bool, no_input
 
     length = measured_mm if measured_mm is not None else _ask(no_input)
     if length is None:
-        raise typer.BadParameter("how long is the check bar?", param_hint="'--measured-mm'")
+        raise typer.BadParameter("check bar not measured yet", param_hint="'--measured-mm'")
     scale = measure(description, length)
     if as_json:
         emit_json({"description": str(description), "scale": scale})
@@ -137,18 +146,18 @@ def _store(description: Path, measured_mm: float | None, as_json: bool, no_input
 
 
 def _ask(no_input: bool) -> float | None:
-    """The measured bar, asked for on a terminal; None for later."""
+    """Ask for the measured check bar on a terminal; None to measure it later."""
     if no_input or not sys.stdin.isatty():
         return None
     answer = typer.prompt(
-        "Length of the printed check bar in mm (empty: later)", default="", show_default=False, err=True
+        "Length of the printed check bar in mm (empty: enter it later)", default="", show_default=False, err=True
     )
     if not str(answer).strip():
         return None
     try:
         return float(str(answer).replace(",", "."))
     except ValueError:
-        raise typer.BadParameter(f"{answer!r} is no length in mm", param_hint="'--measured-mm'") from None
+        raise typer.BadParameter(f"{answer!r} is not a length in mm", param_hint="'--measured-mm'") from None
 
 
 def _tell(sheet: PrintedSheet, as_json: bool) -> None:

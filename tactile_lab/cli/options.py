@@ -1,4 +1,4 @@
-"""Options and arguments that several commands share, so that they mean the same everywhere."""
+"""Options and arguments shared by several commands, so that they mean the same everywhere."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 
 
 class Method(StrEnum):
-    """Ways to estimate, by the names :class:`tactile_lab.slam.tactile_slam.SlamSettings` knows."""
+    """Estimation methods, named as in :class:`tactile_lab.slam.tactile_slam.SlamSettings`."""
 
     JOINT = "joint"
     PARTICLE = "particle"
@@ -22,35 +22,40 @@ class Method(StrEnum):
 
 
 METHOD_HELP = (
-    "joint: shape and trajectory together; particle: calibrated filter; thesis-pf: the filter as printed, "
-    "-graph with its pose graph; baselines: known-pose (the true poses), odometry, icp."
+    "joint: shape and trajectory estimated together; particle: calibrated particle filter; thesis-pf: "
+    "the filter as printed "
+    "in the thesis, -graph with its pose graph; baselines: known-pose (the true poses), "
+    "odometry, icp."
 )
 
 
 SHAPE_HELP = (
-    "Model of the final shape; auto: field or facets, by evidence; to compare with: gpis, facets, superquadric, "
-    "nagata, occupancy, point-cloud, edge-features; or one of an extension."
+    "Model of the final shape. auto: smooth field or facets, chosen by evidence; others: gpis, facets, superquadric, "
+    "nagata, occupancy, point-cloud, edge-features, or one of an extension."
 )
 
-Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
-Root = Annotated[Path, typer.Option(help="Folder of sessions.")]
-LAST = "'last': the newest recorded under --root, which no piece or import is"
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document to standard output.")]
+Root = Annotated[Path, typer.Option(help="Folder that contains the sessions.")]
+LAST = "'last': the newest session under --root, ignoring extracts and imports"
 SessionName = Annotated[
     str, typer.Argument(metavar="SESSION", help=f"A session's folder, its name under --root, or {LAST}.")
 ]
-RigName = Annotated[str, typer.Option("--rig", help="Name of a shipped rig, or a rig file.")]
+RigName = Annotated[str, typer.Option("--rig", help="Name of a built-in rig, or a rig file.")]
 AllowUncalibrated = Annotated[
     bool,
     typer.Option(
         "--allow-uncalibrated",
-        help="Begin though a calibration is missing, expired, failed or foreign; the session records that.",
+        help="Start even if a calibration is missing, expired, failed or belongs to another rig. The session "
+        "records this.",
     ),
 ]
 NoInput = Annotated[
     bool,
     typer.Option(
         "--no-input",
-        help="Never ask: wizards take the usual answers, a file is replaced only with --replace, "
-        "a guided session has a simulated operator.",
+        help="Never ask questions: wizards take the default answers, files are replaced only with --replace, "
+        "and "
+        "a "
+        "simulated operator leads guided sessions.",
     ),
 ]

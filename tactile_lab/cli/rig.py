@@ -1,4 +1,4 @@
-"""``tactile-lab rig``: which rigs there are, and whether one is fit to work."""
+"""``tactile-lab rig``: list rigs, and check whether one is ready."""
 
 from __future__ import annotations
 
@@ -13,19 +13,21 @@ if TYPE_CHECKING:
 
 _FOR_EVER_s = 1e8
 
-app = typer.Typer(help="Rigs: the devices of a laboratory, and their calibration.", no_args_is_help=True)
+app = typer.Typer(help="Rigs: the devices of a laboratory and their calibration.", no_args_is_help=True)
 
 
 @app.command("list")
 def list_rigs(
-    ports: Annotated[bool, typer.Option("--ports", help="List serial ports, CAN and network interfaces.")] = False,
-    watch: Annotated[float, typer.Option(min=0.0, help="List ports; wait so many seconds for a change.")] = 0.0,
+    ports: Annotated[
+        bool, typer.Option("--ports", help="List serial ports, CAN interfaces and network interfaces instead.")
+    ] = False,
+    watch: Annotated[float, typer.Option(min=0.0, help="List ports, then wait this many seconds for changes.")] = 0.0,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """List the rigs that come with the program, or what a sensor could be plugged into.
+    """List the built-in rigs, or the ports that a sensor can be connected to.
 
-    Unplug an adapter while "--watch 30" waits, and it tells which port that was.
+    To find an adapter's port, run "--watch 30" and unplug the adapter.
     """
     if ports or watch:
         _list_ports(watch, as_json)
@@ -61,21 +63,23 @@ def _list_ports(watch_s: float, as_json: bool) -> None:
     changed = {port.name for port in gone} & {port.name for port in come}
     for port in gone:
         if port.name not in changed:
-            say(f"{port.name} went: {port.description}")
+            say(f"{port.name} removed: {port.description}")
     for port in come:
-        say(f"{port.name}: now {port.description}" if port.name in changed else f"{port.name} came: {port.description}")
+        say(
+            f"{port.name}: now {port.description}" if port.name in changed else f"{port.name} added: {port.description}"
+        )
     if watch_s and not (gone or come):
         say("nothing changed")
 
 
 @app.command("show")
 def show(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="Name of a shipped rig, or a rig file.")],
-    every: Annotated[bool, typer.Option("--all", help="The usual settings too.")] = False,
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="Name of a built-in rig, or a rig file.")],
+    every: Annotated[bool, typer.Option("--all", help="Also show settings at their default values.")] = False,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Show what a rig works with: its devices, its calibration files beside the rig file, and its unusual settings."""
+    """Show a rig's devices, calibration files and settings that differ from the defaults."""
     from tactile_lab.cli.console import emit_json, say, show_facts, show_table
     from tactile_lab.rigs.description import load_rig
     from tactile_lab.rigs.effective_settings import effective_settings
@@ -90,10 +94,10 @@ def show(
     show_facts(f"Rig {loaded.description.name}", _facts(loaded))
     say("")
     if shown:
-        title = "All settings" if every else f"Settings that are not the usual ones ({len(shown)} of {len(settings)})"
+        title = "All settings" if every else f"Settings that differ from the defaults ({len(shown)} of {len(settings)})"
         show_table(title, ["setting", "here", "usual"], [(item.name, item.value, item.usual) for item in shown])
     else:
-        say("all settings are the usual ones; --all shows them")
+        say("all settings have their default values; --all shows them")
 
 
 def _facts(rig: Rig) -> list[tuple[str, str]]:
@@ -118,19 +122,22 @@ def _facts(rig: Rig) -> list[tuple[str, str]]:
 
 @app.command("check")
 def check(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="Name of a shipped rig, or a rig file.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="Name of a built-in rig, or a rig file.")],
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of a simulated rig.")] = 0,
     move: Annotated[
-        bool, typer.Option("--move", help="Nudge every motor of a real hand: does it move the joint its map says?")
+        bool,
+        typer.Option(
+            "--move", help="Move every motor of a real hand slightly, to check that it moves the joint in the map."
+        ),
     ] = False,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Read a rig file and its calibration, connect every device, and tell what each one says.
+    """Read a rig file and its calibration, connect every device and report its state.
 
-    Nothing moves without --move. A rig of force fingertips alone, without a hand, can be checked too.
+    Nothing moves without --move. A rig with force fingertips only, without a hand, can be checked too.
 
-    Exit code 0: all well; 2: the files; 4: a device is not ready.
+    Exit code 0: all ready; 2: a file is invalid; 4: a device is not ready.
     """
     from tactile_lab.cli.console import emit_json, say, show_table
     from tactile_lab.rigs.checks.check import check_rig
@@ -152,14 +159,13 @@ def check(
 @app.command("emulate")
 def emulate(
     rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file of kind fingertips or hand.")],
-    seconds: Annotated[float, typer.Option(min=0.0, help="How long; 0 until Ctrl+C.")] = 0.0,
+    seconds: Annotated[float, typer.Option(min=0.0, help="Duration; 0: until Ctrl+C.")] = 0.0,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Stand in for the sensors of a fingertip rig, or for the hand of a hand rig, at the places its file names.
-
-    Until Ctrl+C. Serial ports that do not exist are made; a real one is never replaced. Network addresses must be
-    loopback ones; a hand is served at the interface that far_end names.
+    """Emulate the sensors of a fingertip rig, or the hand of a hand rig, at the addresses in its file, until Ctrl+C.
+    Missing serial ports are created; an existing one is never replaced. Network addresses must be loopback addresses; a
+    hand is emulated at the interface given by far_end.
     """
     import time
 
@@ -172,5 +178,5 @@ def emulate(
             emit_json({"rig": rig, "devices": places})
         for finger, place in places.items():
             say(f"{finger}: {place}")
-        say(f"tactile-lab rig check {rig}  in another terminal; Ctrl+C ends this")
+        say(f"Run tactile-lab rig check {rig} in another terminal. Ctrl+C: stop")
         time.sleep(seconds or _FOR_EVER_s)

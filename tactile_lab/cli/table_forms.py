@@ -1,4 +1,4 @@
-"""Tables that lose nothing: as rows and columns where there is room for them, else as one block a row."""
+"""Tables that cut nothing off: rows and columns if they fit, otherwise one block of lines per row."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from rich.table import Table
 from rich.text import Text
 
 _LAST_COLUMN = 24
-"""The last column may be broken into lines, but not into narrower ones than this."""
+"""Minimum width of the last column when it is wrapped."""
 _GAP, _EDGES = 3, 2
-"""Blanks between two columns of a table, and at its both sides together."""
+"""Spaces between two columns of a table, and in total at both sides."""
 _INDENT = 2
 
 Rows = Sequence[Sequence[str]]
@@ -23,9 +23,9 @@ Rows = Sequence[Sequence[str]]
 def table_form(
     console: Console, title: str, columns: Sequence[str], rows: Rows, right: Sequence[int]
 ) -> RenderableType:
-    """What a console shows of a table.
+    """A table as a console shows it.
 
-    A terminal that is too narrow gets blocks. Elsewhere, in a file or a pipe, a table may be as wide as it needs.
+    A terminal that is too narrow gets blocks. In a file or a pipe a table may be as wide as needed.
 
     Args:
         right: indices of the columns that hold numbers.
@@ -39,7 +39,7 @@ def table_form(
 
 
 def facts_form(console: Console, facts: Rows) -> Table:
-    """Names with values as a console shows them: long ones are broken on a terminal, but not in a file or a pipe."""
+    """Names with values as a console shows them: long values are wrapped on a terminal, but not in a file or a pipe."""
     grid = facts_grid(facts)
     if not console.is_terminal:
         grid.width = sum(max(map(_width, column), default=0) for column in zip(*facts, strict=True)) + _INDENT
@@ -47,7 +47,7 @@ def facts_form(console: Console, facts: Rows) -> Table:
 
 
 def facts_grid(facts: Rows) -> Table:
-    """Names with values, without lines; a long value is broken, also within a word such as a path."""
+    """Names with values, without rules; long values are wrapped, even within a word such as a path."""
     grid = Table.grid(padding=(0, _INDENT))
     grid.add_column(style="dim", no_wrap=True)
     grid.add_column(overflow="fold")
@@ -61,7 +61,7 @@ def _width(cell: str) -> int:
 
 
 def _table(title: str, columns: Sequence[str], rows: Rows, right: Sequence[int], width: int | None) -> Table:
-    """Rows and columns; of the width that they take when None."""
+    """Rows and columns; as wide as needed if width is None."""
     grid = Table(
         box=box.SIMPLE_HEAD, title=Text(title), title_justify="left", title_style="bold", pad_edge=False, width=width
     )
@@ -74,7 +74,7 @@ def _table(title: str, columns: Sequence[str], rows: Rows, right: Sequence[int],
 
 
 def _blocks(title: str, columns: Sequence[str], rows: Rows) -> Group:
-    """A heading for each row, its first cell, and the other cells that hold something below it, each with its name."""
+    """A heading for each row (its first cell), followed by its other non-empty cells with their column names."""
     blocks: list[RenderableType] = [Text(title, style="bold")]
     for row in rows:
         facts = [(name and f"{name}:", cell) for name, cell in zip(columns[1:], row[1:], strict=True) if cell]

@@ -1,4 +1,4 @@
-"""Reading a person at the terminal without ever waiting for him: single keys, or whole lines."""
+"""Non-blocking terminal input: single keys, or whole lines."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _LFLAG, _IFLAG, _CC = 3, 0, 6
 
 
 class KeyInput:
-    """Single keys from a terminal, not echoed; a context that puts the terminal back on every way out.
+    """Single keys from a terminal, not echoed; a context manager that always restores the terminal.
 
-    Ctrl+C still interrupts. Ctrl+Z and Ctrl+S do nothing while the context is open: a program that moves a hand must
-    not be put to sleep by a key.
+    Ctrl+C still interrupts. Ctrl+Z and Ctrl+S have no effect in the context: a program that moves a hand must not be
+    suspended by a key.
 
     Args:
         descriptor: of the terminal; standard input unless given.
@@ -50,20 +50,20 @@ class KeyInput:
         atexit.unregister(self.restore)
 
     def restore(self) -> None:
-        """The terminal as it was; repeatable."""
+        """Restore the terminal; can be called repeatedly."""
         before, self._before = self._before, None
         if before is not None and not self.closed:
             termios.tcsetattr(self._descriptor, termios.TCSADRAIN, before)
 
     def read(self) -> str:
-        """What was typed since the last call."""
+        """Keys typed since the last call."""
         data = _waiting_bytes(self._descriptor)
         self.closed = self.closed or data is None
         return self._decoder.decode(data or b"")
 
 
 class LineInput:
-    """Whole lines from standard input: a terminal without abilities, or a pipe. None where there is no such input.
+    """Whole lines from standard input: a simple terminal, or a pipe. None if there is no such input.
 
     Args:
         descriptor: where to read; standard input unless given.
@@ -73,17 +73,17 @@ class LineInput:
         self._decoder = codecs.getincrementaldecoder("utf-8")("replace")
         self._rest = ""
         self.closed = False
-        """The end of the input was reached."""
+        """Whether the end of the input was reached."""
         try:
             self._descriptor = sys.stdin.fileno() if descriptor is None else descriptor
         except (AttributeError, OSError, ValueError):  # closed before the program began
             self.closed = True
 
     def wait(self, seconds: float) -> None:
-        """Until something can be read, for so long at most. Without an input, so long.
+        """Wait until something can be read, at most this long. Without an input, wait the full time.
 
-        Never for ever: a Ctrl+C that comes between Python's last look at its signals and the system's wait does not
-        end that wait.
+        The time is always limited: a Ctrl+C that arrives between Python's last check for signals and the system call
+        does not end the call.
         """
         if not self.closed:
             select.select([self._descriptor], [], [], seconds)
@@ -91,7 +91,7 @@ class LineInput:
             time.sleep(seconds)
 
     def lines(self) -> list[str]:
-        """Lines that were typed since the last call: complete ones, and in the end what is left."""
+        """Lines typed since the last call: complete ones, and at the end of the input the remainder."""
         if self.closed:
             return []
         data = _waiting_bytes(self._descriptor)
@@ -101,7 +101,7 @@ class LineInput:
 
 
 def _waiting_bytes(descriptor: int) -> bytes | None:
-    """What can be read at once, b"" for nothing; None at the end of the input."""
+    """What can be read without waiting, b"" for nothing; None at the end of the input."""
     try:
         if not select.select([descriptor], [], [], 0)[0]:
             return b""

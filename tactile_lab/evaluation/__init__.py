@@ -1,1 +1,1 @@
-"""How good a session was: truth from the marker camera, error figures, result files, sweeps and timings."""
+"""Evaluation of sessions: ground truth from the marker camera, error metrics, result files, sweeps and timings."""

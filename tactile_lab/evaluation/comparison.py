@@ -1,7 +1,7 @@
-"""Several evaluations beside one another: methods on one session, one method over several sessions.
+"""Compares several evaluations: methods on one session, or one method over several sessions.
 
-Figures are gathered by method; means have a 95 % confidence interval by Student's t. Where all methods were run on the
-same sessions, each is also compared with the first one, session by session, so that their difficulty drops out.
+Metrics are grouped by method; means have a 95 % confidence interval by Student's t. If all methods were run on the same
+sessions, each is also compared with the first one, session by session, so that the sessions' difficulty cancels.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ class Judged:
 
     @property
     def method(self) -> str:
-        """Which method, with the dimension."""
+        """The method, with the dimension."""
         return f"{self.evaluation['method']}, {self.evaluation['dimension']}-D"
 
     def figure(self, keys: Sequence[str]) -> float | None:
-        """A figure by its keys; None where it is unknown."""
+        """A metric by its keys; None if it is unknown."""
         value: Any = self.evaluation
         for key in keys:
             value = value.get(key) if isinstance(value, Mapping) else None
@@ -56,7 +56,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class Figure:
-    """One figure of one method: how many know it, spread, mean, and mean difference to the first method."""
+    """One metric of one method: number of values, spread, mean, and mean difference to the first method."""
 
     title: str
     count: int
@@ -76,10 +76,10 @@ class MethodSummary:
 
 
 def compare(judged: Sequence[Judged]) -> list[MethodSummary]:
-    """One summary a method, in order of appearance.
+    """One summary per method, in order of appearance.
 
-    Several results of one method on one session are no independent runs of it: then each folder of results is a group
-    of its own, and named.
+    Several results of one method on one session are not independent runs: then each results folder is a separate group,
+    with its name.
     """
     counts = Counter((each.session, each.method) for each in judged)
     repeated = {method for (_, method), count in counts.items() if count > 1}
@@ -105,7 +105,7 @@ def _figure(title: str, keys: Sequence[str], group: Sequence[Judged], first: Seq
 
 
 def _difference(keys: Sequence[str], group: Sequence[Judged], first: Sequence[Judged]) -> Interval | None:
-    """Mean difference to the first method over the sessions that both have; None for the first one itself."""
+    """Mean difference to the first method over common sessions; None for the first method itself."""
     if group is first:
         return None
     base = {each.session: each.figure(keys) for each in first}
@@ -115,7 +115,7 @@ def _difference(keys: Sequence[str], group: Sequence[Judged], first: Sequence[Ju
 
 
 def rows_csv(judged: Sequence[Judged]) -> str:
-    """One line for each evaluation; unknown figures are empty."""
+    """One line per evaluation; unknown metrics are empty."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(["session", "results", "object", "method", "seed", "grasps", "status", "failed", *_columns()])
@@ -132,8 +132,8 @@ def _columns() -> list[str]:
 
 
 def table(summaries: Sequence[MethodSummary]) -> list[list[str]]:
-    """Head and body: a line for each method and figure."""
-    head = ["method", "figure", "n", "median / p90 / max", "mean [95 %]", "against the first [95 %]", "failed"]
+    """Header and body: a line per method and metric."""
+    head = ["method", "figure", "n", "median / p90 / max", "mean [95 %]", "relative to the first [95 %]", "failed"]
     body = []
     for summary in summaries:
         for figure in summary.figures:
@@ -147,7 +147,7 @@ def table(summaries: Sequence[MethodSummary]) -> list[list[str]]:
 
 
 def short_table(summaries: Sequence[MethodSummary]) -> list[list[str]]:
-    """Head and body of a table that fits a terminal."""
+    """Header and body of a table that fits a terminal."""
     head, *body = table(summaries)
     return [[line[0], line[1], line[2], line[4], line[5]] for line in [head, *body]]
 

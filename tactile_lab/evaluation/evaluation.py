@@ -1,7 +1,7 @@
-"""All error figures of a session in one record, and its file ``evaluation.json``.
+"""All error metrics of a session in one record, and its file ``evaluation.json``.
 
-Estimates come from ``results/``; truth is what the marker camera saw and the object's own mesh. What
-cannot be known (no camera, no mesh, no shape) is None in the record and null in the file.
+Estimates come from ``results/``; ground truth from the marker camera and the object's mesh. Unknown values (no camera,
+no mesh, no shape) are None in the record and null in the file.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ DECIMALS = 6
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Content of ``evaluation.json``, in its order.
+    """Content of ``evaluation.json``, in this order.
 
     Attributes:
-        aligned: how the estimate's object frame was tied to the truth's for ``shape`` and ``pose``.
+        aligned: how the estimate's object frame was aligned with the truth's for ``shape`` and ``pose``.
         shape: errors with that alignment.
         shape_best_fit: errors after the best rigid alignment.
         registration_rms_mm: see :func:`tactile_lab.evaluation.registration.registration_rms_mm`.
-        symmetry_turns: turns about its axis that leave the object as it is and do not count in the registration, see
-            :func:`tactile_lab.evaluation.truth.rotational_symmetry.symmetry_turns`; None for none.
+        symmetry_turns: rotations about the object's axis that leave it unchanged and do not count in the registration,
+            see :func:`tactile_lab.evaluation.truth.rotational_symmetry.symmetry_turns`; None for none.
         uncertainty: see :class:`UncertaintyFigures`; None without a shape.
         sensing: see :class:`SensingFigures`; None without sightings or mesh.
-        failed: the object was lost or the registration error is above 5 mm; None when neither is known.
-        warnings: why the result should not be believed as it stands, in words.
-        further: figures of extensions by name; left out of the file where there are none.
+        failed: the object was lost or the registration error is above 5 mm; None if neither is known.
+        warnings: why the result should not be trusted, as sentences.
+        further: metrics of extensions by name; left out of the file if there are none.
     """
 
     schema_version: int
@@ -84,22 +84,22 @@ class Evaluation:
 
 
 def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
-    """Judge the results in a folder.
+    """Evaluate the results in a folder.
 
     Args:
         folder: a session's ``results/``.
-        truth: poses, one a grasp, and mesh.
-        object_name: as the session calls it.
+        truth: poses, one per grasp, and mesh.
+        object_name: the name in the session.
 
     Raises:
         SessionError: results are missing or unreadable, or do not belong to the truth.
-        ShapeError: a true mesh or contour that cannot be compared.
+        ShapeError: the true mesh or contour cannot be compared.
     """
     judged = Judged(folder, read_results(folder), truth)
     results, poses = judged.results, judged.poses
     if len(poses) != len(truth.world_T_object):
         counts = f"{len(poses)} grasps in the results, {len(truth.world_T_object)} in the session"
-        raise SessionError(counts, where=str(folder), hint="Replay the session to renew its results")
+        raise SessionError(counts, where=str(folder), hint="Replay the session to update its results")
     _, incomparable = judged.shape
     figures, failures = computed(judged)
     ours = {each.name: figures.pop(each.name) for each in fields(Evaluation) if each.name in figures}

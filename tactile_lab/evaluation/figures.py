@@ -1,7 +1,7 @@
-"""The error figures of an evaluation, in the units people read: millimetres, degrees, shares.
+"""The error metrics of an evaluation, in units for people: millimetres, degrees, shares.
 
-Each is computed by a function that is registered in :data:`FIGURES`; those of extensions stand beside ours. A figure
-that cannot be computed is null in the file and says why among the warnings: it never costs the others.
+Each is computed by a function registered in :data:`FIGURES`; extensions add theirs. A metric that cannot be computed is
+null in the file, with the reason among the warnings; the others are not affected.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class ShapeFigures:
 
     @classmethod
     def of(cls, errors: ShapeErrors | None) -> ShapeFigures | None:
-        """The figures of shape errors in metres."""
+        """The metrics from shape errors in metres."""
         if errors is None:
             return None
         return cls(
@@ -49,7 +49,7 @@ class ShapeFigures:
 
 @dataclass(frozen=True)
 class LoopFigures:
-    """Similar grasps: how many were tested, accepted, and of those wrong (None where the truth is not known)."""
+    """Similar grasps: how many were tested, accepted, and how many of those were wrong (None without ground truth)."""
 
     tested: int
     accepted: int
@@ -67,7 +67,7 @@ class TimeFigures:
 
 @dataclass(frozen=True)
 class SensingFigures:
-    """Distance of the felt contacts from the true surface at the true pose: what the sensing alone gets wrong."""
+    """Distance of the contacts from the true surface at the true pose: the error of the sensing alone."""
 
     median_mm: float
     p95_mm: float
@@ -75,7 +75,7 @@ class SensingFigures:
 
 @dataclass(frozen=True)
 class UncertaintyFigures:
-    """What the estimate says of itself: the standard deviation of its contour or surface, over all its points."""
+    """The estimated uncertainty: the standard deviation of the contour or surface, over all its points."""
 
     sigma_mm_median: float
     sigma_mm_p95: float
@@ -83,7 +83,7 @@ class UncertaintyFigures:
 
 @dataclass(frozen=True)
 class TruthFigures:
-    """For how many grasps the true pose is known, for how many not, and whether the true shape is."""
+    """Number of grasps with and without a true pose, and whether the true shape is known."""
 
     seen: int
     missing: int
@@ -91,14 +91,14 @@ class TruthFigures:
 
 
 Figure: TypeAlias = Callable[[Judged], Any]
-"""Computes a figure: a number, or anything else that :func:`tactile_lab.evaluation.files.plain.plain` can write."""
+"""Computes a metric: a number, or anything else that :func:`tactile_lab.evaluation.files.plain.plain` can write."""
 
 FIGURES: Registry[Figure] = Registry("evaluation figure")
-"""All figures by the name they have in ``evaluation.json``. See ``docs/extending.md`` for adding one."""
+"""All metrics by their name in ``evaluation.json``. See ``docs/extending.md`` for adding one."""
 
 
 def computed(judged: Judged) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """All registered figures by name, None where one cannot be computed; and why, in words."""
+    """All registered metrics by name, None if one cannot be computed; and the reasons."""
     values: dict[str, Any] = {}
     warnings: list[str] = []
     for name in FIGURES:
@@ -115,7 +115,7 @@ def computed(judged: Judged) -> tuple[dict[str, Any], tuple[str, ...]]:
 
 
 def _is_finite(value: Any) -> bool:
-    """No NaN and no infinity in it; a record of figures says by None itself what is not known."""
+    """Whether it contains no NaN and no infinity; a record of metrics has None for unknown values."""
     if isinstance(value, Mapping):
         return all(map(_is_finite, value.values()))
     if isinstance(value, list | tuple):
@@ -129,7 +129,7 @@ def _is_finite(value: Any) -> bool:
 
 
 def _shape(judged: Judged) -> ShapeFigures | None:
-    """Errors with the estimate tied to the truth at the first grasp."""
+    """Errors with the estimate aligned with the truth at the first grasp."""
     compared, _ = judged.shape
     return None if compared is None else ShapeFigures.of(compared.first_grasp)
 

@@ -1,4 +1,4 @@
-"""What there is to judge: an estimate read back from its files, the truth, and what several figures need of both."""
+"""The input of the metrics: an estimate read from its files, the ground truth, and derived values."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, sy
 
 @dataclass(frozen=True)
 class Truth:
-    """What only evaluation may know.
+    """Ground truth, for the evaluation only.
 
     Attributes:
-        world_T_object: the object's pose at each grasp by the marker camera, None where it was not seen.
+        world_T_object: the object's pose at each grasp by the marker camera, None if it was not seen.
         mesh: the object's surface in the truth's object frame, or None.
-        outline_m: its horizontal outline in that frame, shape (n, 2), where that is what is known of it.
+        outline_m: its horizontal outline in that frame, shape (n, 2), if only that is known.
     """
 
     world_T_object: tuple[Pose3 | None, ...]
@@ -43,12 +43,12 @@ class Truth:
 
 @dataclass(frozen=True)
 class Judged:
-    """An estimate beside the truth.
+    """An estimate with its ground truth.
 
     Attributes:
         folder: of the results.
-        results: what is in it.
-        truth: what is known of the object, with one pose a grasp.
+        results: its content.
+        truth: the ground truth, with one pose per grasp.
     """
 
     folder: Path
@@ -57,27 +57,27 @@ class Judged:
 
     @property
     def poses(self) -> tuple[Pose3 | None, ...]:
-        """The estimated ``world_T_object`` at each grasp, None where there is none."""
+        """The estimated ``world_T_object`` at each grasp, None if there is none."""
         return self.results.trajectory.world_T_object
 
     @cached_property
     def symmetry_turns(self) -> int | None:
-        """Turns about its axis that leave the object as it is; None for none, and where its surface is not known."""
+        """Rotational symmetry of the object about its axis; None if it has none or its surface is unknown."""
         return None if self.truth.mesh is None else symmetry_turns(self.truth.mesh)
 
     @cached_property
     def registration_rms_mm(self) -> float | None:
-        """See :func:`tactile_lab.evaluation.registration.registration_rms_mm`; the object's own turns do not count."""
+        """See :func:`tactile_lab.evaluation.registration.registration_rms_mm`; rotations of symmetry do not count."""
         points = [rows.points_world_m for rows in self.results.contacts]
         told = modulo_symmetry(self.poses, self.truth.world_T_object, self.symmetry_turns)
         return registration_rms_mm(points, told, self.truth.world_T_object, self.results.dimension)
 
     @cached_property
     def shape(self) -> tuple[ShapeComparison | None, tuple[str, ...]]:
-        """The contour or mesh compared with the truth, None where one of them is missing; and why there is none.
+        """The contour or mesh compared with the truth, None if one of them is missing; and the reason.
 
         Raises:
-            ShapeError: a true mesh or contour that cannot be compared.
+            ShapeError: the true mesh or contour cannot be compared.
         """
         name = "contour.csv" if self.results.dimension == 2 else "mesh.ply"
         if not (self.folder / name).is_file():
@@ -95,7 +95,7 @@ class Judged:
 def _surface(
     path: Path, truth: trimesh.Trimesh, truth_T_estimate: Pose3 | None
 ) -> tuple[ShapeComparison | None, tuple[str, ...]]:
-    """A surface that is wildly wrong is a result too: no figures, and a word why."""
+    """A completely wrong surface is a result too: no metrics, but the reason."""
     try:
         mesh = read_mesh(path)
     except ShapeError as error:
@@ -104,9 +104,8 @@ def _surface(
 
 
 def true_outline(results: Results, truth: Truth) -> Array | None:
-    """The true outline, shape (n, 2), truth's object frame: as given, or the mesh's section at the contacts' height.
-
-    That is their mean height; half the mesh's where no true pose tells it.
+    """The true outline, shape (n, 2), truth's object frame: as given, or the mesh's section at the contacts' mean
+    height (at half the mesh's height without true poses).
     """
     if truth.outline_m is not None:
         return truth.outline_m

@@ -1,4 +1,4 @@
-"""Loops against the truth: how many of those that went into the pose graph were wrong associations."""
+"""Checks loops against the truth: how many of those in the pose graph were wrong associations."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from tactile_lab.evaluation.trajectory import Poses, estimate_T_truth
 
 WRONG_DISTANCE_m = 0.010
 WRONG_ANGLE_rad = np.radians(10.0)
-"""A loop that is off by more than this is no noise (about 1 mm and 2 degrees) but another face."""
+"""A loop with a larger error is not noise (about 1 mm and 2 degrees) but another face."""
 
 
 def first_in_map(estimate: Poses) -> int:
-    """The grasp in which the object frame was born: number 0 of the pose graph."""
+    """The grasp that defined the object frame: number 0 of the pose graph."""
     return next((index for index, pose in enumerate(estimate) if pose is not None), 0)
 
 
 def wrong_loops(loops: Sequence[Mapping[str, Any]], estimate: Poses, truth: Poses) -> int | None:
-    """How many accepted loops contradict the truth; None when one of them cannot be checked.
+    """How many accepted loops contradict the truth; None if one of them cannot be checked.
 
     Args:
         loops: as in ``slam.json``: grasps in the graph, verdict, relative pose and displacement (3 x 3 each).
-        estimate: estimated poses of all grasps; they fix the object frame that the loops speak of.
+        estimate: estimated poses of all grasps; they define the object frame of the loops.
         truth: true poses of all grasps.
     """
     alignment, offset = estimate_T_truth(estimate, truth), first_in_map(estimate)
@@ -50,7 +50,7 @@ def _is_wrong(loop: Mapping[str, Any], truth: Sequence[Pose3 | None]) -> bool | 
 
 
 def _displacement_error(displacement: Pose2, earlier: Pose2, later: Pose2) -> tuple[float, float]:
-    """How far a displacement misses the object where it truly was; no object frame has to be known for that."""
+    """Error of a displacement relative to the object's true motion; needs no object frame."""
     off = displacement.compose(later).between(earlier)
     return float(np.hypot(off.x(), off.y())), abs(off.theta())
 

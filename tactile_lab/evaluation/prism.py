@@ -1,4 +1,4 @@
-"""A contour stood upright: the solid that a planar session ends with."""
+"""A contour extruded to a prism: the solid of a planar session."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ Triangles = NDArray[np.int64]
 
 
 SAME_POINT_m = 1e-6
-"""Readers of meshes take points this close for one, which would tear the walls between them."""
+"""Mesh readers merge points this close, which would open the walls between them."""
 
 
 def open_ring(points_m: Array) -> Array:
-    """The contour's points once each, counter-clockwise: a repeated first point and doubles are removed.
+    """The contour's points, counter-clockwise, without the repeated first point and duplicates.
 
     Raises:
         ShapeError: fewer than three different points.
@@ -56,10 +56,10 @@ def prism(ring_m: Array, bottom_m: float, top_m: float) -> tuple[Array, Triangle
 
 
 def triangulate(ring_m: Array) -> Triangles:
-    """Triangles (n - 2, 3) that fill a counter-clockwise ring, by cutting ears.
+    """Triangles (n - 2, 3) that fill a counter-clockwise ring, by ear clipping.
 
-    A ring that crosses itself has no proper filling; it still gets a closed set of triangles, because
-    the sharpest convex corner is cut where no ear is left.
+    A ring that crosses itself has no proper filling; it still gets a closed set of triangles, because the sharpest
+    convex corner is clipped if no ear is left.
     """
     left, triangles = list(range(len(ring_m))), []
     while len(left) > 3:

@@ -1,6 +1,6 @@
 """Registration error: how well the contacts of all grasps fit together in the object's frame.
 
-It judges the tracking alone, without any shape model: contacts are placed in the object frame once
+It measures the tracking alone, without any shape model: contacts are placed in the object frame once
 with the estimated and once with the true poses, and compared after one best rigid fit.
 """
 
@@ -20,13 +20,13 @@ FAILURE_LIMIT_MM = 5.0
 
 
 def registration_verdict(error_mm: float, symmetry_turns: int | None) -> tuple[bool, str]:
-    """Whether a run passes, and that in words.
+    """Whether a run passes, and the verdict as text.
 
     Args:
         error_mm: its registration error.
         own_turns: see :func:`tactile_lab.evaluation.truth.rotational_symmetry.symmetry_turns`.
     """
-    without = "" if symmetry_turns is None else ", turns about its own axis left out"
+    without = "" if symmetry_turns is None else ", ignoring rotations about its axis of symmetry"
     passed = error_mm <= FAILURE_LIMIT_MM
     return passed, f"{'passed: at most' if passed else 'failed: above'} {FAILURE_LIMIT_MM:g} mm{without}"
 
@@ -43,7 +43,7 @@ def registration_rms_mm(
         dimension: 2 compares in the table plane only, 3 in space.
 
     Returns:
-        Millimetres, or None when fewer than two grasps with contacts have both poses.
+        Millimetres, or None if fewer than two grasps with contacts have both poses.
     """
     used = [pair for pair in compared_grasps(estimate, truth) if len(contacts_world_m[pair.index])]
     if len(used) < 2:

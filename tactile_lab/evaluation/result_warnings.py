@@ -1,4 +1,4 @@
-"""Why a result should not be believed as it stands: said in words beside the figures, with or without truth."""
+"""Warnings about untrustworthy results, with or without ground truth."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from drivers.core.contact_checks import touched_one_side
 from tactile_lab.evaluation.files.results import Results
 
 UNSUPPORTED_SIGMA_m = 0.005
-"""Where the shape is less certain than this it is a guess between contacts."""
+"""Where the shape is less certain than this it is only interpolated between contacts."""
 
 _WORTH_TELLING = 0.1
 
 
 def result_warnings(results: Results) -> tuple[str, ...]:
-    """All that speaks against the results of an estimation."""
+    """All warnings about the results of an estimation."""
     said = (_warn_if_lost(results), _one_sided(results), _no_shape(results), _warn_of_guesses(results))
     return (*results.slam.get("warnings", ()), *(text for text in said if text))
 
@@ -23,17 +23,17 @@ def _warn_if_lost(results: Results) -> str:
     if results.slam["status"] == "ok":
         return ""
     untracked = sum(step["verdict"] == "untracked" for step in results.slam["steps"])
-    return f"the object is lost: {untracked} of {len(results.slam['steps'])} grasps could not be placed"
+    return f"the object is lost: {untracked} of {len(results.slam['steps'])} grasps could not be registered"
 
 
 def _one_sided(results: Results) -> str:
     if touched_one_side([rows.normals_world for rows in results.contacts]):
-        return "every grasp touched one side of the object only: its other sides are not known"
+        return "every grasp touched only one side of the object: its other sides are unknown"
     return ""
 
 
 def _no_shape(results: Results) -> str:
-    return "the contacts enclose no shape" if results.sigma_quantiles_m is None else ""
+    return "no closed shape could be estimated from the contacts" if results.sigma_quantiles_m is None else ""
 
 
 def _warn_of_guesses(results: Results) -> str:

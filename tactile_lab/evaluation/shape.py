@@ -1,7 +1,7 @@
-"""How well the estimated shape fits the true one, in the truth's object frame.
+"""Errors of the estimated shape in the truth's object frame, computed twice.
 
-Twice: placed by the first grasp's true pose alone, which also counts where the object was believed to
-be, and after the best rigid alignment, which judges the shape alone (the thesis reports the second).
+Once aligned by the first grasp's true pose, which includes the error of the estimated pose, and once after the best
+rigid alignment, which measures the shape alone (the thesis reports the second).
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from tactile_lab.slam.shape.surfaces.sampling import TriangleMesh, distances_to_
 
 @dataclass(frozen=True)
 class ShapeComparison:
-    """Errors of one shape, placed in two ways.
+    """Errors of one shape with two alignments.
 
     Attributes:
-        first_grasp: placed by the first grasp's true pose; None where that is unknown.
+        first_grasp: aligned by the first grasp's true pose; None if that is unknown.
         best_fit: after the best rigid alignment.
     """
 
@@ -40,7 +40,7 @@ def compare_contour(contour_m: Array, truth_m: Array, truth_T_estimate: Pose3 | 
     Args:
         contour_m: estimated contour.
         truth_m: true outline, shape (m, 2).
-        truth_T_estimate: from the first grasp's true pose; None where there is none.
+        truth_T_estimate: from the first grasp's true pose; None if there is none.
 
     Raises:
         ShapeError: a contour without area or with coordinates that are not numbers.
@@ -51,9 +51,9 @@ def compare_contour(contour_m: Array, truth_m: Array, truth_T_estimate: Pose3 | 
 
 
 def compare_mesh(mesh: TriangleMesh, truth: TriangleMesh, truth_T_estimate: Pose3 | None) -> ShapeComparison:
-    """Compare a mesh with the true one, as :func:`compare_contour`.
+    """Compare a mesh with the true one, as :func:`compare_contour` does.
 
-    The best fit turns about the vertical only: the object stands on the table throughout a session.
+    The best fit rotates about the vertical only, since the object stands on the table throughout a session.
 
     Raises:
         ShapeError: a mesh without faces or with coordinates that are not numbers.
@@ -68,7 +68,7 @@ def horizontal_outline(mesh: trimesh.Trimesh, height_m: float) -> Array:
 
     Args:
         mesh: watertight mesh, its object frame.
-        height_m: height of the section in that frame; brought inside the mesh where it lies beyond it.
+        height_m: height of the section in that frame; clamped to the mesh.
 
     Raises:
         ShapeError: the section is empty or open (a mesh that is not watertight).
@@ -87,9 +87,9 @@ def horizontal_outline(mesh: trimesh.Trimesh, height_m: float) -> Array:
 
 
 def contact_distances_m(contacts_world_m: list[Array], truth: list[Pose3], mesh: TriangleMesh) -> Array:
-    """How far each contact was from the true surface when it was felt, shape (n,).
+    """Distance of each contact from the true surface at its time, shape (n,).
 
-    It judges the sensing alone: joints, fingertips and calibration, without any estimated pose.
+    It measures the sensing alone: joints, fingertips and calibration, without any estimated pose.
     """
     points = _in_truth(contacts_world_m, truth)
     return distances_to_mesh(points, mesh) if len(points) else np.zeros(0)

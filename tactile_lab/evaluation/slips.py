@@ -1,7 +1,8 @@
-"""How far an object moved beside the hand between grasps, by the marker camera, and the ``motion`` of a rig that fits.
+"""How far an object slipped relative to the hand between grasps, by the marker camera, and the motion that fits.
 
-The estimation expects slips of a certain size (v of equation 3.7). Too little, and an object that slipped is lost; too
-much, and contacts alone have to say where it is. So it is measured where there is truth.
+The estimation expects slips of a certain size (v of equation 3.7). If it is too small, an
+object that slipped is lost; if it is too large, the pose is determined by contacts alone. So it is measured where
+ground truth is available.
 """
 
 from __future__ import annotations
@@ -19,23 +20,24 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, devi
 from tactile_lab.slam.tracking.evidence.motion_cost import STIFF_BEYOND_SIGMA
 
 LEAST_STEPS = 10
-"""Fewer tell no standard deviation."""
+"""Fewer are not enough for a standard deviation."""
 
 _USUAL_SHARE = 0.75
 _SIGMAS_OF_LENGTH, _SIGMAS_OF_TURN = 1.665, 1.150
-"""So many grasps do no more to an object left lying than closing does, and within how many standard deviations that
-share of a normal distribution lies, in two dimensions and in one. The others push it (decision 30)."""
+"""Share of grasps that move an unheld object no more than usual, and the number of standard deviations that contain
+this share of a normal distribution, in two dimensions and in one. The other grasps push it (decision 30).
+"""
 
 _LEAST_UNHELD = 0.02
 
 
 @dataclass(frozen=True)
 class Slips:
-    """Slips of the object between successive grasps at both of which the camera saw it.
+    """Slips of the object between successive grasps that the camera both saw.
 
     Attributes:
-        carried: where the hand had carried it meanwhile, rows (x_m, y_m, yaw_rad), world frame, shape (n, 3).
-        left: where it had been left, shape (m, 3).
+        carried: slips while the hand carried it, as (x_m, y_m, yaw_rad), world frame, shape (n, 3).
+        left: slips while it was left in place, shape (m, 3).
     """
 
     carried: Array
@@ -43,7 +45,7 @@ class Slips:
 
     @classmethod
     def between(cls, grasps: Sequence[Grasp], world_T_object: Sequence[Pose3 | None]) -> Slips:
-        """Of one session, from its grasps and the true pose at each, None where it is not known."""
+        """Slips of one session, from its grasps and the true pose at each, None if unknown."""
         found: dict[bool, list[Array]] = {True: [], False: []}
         for (before, _), (after, grasp) in pairwise(zip(world_T_object, grasps, strict=True)):
             if before is not None and after is not None:
@@ -54,7 +56,7 @@ class Slips:
 
     @classmethod
     def join(cls, parts: Iterable[Slips]) -> Slips:
-        """Of several sessions."""
+        """Slips of several sessions."""
         known = list(parts)
         none = [np.empty((0, 3))]
         return cls(
@@ -64,9 +66,9 @@ class Slips:
 
     @property
     def motion(self) -> MotionNoise | None:
-        """The noise that fits; None where the hand carried the object too seldom to tell.
+        """The matching motion noise; None if the hand carried the object too rarely.
 
-        ``unheld`` stays 1, which is always safe, where the object was left too seldom.
+        ``unheld`` stays 1, which is always safe, if the object was left in place too rarely.
         """
         if len(self.carried) < LEAST_STEPS:
             return None
@@ -79,17 +81,17 @@ class Slips:
         return MotionNoise(translation_m=translation_m, rotation_rad=rotation_rad, unheld=share)
 
     def pushed_count(self, motion: MotionNoise) -> int:
-        """How many of the grasps that were to leave the object moved it beyond what ``unheld`` makes likely."""
+        """Number of grasps of an object left in place that moved it more than ``unheld`` makes likely."""
         lying = motion.after(np.zeros(3))
         far = lengths_m(self.left) > STIFF_BEYOND_SIGMA * lying.translation_m
         return int(np.sum(far | (np.abs(self.left[:, 2]) > STIFF_BEYOND_SIGMA * lying.rotation_rad)))
 
 
 def lengths_m(slips: Array) -> Array:
-    """How far each slip goes, shape (n,)."""
+    """Length of each slip, shape (n,)."""
     return np.asarray(np.linalg.norm(slips[:, :2], axis=1))
 
 
 def root_mean_squares(slips: Array) -> tuple[float, float]:
-    """Of translations per axis (m), and of turns (rad)."""
+    """Of translations per axis (m), and of rotations (rad)."""
     return float(np.sqrt(np.mean(slips[:, :2] ** 2))), float(np.sqrt(np.mean(slips[:, 2] ** 2)))

@@ -1,4 +1,4 @@
-"""Spreads of figures over runs, and confidence intervals of their means."""
+"""Spreads of metrics over runs, and confidence intervals of their means."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from scipy.stats import t as student
 
 CONFIDENCE = 0.95
 _RESAMPLED, _LEAST_RESAMPLED = 2000, 5
-"""Samples of the bootstrap, and the fewest values that it says something about."""
+"""Number of bootstrap samples, and minimum number of values."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Median, ninetieth percentile and maximum; infinite where too many runs have no figure."""
+    """Median, ninetieth percentile and maximum; infinite if too many runs have no value."""
 
     median: float
     p90: float
@@ -24,12 +24,12 @@ class Spread:
 
     @classmethod
     def of(cls, values: Sequence[float]) -> Spread:
-        """Of at least one value, infinite ones included."""
+        """Of at least one value, which may be infinite."""
         return cls(quantile(values, 0.5), quantile(values, 0.9), max(values))
 
     @classmethod
     def of_known(cls, values: Iterable[float | None]) -> Spread | None:
-        """Of those values that are known; None when there are none."""
+        """Of the known values; None if there are none."""
         known = [value for value in values if value is not None]
         return cls.of(known) if known else None
 
@@ -64,9 +64,8 @@ class Interval:
 
     @classmethod
     def resampled(cls, values: Sequence[float]) -> Interval:
-        """Of at least one value, by the bootstrap: differences that are mostly zero are nothing like normal.
-
-        The interval is None for fewer than five values.
+        """Of at least one value, by the bootstrap, because differences that are mostly zero are not normally
+        distributed. The interval is None for fewer than five values.
         """
         found = np.asarray(values, dtype=float)
         if len(found) < _LEAST_RESAMPLED:
@@ -76,7 +75,7 @@ class Interval:
         return cls(float(found.mean()), float(low), float(high))
 
     def excludes_zero(self, margin: float = 0.0) -> bool:
-        """Zero lies outside of it, by more than a margin."""
+        """Whether zero is outside the interval, by more than a margin."""
         return self.low is not None and self.high is not None and (self.low > margin or self.high < -margin)
 
     def text(self, digits: int = 1) -> str:
@@ -87,7 +86,7 @@ class Interval:
 
 
 def quantile(values: Sequence[float], share: float) -> float:
-    """Linear between the sorted values; infinite as soon as an infinite value takes part."""
+    """Linear between the sorted values; infinite if an infinite value is involved."""
     ordered = sorted(values)
     place = share * (len(ordered) - 1)
     low, part = ordered[math.floor(place)], place - math.floor(place)
@@ -95,5 +94,5 @@ def quantile(values: Sequence[float], share: float) -> float:
 
 
 def number(value: float, digits: int) -> str:
-    """A number with so many digits behind the point."""
+    """A number with this many decimals."""
     return f"{value:.{digits}f}" if math.isfinite(value) else "∞"

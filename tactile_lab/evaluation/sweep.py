@@ -25,17 +25,17 @@ class SweepRun:
 
 
 RunSession = Callable[[SweepRun], Mapping[str, Any]]
-"""Runs one session and gives the content of its ``evaluation.json``."""
+"""Runs one session and returns the content of its ``evaluation.json``."""
 
 
 @dataclass(frozen=True)
 class SweepRow:
-    """What came of one run.
+    """The outcome of one run.
 
     Attributes:
         run: the session.
-        evaluation: content of its ``evaluation.json``, and why it ``ended_early``; None when it did not get that far.
-        problem: why it did not, "" otherwise.
+        evaluation: content of its ``evaluation.json``, and why it ``ended_early``; None if there is none.
+        problem: why there is none, "" otherwise.
     """
 
     run: SweepRun
@@ -70,7 +70,7 @@ class SweepRow:
         return {**run, "failure": self.failure or None, "evaluation": self.evaluation}
 
     def figure(self, *keys: str) -> float | None:
-        """A figure of the evaluation by its keys, None where it is unknown."""
+        """A metric of the evaluation by its keys, None if it is unknown."""
         value: Any = self.evaluation
         for key in keys:
             value = value.get(key) if isinstance(value, Mapping) else None
@@ -85,7 +85,7 @@ COLUMNS = (
     ("rotation RMSE, °", ("pose", "rmse_deg"), 1),
     ("registration, mm", ("registration_rms_mm",), 1),
 )
-"""Figures of a summary: heading, keys in ``evaluation.json``, digits."""
+"""Metrics of a summary: heading, keys in ``evaluation.json``, decimals."""
 
 
 @dataclass(frozen=True)
@@ -93,9 +93,9 @@ class SweepSummary:
     """All runs of one object in one dimension.
 
     Attributes:
-        object_name, dimension: what was run.
+        object_name, dimension: of the runs.
         runs: number of runs.
-        spreads: one for each of :data:`COLUMNS`, over all runs that have the figure, failed ones included.
+        spreads: one for each of :data:`COLUMNS`, over all runs with a value, including failed ones.
         failures: seed and reason of each failed run.
     """
 
@@ -117,12 +117,12 @@ def sweep(
     finished: Callable[[SweepRow], None] = lambda row: None,
     each: Callable[[Callable[[SweepRun], SweepRow], Iterable[SweepRun]], Iterable[SweepRow]] = map,
 ) -> list[SweepRow]:
-    """Run sessions; one that ends in one of our errors becomes a failed row, and the sweep goes on.
+    """Run sessions; an error makes a failed row, and the sweep continues.
 
     Args:
-        runs: what to run.
-        run_session: runs one session and gives the content of its ``evaluation.json``.
-        finished: told about each row, in the order of the runs.
+        runs: the sessions to run.
+        run_session: runs one session and returns the content of its ``evaluation.json``.
+        finished: called with each row, in the order of the runs.
         each: applies a function to all runs, in order: the built-in ``map``, or a process pool's.
     """
     rows = []

@@ -1,4 +1,4 @@
-"""The evaluation as rows for people: the command line and the report print the same ones."""
+"""The evaluation as rows for people, shared by command line and report."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NEEDS_TWO = "needs the true pose at two grasps"
 
 @dataclass(frozen=True)
 class EvaluationRow:
-    """One line: what it is, its value as text, its unit, and what it means."""
+    """One line: label, value as text, unit, and explanation."""
 
     label: str
     value: str
@@ -24,7 +24,7 @@ class EvaluationRow:
 
 
 def evaluation_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
-    """Rows from the content of ``evaluation.json``; what is unknown shows as a dash."""
+    """Rows from the content of ``evaluation.json``; unknown values show as a dash."""
     rows = [
         *_shape_rows(evaluation.get("shape") or {}, evaluation.get("shape_best_fit") or {}),
         *_pose_rows(evaluation.get("pose") or {}),
@@ -60,7 +60,7 @@ def _pose_row(label: str, unit: str, pose: Mapping[str, Any]) -> EvaluationRow:
     )
     if not pose:
         return EvaluationRow(label, UNKNOWN, "", NEEDS_TWO)
-    note = f"RMS; {final} at the end, {step} from grasp to grasp, drift {drift} a grasp"
+    note = f"RMS; {final} at the end, {step} between grasps, drift {drift} per grasp"
     return EvaluationRow(label, rmse, {"deg": "°"}.get(unit, unit), note)
 
 
@@ -68,7 +68,7 @@ def _run_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
     loops, time, truth = (evaluation.get(key) or {} for key in ("loops", "time", "truth"))
     sensing = evaluation.get("sensing") or {}
     grasps, missing = evaluation.get("grasps", 0), truth.get("missing", 0)
-    spread = f"median; 95 % below {_text(time.get('step_ms_p95'), 0)} ms, {_text(time.get('total_s'), 1)} s in all"
+    spread = f"median; 95 % below {_text(time.get('step_ms_p95'), 0)} ms, {_text(time.get('total_s'), 1)} s in total"
     return [
         EvaluationRow(
             "Registration error", _text(evaluation.get("registration_rms_mm"), 2), "mm", _verdict(evaluation)
@@ -83,11 +83,11 @@ def _run_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
 
 
 def _further_rows(further: Mapping[str, Any]) -> list[EvaluationRow]:
-    return [EvaluationRow(name, further_text(value), "", "of an extension") for name, value in further.items()]
+    return [EvaluationRow(name, further_text(value), "", "from an extension") for name, value in further.items()]
 
 
 def further_text(value: Any) -> str:
-    """A figure of an extension, whatever it is; a dash where it is not known."""
+    """A metric of an extension, of any type; a dash if it is unknown."""
     if value is None:
         return UNKNOWN
     return f"{value:.4g}" if isinstance(value, int | float) else json.dumps(value, ensure_ascii=False)

@@ -1,8 +1,7 @@
-"""The object's trajectory: its file, and its errors against the marker camera.
+"""The object's trajectory: its file, and its errors relative to the marker camera.
 
-The estimate's object frame is born at the first grasp and has nothing to do with the frame of the
-object's model. One fixed transform ties them together: the one that makes both agree at the first
-grasp for which both are known.
+The estimate's object frame is defined by the first grasp and independent of the frame of the object's model. One fixed
+transform relates them: the one that makes both agree at the first grasp for which both are known.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ COLUMNS = ("stamp_s", *(f"world_T_object_{row}{column}" for row in range(4) for 
 """Columns of ``trajectory.csv``: the stamp, then the 4 x 4 matrix row by row."""
 
 Poses = Sequence[Pose3 | None]
-"""One ``world_T_object`` a grasp; None where it is unknown."""
+"""One ``world_T_object`` per grasp; None if unknown."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class Trajectory:
 
     Attributes:
         stamps_s: time of each grasp, session clock, seconds.
-        world_T_object: pose at each grasp, or None where the grasp could not be placed.
+        world_T_object: pose at each grasp, or None if the grasp could not be registered.
     """
 
     stamps_s: tuple[float, ...]
@@ -63,7 +62,7 @@ class PoseErrors:
     """Errors of a whole trajectory after the first grasp's object frame is aligned.
 
     Attributes:
-        per_grasp: error at each grasp; None where the estimate or the truth is missing.
+        per_grasp: error at each grasp; None if the estimate or the truth is missing.
         aligned_at: the grasp whose pose the frames were aligned at (its own error is zero).
         rmse_mm, rmse_deg: root mean square over the compared grasps without the aligned one.
         final_mm, final_deg: error at the last compared grasp.
@@ -85,7 +84,7 @@ class PoseErrors:
 
 
 def trajectory_text(trajectory: Trajectory) -> str:
-    """``trajectory.csv`` as text: one line a grasp, empty entries where a grasp was not placed."""
+    """``trajectory.csv`` as text: one line per grasp, with empty entries for unregistered grasps."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -99,12 +98,14 @@ def read_trajectory(path: Path) -> Trajectory:
     """Read ``trajectory.csv``.
 
     Raises:
-        SessionError: the file is missing or not in the form of :func:`trajectory_text`.
+        SessionError: the file is missing or not in the format of :func:`trajectory_text`.
     """
     try:
         rows = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
     except (OSError, UnicodeDecodeError) as error:
-        raise SessionError("trajectory cannot be read", where=str(path), hint="Run the session or replay it") from error
+        raise SessionError(
+            "trajectory cannot be read", where=str(path), hint="Replay the session to write its results"
+        ) from error
     if not rows or tuple(rows[0]) != COLUMNS:
         raise SessionError(f"first line is not '{COLUMNS[0]}' and the 16 entries of world_T_object", where=str(path))
     placed = [_read_row(row, f"{path}, line {number}") for number, row in enumerate(rows[1:], start=2)]
@@ -120,7 +121,7 @@ def _read_row(row: list[str], where: str) -> tuple[float, Pose3 | None]:
             return stamp, None
         matrix = np.array([float(entry) for entry in row[1:]]).reshape(4, 4)
     except ValueError as error:
-        raise SessionError(f"holds an entry that is not a number ({error})", where=where) from error
+        raise SessionError(f"contains an entry that is not a number ({error})", where=where) from error
     return stamp, _rigid(matrix, where)
 
 
@@ -141,20 +142,20 @@ def compared_grasps(estimate: Poses, truth: Poses) -> list[Compared]:
 def estimate_T_truth(estimate: Poses, truth: Poses) -> Pose3 | None:
     """The transform from the truth's object frame into the estimate's, from the first grasp that has both.
 
-    It is the ``A`` in ``aligned = world_T_object_estimate * A``; None when no grasp has both.
+    It is the ``A`` in ``aligned = world_T_object_estimate * A``; None if no grasp has both.
     """
     both = compared_grasps(estimate, truth)
     return both[0].estimate.between(both[0].truth) if both else None
 
 
 def aligned_poses(estimate: Poses, truth: Poses) -> tuple[Pose3 | None, ...]:
-    """The estimated poses of the truth's object frame; all None where no grasp has both."""
+    """The estimated poses of the truth's object frame; all None if no grasp has both."""
     alignment = estimate_T_truth(estimate, truth)
     return tuple(None if pose is None or alignment is None else pose * alignment for pose in estimate)
 
 
 def pose_errors(estimate: Poses, truth: Poses) -> PoseErrors | None:
-    """Errors of the estimated trajectory, or None when no grasp after the aligned one can be compared."""
+    """Errors of the estimated trajectory, or None if no grasp after the aligned one can be compared."""
     both = compared_grasps(aligned_poses(estimate, truth), truth)
     if len(both) < 2:
         return None

@@ -44,6 +44,6 @@ EXPERIMENTS: Mapping[str, Experiment] = {
 def experiment(name: str) -> Experiment:
     """The experiment called ``name``. Raises ConfigurationError if there is none."""
     if name not in EXPERIMENTS:
-        hint = f"Experiments are {', '.join(EXPERIMENTS)}"
-        raise ConfigurationError(f"no experiment called {name!r}", where="experiment", hint=hint)
+        hint = f"Available experiments: {', '.join(EXPERIMENTS)}"
+        raise ConfigurationError(f"there is no experiment {name!r}", where="experiment", hint=hint)
     return EXPERIMENTS[name]

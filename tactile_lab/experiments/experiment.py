@@ -72,10 +72,10 @@ class Experiment:
 
 def _limit(settings: list[Setting], name: str, values: Sequence[str]) -> list[Setting]:
     if not any(name in dict(setting) for setting in settings):
-        hint = f"Settings are {', '.join(dict(settings[0]))}"
-        raise ConfigurationError(f"nothing called {name!r} is varied", where="--only", hint=hint)
+        hint = f"Settings to restrict: {', '.join(dict(settings[0]))}"
+        raise ConfigurationError(f"{name!r} is not a varied setting", where="--only", hint=hint)
     known = list(dict.fromkeys(str(dict(setting)[name]) for setting in settings))
     if unknown := [value for value in values if value not in known]:
-        hint = f"There are {', '.join(known)}"
+        hint = f"Choose from {', '.join(known)}"
         raise ConfigurationError(f"no {name} {', '.join(map(repr, unknown))}", where="--only", hint=hint)
     return [setting for setting in settings if str(dict(setting)[name]) in values]

@@ -112,7 +112,7 @@ def _execute(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
 
 def _in_processes(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
     """Rows as they are finished; the processes end with this generator, however it ends."""
-    os.environ.update(ONE_THREAD)  # the workers inherit it before they load any library
+    os.environ.update(ONE_THREAD, PYTHONSAFEPATH="1")  # inherited: no worker imports from the current folder
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare_worker)
     try:
@@ -122,7 +122,7 @@ def _in_processes(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]
             for future in ready:
                 yield future.result()
     except BrokenProcessPool as error:
-        hint = "Perhaps the memory was too small: take fewer --jobs. The same command goes on where it stopped"
+        hint = "Memory may have run out: use fewer --jobs. The same command resumes where it stopped"
         raise SessionError("a worker process died", where="experiment", hint=hint) from error
     finally:
         _end(pool)
@@ -155,11 +155,13 @@ def _known_rows(name: str, file: Path, keep: bool) -> tuple[dict[str, Row], str]
         head, *lines = file.read_text(encoding="utf-8").splitlines()
         found = json.loads(head)
         if found["format"] != FORMAT or found["experiment"] != name:
-            raise SessionError(f"holds results of {found['experiment']}", where=str(file), hint="Choose another --out")
+            raise SessionError(
+                f"contains results of {found['experiment']}", where=str(file), hint="Choose another --out"
+            )
         rows = [Row.from_json(json.loads(line)) for line in _whole(lines)]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        hint = "Remove the file to begin anew, or choose another --out"
-        raise SessionError("is not a file of results", where=str(file), hint=hint) from error
+        hint = "Remove the file to start again, or choose another --out"
+        raise SessionError("is not a results file", where=str(file), hint=hint) from error
     same = found["version"] == version()
     if not (same or keep):
         return {}, version()

@@ -1,4 +1,4 @@
-"""One HTML file that shows a session: opens from disk, fetches nothing, prints."""
+"""One HTML file that shows a session: opens from disk, loads nothing from the network, can be printed."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ __all__ = ["REPORT", "write"]
 
 
 def write(folder: Path, results: Path | None = None) -> Path:
-    """Write ``report.html`` beside the results it shows; the file's path.
+    """Write ``report.html`` next to its results. Returns the file's path.
 
     Args:
         folder: the session's folder.
-        results: the folder of the results to show; the session's own when None.
+        results: the folder of the results to show; the session's own if None.
 
     Raises:
-        SessionError: no session folder, or no results yet.
-        ShapeError: a mesh that cannot be read.
+        SessionError: not a session folder, or no results yet.
+        ShapeError: a mesh cannot be read.
         WriteError: the file cannot be written.
     """
     results = results or folder / RESULTS

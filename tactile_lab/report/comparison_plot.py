@@ -1,4 +1,4 @@
-"""Means with their confidence intervals, a panel a figure and a line a method, as one SVG file."""
+"""Means with their confidence intervals as one SVG file: a panel per metric, a line per method."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tactile_lab.report.svg import Scale, tick_label
 
 _PLOT, _RIGHT, _LINE, _HEAD, _FOOT = 560.0, 30.0, 24.0, 34.0, 26.0
 _LEAST_LEFT, _LETTER = 170.0, 7.0
-_LEGEND = "dot: mean; bar: its 95 % interval, from 0 on; tick: largest value"
+_LEGEND = "dot: mean; bar: its 95 % interval, cut off at 0; tick: largest value"
 _STYLE = """
 :root { --page:#ffffff; --ink:#1b2330; --soft:#5a6678; --grid:#e6e9ee; --mark:#1d5fa8; }
 @media (prefers-color-scheme: dark) { :root { --page:#191f28; --ink:#e7ebf1; --soft:#9aa7b8; --grid:#2a323e;
@@ -23,9 +23,9 @@ text.title { fill:var(--ink); font-weight:600; }
 
 
 def comparison_svg(summaries: Sequence[MethodSummary]) -> str:
-    """Dots are means, bars their 95 % intervals, ticks the largest value; figures nobody has are left out.
+    """Dots are means, bars their 95 % intervals, ticks the largest value; metrics without values are left out.
 
-    No figure can be below zero: an interval that reaches there is cut off.
+    No metric can be negative: an interval is cut off at zero.
     """
     count = len(summaries[0].figures)
     panels = [[(summary.method, summary.figures[index]) for summary in summaries] for index in range(count)]

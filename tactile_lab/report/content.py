@@ -1,4 +1,4 @@
-"""Everything a report shows, gathered once: no file is read after this."""
+"""The content of a report, gathered once: no file is read afterwards."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ FLAT_m = 1e-7
 
 @dataclass(frozen=True)
 class SessionFacts:
-    """What the session's own description says, as text for people.
+    """The session's manifest as text for people.
 
     Attributes:
-        object_name: the object's catalogue name or the operator's word for it.
+        object_name: the object's catalogue name or the name the operator gave.
         rig: name of the rig.
-        started: date and time, ISO 8601, or "" where the clock was virtual.
-        status: closed, or what else became of it.
+        started: date and time, ISO 8601, or "" with a virtual clock.
+        status: closed, interrupted, failed or recovered.
         notes: the operator's notes.
-        problem: why the session failed, "" where it did not.
-        made_with: name and value of everything that made the session: command, versions, settings.
+        problem: why the session failed, "" if it did not.
+        made_with: names and values of command, versions and settings.
         calibrations: file name and hash of each calibration copy.
     """
 
@@ -57,9 +57,8 @@ class Surface:
 
 
 def with_plain_lids(surface: Surface) -> Surface:
-    """An upright prism whose flat ends have no uncertainty of their own: their corners are doubled, sigma NaN there.
-
-    The ends of a planar session's solid were never felt; colours drawn from their rims would say otherwise.
+    """An upright prism whose flat ends have no uncertainty: their corners are doubled, with sigma NaN. The ends of a
+    planar session's solid were never touched; colours interpolated from their rims would be misleading.
     """
     corners = surface.vertices_m[surface.faces]
     lid = np.ptp(corners[:, :, 2], axis=1) < FLAT_m
@@ -73,7 +72,7 @@ def with_plain_lids(surface: Surface) -> Surface:
 
 @dataclass(frozen=True)
 class TrueShape:
-    """What the marker camera and the object's model say, model in the truth's own object frame.
+    """Ground truth from the marker camera and the object's model; the model is in the truth's own object frame.
 
     Attributes:
         world_T_object: true pose of each grasp or None.
@@ -88,17 +87,17 @@ class TrueShape:
 
 @dataclass(frozen=True)
 class ReportContent:
-    """The material of one report.
+    """The content of one report.
 
     Attributes:
-        facts: the session's description.
-        results: what SLAM left.
-        evaluation: ``evaluation.json``, or None when the session was not evaluated.
-        surface: the estimated surface, or None when there is none.
+        facts: the session's manifest.
+        results: the SLAM results.
+        evaluation: ``evaluation.json``, or None if the session was not evaluated.
+        surface: the estimated surface, or None if there is none.
         contour_m: the estimated contour or section, shape (n, 2), estimate's object frame, or None.
         contour_sigma_m: standard deviation at each point of the contour, shape (n,).
-        truth: what is known of the truth, or None.
-        fitted_outline_m: the true outline laid best onto the estimate, shape (n, 2), estimate's object frame, or None.
+        truth: ground truth, or None.
+        fitted_outline_m: the true outline fitted to the estimate, shape (n, 2), estimate's object frame, or None.
         course: decisions and stops of the session.
     """
 

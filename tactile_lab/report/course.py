@@ -1,4 +1,4 @@
-"""What a recording tells of the course of a session: the exploration policy's decisions, and why everything stopped."""
+"""The course of a session from its recording: the exploration policy's decisions, and the reasons of stops."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Read = TypeVar("Read")
 
 @dataclass(frozen=True)
 class ChosenGrasp:
-    """Where the hand was sent, world frame, how it was to close, and what the policy gave for it (None: nothing)."""
+    """Target of the hand in the world frame, its closing, and the policy's score (None: no score)."""
 
     x_m: float
     y_m: float
@@ -30,18 +30,18 @@ class ChosenGrasp:
 
 @dataclass(frozen=True)
 class PolicyDecision:
-    """What the policy decided about one grasp.
+    """The policy's decision about one grasp.
 
     Attributes:
         number: of the grasp, from 1.
         policy: its name.
         outcome: grasp, stop or nothing.
-        reason: in a sentence.
-        chosen: the grasp; None where none was chosen.
-        promised_gain: what it expects of it, in its own unit; None where it does not say.
-        candidates: how many could be used.
-        vetoed: how many of them a person refused.
-        ruled_out: how many could not be used, by obstacle.
+        reason: as a sentence.
+        chosen: the grasp; None if none was chosen.
+        promised_gain: expected gain in the policy's own unit; None if it has none.
+        candidates: number of feasible candidates.
+        vetoed: number vetoed by a person.
+        ruled_out: number of infeasible candidates, by obstacle.
     """
 
     number: int
@@ -57,7 +57,7 @@ class PolicyDecision:
 
 @dataclass(frozen=True)
 class Stop:
-    """Everything was stopped: when on the session's clock (s), and why."""
+    """A stop: its time on the session's clock (s), and its reason."""
 
     time_s: float
     cause: str
@@ -65,19 +65,19 @@ class Stop:
 
 @dataclass(frozen=True)
 class Course:
-    """Decisions in the order of the grasps, stops in that of time."""
+    """Decisions in the order of the grasps, stops in order of time."""
 
     decisions: tuple[PolicyDecision, ...] = ()
     stops: tuple[Stop, ...] = ()
 
 
 def read_course(session: Session) -> Course:
-    """The course of a session; where a grasp was decided about anew, the last decision counts.
+    """The course of a session; of several decisions about a grasp the last one counts.
 
-    Nothing is told of a session whose recording is kept elsewhere.
+    Empty for a session without its recording.
 
     Raises:
-        SessionError: the recording cannot be read, or a message in it is of another form.
+        SessionError: the recording cannot be read, or a message in it has another format.
     """
     path = session.folder / TRAFFIC
     if not path.is_file() or not may_hold(path, (DECISION_TOPIC, SAFETY_TOPIC)):
@@ -97,7 +97,9 @@ def _read(message: TrafficMessage, path: Path, form: Callable[[dict[str, Any], i
     try:
         return form(json.loads(message.data), message.stamp_ns)
     except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
-        raise SessionError(f"a message of {message.topic} is of another form ({error!r})", where=str(path)) from error
+        raise SessionError(
+            f"a message on {message.topic} has an unexpected format ({error!r})", where=str(path)
+        ) from error
 
 
 def _decision(content: dict[str, Any], stamp_ns: int) -> PolicyDecision:

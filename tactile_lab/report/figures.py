@@ -15,7 +15,7 @@ from tactile_lab.report.svg import Chart, Frame, tick_label
 MAP_WIDTH = 500.0
 NORMAL_LENGTH_mm = 6.0
 LEAST_COLUMNS = 8
-"""Width of the force map in grasps, so that a short session has no endless cells."""
+"""Minimum width of the force map in grasps, so that a short session does not have very wide cells."""
 FINGER_NAMES = dict(zip(FINGERS, ("first", "middle", "ring", "little", "thumb"), strict=True))
 
 
@@ -133,7 +133,7 @@ def _grasp_ticks(grasps: int) -> list[float]:
 
 
 def trajectory_view(content: ReportContent) -> str | None:
-    """Where the object was on the table at each grasp: estimate and truth, with headings."""
+    """The object's pose on the table at each grasp: estimate and truth, with headings."""
     truth = content.truth.world_T_object if content.truth else (None,) * len(content.results.trajectory.stamps_s)
     estimate = content.results.trajectory.world_T_object
     shown = aligned_poses(estimate, truth)
@@ -147,7 +147,7 @@ def trajectory_view(content: ReportContent) -> str | None:
     _draw_path(chart, truth, "truth")
     _draw_path(chart, shown, "estimate")
     placed = sum(pose is not None for pose in shown)
-    return chart.text("Object on the table", f"{placed} estimated poses of the object, with the true ones beside them.")
+    return chart.text("Object on the table", f"{placed} estimated poses of the object, with the true poses.")
 
 
 def _draw_path(chart: Chart, poses: tuple[Pose3 | None, ...], kind: str) -> None:
@@ -163,7 +163,7 @@ def _draw_path(chart: Chart, poses: tuple[Pose3 | None, ...], kind: str) -> None
 
 
 def force_map(content: ReportContent) -> str | None:
-    """Contact force of each finger at each grasp; an empty place is a finger without contact."""
+    """Contact force of each finger at each grasp; an empty cell is a finger without contact."""
     forces = [dict(zip(rows.fingers, rows.force_N, strict=True)) for rows in content.results.contacts]
     largest = max((max(found.values()) for found in forces if found), default=0.0)
     if largest <= 0.0:

@@ -32,15 +32,15 @@ _EVALUATE = "Run: tactile-lab evaluate"
 
 
 def gather(session: Session, folder: Path) -> ReportContent:
-    """Everything a report shows, from the session's description, its results and its evaluation.
+    """Gather the content of a report from the session's manifest, its results and its evaluation.
 
     Args:
         session: the session.
         folder: its results, or those of a replay.
 
     Raises:
-        SessionError: there are no results, or a file is not as the program leaves it; the recording cannot be read.
-        ShapeError: a mesh that cannot be read.
+        SessionError: there are no results, a file is invalid, or the recording cannot be read.
+        ShapeError: a mesh cannot be read.
     """
     results = read_results(folder)
     surface = _surface(folder / "mesh.ply", results.dimension)
@@ -60,7 +60,7 @@ def gather(session: Session, folder: Path) -> ReportContent:
 
 
 def facts(manifest: Manifest) -> SessionFacts:
-    """The description of a session, as text."""
+    """The manifest of a session, as text."""
     plain_settings = {name: value for name, value in manifest.settings.items() if not isinstance(value, dict)}
     made_with = [
         ("session", manifest.name),
@@ -93,16 +93,16 @@ def _surface(path: Path, dimension: int) -> Surface | None:
 
 
 def read_surface(path: Path) -> Surface:
-    """An estimated surface with the standard deviations its file holds.
+    """An estimated surface with the standard deviations in its file.
 
     Raises:
-        ShapeError: not a mesh as the program writes it.
+        ShapeError: not a mesh written by this program.
     """
     mesh = read_mesh(path)
     written = mesh.metadata["_ply_raw"]["vertex"]["data"]  # reading merges equal vertices and drops their properties
     if "sigma_m" not in (written.dtype.names or ()):
         raise ShapeError(
-            "holds no standard deviations", where=str(path), hint="Replay the session to renew its results"
+            "contains no standard deviations", where=str(path), hint="Replay the session to renew its results"
         )
     _, nearest = cKDTree(np.column_stack([written[axis] for axis in "xyz"])).query(mesh.vertices)
     sigma_m = np.asarray(written["sigma_m"], dtype=float)[nearest]
@@ -110,7 +110,7 @@ def read_surface(path: Path) -> Surface:
 
 
 def _outline(folder: Path, results: Results, surface: Surface | None) -> tuple[Array | None, Array]:
-    """The contour, in space the surface's section at the contacts, with its standard deviations."""
+    """The contour (in space the surface's section at the contacts) with its standard deviations."""
     if results.dimension == 2:
         return _contour(folder / "contour.csv", results)
     if surface is None:
@@ -140,7 +140,7 @@ def _truth(session: Session, folder: Path, results: Results) -> TrueShape | None
 
 
 def _fit(contour_m: Array | None, truth: TrueShape | None) -> Array | None:
-    """The true outline, laid best onto the estimated one."""
+    """The true outline, fitted to the estimated one."""
     if contour_m is None or truth is None or truth.outline_m is None:
         return None
     estimate_T_truth = align_contours(truth.outline_m, contour_m)

@@ -1,4 +1,4 @@
-"""The tabular parts of a report: loops, grasps, stops, decisions, evaluation, origin."""
+"""The tables of a report: loops, grasps, stops, decisions, evaluation, provenance."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from tactile_lab.report.markup import Markup, badge, element, figure, join, tabl
 
 
 def number(value: float | None, digits: int = 1) -> str:
-    """A figure with so many digits, a dash where it is not known."""
+    """A number with this many digits, a dash if it is unknown."""
     return UNKNOWN if value is None else f"{value:.{digits}f}"
 
 
 def loops_card(content: ReportContent) -> Markup:
-    """Similar grasps that were tested and what came of them."""
+    """Loop candidates (similar grasps) and the outcome of their tests."""
     loops = content.results.slam["loops"]
     if not loops:
         text = element("p", "No grasp was similar enough to an earlier one to be tested.", class_="lead")
@@ -32,7 +32,7 @@ def loops_card(content: ReportContent) -> Markup:
     rows = [_loop_row(loop, born) for loop in loops]
     titles = ["grasps", "faces", "test value", "verdict", "reason"]
     accepted = sum(bool(loop["accepted"]) for loop in loops)
-    told = f"{accepted} of {len(loops)} went into the pose graph."
+    told = f"{accepted} of {len(loops)} were accepted into the pose graph."
     return element(
         "div",
         element("h3", "Similar grasps"),
@@ -54,14 +54,14 @@ def _loop_row(loop: Mapping[str, Any], born: int) -> list[str | Markup]:
 
 
 def grasp_section(content: ReportContent) -> Markup:
-    """Forces and one line a grasp."""
+    """Forces, and one line per grasp."""
     picture = figures.force_map(content)
     parts = [element("h2", "Grasps")]
     if picture is not None:
-        parts.append(figure(picture, "Newton; a dashed place is a finger that did not touch.", "Contact forces"))
+        parts.append(figure(picture, "In newtons; a dashed cell is a finger that did not touch.", "Contact forces"))
     rows = [_grasp_row(content, index) for index in range(len(content.results.contacts))]
     titles = ["grasp", "time, s", "contacts", "verdict", "reason", "σ, mm", "σ, °", "error, mm", "error, °"]
-    note = "σ is the estimate's own standard deviation of position and heading; the error is against the marker camera."
+    note = "σ is the estimated standard deviation of position and heading; the error is relative to the marker camera."
     parts.append(element("div", table(titles, rows, (0, 3, 4)), element("p", note, class_="note"), class_="card wide"))
     return join(parts)
 
@@ -70,7 +70,7 @@ _VERDICTS = {"first": "good", "tracked": "good", "uncertain": "warn", "untracked
 
 
 def _grasp_row(content: ReportContent, index: int) -> list[str | Markup]:
-    """One grasp: when, what was felt, what SLAM made of it, how well."""
+    """One grasp: time, contacts, estimate, error."""
     results = content.results
     step: Mapping[str, Any] = _entry(results.slam["steps"], index)
     error: Mapping[str, Any] = _entry(((content.evaluation or {}).get("pose") or {}).get("per_grasp"), index)
@@ -91,7 +91,7 @@ def _grasp_row(content: ReportContent, index: int) -> list[str | Markup]:
 
 
 def _entry(entries: Sequence[Mapping[str, Any] | None] | None, index: int) -> Mapping[str, Any]:
-    """An entry of a list that may be too short or hold nulls."""
+    """An entry of a list that may be too short or contain nulls."""
     return (entries[index] if entries and index < len(entries) else None) or {}
 
 
@@ -104,7 +104,7 @@ def _pose_sigma(covariance: Sequence[Sequence[float | None]] | None) -> tuple[fl
 
 
 def evaluation_section(content: ReportContent) -> Markup:
-    """The evaluation as a table with what each figure means."""
+    """The evaluation as a table with the meaning of each metric."""
     parts = [element("h2", "Evaluation")]
     if content.evaluation is None:
         return join([*parts, element("p", "The session has not been evaluated. Run: tactile-lab evaluate SESSION")])
@@ -132,30 +132,30 @@ def origin_section(content: ReportContent) -> Markup:
 
 _OUTCOMES = {"stop": ("ended the session", "good"), "nothing": ("no grasp", "warn")}
 _NOTE = (
-    "Place and turn of the hand on the table; score and promised gain in the policy\u2019s own unit, the higher the "
-    "better; candidates that could be used, of all; those that a person vetoed."
+    "Position and rotation of the hand on the table; score and expected gain in the policy\u2019s own unit, higher is "
+    "better; feasible candidates of all; candidates vetoed by a person."
 )
 
 
 def stops_card(course: Course) -> Markup:
-    """When and why everything was stopped; nothing where it was not."""
+    """When and why everything was stopped; empty if it was not."""
     if not course.stops:
         return Markup("")
     lines = [element("li", element("b", f"at {stop.time_s:.1f} s"), f"  {stop.cause}") for stop in course.stops]
-    heading = element("h3", badge("stopped", "bad"), " Everything was stopped, zero demands to the hand")
+    heading = element("h3", badge("stopped", "bad"), " All motion was stopped, with zero demands to the hand")
     return element("div", heading, element("ul", *lines), class_="card wide")
 
 
 def decisions_card(course: Course) -> Markup:
-    """One line a decision of the exploration policy; nothing where no policy decided."""
+    """One line per decision of the exploration policy; empty without a policy."""
     if not course.decisions:
         return Markup("")
     titles = ["grasp", "closing", "x, mm", "y, mm", "turn, \u00b0", "score", "gain", "candidates", "vetoed", "reason"]
     policies = ", ".join(dict.fromkeys(decision.policy for decision in course.decisions))
     return element(
         "div",
-        element("h3", "Why these grasps"),
-        element("p", f"Policy: {policies}. Grasps without a line here followed the fixed rule.", class_="lead"),
+        element("h3", "Choice of the grasps"),
+        element("p", f"Policy: {policies}. Grasps that are not listed followed the fixed rule.", class_="lead"),
         table(titles, map(_row, course.decisions), (0, 1, 9)),
         element("p", _NOTE, class_="note"),
         class_="card wide",
@@ -175,7 +175,7 @@ def _row(decision: PolicyDecision) -> list[str | Markup]:
 
 
 def _chosen(decision: PolicyDecision) -> list[str | Markup]:
-    """Closing, place, turn and score of the chosen grasp; what came instead where there is none."""
+    """Closing, position, rotation and score of the chosen grasp; the outcome if there is none."""
     chosen = decision.chosen
     if chosen is None:
         return [badge(*_OUTCOMES.get(decision.outcome, (decision.outcome, "warn"))), *[UNKNOWN] * 4]

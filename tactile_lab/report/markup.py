@@ -1,4 +1,4 @@
-"""HTML building blocks. Texts are escaped here; what is already markup is of type :class:`Markup`."""
+"""HTML building blocks. Texts are escaped here; existing markup has type :class:`Markup`."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def markup(content: str | Markup) -> Markup:
 
 
 def element(tag: str, *content: str | Markup, **attributes: str) -> Markup:
-    """One element. ``class_`` stands for ``class``; underlines in other names for hyphens."""
+    """One element. ``class_`` stands for ``class``; underscores in other names for hyphens."""
     names = "".join(f' {name.rstrip("_").replace("_", "-")}="{escape(value)}"' for name, value in attributes.items())
     return Markup(f"<{tag}{names}>{join(content)}</{tag}>")
 
 
 def join(parts: Iterable[str | Markup], between: str = "") -> Markup:
-    """Parts one after the other."""
+    """Concatenate parts."""
     return Markup(between.join(markup(part) for part in parts))
 
 
@@ -35,7 +35,7 @@ def figure(picture: str, caption: str, heading: str = "", *extra: Markup) -> Mar
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str | Markup]], text_columns: Iterable[int] = (0,)) -> Markup:
-    """A table whose first column names the row; ``text_columns`` are set to the left."""
+    """A table whose first column names the row; ``text_columns`` are left-aligned."""
     left = set(text_columns)
     kinds = [{"class_": "text"} if index in left else {} for index in range(len(head))]
     titles = [element("th", title, scope="col", **kind) for title, kind in zip(head, kinds, strict=True)]

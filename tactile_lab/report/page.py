@@ -7,11 +7,11 @@ from tactile_lab.report.content import ReportContent
 from tactile_lab.report.markup import Markup, element, join
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-"""The browser is told to fetch nothing, whatever the page's content says."""
+"""Forbids the browser to load anything from the network, whatever the page contains."""
 
 
 def page(content: ReportContent) -> str:
-    """The report as one HTML document that needs nothing beside it."""
+    """The report as one self-contained HTML document."""
     title = f"{content.facts.object_name} · tactile SLAM"
     head = element(
         "head",
@@ -31,7 +31,9 @@ def page(content: ReportContent) -> str:
         listings.decisions_card(content.course),
         listings.evaluation_section(content),
         listings.origin_section(content),
-        element("footer", "Lengths in millimetres, angles in degrees. Files beside this page: see results/."),
+        element(
+            "footer", "Lengths in millimetres, angles in degrees. The data files are next to this page in results/."
+        ),
     )
     script = [] if content.surface is None else [element("script", Markup(sections.resource("viewer.js")))]
     return f"<!doctype html>\n{element('html', head, element('body', join([body, *script])), lang='en')}\n"

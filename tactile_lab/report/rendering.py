@@ -19,7 +19,7 @@ _AMBIENT = 0.45
 
 @dataclass(frozen=True)
 class View:
-    """A direction to look from: azimuth about z from +x and elevation above the table, radians."""
+    """A viewing direction: azimuth about z from +x and elevation above the table, radians."""
 
     name: str
     azimuth_rad: float
@@ -80,7 +80,7 @@ def _shrink(picture: NDArray[np.uint8], size_px: int) -> NDArray[np.uint8]:
 
 
 def png_data_uri(picture: NDArray[np.uint8]) -> str:
-    """A picture as a ``data:`` address that can stand in the page itself."""
+    """A picture as a ``data:`` URL inside the page."""
     _, encoded = cv2.imencode(".png", picture)
     return "data:image/png;base64," + base64.b64encode(encoded.tobytes()).decode("ascii")
 
@@ -90,5 +90,5 @@ def _centre(vertices_m: Array) -> Array:
 
 
 def views(vertices_m: Array, faces: NDArray[np.int64], vertex_rgb: NDArray[np.uint8], size_px: int) -> Sequence[str]:
-    """The pictures of all :data:`VIEWS` as ``data:`` addresses."""
+    """The pictures of all :data:`VIEWS` as ``data:`` URLs."""
     return [png_data_uri(render(vertices_m, faces, vertex_rgb, view, size_px)) for view in VIEWS]

@@ -57,7 +57,7 @@ def _badges(content: ReportContent) -> list[Markup]:
 
 
 def key_figures(content: ReportContent) -> Markup:
-    """The strip of large numbers."""
+    """The row of key figures."""
     evaluation: Mapping[str, Any] = content.evaluation or {}
     shape, best = evaluation.get("shape") or {}, evaluation.get("shape_best_fit") or {}
     pose, time = evaluation.get("pose") or {}, evaluation.get("time") or {}
@@ -71,7 +71,7 @@ def key_figures(content: ReportContent) -> Markup:
         ("Position error", number(pose.get("rmse_mm")), "mm", _at_end(pose, "final_mm")),
         ("Rotation error", number(pose.get("rmse_deg")), "°", _at_end(pose, "final_deg")),
         ("Grasps", str(grasps), "", f"{placed} placed, {contacts} contacts"),
-        ("SLAM step", number(time.get("step_ms_median"), 0), "ms", f"median; {number(time.get('total_s'))} s in all"),
+        ("SLAM step", number(time.get("step_ms_median"), 0), "ms", f"median; {number(time.get('total_s'))} s in total"),
     ]
     return element("dl", *(_tile(*tile) for tile in tiles), class_="strip")
 
@@ -82,7 +82,7 @@ def _tile(name: str, value: str, unit: str, under: str) -> Markup:
 
 
 def _at_end(pose: Mapping[str, Any], key: str) -> str:
-    return f"RMS; {number(pose[key])} at the end" if pose else "needs two sightings"
+    return f"RMS; {number(pose[key])} at the end" if pose else "needs two marker sightings"
 
 
 def _best(value: float | None, digits: int = 1, unit: str = " mm") -> str:
@@ -104,22 +104,24 @@ def shape_section(content: ReportContent) -> Markup:
 def _shape_lead(content: ReportContent) -> str:
     if content.results.dimension == 2:
         return (
-            "The horizontal outline of the object in the frame born at the first grasp. The solid is that outline, "
-            "extruded from the table to the highest contact: a planar session feels no top."
+            "The horizontal outline of the object in the frame defined by the first grasp. The solid is that outline, "
+            "extruded from the table to the highest contact: a planar session does not measure the top."
         )
-    return "The object's surface in the frame born at the first grasp, and its section at the height of the contacts."
+    return (
+        "The object's surface in the frame defined by the first grasp, and its section at the height of the contacts."
+    )
 
 
 def _top_view_card(content: ReportContent, picture: str) -> Markup:
     keys = [("contour", "estimate"), ("contour_band", "two standard deviations"), ("contact", "contact with normal")]
     if content.truth_outline_m() is not None:
-        keys.insert(1, ("truth", "true outline, by the first grasp"))
+        keys.insert(1, ("truth", "true outline, aligned at the first grasp"))
     if content.fitted_outline_m is not None:
         keys.insert(2, ("truth-fit", "at best fit"))
     bar = _scale(content.contour_sigma_m)
     caption = (
-        "Hold the pointer over a contact to see its finger and force. The dashed outline is placed by the first"
-        " grasp's marker pose alone, the dotted one as well as it can be laid onto the estimate."
+        "Point at a contact to see its finger and force. The dashed outline is aligned by the marker pose of the first"
+        " grasp, the dotted one is fitted to the estimate."
     )
     return figure(picture, caption, "Seen from above", legend(keys), bar)
 
@@ -185,7 +187,7 @@ def _controls(content: ReportContent) -> Markup:
 
 
 def tracking_section(content: ReportContent) -> Markup:
-    """Errors over the grasps and the object's way over the table."""
+    """Errors over the grasps and the object's path on the table."""
     errors, way = figures.error_over_grasps(content), figures.trajectory_view(content)
     cards = []
     if errors is not None:
@@ -207,13 +209,13 @@ def tracking_section(content: ReportContent) -> Markup:
 
 def _tracking_lead(content: ReportContent) -> str:
     if content.truth is None:
-        return "No marker camera saw the object: there is no truth to compare with."
+        return "No marker camera saw the object: there is no ground truth to compare with."
     return (
-        "The object's pose at each grasp against the marker camera, after the estimate's object frame is aligned "
-        "at the first grasp that both know (zero by construction)."
+        "The object's pose at each grasp compared with the marker camera. The object frames are aligned at the "
+        "first grasp known to both, where the error is therefore zero."
     )
 
 
 def resource(name: str) -> str:
-    """A text file that lies beside this module in the package."""
+    """A text file next to this module in the package."""
     return files("tactile_lab.report").joinpath(name).read_text(encoding="utf-8")

@@ -16,7 +16,7 @@ import numpy as np
 from drivers.core.contacts import Array
 
 LEAST_SPAN = 20.0
-"""A map shows at least so much (millimetres), however close together its points are."""
+"""Minimum extent of a map (millimetres)."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Scale:
 
 
 def tick_label(value: float) -> str:
-    """A tick value in as few digits as it needs, with a proper minus sign."""
+    """A tick value with as few digits as needed and a proper minus sign."""
     return f"{value:.6g}".replace("-", "\u2212") if abs(value) > 1e-12 else "0"
 
 
@@ -70,7 +70,7 @@ class Chart:
     def map(cls, width: float, points: Array, margin: float = 0.08, ratios: tuple[float, float] = (0.6, 0.8)) -> Chart:
         """A chart with equal scales on both axes that shows all points of shape (n, 2).
 
-        The data area is as high as the data ask for, within ``ratios`` of its width.
+        The height of the data area follows the data, within ``ratios`` of its width.
         """
         low, high = points.min(axis=0), points.max(axis=0)
         centre, span = (low + high) / 2, np.maximum(high - low, LEAST_SPAN) * (1 + 2 * margin)
@@ -82,7 +82,7 @@ class Chart:
         return cls(Frame(width, height + frame.top + frame.bottom), (left, right), (bottom, top))
 
     def add(self, element: str) -> None:
-        """Add a ready SVG element."""
+        """Add a finished SVG element."""
         self._elements.append(element)
 
     def axes(self, x_label: str, y_label: str, x_ticks: Sequence[float] | None = None, wanted_y: int = 5) -> None:
@@ -111,7 +111,7 @@ class Chart:
     def dot(
         self, at: Sequence[float] | Array, kind: str, *, radius: float = 3.5, tip: str = "", style: str = ""
     ) -> None:
-        """A dot at (x, y) with a text that shows under the pointer."""
+        """A dot at (x, y) with a tooltip."""
         title = f"<title>{escape(tip)}</title>" if tip else ""
         place = f'cx="{self.x(at[0]):.2f}" cy="{self.y(at[1]):.2f}" r="{radius:g}"'
         self.add(f'<circle class="{kind}" {place}{_style(style)}>{title}</circle>')
@@ -140,7 +140,7 @@ class Chart:
         return f"M{'L'.join(steps)}{'Z' if closed else ''}" if steps else ""
 
     def text(self, title: str, description: str) -> str:
-        """The SVG element, with a name and a description for those who cannot see it."""
+        """The SVG element, with a name and a description for screen readers."""
         size = f'viewBox="0 0 {self.frame.width:.0f} {self.frame.height:.0f}"'
         names = f"<title>{escape(title)}</title><desc>{escape(description)}</desc>"
         label = escape(f"{title}. {description}")

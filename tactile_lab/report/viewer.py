@@ -16,11 +16,11 @@ from tactile_lab.report.content import Faces, ReportContent, Surface
 NORMAL_LENGTH_m = 0.008
 SHARP_EDGE_rad = np.radians(20.0)
 TRUTH_SECTIONS = 5
-"""Horizontal sections drawn of the true mesh, so that round objects show too."""
+"""Number of horizontal sections of the true mesh, so that round objects are visible too."""
 
 
 def viewer_data(content: ReportContent, surface: Surface, sigma_high_mm: float) -> str:
-    """Everything the view needs as one JSON text that may stand inside a script element."""
+    """The view's data as one JSON text that is safe inside a script element."""
     contacts = content.placed_contacts()
     points = np.concatenate([np.zeros((0, 3)), *(grasp.points_m for grasp in contacts)])
     normals = np.concatenate([np.zeros((0, 3)), *(grasp.normals for grasp in contacts)])

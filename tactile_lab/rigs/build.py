@@ -139,7 +139,7 @@ def fitted_tips(rig: Rig) -> dict[str, Any]:
     if missing := sorted(set(fitted) - set(known)):
         what = f"the fingertip calibration does not name {', '.join(missing)}"
         raise ConfigurationError(
-            what, where=rig.source, hint="Calibrate the finger, or take it out of wires.fingertips"
+            what, where=rig.source, hint="Calibrate the finger, or remove it from wires.fingertips"
         )
     return {finger: known[finger] for finger in FINGERS if finger in fitted}
 

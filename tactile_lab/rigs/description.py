@@ -69,7 +69,7 @@ class CalibrationFiles(StrictModel):
     @model_validator(mode="after")
     def _camera_with_markers(self) -> CalibrationFiles:
         if (self.camera is None) != (self.markers is None):
-            raise ValueError("camera and markers belong together: name both or neither")
+            raise ValueError("camera and markers belong together: give both or neither")
         return self
 
 
@@ -135,14 +135,14 @@ class RigDescription(StrictModel):
     @model_validator(mode="after")
     def _wires_fit(self) -> RigDescription:
         if (self.kind == "wired") != (self.wires is not None):
-            raise ValueError("wires belong to kind wired, and kind wired needs them")
+            raise ValueError("a rig of kind wired needs wires, and no other kind may have them")
         if self.wires is None and any((self.calibration.boards, self.calibration.rates, self.calibration.gains)):
-            raise ValueError("calibration.boards, rates and gains belong to a hand on wires")
+            raise ValueError("calibration.boards, rates and gains are only for a hand on wires")
         if self.emulated and self.kind != "wired":
-            raise ValueError("emulated belongs to kind wired: a simulated rig needs none")
+            raise ValueError("emulated is only for kind wired: a simulated rig needs no emulators")
         if self.wires is not None and bool(self.wires.fingertips) != isinstance(self.fingertip_kind, LinkedKind):
             linked = ", ".join(name for name in FINGERTIPS if isinstance(FINGERTIPS[name], LinkedKind))
-            raise ValueError(f"wires.fingertips belong to fingertips with wires ({linked}): others use the palm's")
+            raise ValueError(f"wires.fingertips is only for fingertips with wires ({linked}): others use the palm's")
         if self.wires is not None and self.wires.camera is not None and self.calibration.camera is None:
             raise ValueError("wires.camera needs calibration.camera and calibration.markers")
         return self
@@ -182,11 +182,13 @@ def load_rig(name_or_path: str) -> Rig:
         path = shipped_rigs().get(name_or_path, path)
     if path.suffix not in {".yaml", ".yml"}:
         known = ", ".join(shipped_rigs())
-        raise ConfigurationError("no such rig", where=name_or_path, hint=f"Name one of {known}, or a .yaml file")
+        raise ConfigurationError("no such rig", where=name_or_path, hint=f"Use one of {known}, or a .yaml file")
     content = load(path)
     if isinstance(content, dict) and content.get("kind") == "fingertips":
         raise ConfigurationError(
-            "has fingertips alone, and no hand to run a session with", where=str(path), hint="Use it with rig check"
+            "has only fingertips, and no hand to run a session with",
+            where=str(path),
+            hint="Use it with tactile-lab rig check",
         )
     extensions = _extensions(content, path)
     for extension in extensions.values():
@@ -258,7 +260,11 @@ def rig_of_session(session: Session) -> Rig:
     where = f"{session.folder}/session.yaml"
     kept = [session.calibration_file(role) for role in session.manifest.calibration if role.startswith("extension-")]
     named = " ".join(f"--extension {file}" for file in kept)
-    hint = f"It ran with code of its own. Look at it, then use tactile-lab {named}" if kept else OTHER_VERSION
+    hint = (
+        f"The session ran with its own extension code. Check that code, then use tactile-lab {named}"
+        if kept
+        else OTHER_VERSION
+    )
     with recorded_keys():
         description = describe(session.manifest.rig_description, where=where, hint=hint)
     files = {role: session.calibration_file(role) for role in session.manifest.calibration}
@@ -279,5 +285,5 @@ def _present(files: dict[str, Path], where: str) -> dict[str, Path]:
     for role, file in files.items():
         if not file.is_file():
             hint = f"Calibrate it, or correct calibration.{role} in the rig file"
-            raise ConfigurationError(f"names a {role} calibration that is missing: {file}", where=where, hint=hint)
+            raise ConfigurationError(f"names a missing {role} calibration: {file}", where=where, hint=hint)
     return files

@@ -35,7 +35,7 @@ from tactile_lab.rigs.fingertip_rig import FingertipRig, is_fingertip_rig, load_
 from tactile_lab.rigs.hand_rig import HandRig, is_hand_rig, load_hand_rig
 
 _EMULATED_SERIAL = 634
-_NO_NEED = "Name a file of kind fingertips or hand; simulated and emulated rigs start what they need"
+_NO_NEED = "Give a rig file of kind fingertips or hand; simulated and emulated rigs start their emulators themselves"
 _VOLTS_RATE_Hz = 1000.0
 
 
@@ -51,12 +51,12 @@ def emulated_rig(name: str) -> AbstractContextManager[dict[str, str]]:
     """
     path = Path(name)
     if name in shipped_rigs():
-        raise ConfigurationError("is a rig that comes with the program", where=name, hint=_NO_NEED)
+        raise ConfigurationError("is a built-in rig", where=name, hint=_NO_NEED)
     if is_hand_rig(path):
         return emulated_hand(load_hand_rig(path))
     if is_fingertip_rig(path):
         return emulate_sensors(load_fingertip_rig(path))
-    raise ConfigurationError("is no rig of kind fingertips or hand", where=name, hint=_NO_NEED)
+    raise ConfigurationError("is not a rig of kind fingertips or hand", where=name, hint=_NO_NEED)
 
 
 @contextmanager
@@ -88,8 +88,10 @@ def emulated_hand(rig: HandRig) -> Iterator[dict[str, str]]:
     """
     description = rig.description
     if description.far_end is None:
-        hint = "Make a cable (ip link add A type veth peer name B), name A in ethercat.interface and B in far_end"
-        raise ConfigurationError("far_end is not named, so there is nothing to serve", where=rig.source, hint=hint)
+        hint = "Create a cable (ip link add A type veth peer name B), and put A in ethercat.interface and B in far_end"
+        raise ConfigurationError(
+            "far_end is missing, so there is no interface for the emulator", where=rig.source, hint=hint
+        )
     serial = _EMULATED_SERIAL if description.ethercat.serial is None else description.ethercat.serial
     palm, tactile = rig.setup.stated_palm or USUAL_PALM, description.hand.tactile
     settings = ChainSettings(palm=palm, serial=serial, eeprom="mapped", tactile=tactile)
@@ -109,7 +111,7 @@ EMULATORS: Registry[Emulate] = Registry("emulator of a wire", "emulated wires")
 
 def _net_box(running: ExitStack, wiring: NetBoxWiring, sensor: EmulatedSensor, folder: Path) -> None:
     if not ipaddress.ip_address(wiring.host).is_loopback:
-        raise ValueError("only loopback addresses such as 127.0.0.2 are")
+        raise ValueError("only loopback addresses such as 127.0.0.2 can be")
     running.enter_context(NetBoxServer(NetBoxUnit(sensor), wiring.host, wiring.port, wiring.http_port))
 
 
@@ -125,7 +127,7 @@ def _controller(running: ExitStack, wiring: ControllerWiring, sensor: EmulatedSe
 
 def _can_board(running: ExitStack, wiring: CanWiring, sensor: EmulatedSensor, folder: Path) -> None:
     if wiring.interface == "virtual":
-        raise ValueError("a virtual bus does not leave this program")
+        raise ValueError("a virtual bus exists only inside one program")
     running.enter_context(CanServer(CanUnit(sensor, wiring.base), open_bus(wiring)))
 
 
@@ -166,4 +168,6 @@ def _volts(wiring: VoltsWiring, sensor: EmulatedSensor, folder: Path) -> Iterato
 
 
 def _refusal(rig: FingertipRig, finger: str, what: str) -> ConfigurationError:
-    return ConfigurationError(what, where=f"{rig.source}: wires.{finger}", hint="Name a place that is free here")
+    return ConfigurationError(
+        what, where=f"{rig.source}: wires.{finger}", hint="Choose an address that is free on this computer"
+    )

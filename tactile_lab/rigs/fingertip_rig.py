@@ -28,7 +28,7 @@ def one_place_each(wires: dict[str, WireSettings]) -> dict[str, WireSettings]:
     taken: dict[str, str] = {}
     for finger, wiring in wires.items():
         if (place := place_of(wiring)) in taken:
-            raise ValueError(f"{taken[place]} and {finger} both name {place}")
+            raise ValueError(f"{taken[place]} and {finger} both use {place}")
         taken[place] = finger
     return wires
 
@@ -93,6 +93,6 @@ def load_fingertip_rig(path: Path) -> FingertipRig:
         raise ConfigurationError(
             f"the fingertip calibration {description.calibration} does not name {', '.join(missing)}",
             where=str(path),
-            hint="Calibrate the finger, or take it out of wires",
+            hint="Calibrate the finger, or remove it from wires",
         )
     return FingertipRig(description, calibrations, path.parent, str(path))

@@ -92,7 +92,7 @@ class WiredLaboratory:
     def remarks(self) -> tuple[str, ...]:
         """Physics that could not keep up with the clock; see :class:`Laboratory`."""
         lost_s = 0.0 if self.emulators is None else self.emulators.lost_s
-        return (f"the emulated laboratory stood still for {lost_s:.1f} s: this computer is too slow",) if lost_s else ()
+        return (f"the emulated laboratory stalled for {lost_s:.1f} s: this computer is too slow",) if lost_s else ()
 
 
 @contextmanager

@@ -48,7 +48,7 @@ def _is_ethernet(interface: Path) -> bool:
 
 def _network(interface: Path) -> PortFound:
     connected = _kernel_report(interface / "operstate") == "up"
-    return PortFound("network", interface.name, "connected" if connected else "no cable, or not set up")
+    return PortFound("network", interface.name, "connected" if connected else "no cable, or interface down")
 
 
 def _kernel_report(file: Path) -> str:

@@ -98,13 +98,13 @@ def camera_source(rig: Rig, wiring: LocalCamera) -> CameraSourceSettings:
     lens, markers = load_camera(rig.files["camera"]), load_model(rig.files["markers"], MarkerSettings)
     given = settings.model_fields_set
     if "dictionary" in given and settings.dictionary != markers.dictionary:
-        what = f"looks for {settings.dictionary}, the markers are of {markers.dictionary}"
-        raise ConfigurationError(what, where=where, hint="Leave dictionary out: the marker file says it")
+        what = f"detects {settings.dictionary}, but the markers are from {markers.dictionary}"
+        raise ConfigurationError(what, where=where, hint="Remove dictionary: the marker file has it")
     size_px = lens.size_px or settings.size_px
     if "size_px" in given and settings.size_px != size_px:
         stated, made = (" x ".join(map(str, size)) for size in (settings.size_px, size_px))
-        what = f"takes pictures of {stated} pixels, the lens was calibrated with {made}"
-        raise ConfigurationError(what, where=where, hint="Calibrate the camera for this size, or leave size_px out")
+        what = f"takes pictures of {stated} pixels, but the lens was calibrated with {made}"
+        raise ConfigurationError(what, where=where, hint="Calibrate the camera for this size, or remove size_px")
     source = source_beside(settings.source, Path(rig.source).parent)
     known = settings.model_copy(update={"source": source, "dictionary": markers.dictionary, "size_px": size_px})
     known.place()
@@ -132,8 +132,8 @@ def emulation_plan(rig: Rig, seed: int, object_name: str) -> EmulationPlan:
 def _hand_place(rig: Rig) -> HandPlace:
     wiring = wires_of(rig).hand
     if wiring.far_end is None:
-        hint = "Name the other end of the virtual cable, as the shipped sim-wire rig does"
-        raise ConfigurationError("stand-ins need wires.hand.far_end", where=rig.source, hint=hint)
+        hint = "Give the other end of the virtual cable, as in the built-in rig sim-wire"
+        raise ConfigurationError("emulators need wires.hand.far_end", where=rig.source, hint=hint)
     return HandPlace(
         near=wiring.ethercat.interface,
         far=wiring.far_end,
@@ -148,7 +148,7 @@ def _camera_place(rig: Rig) -> Place | None:
     """Where the plant's camera is served; a camera of this computer is used as it is, and sees what it sees."""
     camera, eye = wires_of(rig).camera, rig.description.simulation.camera
     if isinstance(camera, RemoteCamera) and (eye.stream_hz is not None or eye.late_ms):
-        what, hint = "the stand-in camera waits for triggers, and answers at once", "Leave stream_hz and late_ms out"
+        what, hint = "the emulated camera waits for triggers and answers immediately", "Remove stream_hz and late_ms"
         raise ConfigurationError(what, where=f"{rig.source}: simulation.camera", hint=hint)
     return (camera.host, camera.port) if isinstance(camera, RemoteCamera) else None
 
@@ -156,7 +156,7 @@ def _camera_place(rig: Rig) -> Place | None:
 def _base_place(rig: Rig) -> Place:
     wiring, kind = wires_of(rig).base, rig.description.positioner_kind
     if not kind.emulator_host:
-        what, hint = f"no emulator of the positioner {rig.description.positioner}", "Run it on a simulated rig"
+        what, hint = f"there is no emulator of the positioner {rig.description.positioner}", "Run it on a simulated rig"
         raise ConfigurationError(what, where=f"{rig.source}: wires.base", hint=hint)
     place = wiring.model_dump()
     return place["host"], place["port"]
@@ -166,7 +166,7 @@ def _with_emulator(rig: Rig, finger: str, wiring: WireSettings) -> WireSettings:
     if not WIRES[wiring.wire].emulator_host:
         fed = ", ".join(name for name in WIRES if WIRES[name].emulator_host)
         where = f"{rig.source}: wires.fingertips.{finger}"
-        raise ConfigurationError(f"the simulated plant feeds {fed} wires alone", where=where, hint=f"Use wire: {fed}")
+        raise ConfigurationError(f"the simulated plant feeds only {fed} wires", where=where, hint=f"Use wire: {fed}")
     return wiring
 
 

@@ -1,1 +1,1 @@
-"""Tactile SLAM, pure science: no device, no session, no file."""
+"""Tactile SLAM itself: independent of devices, sessions and files."""

@@ -1,4 +1,4 @@
-"""The object's shape as an estimation has it now: the most probable model of the contacts at their present poses."""
+"""The current estimate of the object's shape: the most probable model of the contacts at their present poses."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from tactile_lab.slam.tracking.trackers import TrackingSettings
 
 @dataclass(frozen=True)
 class PresentShape:
-    """What a shape model makes of the contacts.
+    """The shape that a model fits to the contacts.
 
     Attributes:
-        extracted: the outline (dimension 2) or the surface, object frame, with its standard deviation; None where the
+        extracted: the outline (dimension 2) or the surface, object frame, with its standard deviation; None if the
             contacts enclose nothing, or the model fails: the trajectory is still a result.
-        warning: why the model fails, with its file; empty when it does not.
+        warning: why the model failed, with its file; empty if it did not.
     """
 
     extracted: Contour | SurfaceMesh | None
@@ -37,13 +37,13 @@ def present_shape(
     origin_height_m: float,
     resolution_m: float,
 ) -> PresentShape:
-    """The shape of the contacts by one model; never raises for what is wrong with the model.
+    """The shape of the contacts by one model; never raises for errors of the model.
 
     Args:
         field: of the contacts.
         contact_map: the contacts at their poses.
-        settings: of the estimation; an object that moves on the table stands on it. Of method "joint" the surface's
-            sigma includes what the poses leave open.
+        settings: of the estimation; an object that moves on the table stands on it. With method "joint" the surface's
+            sigma includes the uncertainty of the poses.
         model: of the shape.
         origin_height_m: height of the object frame's origin over the table.
         resolution_m: of the outline or surface.
@@ -77,7 +77,7 @@ def _extract(
 
 
 def _problem(extracted: object, wanted: type[Contour | SurfaceMesh]) -> str:
-    """Why an outline or surface is none, in words; empty when it is one."""
+    """Why an outline or surface is invalid; empty if it is valid."""
     if not isinstance(extracted, wanted):
         return f"gives a {type(extracted).__name__} where a {wanted.__name__} belongs"
     points_m = extracted.points_m if isinstance(extracted, Contour) else extracted.vertices

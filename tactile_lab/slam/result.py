@@ -1,4 +1,4 @@
-"""What tactile SLAM tells: after every grasp, and at the end."""
+"""Results of tactile SLAM: after every grasp, and at the end."""
 
 from __future__ import annotations
 
@@ -17,18 +17,17 @@ Verdict = Literal["first", "tracked", "uncertain", "untracked"]
 
 @dataclass(frozen=True)
 class SlamStep:
-    """What one grasp told.
+    """The result of one grasp.
 
     Attributes:
         index, stamp_ns: of the grasp.
-        world_T_object: pose after this grasp, None before the object frame is born.
-        covariance: of (x m, y m, yaw rad) in the world, shape (3, 3), None as the pose.
+        world_T_object: pose after this grasp, None before the object frame is defined.
+        covariance: of (x m, y m, yaw rad) in the world, shape (3, 3), None if there is no pose.
         effective_count: effective number of particles or hypotheses.
         observability: smallest eigenvalue of (3.18) of this grasp's contacts for motions on the table.
         verdict: "first", "tracked", "uncertain" or "untracked".
-        reason: the verdict in words.
-        contacts: number of contacts of this dimension.
-        contacts_used: how many of them entered the shape.
+        reason: the verdict as text. contacts: number of contacts of this dimension.
+        contacts_used: number of them used for the shape.
         seconds: computing time.
     """
 
@@ -50,16 +49,16 @@ class SlamResult:
     """A finished session.
 
     Attributes:
-        method, seed, dimension: as asked for.
-        world_T_object: the pose at each grasp, None where the object was not known.
+        method, seed, dimension: as requested.
+        world_T_object: the pose at each grasp, None if unknown.
         covariances: of (x, y, yaw), None as the poses.
-        steps: what each grasp told when it was taken; later corrections are in ``world_T_object``.
+        steps: the result of each grasp when it was taken; later corrections are in ``world_T_object``.
         loops: every loop of the pose graph with its verdict.
         surface: the final field in the object frame, None if there was no usable grasp.
         contour: the final outline (dimension 2), object frame.
         mesh: the final surface (dimension 3), object frame.
         status: "ok" or "lost".
-        warnings: what failed on the way without ending it, in words.
+        warnings: failures that did not end the estimation.
     """
 
     method: str

@@ -1,18 +1,18 @@
 """Tactile SLAM: follow an object through successive grasps and build its shape at the same time.
 
 :meth:`TactileSlam.step` is algorithm 3.1 of the thesis for one grasp, followed by the pose graph of its
-section 3.3.3. Frames: the object frame is born at the first grasp, its origin at the contacts' centre, its x
+section 3.3.3. Frames: the object frame is defined by the first grasp, its origin at the contacts' centre, its x
 axis along the palm's horizontal axis, z up (section 3.4). The object stays on the table: its pose is
-``(x, y, yaw)`` and its origin keeps the height it was born at, so that in the object frame a contact's z is its
+``(x, y, yaw)`` and its origin keeps its initial height, so that in the object frame a contact's z is its
 height over the table minus that height, in every grasp.
 
-What happens to grasps that cannot be placed:
+Grasps that cannot be registered:
 
-- No particle explains the contacts (with the thesis's gate: fewer than four close and observable ones): the
-  predicted pose stays, with its grown covariance, the contacts are kept aside: "untracked".
+- No particle explains the contacts (with the thesis's gate: fewer than four close and observable ones): the predicted
+  pose is kept, with its increased covariance, and the contacts are not used: "untracked".
 - The pose is corrected, but remains so uncertain that it moves the contacts along their normals by more than
-  ``placement_limit_m`` (few contacts, or a direction not observed): "uncertain". A particle filter keeps the
-  contacts aside, because its only map could not take them back; joint hypotheses use them and stay revisable.
+  ``placement_limit_m`` (few contacts, or a direction not observed): "uncertain". A particle filter does not use the
+  contacts, because they could not be removed from its only map; joint hypotheses use them and remain revisable.
 
 A session is lost when the last ``lost_after`` grasps were untracked, or more than half of all.
 """
@@ -60,12 +60,12 @@ class SlamSettings(TrackingSettings):
 
     Attributes:
         back_end: the pose graph.
-        least_first_contacts: the object frame is born at the first grasp with so many contacts.
-        placement_limit_m: see the module's text.
+        least_first_contacts: the first grasp with this many contacts defines the object frame.
+        placement_limit_m: see the module's docstring.
         shape_model: of the final outline or surface; "auto" is chosen by evidence.
         lost_after: successive untracked grasps after which the object counts as lost.
         contour_resolution_m, mesh_resolution_m: of the final shape.
-        largest_sigma_m: the parts of the shape that are known so well are written once more, apart; None for not.
+        largest_sigma_m: also write the part of the shape with a standard deviation below this; None: do not.
     """
 
     back_end: BackEndSettings = BackEndSettings()
@@ -90,11 +90,11 @@ class TactileSlam:
         """
         Args:
             settings: see there.
-            seed: of all that is left to chance.
-            known_poses: true ``world_T_object`` of every grasp, in order, for method "known-pose" and no other.
+            seed: of all random numbers. known_poses: true ``world_T_object`` of every grasp, in order, only for method
+                "known-pose".
 
         Raises:
-            ConfigurationError: the method needs poses and has none, or is given poses that it must not know.
+            ConfigurationError: the method needs poses and has none, or is given poses that it must not use.
         """
         self._settings = settings or SlamSettings()
         self._known_poses = poses_to_be_told(self._settings.method, known_poses)
@@ -118,17 +118,17 @@ class TactileSlam:
 
     @property
     def settings(self) -> SlamSettings:
-        """What was asked for."""
+        """The settings."""
         return self._settings
 
     @property
     def step_count(self) -> int:
-        """Grasps taken into account so far."""
+        """Number of grasps added so far."""
         return len(self._steps)
 
     @on_one_thread
     def step(self, grasp: Grasp) -> SlamStep:
-        """Take one grasp into account (algorithm 3.1, then the graph).
+        """Add one grasp (algorithm 3.1, then the graph).
 
         Raises:
             TrackingError: the grasp has entries that are not finite, or wrong units; nothing was changed.
@@ -147,7 +147,7 @@ class TactileSlam:
         return self._record(grasp, contacts, verdict, reason, started)
 
     def add_grasp(self, grasp: Grasp) -> SlamStep:
-        """As :meth:`step`, but a grasp that is refused counts as one without contacts; its step says why."""
+        """As :meth:`step`, but an invalid grasp counts as one without contacts; its step says why."""
         try:
             return self.step(grasp)
         except TrackingError as error:
@@ -181,12 +181,12 @@ class TactileSlam:
 
     @property
     def world_T_object(self) -> Pose3 | None:
-        """The present pose; None before the object frame is born."""
+        """The present pose; None before the object frame is defined."""
         return self._trajectory()[-1] if self._steps else None
 
     @property
     def trajectory(self) -> tuple[Pose3 | None, ...]:
-        """The pose at every grasp so far, as the present knowledge has it; None where it is not known."""
+        """The present estimate of the pose at every grasp; None if unknown."""
         return self._trajectory()
 
     @property
@@ -212,7 +212,7 @@ class TactileSlam:
 
     @on_one_thread
     def shape(self, resolution_m: float) -> Contour | SurfaceMesh | None:
-        """The present outline or surface by the model of the settings; None where the contacts enclose nothing yet.
+        """The present outline or surface by the model of the settings; None if the contacts enclose nothing yet.
 
         See :func:`tactile_lab.slam.current_shape.present_shape`.
         """
@@ -231,25 +231,25 @@ class TactileSlam:
 
     @property
     def surface_grasps(self) -> NDArray[np.intp]:
-        """Which grasp each contact of :attr:`surface` comes from, counted from the object frame's birth, shape (n,)."""
+        """Number of the grasp of each contact of :attr:`surface`, from the first in the map, shape (n,)."""
         return np.empty(0, dtype=np.intp) if self._tracker is None else self._tracker.refined.grasp_indices
 
     @property
     def mechanisms_that_acted(self) -> frozenset[Mechanism]:
-        """Of method "joint", those that say whether they changed anything and did; the others are not among them."""
+        """Mechanisms of method "joint" that reported a change."""
         tracker = self._tracker
         return frozenset(tracker.mechanisms.changed) if isinstance(tracker, JointTracker) else frozenset()
 
     @property
     def is_lost(self) -> bool:
-        """The rule is in the module's text; a session without any object frame is lost as well."""
+        """See the module's docstring; a session without an object frame is lost as well."""
         untracked = [step.verdict == "untracked" for step in self._steps]
         recent = untracked[-self._settings.lost_after :]
         all_recent = len(recent) == self._settings.lost_after and all(recent)
         return self._tracker is None or all_recent or 2 * sum(untracked) > len(untracked)
 
     def _begin(self, grasp: Grasp, contacts: ContactSet, started: float) -> SlamStep:
-        """The object frame is born: origin at the contacts' centre, x axis along the palm's (section 3.4)."""
+        """Define the object frame: origin at the contacts' centre, x axis along the palm's (section 3.4)."""
         least = self._settings.least_first_contacts
         if len(contacts) < least:
             reason = f"{len(contacts)} contacts, the object frame needs {least}"
@@ -295,7 +295,7 @@ class TactileSlam:
         return step
 
     def _placed_grasps(self) -> list[PlacedGrasp | None]:
-        """One entry a grasp; grasps before the object frame was born have none."""
+        """One entry per grasp; None before the object frame was defined."""
         placed = list(self._tracker.refined.placed) if self._tracker else []
         return [None] * (len(self._steps) - len(placed)) + placed
 

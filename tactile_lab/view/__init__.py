@@ -1,4 +1,4 @@
-"""The live page: a process of its own that shows a session and sends back what is pressed.
+"""The live page: a separate process that shows a session and sends back button presses.
 
-Nothing here can delay or stop a recording: the session hands over copies through a bounded queue and never waits.
+Nothing here can delay or stop a recording: the session passes copies through a bounded queue and never waits.
 """

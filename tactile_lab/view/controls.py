@@ -1,4 +1,4 @@
-"""The panel of the page: what to do, what is seen, the grasps so far, and buttons."""
+"""The panel of the page: what to do, sensor readings, the grasps so far, and buttons."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from tactile_lab.colours import hex_colour, viridis
 from tactile_lab.view.scene import Scene, SIGMA_FULL_m
 
 Press = Callable[[Ask, str], None]
-"""Called with what was pressed and a text."""
+"""Called with the request of a pressed button and a text."""
 
 BUTTONS: tuple[tuple[Ask, str, IconName, str], ...] = (
-    (Ask.NEXT, "Next step", Icon.PLAYER_SKIP_FORWARD, "This step is done"),
-    (Ask.GO, "Do it", Icon.ROBOT, "Let the rig do this step by itself"),
+    (Ask.NEXT, "Next step", Icon.PLAYER_SKIP_FORWARD, "Finish this step"),
+    (Ask.GO, "Do it", Icon.ROBOT, "Let the rig do this step automatically"),
     (Ask.CAPTURE, "Capture", Icon.FOCUS_CENTERED, "Measure this grasp now"),
-    (Ask.UNDO, "Undo", Icon.ARROW_BACK_UP, "Take the last grasp back"),
-    (Ask.PAUSE, "Pause / go on", Icon.PLAYER_PAUSE, "Nothing moves until it is pressed again"),
+    (Ask.UNDO, "Undo", Icon.ARROW_BACK_UP, "Undo the last grasp"),
+    (Ask.PAUSE, "Pause / resume", Icon.PLAYER_PAUSE, "Pause all motion until pressed again"),
     (Ask.END, "End", Icon.PLAYER_STOP, "End the session; press twice"),
 )
 _ROWS = 8
@@ -37,8 +37,8 @@ class Controls:
 
     Args:
         server: the page.
-        press: called with what was pressed and a text.
-        live: there is a session that can be asked for something.
+        press: called with a button's request and a text.
+        live: whether a session accepts requests.
     """
 
     def __init__(self, server: viser.ViserServer, press: Press, *, live: bool) -> None:
@@ -64,20 +64,20 @@ class Controls:
 
     def _note(self, server: viser.ViserServer, press: Press) -> None:
         text: Any = server.gui.add_text("Note", "")
-        button = server.gui.add_button("Keep the note", icon=Icon.PENCIL, color="gray")
+        button = server.gui.add_button("Save note", icon=Icon.PENCIL, color="gray")
 
         def keep(event: viser.GuiEvent[Any]) -> None:
             note, text.value = text.value, ""
             if note.strip():
                 press(Ask.NOTE, note)
             elif event.client is not None:  # a browser that is behind sends the press and drops what was written
-                said = "Nothing was written, or it did not arrive. Write it, and press again."
-                event.client.add_notification("No note kept", said, auto_close_seconds=_SHOWN_s, color="red")
+                said = "The note is empty, or was not received. Write it and press again."
+                event.client.add_notification("Note not saved", said, auto_close_seconds=_SHOWN_s, color="red")
 
         button.on_click(keep)
 
     def draw(self, scene: Scene) -> None:
-        """Bring the panel up to date."""
+        """Update the panel."""
         self._status.content = status_html(scene)
         self._history.content = history_html(scene)
 
@@ -98,7 +98,7 @@ def status_html(scene: Scene) -> str:
         ("object", str(guide.get("unknown", ""))),
         ("next", str(guide.get("suggestion", "") or scene.next_plan.get("reason", ""))),
         ("last", scene.messages[-1] if scene.messages else ""),
-        ("left out", f"{scene.dropped} messages: the page was slower than the session" if scene.dropped else ""),
+        ("not shown", f"{scene.dropped} messages: the page was slower than the session" if scene.dropped else ""),
     ]
     parts += [_fact(name, value) for name, value in facts if value]
     if scene.surface is not None:
@@ -142,12 +142,12 @@ def history_html(scene: Scene) -> str:
         rows.append(f"<tr><td>{grasp.index + 1}</td><td>{len(grasp.fingers)}</td><td>{said}</td></tr>")
     if not rows:
         return f'<div style="{PANEL_STYLE}">no grasp yet</div>'
-    head = '<tr style="text-align:left;color:#57606a"><th>grasp</th><th>contacts</th><th>the estimate says</th></tr>'
+    head = '<tr style="text-align:left;color:#57606a"><th>grasp</th><th>contacts</th><th>estimate</th></tr>'
     return f'<div style="{PANEL_STYLE}"><table style="width:100%">{head}{"".join(rows)}</table></div>'
 
 
 def _scale() -> str:
-    """What the colours of the surface mean."""
+    """Legend of the surface's colours."""
     colours = ",".join(hex_colour(colour) for colour in viridis(np.linspace(0.0, 1.0, 6)))
     bar = f'<span style="flex:1;height:8px;border-radius:4px;background:linear-gradient(90deg,{colours})"></span>'
     return (
@@ -157,7 +157,7 @@ def _scale() -> str:
 
 
 def line_html(text: str, style: str) -> str:
-    """A line of text in a style; nothing for no text."""
+    """A line of styled text; empty for no text."""
     return f'<div style="{style}">{html.escape(text)}</div>' if text else ""
 
 

@@ -42,7 +42,7 @@ class Drawing:
 
     Args:
         server: the page.
-        distance: of the eye at first, as a multiple of what shows a hand at an object.
+        distance: initial camera distance, as a multiple of the one that shows a hand at an object.
     """
 
     def __init__(self, server: viser.ViserServer, distance: float = 1.0) -> None:
@@ -66,7 +66,7 @@ class Drawing:
         server.initial_camera.fov = np.radians(42.0)
 
     def draw(self, scene: Scene) -> None:
-        """Bring the page up to date."""
+        """Update the page."""
         changed, scene.changed = scene.changed, set()
         if "hand" in changed:
             self._hand(scene)
@@ -77,7 +77,7 @@ class Drawing:
             self._plan(scene)
 
     def _replace(self, group: str, nodes: list[Any]) -> None:
-        """The nodes of a group from now on; those of the same name have taken the place of the old ones already."""
+        """Set the nodes of a group; nodes of the same name have already replaced the old ones."""
         names = {node.name for node in nodes}
         for node in self._nodes.get(group, []):
             if node.name not in names:
@@ -217,9 +217,9 @@ def quaternion(pose: Pose3) -> Array:
 
 
 def patches(surface: ShownSurface) -> list[Patch]:
-    """The surface in parts of one colour each: dark where it is well known, yellow where it is not.
+    """The surface in parts of one colour each: dark where certain, yellow where uncertain.
 
-    An outline is shown as the wall that stands on it, from the table to twice the height of the contacts.
+    An outline is shown as a vertical wall from the table to twice the height of the contacts.
     """
     vertices_m, faces, sigma_m = surface.vertices_m, surface.faces, surface.sigma_m
     if surface.dimension == 2:
@@ -231,7 +231,7 @@ def patches(surface: ShownSurface) -> list[Patch]:
 
 
 def _patch_of(vertices_m: Array, faces: Any, colour: Any) -> Patch:
-    """Only the vertices that these faces need."""
+    """A patch with only the vertices that these faces need."""
     used, renumbered = np.unique(faces, return_inverse=True)
     red, green, blue = (int(channel) for channel in colour)
     return Patch(vertices_m[used], renumbered.reshape(-1, 3), (red, green, blue))

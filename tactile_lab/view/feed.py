@@ -10,7 +10,7 @@ from sessions.guided.operator import Ask, Panel, Request, request_of
 from tactile_lab.view.page_transport import PageTransport
 
 PAGE_ASKS = frozenset(Ask) - {Ask.ATTACH, Ask.MOVE, Ask.FINGERS}
-"""What a page may ask for: nothing that moves the hand by itself, and no files of this computer."""
+"""Requests allowed from a page: none that names files of this computer."""
 _PENDING = 50
 
 
@@ -28,16 +28,16 @@ class ViewFeed(PageTransport):
         self._asked: deque[Request] = deque(maxlen=_PENDING)
 
     def on_press(self, content: Mapping[str, Any]) -> None:
-        """Keep what may be asked for. Raises ValueError for what is no request."""
+        """Store an allowed request. Raises ValueError for anything else."""
         if (request := request_of(content)).ask in PAGE_ASKS:
             self._asked.append(request)
 
     def requests(self) -> Sequence[Request]:
-        """What was pressed since the last call."""
+        """Requests since the last call."""
         requests = []
         while self._asked:
             requests.append(self._asked.popleft())
         return requests
 
     def show(self, panel: Panel) -> None:
-        """The page is shown the recorded panels."""
+        """Nothing to do: the page shows the recorded panels."""

@@ -1,9 +1,8 @@
-"""The door of the page: who may see it and press its buttons.
+"""Access control of the page: who may see it and press its buttons.
 
-The page itself listens on an address of the loopback network that is drawn at random for each session, and is reached
-through this door only. The door takes a visitor who names it by the name it is known by (so that no other web site,
-open in the same browser, can press a button), and who shows the token where there is one: once in the address, then in
-a cookie.
+The page itself listens on a random address of the loopback network, new for each session, and is reached only through
+this gate. The gate accepts a visitor who uses one of its known host names (so that no other web site open in the same
+browser can press a button) and who has the token if there is one: once in the address, then in a cookie.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ def new_token() -> str:
 
 
 def inner_address() -> str:
-    """An address of the loopback network that no web page can guess (Linux answers on all of 127/8)."""
+    """A random address of the loopback network, which no web page can guess (Linux answers on all of 127/8)."""
     return str(ipaddress.IPv4Address((127 << 24) | (1 << 16) | secrets.randbelow((1 << 24) - (2 << 16))))
 
 
@@ -63,7 +62,7 @@ class Gate:
     """Decides about requests.
 
     Args:
-        names: host names and addresses by which the page may be called.
+        names: host names and addresses of the page.
         token: "" for none.
     """
 
@@ -71,13 +70,13 @@ class Gate:
         self._names, self._token = names, token
 
     def verdict(self, head: Head) -> tuple[HTTPStatus, str]:
-        """OK: let it through; SEE_OTHER with the cookie to set; anything else with the reason."""
+        """OK: pass it on; SEE_OTHER with the cookie to set; anything else with the reason."""
         host = head.headers.get("host", "")
         if _host_name(host) not in self._names:
-            return HTTPStatus.FORBIDDEN, f"this page is not called {host[:80]}"
+            return HTTPStatus.FORBIDDEN, f"this page is not known as {host[:80]}"
         origin = head.headers.get("origin")
         if origin is not None and origin.partition("://")[2] != host:
-            return HTTPStatus.FORBIDDEN, "asked for by another web site"
+            return HTTPStatus.FORBIDDEN, "the request comes from another web site"
         if not self._token:
             return HTTPStatus.OK, ""
         if self._same(_cookie(head.headers.get("cookie", ""))):
@@ -85,7 +84,7 @@ class Gate:
         shown = re.search(r"[?&]token=([A-Za-z0-9_-]+)", head.path)
         if shown and self._same(shown[1]):
             return HTTPStatus.SEE_OTHER, f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
-        return HTTPStatus.FORBIDDEN, "the token is missing or wrong: use the address that the session has shown"
+        return HTTPStatus.FORBIDDEN, "the token is missing or wrong: use the address that the session printed"
 
     def _same(self, shown: str) -> bool:
         return hmac.compare_digest(shown.encode(), self._token.encode())
@@ -106,7 +105,7 @@ def _cookie(header: str) -> str:
 
 
 async def serve(gate: Gate, address: str, port: int, inner: tuple[str, int]) -> asyncio.Server:
-    """Listen, and carry what may pass to ``inner``. Raises OSError when the address cannot be taken."""
+    """Listen, and forward accepted requests to ``inner``. Raises OSError if the address is not available."""
 
     async def visit(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with contextlib.suppress(OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, TimeoutError):
@@ -132,7 +131,7 @@ async def _visit(
 
 
 def _closing(head: bytes) -> bytes:
-    """Every page request has a connection of its own, so that each one passes the door; a websocket keeps its own."""
+    """Every page request has a separate connection, so that each one is checked; a websocket keeps its connection."""
     if re.search(rb"(?im)^upgrade:", head):
         return head
     without = re.sub(rb"(?im)^connection:[^\r\n]*\r\n", b"", head)
@@ -140,7 +139,7 @@ def _closing(head: bytes) -> bytes:
 
 
 def _answer(status: HTTPStatus, text: str) -> bytes:
-    """An answer without a page; the cookie goes with the way on."""
+    """A response without a page; a cookie is set with a redirect."""
     extra = f"Set-Cookie: {text}\r\nLocation: /\r\n" if status is HTTPStatus.SEE_OTHER else ""
     body = b"" if extra else f"{status.value} {status.phrase}: {text}\n".encode()
     head = f"HTTP/1.1 {status.value} {status.phrase}\r\n{extra}Content-Type: text/plain; charset=utf-8\r\n"

@@ -1,4 +1,4 @@
-"""The page: viser behind the door, fed with messages."""
+"""The page: viser behind the access control, updated by messages."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from tactile_lab.view.wizard_feed import QUIT
 from tactile_lab.view.wizard_panel import WizardPanel
 
 Say = Callable[..., None]
-"""Says what was pressed, by names: ask and text, or question and answer."""
+"""Reports a pressed button by keywords: ask and text, or question and answer."""
 
 _WHOLE_TABLE = 3.0
-"""A wizard's hand presses the edges of the table too: seen from so much farther away."""
+"""Camera distance for a wizard, whose hand also presses the edges of the table."""
 
 
 class Page:
     """A page that shows a scene.
 
     Args:
-        address, port: where it listens; port 0 takes a free one.
-        token: what a visitor has to show; needed for any address but the loopback interface's.
+        address, port: where it listens; port 0: any free port.
+        token: access token; needed for any address but the loopback interface's.
         title: of the page.
-        panel: whose buttons it has.
-        say: called with what was pressed, in another thread; None where there is nothing to ask for.
+        panel: which buttons it has.
+        say: called with a pressed button, in another thread; None without requests.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Page:
     ) -> None:
         if not token and not is_loopback(address):
             raise DeviceError(
-                "a token is needed to listen there", where=address, hint="Listen on 127.0.0.1, or --token"
+                "a token is needed to listen on this address", where=address, hint="Listen on 127.0.0.1, or use --token"
             )
         self._door, self._token = (address, port), token
         with redirect_stdout(StringIO()):  # viser greets on standard output
@@ -67,10 +67,10 @@ class Page:
         self._thread = threading.Thread(target=self._loop.run_forever, name="door", daemon=True)
         self._server: asyncio.Server | None = None
         self.url = ""
-        """Where the page is, token and all."""
+        """URL of the page, including the token."""
 
     def __enter__(self) -> Self:
-        """Open the door. Raises DeviceError when the address cannot be taken."""
+        """Start listening. Raises DeviceError if the address is not available."""
         self._thread.start()
         address, port = self._door
         inner = (self._inner.get_host(), self._inner.get_port())
@@ -93,7 +93,7 @@ class Page:
         self.close()
 
     def close(self) -> None:
-        """Nobody can see the page any more."""
+        """Close the page."""
         if self._server is not None:
             self._loop.call_soon_threadsafe(self._server.close)
         asyncio.run_coroutine_threadsafe(_end_visits(), self._loop).result(2.0)
@@ -111,7 +111,7 @@ class Page:
 
 
 def _controls(server: viser.ViserServer, panel: str, say: Say | None) -> Controls | WizardPanel:
-    """The panel, which says what is pressed."""
+    """The panel with its buttons."""
     told: Say = say or (lambda **content: None)
 
     def press(ask: Ask, text: str) -> None:
@@ -126,13 +126,13 @@ def _controls(server: viser.ViserServer, panel: str, say: Say | None) -> Control
 
 
 def refuse_tunnels(server: viser.ViserServer) -> None:
-    """A visitor of viser's page may ask for a public address of it: not here."""
+    """Disable viser's option to request a public address for the page."""
     for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
         server._websock_server.unregister_handler(message)
 
 
 async def _end_visits() -> None:
-    """Nobody is carried any further."""
+    """No public address."""
     others = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
     for task in others:
         task.cancel()
@@ -140,7 +140,7 @@ async def _end_visits() -> None:
 
 
 def _names(address: str) -> frozenset[str]:
-    """By what names a page at an address may be called."""
+    """Valid host names of a page at an address."""
     if is_loopback(address):
         return frozenset({address, "localhost", "127.0.0.1", "::1"})
     return frozenset({address.lower()})

@@ -1,8 +1,7 @@
-"""A page as a process of its own, and the way there and back: messages out, lines in, and never a wait.
+"""Runs the page in a separate process and exchanges messages with it without waiting.
 
-What the page is to show goes through a bounded queue to a thread that writes to the process's standard input: a page
-that is slow, stopped or dead holds up that thread and nothing else, and what does not fit into the queue is counted and
-left out.
+Messages to the page go through a bounded queue to a thread that writes to the process's standard input: a page that is
+slow, stopped or dead blocks only that thread, and messages that do not fit into the queue are counted and dropped.
 """
 
 from __future__ import annotations
@@ -12,39 +11,39 @@ import contextlib
 import json
 import queue
 import subprocess
-import sys
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from types import TracebackType
 from typing import Any, Literal, Self
 
+from drivers.core.child_process import child_command, child_environment
 from drivers.core.errors import DeviceError
 from tactile_lab.view.scene import SHOWN_TOPICS
 
 QUEUE_LENGTH = 400
-"""Messages that may wait: some ten seconds of a session."""
+"""Size of the queue in messages: about ten seconds of a session."""
 START_TIMEOUT_s = 60.0
 _END_TIMEOUT_s = 2.0
 _LINE_BYTES = 10_000
 
 
 class PageTransport(ABC):
-    """A page that is started, given what it shows, and listened to; a :class:`~.recorder.TrafficSink`.
+    """Starts a page, sends it messages and receives its requests; a :class:`~.recorder.TrafficSink`.
 
     Args:
-        panel: whose buttons the page has.
-        address, port: where the page listens; port 0 takes a free one.
-        token: what a visitor has to show; "" for none, on the loopback interface only.
+        panel: which buttons the page has.
+        address, port: where the page listens; port 0: any free port.
+        token: access token; "" for none, on the loopback interface only.
         title: of the page.
     """
 
     def __init__(self, panel: Literal["session", "wizard"], address: str, port: int, token: str, title: str) -> None:
         self._settings = {"panel": panel, "address": address, "port": port, "token": token, "title": title}
         self.dropped = 0
-        """Messages that were left out because the page did not keep up."""
+        """Messages that were dropped because the page did not keep up."""
         self.url = ""
-        """Where the page is, once it is there."""
+        """URL of the page, once it listens."""
         self._queue: queue.Queue[bytes | None] = queue.Queue(QUEUE_LENGTH)
         self._process: subprocess.Popen[bytes] | None = None
         self._ready = threading.Event()
@@ -54,10 +53,14 @@ class PageTransport(ABC):
     # --- lifecycle ---------------------------------------------------------------------------------------------
 
     def __enter__(self) -> Self:
-        """Start the page and wait until it listens. Raises DeviceError when it does not."""
-        command = [sys.executable, "-m", "tactile_lab.view.process"]
+        """Start the page and wait until it listens. Raises DeviceError if it does not."""
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True
+            child_command("tactile_lab.view.process"),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+            env=child_environment(),
         )
         self._queue.put_nowait(json.dumps(self._settings).encode() + b"\n")
         for work in (self._send, self._listen):
@@ -67,7 +70,7 @@ class PageTransport(ABC):
         if not self._ready.wait(START_TIMEOUT_s) or self._problem:
             self.close()
             text = self._problem or f"did not start within {START_TIMEOUT_s:.0f} s"
-            raise DeviceError(text, where="page", hint="Choose another --view-port, or go on without --view")
+            raise DeviceError(text, where="page", hint="Choose another --view-port, or run without --view")
         return self
 
     def __exit__(
@@ -76,7 +79,7 @@ class PageTransport(ABC):
         self.close()
 
     def close(self) -> None:
-        """End the page; bounded in time, whatever state the page is in."""
+        """End the page, in limited time, whatever its state."""
         process, self._process = self._process, None
         if process is None:
             return
@@ -102,7 +105,7 @@ class PageTransport(ABC):
     # --- out ---------------------------------------------------------------------------------------------------
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        """Show this; at once, whatever the page does."""
+        """Queue a message, without waiting."""
         if topic not in SHOWN_TOPICS:
             return
         content = {"topic": topic, "stamp_ns": stamp_ns, "dropped": self.dropped}
@@ -113,7 +116,7 @@ class PageTransport(ABC):
             self.dropped += 1
 
     def _send(self) -> None:
-        """Thread: from the queue to the page; may be held up for as long as the page is."""
+        """Thread: from the queue to the page; blocks for as long as the page does."""
         process = self._process
         assert process is not None
         assert process.stdin is not None
@@ -128,7 +131,7 @@ class PageTransport(ABC):
     # --- in ----------------------------------------------------------------------------------------------------
 
     def _listen(self) -> None:
-        """Thread: what the page says, line by line, until it ends."""
+        """Thread: reads the page's output line by line until it ends."""
         process = self._process
         assert process is not None
         assert process.stdout is not None
@@ -140,7 +143,7 @@ class PageTransport(ABC):
             self._ready.set()
 
     def _on_line(self, line: bytes) -> None:
-        """One line of the page; lines that mean nothing are left out."""
+        """Process one line of the page; invalid lines are ignored."""
         try:
             content = json.loads(line)
             if "url" in content or "problem" in content:
@@ -153,4 +156,4 @@ class PageTransport(ABC):
 
     @abstractmethod
     def on_press(self, content: Mapping[str, Any]) -> None:
-        """What was pressed, in the thread that listens. Raises ValueError or TypeError for what means nothing."""
+        """A button was pressed; called in the reading thread. Raises ValueError or TypeError for an invalid message."""

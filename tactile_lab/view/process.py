@@ -1,6 +1,6 @@
-"""The page's process: settings and messages come on standard input, what is pressed goes out on standard output.
+"""The page's process: reads settings and messages from standard input, writes button presses to standard output.
 
-It ends when its input does, so that no page outlives its session.
+It ends with its input, so that no page outlives its session.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ import sys
 import threading
 from typing import Any, BinaryIO
 
+from drivers.core.child_process import failure
 from drivers.core.errors import TactileLabError
 
 DRAW_PERIOD_s = 0.1
 
 
 class Mouth:
-    """Says lines on what was standard output; whatever a library prints goes nowhere."""
+    """Writes lines to the original standard output; output of libraries is discarded."""
 
     def __init__(self) -> None:
         self._out: BinaryIO = os.fdopen(os.dup(1), "wb", buffering=0)
@@ -28,29 +29,32 @@ class Mouth:
         self._lock = threading.Lock()
 
     def say(self, **content: Any) -> None:
-        """One line of JSON."""
+        """Write one line of JSON."""
         with self._lock:
             self._out.write(json.dumps(content).encode() + b"\n")
 
 
 def main() -> int:
-    """Show what comes in until it ends; 1 when the page cannot be opened."""
+    """Show messages until the input ends. Returns 1 if the page cannot be opened."""
     mouth = Mouth()
     settings = json.loads(sys.stdin.buffer.readline())
-    from tactile_lab.view.page import Page
-
     try:
+        from tactile_lab.view.page import Page
+
         with Page(**settings, say=mouth.say) as page:
             mouth.say(url=page.url)
             _show(page)
     except TactileLabError as error:
         mouth.say(problem=str(error))
         return 1
+    except Exception as error:
+        mouth.say(problem=failure(error))
+        return 1
     return 0
 
 
 def _show(page: Any) -> None:
-    """Take messages in one thread, draw in this one."""
+    """Read messages in one thread, draw in this one."""
     lock, ended = threading.Lock(), threading.Event()
 
     def take() -> None:

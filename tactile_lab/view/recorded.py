@@ -1,4 +1,4 @@
-"""A recorded or running session, shown from its files: reading them disturbs nobody."""
+"""Shows a recorded or running session from its files, without affecting it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from sessions.recording.traffic.reader import TrafficMessage
 from tactile_lab.view.scene import SHOWN_TOPICS, Scene
 
 _POLL_s, _POLL_SHARE = 1.0, 5.0
-"""A running session is read again after a second, or five times as long as reading took."""
+"""A running session is read again after a second, or after five times the duration of reading."""
 _DRAW_ns = NANOSECONDS // 10
 
 
 def shown_messages(session: Session, skip: int = 0) -> Iterator[TrafficMessage]:
-    """What a page shows of a session so far, without the first ``skip``. Raises SessionError."""
+    """Messages of a session so far that a page shows, without the first ``skip``. Raises SessionError."""
     shown = (message for message in session.traffic().messages() if message.topic in SHOWN_TOPICS)
     for number, message in enumerate(shown):
         if number >= skip:
@@ -23,7 +23,7 @@ def shown_messages(session: Session, skip: int = 0) -> Iterator[TrafficMessage]:
 
 
 def play(session: Session, scene: Scene, draw: Callable[[], None], clock: Clock, speed: float) -> int:
-    """Show a recording at ``speed`` times its pace, or at once for 0; gives the number of messages."""
+    """Show a recording at ``speed`` times its pace, or immediately for 0. Returns the number of messages."""
     begun_ns, first_ns, drawn_ns, count = clock.now_ns(), None, None, 0
     for message in shown_messages(session):
         first_ns = message.stamp_ns if first_ns is None else first_ns
@@ -41,7 +41,7 @@ def play(session: Session, scene: Scene, draw: Callable[[], None], clock: Clock,
 
 
 def follow(session: Session, scene: Scene, draw: Callable[[], None], clock: Clock, seen: int) -> None:
-    """Show what comes, until the session is closed. Raises SessionError."""
+    """Show new messages until the session is closed. Raises SessionError."""
     while Session.open(session.folder).manifest.status == "open":
         begun_ns = clock.now_ns()
         for message in shown_messages(session, seen):

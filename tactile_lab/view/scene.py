@@ -1,4 +1,4 @@
-"""What a session looks like, put together from the messages that viewers are given."""
+"""The visible state of a session, built from the messages for viewers."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from sessions.recording.traffic import schemas
 
 PALM = "palm"
 WIZARD_TOPIC = "/wizard"
-"""What a calibration wizard shows and asks; it goes to a page only and is not recorded."""
+"""Topic of a calibration wizard's panel; only for a page, not recorded."""
 MESSAGES = 6
-"""So many of the last events are shown."""
+"""Number of log events shown."""
 SIGMA_FULL_m = 0.010
 """Standard deviation at which a surface counts as unknown: the far end of the colour map."""
 
@@ -31,7 +31,7 @@ class ShownGrasp:
         fingers: of the contacts.
         points_world_m, normals_world: shape (n, 3), as measured.
         forces_N: shape (n,).
-        world_T_object: the pose that the estimation gave the grasp; None before it did.
+        world_T_object: the pose that the estimation gave the grasp; None before that.
     """
 
     index: int
@@ -63,21 +63,21 @@ class ShownSurface:
 
 @dataclass
 class Scene:
-    """The newest of everything.
+    """The newest state.
 
     Attributes:
         world_T_palm, world_T_distal: the hand.
-        loads_N: contact force of each fingertip; None where there is no usable reading.
+        loads_N: contact force of each fingertip; None if there is no usable reading.
         grasps: the contacts so far.
         world_T_object, covariance: the pose, and that of its x, y (m) and yaw (rad).
         surface: as estimated.
         plan: the next grasp, as :meth:`sessions.motion.grasp_plan.GraspPlan.as_plain` gives it.
-        steps: what the estimation said of each grasp.
-        guide: what the person of a guided session is shown.
-        wizard: what the person of a calibration wizard is shown: question, lines, tables.
+        steps: the estimator's verdict on each grasp.
+        guide: the panel of a guided session.
+        wizard: the panel of a calibration wizard: question, lines, tables.
         messages: the newest events.
         stamp_ns: session clock of the newest message.
-        dropped: messages that were left out because the page did not keep up.
+        dropped: messages dropped because the page did not keep up.
         changed: names of the attributes that changed since they were drawn.
     """
 
@@ -104,7 +104,7 @@ class Scene:
         return self.plan if self.plan.get("index", 0) > measured else {}
 
     def take(self, topic: str, data: bytes, stamp_ns: int) -> None:
-        """Take one message; topics that are not shown change nothing. Raises ValueError for content of another form."""
+        """Process one message; topics that are not shown are ignored. Raises ValueError for invalid content."""
         read = _READERS.get(topic)
         if read is None:
             return
@@ -149,7 +149,7 @@ def _slam_pose(scene: Scene, content: dict[str, Any]) -> None:
 
 
 def _slam_state(scene: Scene, content: dict[str, Any]) -> None:
-    """The state follows its pose: the newest grasp has been placed there, or grasps were taken back."""
+    """Process an estimate: the newest grasp was registered, or grasps were undone."""
     index = int(content["index"])
     covariance = content.get("covariance")
     scene.covariance = None if covariance is None else np.array(covariance, dtype=float)
@@ -210,7 +210,7 @@ _READERS = {
     WIZARD_TOPIC: _wizard,
 }
 SHOWN_TOPICS = frozenset(_READERS)
-"""What a page needs to be given."""
+"""Whether a page needs this topic."""
 
 
 def _pose(position: dict[str, float], rotation: dict[str, float]) -> Pose3:

@@ -1,4 +1,4 @@
-"""The hand as lines: from the frames that are recorded (palm and fingertips) to where its bones are."""
+"""The hand as lines: computes its bones from the recorded frames (palm and fingertips)."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ _KNUCKLES_m = {
     "LF": (-0.033, 0.0, 0.0865),
     "TH": (0.034, -0.0085, 0.029),
 }
-"""Where the fingers begin in the palm frame (Shadow's hand description; the little finger's palm joint at 0)."""
+"""Base of the fingers in the palm frame (Shadow's hand description; the little finger's palm joint at 0)."""
 _BONES_m = {"TH": (0.038, 0.032)}
 _LONG_BONES_m = (0.045, 0.025)
 
 
 def bones(world_T_palm: Pose3, world_T_distal: Mapping[str, Pose3]) -> Array:
-    """The bones of the fingers whose frames are there, shape (n, 2, 3): three a finger, from the knuckle to the tip.
+    """The bones of the fingers with known frames, shape (n, 2, 3): three per finger, from the knuckle to the tip.
 
-    The joint between the first two follows from their lengths; it lies on the back of the hand. The thumb's base turns
-    in ways that its tip does not tell, so that its joint is drawn roughly.
+    The joint between the first two follows from their lengths; it is on the back of the hand. The thumb's base rotation
+    cannot be derived from its tip, so that its joint is drawn approximately.
     """
     found = []
     for finger in FINGERS:

@@ -1,4 +1,4 @@
-"""A wizard's end of its page: what it tells and asks goes out, answers come in."""
+"""A wizard's connection to its page: sends text and questions, receives answers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LINES, _TABLES = 8, 8
 class WizardFeed(PageTransport):
     """A page that shows a wizard: its question with a button for each answer, its figures, and the hand.
 
-    Every message holds all that the page shows, so that one that is lost is made good by the next.
+    Every message contains the complete state of the page, so that a lost one does not matter.
 
     Args:
         address, port, token, title: see :class:`~tactile_lab.view.page_transport.PageTransport`.
@@ -37,12 +37,12 @@ class WizardFeed(PageTransport):
     # --- out ---------------------------------------------------------------------------------------------------
 
     def line(self, text: str, style: str = "") -> None:
-        """One line that people are told."""
+        """Show one line of text."""
         self._lines.append((text, style))
         self.renew()
 
     def table(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[int]) -> None:
-        """A table; it takes the place of an older one of that title."""
+        """Show a table; it replaces an older one with the same title."""
         self._tables.pop(title, None)
         self._tables[title] = {"title": title, "columns": list(columns), "rows": [*rows], "right": list(right)}
         for old in list(self._tables)[:-_TABLES]:
@@ -50,7 +50,7 @@ class WizardFeed(PageTransport):
         self.renew()
 
     def ask(self, text: str, answers: Mapping[str, str], usual: str) -> None:
-        """Show a question with what may be answered to it, by key; answers to earlier ones count no longer."""
+        """Show a question with its possible answers by key; answers to earlier questions are ignored."""
         self._answers = {}
         self._pressed.clear()
         self._number += 1
@@ -58,7 +58,7 @@ class WizardFeed(PageTransport):
         self.renew()
 
     def on_answered(self) -> None:
-        """The question is answered, and its buttons go."""
+        """The question is answered: remove its buttons."""
         self._answers = {}
         self.renew()
 
@@ -72,10 +72,10 @@ class WizardFeed(PageTransport):
     # --- in ----------------------------------------------------------------------------------------------------
 
     def on_press(self, content: Mapping[str, Any]) -> None:
-        """Keep an answer to the question that is shown; to quit is like Ctrl+C while there is none.
+        """Store an answer to the current question; to quit without a question is like Ctrl+C.
 
         Raises:
-            TypeError: it is no answer.
+            TypeError: it is not an answer.
         """
         key, number = content.get("answer"), content.get("question")
         if key == QUIT and not self._answers:
@@ -84,5 +84,5 @@ class WizardFeed(PageTransport):
             self._pressed.append(str(key))
 
     def answer(self) -> str | None:
-        """What was pressed, if anything was."""
+        """The pressed answer, if any."""
         return self._pressed.popleft() if self._pressed else None

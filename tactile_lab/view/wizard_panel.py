@@ -1,4 +1,4 @@
-"""The panel of a wizard's page: the question with its answers as buttons, the figures so far, and the last words."""
+"""The panel of a wizard's page: the question with its answers as buttons, the tables so far, and the latest text."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class WizardPanel:
 
     Args:
         server: the page.
-        answer: called with what was pressed.
-        quit_key: the answer of the button that is always there.
+        answer: called with a pressed answer.
+        quit_key: the answer of the button that is always shown.
     """
 
     def __init__(self, server: viser.ViserServer, answer: Answer, quit_key: str) -> None:
         self._server, self._answer = server, answer
         self._head = server.gui.add_html("", order=_HEAD)
-        hint = "End here; nothing is stored"
+        hint = "Quit; nothing is stored"
         leave = server.gui.add_button("Quit", hint=hint, icon=Icon.PLAYER_STOP, color="red", order=_QUIT)
         leave.on_click(lambda event: answer(0, quit_key))
         self._told = server.gui.add_html("", order=_TOLD)
@@ -40,7 +40,7 @@ class WizardPanel:
         self._buttons: list[Any] = []
 
     def draw(self, scene: Scene) -> None:
-        """Bring the panel up to date."""
+        """Update the panel."""
         self._head.content, self._told.content = head_html(scene), told_html(scene)
         question = scene.wizard.get("question", {"number": 0, "answers": []})
         shown = (int(question["number"]), len(question["answers"]))
@@ -62,17 +62,17 @@ class WizardPanel:
 
 
 def head_html(scene: Scene) -> str:
-    """The question, or what goes on, and the forces on the fingertips."""
+    """The question, or the current activity, and the forces on the fingertips."""
     question = scene.wizard.get("question", {})
     style = "font-size:1.15em;font-weight:600;color:#1f6feb"
     text = line_html(str(question.get("text", "")), style)
-    waits = "" if not question or question["answers"] else line_html("Goes on: wait, or quit", "color:#57606a")
+    waits = "" if not question or question["answers"] else line_html("Working: wait, or quit", "color:#57606a")
     forces = forces_html(scene) if scene.loads_N else ""
     return f'<div style="{PANEL_STYLE}">{text}{waits}{forces}</div>'
 
 
 def told_html(scene: Scene) -> str:
-    """The newest words, a verdict above them, and the tables, the newest first."""
+    """The latest text below the verdict, and the tables, newest first."""
     lines = scene.wizard.get("lines", [])
     verdicts = [banner(text, _VERDICTS[text]) for text, _ in lines if text in _VERDICTS]
     words = [line_html(text, f"color:{_colour(style)}") for text, style in reversed(lines) if text not in _VERDICTS]
@@ -85,7 +85,7 @@ def _colour(style: str) -> str:
 
 
 def _table(table: dict[str, Any]) -> str:
-    """A table with its own bar to scroll, for there may be a line for each of many poses."""
+    """A scrollable table, since there may be many poses."""
     head = "".join(f"<th>{html.escape(name)}</th>" for name in table["columns"])
     rows = "".join(f"<tr>{_cells(row, table['right'])}</tr>" for row in table["rows"])
     title = line_html(table["title"], "font-weight:600;margin-top:0.6em")

@@ -100,10 +100,10 @@ def _take(found: Gathering, picture: Picture, board: AnyBoard) -> bool:
 def _nothing_found(source: str, board: AnyBoard, last: Image | None, found: Gathering) -> ConfigurationError:
     other = None if last is None else other_dictionary(last, board.dictionary)
     if other is not None:
-        what = f"the pictures show markers of {other}, the board is described with {board.dictionary}"
-        return ConfigurationError(what, where=source, hint="Name the board's own description with --board")
+        what = f"the pictures show markers of {other}, but the board is described with {board.dictionary}"
+        return ConfigurationError(what, where=source, hint="Give the description of this board with --board")
     reasons = sorted(set(found.refused.values()))
-    what = f"no picture of {found.pictures} shows the board ({'; '.join(reasons[:3])})"
+    what = f"none of the {found.pictures} pictures shows the board ({'; '.join(reasons[:3])})"
     return ConfigurationError(what, where=source, hint="Check the board's description, light and focus")
 
 

@@ -79,7 +79,7 @@ def fingertip_wizard(
     before = force_fingertips(rig, request.finger)[request.finger]
     if request.finger not in LONG_FINGERS:
         hint = "Record its wrenches by hand, and give them with --from"
-        raise ConfigurationError(f"{request.finger} cannot be stretched alone", where="--finger", hint=hint)
+        raise ConfigurationError(f"{request.finger} cannot be stretched on its own", where="--finger", hint=hint)
     world_T_mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
     plan, data = plan_wrenches(request.finger, request.presses), _data(rig, request.finger)
     wizard = FingertipWizard(plan, data, before, request.settings.noise)

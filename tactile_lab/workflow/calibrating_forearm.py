@@ -128,8 +128,8 @@ def _upright(semi_axes_m: tuple[float, float, float], distal_T_tip: Pose3) -> Ti
 def hand_board(rig: Rig, request: ForearmRequest) -> Board:
     """The board on the hand. Raises ConfigurationError when none is named."""
     if request.board is None and "board" not in rig.files:
-        hint = "Print one with tactile-lab markers, glue it to the palm, and name its file with --board"
-        raise ConfigurationError("no board on the hand is named", where=rig.source, hint=hint)
+        hint = "Print one with tactile-lab markers, glue it to the palm, and give its file with --board"
+        raise ConfigurationError("no board on the hand is given", where=rig.source, hint=hint)
     return load_board(request.board or rig.files["board"])
 
 
@@ -139,12 +139,12 @@ def _plan(rig: Rig, request: ForearmRequest) -> tuple[Planned, ...]:
         return plan_views(request.settings.views.model_copy(update=changes))
     if unknown := sorted(set(request.fingers) - set(LONG_FINGERS)):
         hint = f"Press with some of {', '.join(LONG_FINGERS)}"
-        raise ConfigurationError(f"{', '.join(unknown)} cannot be stretched alone", where="--fingers", hint=hint)
+        raise ConfigurationError(f"{', '.join(unknown)} cannot be stretched on its own", where="--fingers", hint=hint)
     if missing := sorted(set(request.fingers) - set(tip_shapes(rig))):
         raise ConfigurationError(f"has no calibrated fingertip on {', '.join(missing)}", where=rig.source)
     if request.geometry is None and "geometry" not in rig.files:
-        hint = "State the table's edges, a block or marked points in a file and name it with --geometry"
-        raise ConfigurationError("no geometry of known place is named", where=rig.source, hint=hint)
+        hint = "Describe the table's edges, a block or marked points in a file, and give it with --geometry"
+        raise ConfigurationError("no geometry with a known pose is given", where=rig.source, hint=hint)
     geometry = load_geometry(request.geometry or rig.files["geometry"])
     return plan_touches(geometry, request.fingers, request.touches)
 
@@ -155,7 +155,7 @@ def _data(rig: Rig, method: str) -> ForearmData:
     if method == "touch":
         return data
     if "camera" not in rig.files:
-        hint = "Name its lens and markers in the rig file, or use --method touch"
+        hint = "Add its lens and markers to the rig file, or use --method touch"
         raise ConfigurationError("the rig has no camera", where=rig.source, hint=hint)
     markers = load_model(rig.files["markers"], MarkerSettings)
     return replace(data, camera=load_camera(rig.files["camera"]), markers=markers)

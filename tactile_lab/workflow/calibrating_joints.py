@@ -113,7 +113,9 @@ def from_file(source: Path, rig: Rig, settings: JointSettings) -> FoundJoints:
     check_origin(data, here, str(source))
     if not data.touches:
         hint = "Record touches: tactile-lab calibrate joints --record FILE"
-        raise ConfigurationError("holds pictures, which tell no finger's joints", where=str(source), hint=hint)
+        raise ConfigurationError(
+            "contains pictures, which do not determine the fingers' joints", where=str(source), hint=hint
+        )
     return from_touches(data, rig, settings)
 
 
@@ -198,8 +200,8 @@ def joint_wizard(request: JointRequest, onlooker: TrafficSink) -> Iterator[tuple
 
 def _block(rig: Rig, request: JointRequest) -> Block:
     if request.block is None and "block" not in rig.files:
-        hint = "State its size and place in a file and name it with --block, or give known poses with --from"
-        raise ConfigurationError("no block of known place is named", where=rig.source, hint=hint)
+        hint = "Describe its size and pose in a file and give it with --block, or give known poses with --from"
+        raise ConfigurationError("no block with a known pose is given", where=rig.source, hint=hint)
     return load_block(request.block or rig.files["block"])
 
 
@@ -214,7 +216,7 @@ def _with_block(rig: Rig, block: Block) -> Rig:
     size_m = np.ptp(object_model(BLOCK).mesh.bounds, axis=0)
     if not np.allclose(size_m, block.size_m, atol=1e-6):
         what = "the simulated block is " + " x ".join(f"{1e3 * side:.0f}" for side in size_m) + " mm"
-        raise ConfigurationError(what, where=rig.source, hint="State that size")
+        raise ConfigurationError(what, where=rig.source, hint="Give that size")
     place, yaw = block.world_T_block.translation_m, block.world_T_block.pose().rotation().yaw()
     start = ObjectStart(x_m=place[0], y_m=place[1], yaw_rad=float(yaw))
     return clear_table(rig, {"start": start, "object_mass_kg": _STEEL_kg})

@@ -85,7 +85,9 @@ def _check_different(sessions: Sequence[Session]) -> None:
     """A session counted twice would make a confidence interval too narrow. Raises SessionError."""
     for name, count in Counter(session.manifest.name for session in sessions).items():
         if count > 1:
-            raise SessionError("is named twice", where=name, hint="Name each session once, and none beside its copy")
+            raise SessionError(
+                "is given twice", where=name, hint="Give each session once, and not together with its copy"
+            )
 
 
 def result_folders(session: Session, names: Sequence[str]) -> list[Path]:
@@ -93,7 +95,9 @@ def result_folders(session: Session, names: Sequence[str]) -> list[Path]:
     if not names:
         found = sorted(path.parent for path in session.folder.glob(f"*/{TRAJECTORY}"))
         if not found:
-            raise SessionError("holds no results", where=str(session.folder), hint="Replay the session to get some")
+            raise SessionError(
+                "contains no results", where=str(session.folder), hint="Replay the session to create them"
+            )
         return found
     return list(dict.fromkeys(_folder(session, name) for name in names))
 
@@ -102,7 +106,7 @@ def _folder(session: Session, name: str) -> Path:
     for path in (session.folder / name, Path(name)):
         if (path / TRAJECTORY).is_file():
             return path
-    hint = "Name folders of results inside the session, or by their path"
+    hint = "Give results folders inside the session, or their paths"
     raise SessionError(f"has no results called {name!r}", where=str(session.folder), hint=hint)
 
 
@@ -126,7 +130,7 @@ def session_clock_offset(session: Session, choice: TruthChoice) -> ClockOffset:
         return ClockOffset(None, None, 0, "the session has no camera")
     palm, holds_s = _hand_track(session)
     if palm is None or not holds_s:
-        return ClockOffset(None, None, 0, "the hand held nothing in this session")
+        return ClockOffset(None, None, 0, "the hand never held the object in this session")
     return clock_offset(palm, *_object_track(session, detector), holds_s)
 
 

@@ -16,8 +16,11 @@ from drivers.core.atomic_files import write_whole
 from drivers.core.calibration_file import load_parameters
 from drivers.core.configuration import StrictModel, validate
 
-_HEAD = "# Made by tactile-lab markers; measured_bar_mm is the length of the print's check bar, 100 mm if it is true.\n"
-_RIG_HEAD = "# The markers of a rig as they were printed: name this file as calibration.markers in the rig file.\n"
+_HEAD = (
+    "# Made by tactile-lab markers; measured_bar_mm is the measured length of the print's check bar, "
+    "nominally 100 mm.\n"
+)
+_RIG_HEAD = "# The printed markers of a rig: use this file as calibration.markers in the rig file.\n"
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ def _write_vectors(sheet: Sheet, out: Path, name: str) -> tuple[Path, Path]:
 
 
 def _write(path: Path, content: str | bytes) -> Path:
-    write_whole(path, content, "Choose another place with --out")
+    write_whole(path, content, "Choose another folder with --out")
     return path
 
 
@@ -95,5 +98,5 @@ def _text(model: StrictModel, head: str) -> str:
 def check_bar_words(scale: float, measured: bool) -> str:
     """What is known of the print's scale, in words."""
     if not measured:
-        return f"check bar not measured yet: taken as {CHECK_BAR_mm:g} mm"
+        return f"check bar not measured yet: assumed to be {CHECK_BAR_mm:g} mm"
     return f"check bar measures {CHECK_BAR_mm * scale:g} mm: true scale {scale:.4f}"

@@ -87,7 +87,7 @@ def reconstruct(
     """
     path = Path(source)
     if path.suffix.lower() == ".csv":
-        hint = f"Timed contacts become one by: tactile-lab session import {source}"
+        hint = f"To convert timed contacts: tactile-lab session import {source}"
         raise ConfigurationError("is a table, not a contact log", where=source, hint=hint)
     if path.is_file() or path.suffix == ".json":
         return reconstruct_log(path, wishes, out, progress)
@@ -105,7 +105,7 @@ def reconstruct_log(
     log = read_contact_log(path)
     settings, progress = wishes.apply(log_settings(log)), progress or NullProgress()
     if settings.dimension > log.dimension:
-        raise ConfigurationError("a log of dimension 2 has no heights", where=str(path), hint="Ask for dimension 2")
+        raise ConfigurationError("a log of dimension 2 has no heights", where=str(path), hint="Use dimension 2")
     out = out or path.with_name(f"{path.stem}-{_label(settings)}")
     check_replaceable(out)
     truth = log_truth(log, path.parent)

@@ -51,7 +51,7 @@ def replay_session(
     """
     if has_results(session) and out.resolve() == session.results.resolve():
         hint = "Choose another folder for the results (--into or --out)"
-        raise ConfigurationError("holds the session's own results", where=str(out), hint=hint)
+        raise ConfigurationError("contains the session's own results", where=str(out), hint=hint)
     check_replaceable(out)
     rig = rig_of_session(session)
     replay = Replay(session, build_interpreter(rig), speed)
@@ -94,7 +94,9 @@ def check_replaceable(out: Path) -> None:
     except OSError as error:
         raise ConfigurationError(f"cannot be used ({error.strerror})", where=str(out), hint=hint) from error
     if strange:
-        raise ConfigurationError(f"holds files that are no results, such as {strange[0]}", where=str(out), hint=hint)
+        raise ConfigurationError(
+            f"contains files that are not results, such as {strange[0]}", where=str(out), hint=hint
+        )
 
 
 def recorded_slam(session: Session) -> SlamSettings:

@@ -122,8 +122,8 @@ def _kept_when_interrupted(session: RunningSession) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        hint = f"What was recorded is kept: tactile-lab session replay {session.folder}"
-        raise InterruptionError("interrupted before it was done", where=str(session.folder), hint=hint) from None
+        hint = f"The recording is kept: tactile-lab session replay {session.folder}"
+        raise InterruptionError("interrupted before it was finished", where=str(session.folder), hint=hint) from None
 
 
 def _record(

@@ -36,7 +36,7 @@ def check_sweep(rig: str, objects: Sequence[str] | None, root: Path, method: str
         root.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         hint = "Choose another folder with --out"
-        raise SessionError(f"cannot be made ({error.strerror})", where=str(root), hint=hint) from error
+        raise SessionError(f"cannot be created ({error.strerror})", where=str(root), hint=hint) from error
     return tuple(objects or CATALOGUE)
 
 

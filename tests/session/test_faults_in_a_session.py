@@ -28,7 +28,7 @@ def test_a_session_goes_on_under_losses_counts_them_and_replays_identically(tmp_
     assert not swept.ended
     told = "; ".join(swept.told)
     assert "hand: 3 of " in told
-    assert "base: 3 messages were no status of a positioner" in told
+    assert "base: 3 messages were not a positioner status" in told
     assert "3 undecodable base" in told
     assert swept.lost["lost cycles hand"] == 3
     assert "MF: " in told

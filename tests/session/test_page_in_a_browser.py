@@ -49,18 +49,18 @@ def test_every_button_that_a_person_presses_reaches_the_session_and_the_recordin
         for label, ask in (
             ("Capture", Ask.CAPTURE),
             ("Undo", Ask.UNDO),
-            ("Pause / go on", Ask.PAUSE),
-            ("Pause / go on", Ask.PAUSE),
+            ("Pause / resume", Ask.PAUSE),
+            ("Pause / resume", Ask.PAUSE),
             ("Next step", Ask.NEXT),
             ("Do it", Ask.GO),
             ("End", Ask.END),
         ):
             browser.press(label)
             assert asked(feed).ask is ask, label
-        browser.press("Keep the note")
-        until(lambda: browser.shows("Nothing was written"), "that there is no note")
+        browser.press("Save note")
+        until(lambda: browser.shows("The note is empty"), "that there is no note")
         browser.write("slipped at the edge")
-        browser.press("Keep the note")
+        browser.press("Save note")
         noted = asked(feed)
         assert (noted.ask, noted.text) == (Ask.NOTE, "slipped at the edge")
         assert feed.pid is not None

@@ -202,8 +202,8 @@ def _stopped_after_s(session: Session, struck_ns: int) -> float | None:
 def _told(session: Session) -> Iterator[str]:
     """Warnings of the devices with their last figures, and what the record counts as lost beside them."""
     for _, level, words in _events(session):
-        if level > 2 and "in all: " in words:
-            yield words.replace("in all: ", "")
+        if level > 2 and "total: " in words:
+            yield words.replace("total: ", "")
     lost: dict[str, list[tuple[str, int]]] = {}
     for name, number in session.manifest.data_loss.items():
         kind, _, topic = name.partition(" /")

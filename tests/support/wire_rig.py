@@ -28,7 +28,7 @@ def wire_rig(folder: Path, **changes: Any) -> Path:
     wires["base"]["host"], wires["camera"]["host"] = f"{net}.20", f"{net}.21"
     for number, wire in enumerate(wires["fingertips"].values()):
         wire["host"] = f"{net}.{11 + number}"
-    content["hand"] |= {"cycle_s": 0.004, "lost_limit": 50}
+    content["hand"] |= {"cycle_s": 0.004}
     content["base"] |= {"lost_limit": 100}
     content["conductor"]["safety"] = {"tip_stale_s": 2.0, "stale_s": 5.0, "first_moves_scale": 1.0}
     path = folder / "wire.yaml"

@@ -55,7 +55,7 @@ def one_line(answer, code: int, *words: str) -> None:
             "conductor: {grasps: 0, cycle: {grip: 1}}\n",
             ("conductor.grasps", "conductor.cycle.grip"),
         ),
-        (r"joints: .*", "joints: nowhere.yaml", ("joints calibration that is missing", "calibration.joints")),
+        (r"joints: .*", "joints: nowhere.yaml", ("missing joints calibration", "calibration.joints")),
         (r"(?s)\A.*\Z", "", ("the document: must be keys with values",)),
     ],
 )

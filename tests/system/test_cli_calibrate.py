@@ -92,7 +92,7 @@ def test_a_stated_pose_needs_its_uncertainty(inside, tmp_path):
     ("change", "words"),
     [
         ({"rig": "another"}, "was recorded on rig another, not on simulated-hand"),
-        ({"touches": []}, "needs touches, or views"),
+        ({"touches": []}, "needs either touches or views"),
         ({"colour": "red"}, "colour: unknown key"),
     ],
 )
@@ -111,14 +111,14 @@ def test_too_little_motion_is_refused_before_anything_is_solved(inside, data, tm
     answer = inside("calibrate", "forearm", "--from", path, "--out", tmp_path / "forearm.yaml", "--no-input")
     assert answer.code == 2
     assert "the motion is not enough" in answer.err
-    assert "no or few touches tell the place along" in answer.err
+    assert "too few touches determine the position along" in answer.err
     assert files(tmp_path) == ["data.json"]
 
 
 def test_without_anybody_to_ask_it_ends_and_says_how_to_script_it(inside, data, tmp_path):
     answer = inside("calibrate", "forearm", "--from", data, "--out", tmp_path / "forearm.yaml")
     assert answer.code == 130
-    assert "Give --no-input" in answer.err
+    assert "Use --no-input" in answer.err
     assert files(tmp_path) == []
 
 
@@ -126,7 +126,7 @@ def test_from_the_first_question_to_the_stored_result_on_the_simulated_rig(progr
     (tmp_path / "settings.yaml").write_text(yaml.safe_dump(SETTINGS))
     words = ("--settings", "settings.yaml", "--touches", 3, "--out", "forearm.yaml", "--replace")
     terminal = program.terminal(tmp_path, "calibrate", "forearm", *words)
-    terminal.until("Is its way clear", "y\n")
+    terminal.until("Is its path clear", "y\n")
     terminal.until("1/15 FF presses table top")
     for number in range(1, 16):
         terminal.type("\n")

@@ -70,7 +70,7 @@ def test_poses_without_measured_angles_are_read_from_the_hand(inside, tmp_path):
 
 @pytest.mark.parametrize(
     ("measured", "words"),
-    [({0.0: 1.0}, "1 pose, 2 needed"), ({0.0: 3.0, 10.0: 7.0, 15.0: 18.0}, "deg left, limit 1.00")],
+    [({0.0: 1.0}, "1 pose, 2 needed"), ({0.0: 3.0, 10.0: 7.0, 15.0: 18.0}, "deg, limit 1.00")],
 )
 def test_joints_outside_their_limits_end_with_3_and_replace_nothing(inside, tmp_path, measured, words):
     source = poses(tmp_path / "poses.yaml", measured)
@@ -121,13 +121,13 @@ def test_sound_electrodes_are_told_with_their_tare(inside, tmp_path):
 def test_dead_and_open_electrodes_are_named_with_exit_code_3(inside, tmp_path):
     answer = inside("calibrate", "electrodes", "--from", counts(tmp_path / "counts.csv", {3: 1800.0, 7: 4095.0}))
     assert answer.code == 3
-    assert "does not move at all: dead" in answer.err
+    assert "never changes: dead" in answer.err
     assert "at the end of its range" in answer.err
     assert "2 faulty" in answer.err
 
 
 @pytest.mark.parametrize(
-    ("text", "words"), [("a,b\n", "is no table of counts"), ("1,2\n3,4\n", "2 samples, 20 needed")]
+    ("text", "words"), [("a,b\n", "is not a table of counts"), ("1,2\n3,4\n", "2 samples, 20 needed")]
 )
 def test_tables_of_counts_that_can_not_be_used_are_named(inside, tmp_path, text, words):
     path = tmp_path / "counts.csv"
@@ -141,7 +141,7 @@ def test_tables_of_counts_that_can_not_be_used_are_named(inside, tmp_path, text,
 
 @pytest.mark.parametrize(
     ("words", "told"),
-    [(("--finger", "TH"), "TH cannot be stretched alone"), (("--rig", "sim-biotac"), "has no force fingertips")],
+    [(("--finger", "TH"), "TH cannot be stretched on its own"), (("--rig", "sim-biotac"), "has no force fingertips")],
 )
 def test_fingertips_that_can_not_be_measured_are_refused(inside, tmp_path, words, told):
     answer = inside("calibrate", "fingertip", *words, "--out", tmp_path / "tips.yaml", "--no-input")

@@ -109,7 +109,10 @@ def test_all_results_of_one_session_are_compared_when_it_is_judged_elsewhere(
 @pytest.mark.parametrize(
     ("spoil", "told"),
     [
-        (lambda lens: write_record(lens, read_record(lens).model_copy(update={"rig": "another"})), "is of rig another"),
+        (
+            lambda lens: write_record(lens, read_record(lens).model_copy(update={"rig": "another"})),
+            "belongs to rig another",
+        ),
         (lambda lens: lens.write_text(lens.read_text().replace("focal_px: [", "focal_px: [1")), "changed"),
     ],
     ids=["another rig", "by hand"],
@@ -127,10 +130,10 @@ def test_a_lens_of_another_rig_or_changed_by_hand_gives_no_truth(
     ("words", "told"),
     [
         (("first", "nowhere"), "no such session"),
-        (("first", "first"), "first: is named twice"),
+        (("first", "first"), "first: is given twice"),
         (("first", "second", "--results", "magic"), "has no results called 'magic'"),
         (("first", "--lens", "nowhere.yaml"), "nowhere.yaml: cannot be read"),
-        (("first", "--results", "results", "--out", "{file}"), "is no folder). Choose another folder with --out"),
+        (("first", "--results", "results", "--out", "{file}"), "is not a folder). Choose another folder with --out"),
     ],
 )
 def test_comparisons_that_can_not_be_made_are_refused(

@@ -128,7 +128,7 @@ def test_settings_of_another_version(inside, session_copy):
 def test_a_calibration_copy_changed_or_missing(inside, session_copy):
     joints = session_copy / "calibration" / "joints.yaml"
     joints.write_text(joints.read_text() + "# a remark\n")
-    refused(inside("session", "replay", session_copy), "joints.yaml", "changed since it was recorded")
+    refused(inside("session", "replay", session_copy), "joints.yaml", "changed since the recording")
     joints.unlink()
     refused(inside("session", "replay", session_copy), "joints.yaml", "cannot be read")
 
@@ -136,8 +136,8 @@ def test_a_calibration_copy_changed_or_missing(inside, session_copy):
 def test_deleted_results_are_made_again_by_a_replay(inside, session_copy):
     before = {path.name: path.read_bytes() for path in (session_copy / "results").iterdir()}
     shutil.rmtree(session_copy / "results")
-    refused(inside("evaluate", session_copy), "trajectory", "replay it")
-    refused(inside("report", session_copy), "trajectory", "replay it")
+    refused(inside("evaluate", session_copy), "trajectory", "Replay the session")
+    refused(inside("report", session_copy), "trajectory", "Replay the session")
     answer = inside("session", "replay", session_copy)
     assert answer.code == 0
     assert {path.name for path in (session_copy / "results").iterdir()} == set(before)
@@ -149,7 +149,7 @@ def test_results_replaced_by_a_file(inside, session_copy):
     shutil.rmtree(session_copy / "results")
     (session_copy / "results").write_text("in the way")
     for command in ("evaluate", "session replay"):
-        refused(inside(*command.split(), session_copy), "results", "Move what stands in its place")
+        refused(inside(*command.split(), session_copy), "results", "Move the file that is in its place")
 
 
 def test_results_that_can_not_be_read(inside, session_copy):

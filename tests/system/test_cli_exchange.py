@@ -119,9 +119,12 @@ GOOD = "time_s,x_m,y_m,nx,ny\n0,0.05,0,1,0\n1,-0.05,0,-1,0\n"
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (GOOD.replace("x_m", "x_mm"), ("'x_mm' is in another unit", "call it x_m")),
+        (GOOD.replace("x_m", "x_mm"), ("'x_mm' is in another unit", "name it x_m")),
         (GOOD.replace("0.05", "50"), ("millimetres",)),
-        (GOOD.replace("0,0.05", "3,0.05"), ("contact 2", "before that of the contact before", "Sort the lines")),
+        (
+            GOOD.replace("0,0.05", "3,0.05"),
+            ("contact 2", "earlier than that of the previous contact", "Sort the lines"),
+        ),
         ("", ("no column",)),
     ],
 )
@@ -186,7 +189,7 @@ def test_an_export_to_where_nothing_can_be_written_is_refused(inside, piece, rec
 def test_an_export_of_nothing_is_refused(inside, piece):
     answer = inside("session", "export", piece)
     assert (answer.code, answer.out) == (2, "")
-    assert "name at least one of --contacts, --csv" in answer.err
+    assert "give at least one of --contacts, --csv" in answer.err
 
 
 def test_a_piece_of_a_session_is_cut_out_and_lists_like_any_other(inside, recorded, tmp_path):
@@ -198,8 +201,8 @@ def test_a_piece_of_a_session_is_cut_out_and_lists_like_any_other(inside, record
     listed = json.loads(inside("session", "list", "--root", into.parent, "--json").out)
     assert [(item["name"], item["status"]) for item in listed] == [("piece-1", "closed")]
     for words, told in (
-        (("--links", "elbow"), "no link called elbow"),
-        (("--from", 5, "--to", 4), "nothing was recorded in that piece"),
+        (("--links", "elbow"), "no transport called elbow"),
+        (("--from", 5, "--to", 4), "nothing was recorded in that part"),
     ):
         answer = inside("session", "extract", recorded, "--into", tmp_path / "runs" / "piece-2", *words)
         assert answer.code in (1, 2)
@@ -229,7 +232,9 @@ def test_an_archive_becomes_a_session_that_lists_and_shows(inside, packed, tmp_p
     assert json.loads(answer.out) == {"session": str(tmp_path / "runs" / "from-afar"), "status": "closed"}
     shown = json.loads(inside("session", "show", "from-afar", "--root", tmp_path / "runs", "--json").out)
     assert (shown["name"], shown["counts"]["grasps"]) == ("from-afar", 2)
-    refused(inside("session", "import", packed, "--root", tmp_path / "runs", "--name", "from-afar"), 1, "there already")
+    refused(
+        inside("session", "import", packed, "--root", tmp_path / "runs", "--name", "from-afar"), 1, "exists already"
+    )
     refused(inside("session", "import", packed, "--root", tmp_path / "runs", "--name", "../up"), 1, "cannot be the")
 
 
@@ -239,8 +244,8 @@ def test_an_archive_becomes_a_session_that_lists_and_shows(inside, packed, tmp_p
         ("../evil.txt", b"evil", "unsafe name"),
         ("s/../../evil.txt", b"evil", "unsafe name"),
         ("/tmp/evil.txt", b"evil", "unsafe name"),
-        ("s/calibration/joints.yaml", b"# another\n", "holds two files of one name"),
-        ("s/zeros", bytes(20_000_000), "out of all proportion"),
+        ("s/calibration/joints.yaml", b"# another\n", "contains two files of the same name"),
+        ("s/zeros", bytes(20_000_000), "which is implausible"),
         ("t/session.yaml", b"", "2 folders"),
     ],
 )
@@ -278,7 +283,7 @@ def test_a_torn_session_is_recovered_and_the_torn_one_is_kept(inside, session_co
     told = json.loads(answer.out)
     assert "/link/hand/rx" in json.dumps(told)
     assert told["left_out"] == ["results"]
-    assert f"(results); new ones: tactile-lab session replay {told['session']}" in answer.err
+    assert f"(results); make new ones with: tactile-lab session replay {told['session']}" in answer.err
     answer = inside("session", "list", "--root", tmp_path, "--json")
     assert answer.code == 0, answer.err
     assert sorted(item["status"] for item in json.loads(answer.out)) == ["damaged", "recovered"]
@@ -320,7 +325,7 @@ def test_a_calibration_that_is_not_the_recorded_one_is_refused_wherever_bytes_ar
     joints.write_text(joints.read_text().replace("22.5", "23.5"))
     for command in ("replay", "export"):
         more = ("--csv", tmp_path / "tables") if command == "export" else ()
-        refused(inside("session", command, session_copy, *more), 1, "joints.yaml", "changed since it was recorded")
+        refused(inside("session", command, session_copy, *more), 1, "joints.yaml", "changed since the recording")
     assert "joints" in inside("session", "show", session_copy).err
     assert inside("session", "export", session_copy, "--archive", tmp_path / "a.zip").code == 0
     refused(inside("session", "import", tmp_path / "a.zip", "--root", tmp_path / "in"), 1, "changed since")

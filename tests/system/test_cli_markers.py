@@ -87,12 +87,12 @@ def test_a_person_is_asked_for_the_bar_and_may_answer_later(
 @pytest.mark.parametrize(
     ("words", "code", "told"),
     [
-        (("poster",), 2, "none of single, grid, charuco, rig"),
+        (("poster",), 2, "neither one of single, grid, charuco"),
         (("charuco", "--paper", "A9"), 2, "no paper called 'A9'"),
         (("charuco", "--square-mm", 60, "--marker-mm", 40), 2, "do not fit on A4"),
         (("charuco", "--square-mm", 20, "--marker-mm", 20), 2, "marker"),
-        (("charuco", "--side-mm", 20), 2, "'--side-mm': does not belong to charuco"),
-        (("single", "--dictionary", "DICT_9X9_50"), 2, "'DICT_9X9_50' is no dictionary of OpenCV. Change"),
+        (("charuco", "--side-mm", 20), 2, "'--side-mm': has no effect for charuco"),
+        (("single", "--dictionary", "DICT_9X9_50"), 2, "'DICT_9X9_50' is not an OpenCV dictionary. Change"),
         (("single", "--number", 50), 2, "50"),
         (("single", "--side-mm", -4), 2, "side_m"),
         (("single", "--measured-mm", 99.2), 2, "at most 0.5 % are allowed"),
@@ -116,4 +116,6 @@ def test_what_can_not_be_printed_or_measured_is_named_and_nothing_is_written(
 def test_a_folder_that_can_not_be_made_is_named(inside: Any, tmp_path: Path) -> None:
     (tmp_path / "out").write_text("mine")
     answer = inside("markers", "single", "--out", tmp_path / "out", "--no-input")
-    assert (answer.code, "out is no folder). Choose another place with --out" in answer.err) == (1, True), answer.err
+    assert (answer.code, "out is not a folder). Choose another folder with --out" in answer.err) == (1, True), (
+        answer.err
+    )

@@ -232,7 +232,7 @@ def to_millimetres(index: int, contact: dict) -> None:
         (lambda log: each_contact(log, to_millimetres), ("millimetres",)),
         (lambda log: each_contact(log, negate), ("normals point into the object", "negate them")),
         (lambda log: log.update(format="tactile-contacts/9"), ("'tactile-contacts/9'",)),
-        (lambda log: log["grasps"][0]["contacts"][0].update(normal_world=[0, 0, 0]), ("a normal has length 1",)),
+        (lambda log: log["grasps"][0]["contacts"][0].update(normal_world=[0, 0, 0]), ("a normal must have length 1",)),
     ],
 )
 def test_a_log_that_makes_no_sense_is_explained(inside, planar_log, tmp_path, change, words):
@@ -286,7 +286,7 @@ def test_settings_that_do_not_fit_are_explained(inside, planar_log, tmp_path, se
 def test_other_files_in_the_folder_of_results_are_left_alone(inside, planar_log, tmp_path):
     (tmp_path / "thesis.docx").write_text("years of work")
     answer = inside("reconstruct", planar_log, "--method", "odometry", "--out", tmp_path)
-    refused(answer, 2, "holds files that are no results, such as thesis.docx")
+    refused(answer, 2, "contains files that are not results, such as thesis.docx")
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.docx"]
 
 
@@ -330,7 +330,7 @@ def test_contacts_on_one_face_leave_the_others_unknown(inside, tmp_path):
     write_contact_log(tmp_path / "log.json", ContactLog(2, 0.001, 0.0873, MOTION, one_face()))
     document = reconstructed(inside, tmp_path / "log.json")
     honest(document)
-    assert "one side of the object only" in document["warnings"][0]
+    assert "only one side of the object" in document["warnings"][0]
 
 
 def test_contacts_repeated_at_one_place_make_no_certain_shape(inside, planar_log, tmp_path):
@@ -358,7 +358,7 @@ def test_grasps_of_two_contacts_only_are_lost(inside, planar_log, tmp_path):
     document = reconstructed(inside, changed(planar_log, tmp_path, thin))
     assert document["status"] == "lost"
     assert document["shape"] is None
-    assert "the object is lost: 6 of 6 grasps could not be placed" in document["warnings"]
+    assert "the object is lost: 6 of 6 grasps could not be registered" in document["warnings"]
 
 
 @pytest.mark.parametrize("method", ["joint", "particle", "thesis-pf", "icp"])

@@ -18,7 +18,7 @@ def test_slips_of_recorded_sessions_are_told_and_too_few_say_so(inside, recorded
     answer = inside("session", "slips", "--root", recorded_root)
     assert answer.code == 0
     assert "Slips in 1 session (" in answer.err
-    assert "left where it was" in answer.err
+    assert "left in place" in answer.err
     assert "at least 10 are needed" in answer.err
     document = json.loads(inside("session", "slips", recorded.name, "--root", recorded_root, "--json").out)
     assert document["sessions"] == [recorded.name]
@@ -33,8 +33,8 @@ def test_the_motion_is_printed_as_the_rig_file_wants_it(inside, recorded_root, r
     slips = Slips(rng.normal(size=(40, 3)) * [0.006, 0.006, 0.15], rng.normal(size=(40, 3)) * [0.0006, 0.0006, 0.01])
     monkeypatch.setattr("tactile_lab.workflow.measuring_slips.session_slips", lambda session: slips)
     said = inside("session", "slips", recorded.name, "--root", recorded_root).err
-    assert "pushed by the closing hand where it was to be left: 0 of 40" in said
-    motion = MotionNoise.model_validate(yaml.safe_load(said.split("in the rig file:")[1])["motion"])
+    assert "pushed by the closing hand although left in place: 0 of 40" in said
+    motion = MotionNoise.model_validate(yaml.safe_load(said.split("for the rig file:")[1])["motion"])
     assert motion.translation_m == pytest.approx(0.006, rel=0.2)
     assert motion.unheld == pytest.approx(0.1, rel=0.3)
 
@@ -69,5 +69,5 @@ def test_sessions_whose_camera_saw_nothing_show_no_slip(inside, recorded_root, m
     monkeypatch.setattr("tactile_lab.workflow.measuring_slips.session_slips", lambda session: Slips.between([], []))
     answer = inside("session", "slips", "--root", recorded_root)
     assert answer.code != 0
-    assert "no session shows a slip" in answer.err
-    assert "marker camera saw the object at two grasps in a row" in answer.err
+    assert "slips cannot be measured in any of the sessions" in answer.err
+    assert "marker camera that sees the object at two grasps in a row" in answer.err

@@ -47,11 +47,11 @@ class At(NamedTuple):
     question: str
 
 
-BEGUN = ((REPLACE, "y\n"), ("Is its way clear?", "y\n"))
+BEGUN = ((REPLACE, "y\n"), ("Is its path clear?", "y\n"))
 
 STEPS = {
     "forearm, replace": At(FOREARM, (), REPLACE),
-    "forearm, begin": At(FOREARM, BEGUN[:1], "Is its way clear?"),
+    "forearm, begin": At(FOREARM, BEGUN[:1], "Is its path clear?"),
     "forearm, first touch": At(FOREARM, BEGUN, "1/15 FF presses"),
     "forearm, later touch": At(FOREARM, (*BEGUN, ("1/15 FF presses", "\n")), "2/15 MF presses"),
     "forearm, store": At(TOUCHED, BEGUN[:1], STORE),
@@ -60,7 +60,7 @@ STEPS = {
     "camera, while pictures are taken": At(CAMERA, (*BEGUN[:1], ("begin", "\n")), "2 views"),
     "camera, store": At(CAMERA, (*BEGUN[:1], ("begin", "\n"), ("12 views", "d\n")), "Store it as result"),
     "fingertip, replace": At(FINGERTIP, (), REPLACE),
-    "fingertip, begin": At(FINGERTIP, BEGUN[:1], "Is its way clear?"),
+    "fingertip, begin": At(FINGERTIP, BEGUN[:1], "Is its path clear?"),
     "fingertip, free": At(FINGERTIP, BEGUN, "1/16 FF free"),
     "fingertip, pressed": At(
         FINGERTIP,
@@ -78,7 +78,7 @@ def measured(program: WarmProgram, tmp_path_factory: pytest.TempPathFactory) -> 
     """A folder in which a person measured a fingertip and stored the result; only to be read."""
     folder = prepared(tmp_path_factory.mktemp("measured"))
     terminal = program.terminal(folder, "calibrate", *FINGERTIP, "--record", "wrenches.yaml")
-    terminal.until("Is its way clear?", "y\n")
+    terminal.until("Is its path clear?", "y\n")
     terminal.until("1/16 FF free", "\n")
     terminal.until("2/16 FF free", "u\n")  # take it back, and do it again
     terminal.until("1/16 FF free", "\n")
@@ -126,7 +126,7 @@ def test_a_lens_is_shown_guided_and_stored(program: WarmProgram, tmp_path: Path)
     terminal = program.terminal(tmp_path, "calibrate", *CAMERA, "--notes", "by a test")
     terminal.until("begin", "\n")
     terminal.until("next: the board in the")
-    terminal.until("all is covered", "d\n")
+    terminal.until("coverage complete", "d\n")
     terminal.until(STORE, "y\n")
     told = terminal.ended(0)
     assert re.search(r"fx_px +7\d\d\.\d+ ", told)
@@ -141,7 +141,7 @@ def test_joints_are_corrected_and_an_older_file_replaced(program: WarmProgram, m
     copied(measured, tmp_path)
     terminal = program.terminal(tmp_path, "calibrate", *JOINTS)
     terminal.until(REPLACE, "maybe\n")
-    terminal.until("'maybe' is none of the answers")
+    terminal.until("'maybe' is not one of the answers")
     terminal.until(REPLACE, "yes\n")
     terminal.until(STORE, "\n")
     assert "PASS" in terminal.ended(0)
@@ -168,7 +168,7 @@ def test_ended_at_any_step_nothing_is_stored(
     ("spoil", "words"),
     [
         (lambda data: wrenches(data, -1.0), "opposite sign"),
-        (lambda data: {**data, "presses": data["presses"][:2]}, "2 presses, 6 needed"),
+        (lambda data: {**data, "presses": data["presses"][:2]}, "2 presses, but 6 are needed"),
         (lambda data: {**data, "rig": "another"}, "another"),
     ],
 )
@@ -202,7 +202,7 @@ def test_ended_while_the_hand_moves_nothing_is_stored(program: WarmProgram, meas
     before = copied(measured, tmp_path)
     terminal = program.terminal(tmp_path, "calibrate", *FINGERTIP, "--record", "wrenches.yaml")
     terminal.until(REPLACE, "y\n")
-    terminal.until("Is its way clear?", "y\n")
+    terminal.until("Is its path clear?", "y\n")
     terminal.until("1/16", "\n")
     terminal.until("1/16 FF free, hand pitched 0 deg, rolled 0 deg: done")
     terminal.until("2/16", "\n")

@@ -70,7 +70,7 @@ def events(session: Session) -> str:
 def grasp(terminal: Terminal) -> None:
     """One grasp as the prompts say, up to the hold."""
     terminal.until("SPACE: go on", " ")
-    terminal.until("Guide the hand", "g")
+    terminal.until("Move the hand", "g")
     terminal.until("Close the fingers", "g")
 
 
@@ -85,17 +85,17 @@ def test_person_guides_a_session_with_undo_pause_an_unplugged_sensor_and_a_resum
     terminal.until("resumed", " ")
     terminal.until("Turn the object", "g")
     terminal.until("Ready for the next grasp", "u")
-    terminal.until("is taken back")
+    terminal.until("undone")
     terminal.cable.touch()
     terminal.until("no usable reading from MF")
     terminal.cable.unlink()
-    terminal.until("MF can be read again", "p")
+    terminal.until("readings from MF are back", "p")
     terminal.until("resumed")
     grasp(terminal)
     terminal.until("Hold still", " ")
     terminal.until("Turn the object", "g")
     terminal.until("Ready for the next grasp", "e")
-    terminal.until("once more to end", "e")
+    terminal.until("press again to end", "e")
     assert terminal.ended() == 3  # done, with the loss of the unplugged sensor
     assert terminal.modes_at_end == before
     session = terminal.session
@@ -104,7 +104,7 @@ def test_person_guides_a_session_with_undo_pause_an_unplugged_sensor_and_a_resum
     assert all("ft/MF" in loss for loss in session.manifest.data_loss)
     assert (session.folder / "attachments" / "notes.txt").read_text() == "box on its side\n"
     told = events(session)
-    for text in ("paused: by the operator", "grasp 1 is taken back", "no usable reading from MF", "can be read again"):
+    for text in ("paused: by the operator", "grasp 1 undone", "no usable reading from MF", "are back"):
         assert text in told
     again = tmp_path / "again"
     with pytest.raises(SystemExit) as ended:

@@ -105,9 +105,9 @@ def test_a_piece_of_a_session_is_a_session(session, tmp_path):
     piece = Session.open(tmp_path / "piece-1")
     assert piece.calibration_file("joints").is_file()
     assert sum(1 for _ in piece.traffic().messages()) == sum(counts.values())
-    with pytest.raises(ConfigurationError, match=r"no link called elbow.*Its links are base, camera, ft/FF"):
+    with pytest.raises(ConfigurationError, match=r"no transport called elbow.*Its transports are base, camera, ft/FF"):
         extract(session, tmp_path / "piece-2", Piece(transports={"elbow"}))
-    with pytest.raises(SessionError, match="nothing was recorded in that piece"):
+    with pytest.raises(SessionError, match="nothing was recorded in that part"):
         extract(session, tmp_path / "piece-2", Piece(from_s=1e6))
     with pytest.raises(SessionError, match="exists already"):
         extract(session, tmp_path / "piece-1", Piece())

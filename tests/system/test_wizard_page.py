@@ -52,7 +52,7 @@ def test_a_wizard_is_led_from_its_page(program: WarmProgram, tmp_path: Path) -> 
         browser.do("Page.navigate", url=opened(terminal))
         until(lambda: browser.shows("Store it as joints.yaml?"), "the last question")
         assert browser.shows("PASS")
-        assert browser.shows("left, deg")
+        assert browser.shows("residual, deg")
         browser.press("Yes")
         browser.press("Close it")
         terminal.ended(0)

@@ -52,7 +52,7 @@ def test_the_command_line_tells_it_in_one_line_each(tmp_path: Path, capsys: pyte
 def test_both_names_at_once_are_refused_with_both(tmp_path: Path) -> None:
     path = tmp_path / "motion.yaml"
     path.write_text(yaml.safe_dump({"unheld": 0.2, "left_lying": 0.3}))
-    with pytest.raises(ConfigurationError, match="left_lying is the former name of unheld: keep unheld alone"):
+    with pytest.raises(ConfigurationError, match="left_lying is the former name of unheld: remove left_lying"):
         load_model(path, MotionNoise)
 
 
@@ -60,7 +60,7 @@ def test_keys_without_a_meaning_any_more_are_left_out_and_told() -> None:
     class Newer(MotionNoise):
         retired = ("wobble",)
 
-    with pytest.warns(RenamedKeyWarning, match="test: wobble has no effect any more"):
+    with pytest.warns(RenamedKeyWarning, match="test: wobble no longer has any effect"):
         assert validate({"wobble": 3, "unheld": 0.5}, Newer, where="test").unheld == 0.5
 
 

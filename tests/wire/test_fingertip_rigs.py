@@ -108,8 +108,8 @@ def test_a_wrong_baud_rate_is_found_out(rig: Path) -> None:
 def test_another_sensor_than_the_rig_names_is_found_out(rig: Path) -> None:
     with emulate_sensors(load_fingertip_rig(rig)):
         box, digital = (found(changed(rig, finger, serial="FT77777"))[finger] for finger in ("FF", "MF"))
-    assert "the box uses the calibration of FT20001, the rig file names FT77777" in box.detail
-    assert "the sensor is FT00002, the rig file names FT77777" in digital.detail
+    assert "the box uses the calibration of FT20001, but the rig file names FT77777" in box.detail
+    assert "the sensor is FT00002, but the rig file names FT77777" in digital.detail
 
 
 def test_a_device_that_is_no_controller_is_told(rig: Path, tmp_path: Path) -> None:
@@ -142,7 +142,7 @@ def test_a_wire_that_does_not_fit_is_named(
 
 def test_two_fingers_on_one_port_are_refused(rig: Path) -> None:
     port = yaml.safe_load(rig.read_text())["wires"]["MF"]["port"]
-    with pytest.raises(ConfigurationError, match="MF and TH both name port"):
+    with pytest.raises(ConfigurationError, match="MF and TH both use port"):
         load_fingertip_rig(changed(rig, "TH", port=port))
 
 
@@ -175,7 +175,7 @@ def test_emulated_volts_go_through_the_rigs_own_calibration(rig: Path, lab_data:
     ("changes", "words"),
     [
         ({"host": "192.168.1.1"}, "only loopback"),
-        ({"wire": "can-oem", "interface": "virtual", "channel": "x"}, "does not leave this program"),
+        ({"wire": "can-oem", "interface": "virtual", "channel": "x"}, "exists only inside one program"),
     ],
 )
 def test_what_cannot_be_emulated_is_told(rig: Path, changes: dict[str, object], words: str) -> None:
@@ -187,7 +187,7 @@ def test_what_cannot_be_emulated_is_told(rig: Path, changes: dict[str, object], 
 
 @pytest.mark.parametrize("name", ["sim", str(TIPS.parents[2] / "sim-wire.yaml")])
 def test_rigs_that_start_what_they_need_are_not_emulated(name: str) -> None:
-    with pytest.raises(ConfigurationError, match="simulated and emulated rigs start what they need"):
+    with pytest.raises(ConfigurationError, match="simulated and emulated rigs start their emulators"):
         emulated_rig(name)
 
 
@@ -199,7 +199,7 @@ def test_a_real_port_is_never_replaced(rig: Path) -> None:
 
 
 def test_a_session_needs_a_hand(rig: Path) -> None:
-    with pytest.raises(ConfigurationError, match=r"bench\.yaml: has fingertips alone, and no hand"):
+    with pytest.raises(ConfigurationError, match=r"bench\.yaml: has only fingertips, and no hand"):
         load_rig(str(rig))
 
 

@@ -59,7 +59,7 @@ def test_a_motor_map_is_checked_by_moving_when_asked(tmp_path: Path) -> None:
         file = rig_file(tmp_path, near, calibration={"joints": str(JOINTS), "motors": str(wrong)})
         findings = {finding.device: finding for finding in check_rig(str(file), move=True)}
     assert not findings["motor map"].ok
-    assert "is said to pull FFJ3, but moves MFJ3" in findings["motor map"].detail
+    assert "moves MFJ3, but the motor map says FFJ3" in findings["motor map"].detail
 
 
 def test_a_simulated_rig_has_no_motors_to_nudge() -> None:
@@ -92,7 +92,7 @@ def test_a_missing_interface_is_told(tmp_path: Path) -> None:
 
 def test_files_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     with (
-        pytest.raises(ConfigurationError, match="far_end is not named"),
+        pytest.raises(ConfigurationError, match="far_end is missing"),
         emulated_hand(load_hand_rig(rig_file(tmp_path, "lo"))),
     ):
         pass

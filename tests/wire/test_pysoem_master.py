@@ -79,7 +79,7 @@ def test_the_hand_driver_works_through_soem(ends: tuple[str, str]) -> None:
 
 
 def test_a_bare_eeprom_is_refused_with_the_way_out(ends: tuple[str, str]) -> None:
-    with EmulatedHandProcess(ends[1], JOINTS), pytest.raises(DeviceError, match=r"0 \+ 0 bytes.*our own master"):
+    with EmulatedHandProcess(ends[1], JOINTS), pytest.raises(DeviceError, match=r"0 \+ 0 bytes.*the built-in master"):
         transport(ends[0]).open()
 
 

@@ -111,7 +111,7 @@ def load(path: Path) -> AtiCalibration:
     except (KeyError, ValueError) as error:
         raise ConfigurationError(f"calibration is incomplete or damaged ({error})", where=str(path)) from error
     raise ConfigurationError(
-        f"is no ATI calibration (root element {root.tag})", where=str(path), hint="Give a .cal or Net F/T XML file"
+        f"is not an ATI calibration (root element {root.tag})", where=str(path), hint="Give a .cal or Net F/T XML file"
     )
 
 
@@ -229,12 +229,12 @@ def _text(parent: ET.Element, tag: str) -> str:
 
 def _number(text: str) -> float:
     if not math.isfinite(value := float(text)):
-        raise ValueError(f"{text!r} is no finite number")
+        raise ValueError(f"{text!r} is not a finite number")
     return value
 
 
 def _numbers(text: str, count: int) -> Array:
     values = np.array([_number(word) for word in text.split()])
     if len(values) != count:
-        raise ValueError(f"{len(values)} numbers where {count} belong")
+        raise ValueError(f"{len(values)} numbers instead of {count}")
     return values

@@ -58,7 +58,7 @@ def split_identifier(word: int) -> tuple[int, Op]:
     try:
         return word >> 4, Op(word & 0xF)
     except ValueError as error:
-        raise CodecError(f"identifier 0x{word:03x} is no message of an F/T board", where="CAN") from error
+        raise CodecError(f"identifier 0x{word:03x} is not a message of an F/T board", where="CAN") from error
 
 
 def request(op: Op, data: bytes = b"", base: int = DEFAULT_BASE) -> CanFrame:
@@ -122,5 +122,5 @@ def describe_status(status: int) -> tuple[str, ...]:
 
 def _unpack(form: struct.Struct, data: bytes) -> tuple[int, ...]:
     if len(data) != form.size:
-        raise CodecError(f"{len(data)} data bytes where {form.size} belong", where="CAN")
+        raise CodecError(f"{len(data)} data bytes instead of {form.size}", where="CAN")
     return form.unpack(data)

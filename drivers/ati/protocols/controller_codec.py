@@ -37,7 +37,7 @@ def encode_binary(record: Record) -> bytes:
 def decode_binary(payload: bytes) -> Record:
     """A record of 13 bytes. Raises CodecError for another length."""
     if len(payload) != _BINARY.size:
-        raise CodecError(f"{len(payload)} bytes where a record has {_BINARY.size}", where="F/T controller")
+        raise CodecError(f"{len(payload)} bytes instead of the {_BINARY.size} of a record", where="F/T controller")
     error, *counts = _BINARY.unpack(payload)
     return Record(error, tuple(counts))
 
@@ -45,14 +45,14 @@ def decode_binary(payload: bytes) -> Record:
 def encode_ascii(record: Record) -> bytes:
     """A record as a line, with its end. Raises CodecError unless there are six counts."""
     if len(record.counts) != 6:
-        raise CodecError(f"{len(record.counts)} counts where six belong", where="F/T controller")
+        raise CodecError(f"{len(record.counts)} counts instead of six", where="F/T controller")
     return (f"{record.error}," + ",".join(f"{count:6d}" for count in record.counts) + "\r\n").encode("ascii")
 
 
 def decode_ascii(line: bytes) -> Record:
     """A line without its end. Raises CodecError when it is no record."""
     if (match := _ASCII.fullmatch(line)) is None:
-        raise CodecError(f"{line[:60]!r} is no record", where="F/T controller")
+        raise CodecError(f"{line[:60]!r} is not a record", where="F/T controller")
     error, *counts = (int(word) for word in match.groups())
     return Record(error, tuple(counts))
 

@@ -65,7 +65,7 @@ class DigitalCalibration:
 def unit_names(force_code: int, torque_code: int) -> tuple[str, str]:
     """Names of the unit codes. Raises CodecError for a code that is none."""
     if not (1 <= force_code <= len(FORCE_UNITS) and 1 <= torque_code <= len(TORQUE_UNITS)):
-        raise CodecError(f"unit codes {force_code} and {torque_code} mean nothing", where="ATI calibration")
+        raise CodecError(f"unknown unit codes {force_code} and {torque_code}", where="ATI calibration")
     return FORCE_UNITS[force_code - 1], TORQUE_UNITS[torque_code - 1]
 
 
@@ -84,7 +84,7 @@ def decode_block(block: bytes) -> DigitalCalibration:
         CodecError: wrong length, or it can be no calibration (an empty slot, for example).
     """
     if len(block) != BLOCK.size:
-        raise CodecError(f"{len(block)} bytes where {BLOCK.size} belong", where="ATI calibration block")
+        raise CodecError(f"{len(block)} bytes instead of {BLOCK.size}", where="ATI calibration block")
     serial, part, _, time, *rest = BLOCK.unpack(block)
     matrix, (force_code, torque_code), ratings = np.array(rest[:36]).reshape(6, 6), rest[36:38], np.array(rest[38:44])
     force_unit, torque_unit = unit_names(force_code, torque_code)

@@ -20,7 +20,7 @@ for _byte in range(256):
         _crc = _crc >> 1 ^ (0xA001 if _crc & 1 else 0)
     _TABLE[_byte] = _crc
 
-EXCEPTIONS = {1: "function not known", 2: "no such register", 3: "value refused", 4: "device failure", 6: "device busy"}
+EXCEPTIONS = {1: "unknown function", 2: "no such register", 3: "value refused", 4: "device failure", 6: "device busy"}
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def crc16(payload: bytes) -> int:
 def encode(frame: Frame) -> bytes:
     """A frame as bytes. Raises CodecError when it is too long for the line."""
     if len(frame.data) > 252:
-        raise CodecError(f"{len(frame.data)} data bytes where 252 fit", where="Modbus")
+        raise CodecError(f"{len(frame.data)} data bytes, at most 252 fit", where="Modbus")
     body = bytes((frame.slave, frame.function)) + frame.data
     return body + crc16(body).to_bytes(2, "little")
 
@@ -59,9 +59,9 @@ def encode(frame: Frame) -> bytes:
 def decode(payload: bytes) -> Frame:
     """One whole frame. Raises CodecError when it is too short or its check word is wrong."""
     if len(payload) < 4:
-        raise CodecError(f"{len(payload)} bytes where a frame has at least 4", where="Modbus")
+        raise CodecError(f"{len(payload)} bytes, a frame has at least 4", where="Modbus")
     if crc16(payload[:-2]) != int.from_bytes(payload[-2:], "little"):
-        raise CodecError("wrong check word", where="Modbus", hint="Check baud rate, parity and wiring")
+        raise CodecError("wrong checksum", where="Modbus", hint="Check baud rate, parity and wiring")
     return Frame(payload[0], payload[1], payload[2:-2])
 
 

@@ -114,7 +114,7 @@ def decode_request(payload: bytes) -> Request:
         CodecError: wrong length, header or command.
     """
     if len(payload) != _REQUEST.size:
-        raise CodecError(f"{len(payload)} bytes where a request has {_REQUEST.size}", where="RDT request")
+        raise CodecError(f"{len(payload)} bytes instead of the {_REQUEST.size} of a request", where="RDT request")
     header, command, count = _REQUEST.unpack(payload)
     if header != HEADER:
         raise CodecError(f"header 0x{header:04x} is not 0x{HEADER:04x}", where="RDT request")
@@ -172,7 +172,7 @@ def encode_records(
     """
     rows = np.atleast_2d(np.asarray(counts))
     if rows.ndim != 2 or rows.shape[1] != 6:
-        raise CodecError(f"counts of shape {rows.shape} where (n, 6) is needed", where="RDT record")
+        raise CodecError(f"counts of shape {rows.shape} instead of (n, 6)", where="RDT record")
     if (np.abs(rows.astype(np.float64)) > 2**31 - 1).any():
         raise CodecError("a count does not fit 32 bits", where="RDT record")
     columns = [np.asarray(words, np.int64) & 0xFFFFFFFF for words in (rdt_sequence, ft_sequence, status)]

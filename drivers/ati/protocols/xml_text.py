@@ -17,7 +17,7 @@ def parse_xml(content: bytes) -> ET.Element:
         raise ValueError("is too large")
     text = content.replace(b"\0", b"").upper()  # also finds the words in UTF-16
     if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
-        raise ValueError("carries a document type or entities")
+        raise ValueError("contains a document type or entities")
     try:
         return ET.fromstring(content)
     except (ET.ParseError, LookupError) as error:

@@ -118,7 +118,7 @@ class CanWire:
 
     def health(self) -> tuple[str, ...]:
         """Lost halves and questions without an answer, in words."""
-        halves = (f"{self.lost} readings lost half of their frames",) if self.lost else ()
+        halves = (f"{self.lost} readings lost one of their two frames",) if self.lost else ()
         return (*halves, *self._turn.health())
 
     def _take_first(self, data: bytes) -> None:
@@ -181,7 +181,7 @@ class CanWire:
     def _check_serial(self, where: str, found: str) -> None:
         if self._serial and found != self._serial:
             raise DeviceError(
-                f"the sensor is {found}, the rig file names {self._serial}",
+                f"the sensor is {found}, but the rig file names {self._serial}",
                 where=where,
-                hint="Exchange the cables, or correct the rig file",
+                hint="Swap the cables, or correct the rig file",
             )

@@ -92,7 +92,7 @@ class ControllerWire:
             return
         if self._heard:
             raise DeviceError(
-                "what answers is no F/T controller at this baud rate",
+                "the answer is not from an F/T controller at this baud rate",
                 where=talk.name,
                 hint="Compare the baud rate with the controller's (9600, 19200 or 38400)",
             )

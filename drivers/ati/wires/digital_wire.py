@@ -123,9 +123,7 @@ class DigitalWire:
         stream = self._stream
         if not stream.skipped_bytes:
             return ()
-        return (
-            f"{stream.skipped_bytes} bytes of the line fit no sample, alignment found again {stream.resyncs} times",
-        )
+        return (f"{stream.skipped_bytes} bytes do not belong to any sample; realigned {stream.resyncs} times",)
 
     def _restart(self) -> None:
         self._buffer, self._stream, self._streaming = bytearray(), GaugeStream(), False
@@ -194,7 +192,7 @@ class DigitalWire:
             )
         if self._serial and self.calibration.serial != self._serial:
             raise DeviceError(
-                f"the sensor is {self.calibration.serial}, the rig file names {self._serial}",
+                f"the sensor is {self.calibration.serial}, but the rig file names {self._serial}",
                 where=where,
-                hint="Exchange the cables, or correct the rig file",
+                hint="Swap the cables, or correct the rig file",
             )

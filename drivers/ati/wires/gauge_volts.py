@@ -28,7 +28,7 @@ def encode_volts(counter: int, volts: tuple[float, ...]) -> bytes:
     """A reading of six gauges, with or without thermistor. Raises CodecError for another number of values."""
     form = {GAUGES: PLAIN, GAUGES + 1: WITH_THERMISTOR}.get(len(volts))
     if form is None:
-        raise CodecError(f"{len(volts)} volts where six or seven belong", where="gauge volts")
+        raise CodecError(f"{len(volts)} volts instead of six or seven", where="gauge volts")
     return form.pack(counter & 0xFFFFFFFF, *volts)
 
 
@@ -36,7 +36,7 @@ def decode_volts(payload: bytes) -> tuple[int, Array]:
     """Counter and volts, shape (6,) or (7,). Raises CodecError for another length or values that are not finite."""
     form = {PLAIN.size: PLAIN, WITH_THERMISTOR.size: WITH_THERMISTOR}.get(len(payload))
     if form is None:
-        raise CodecError(f"{len(payload)} bytes where {PLAIN.size} or {WITH_THERMISTOR.size} belong", where="volts")
+        raise CodecError(f"{len(payload)} bytes instead of {PLAIN.size} or {WITH_THERMISTOR.size}", where="volts")
     counter, *volts = form.unpack(payload)
     if not np.isfinite(volts).all():
         raise CodecError("volts that are not finite", where="gauge volts", hint="Check the acquisition program")

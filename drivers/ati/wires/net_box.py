@@ -88,7 +88,7 @@ def set_rate(host: str, port: int, rate_hz: int, timeout_s: float = 2.0) -> NetB
     page = fetch_page(host, port, timeout_s)
     if page.rate_hz not in (rate_hz, achievable_rate(rate_hz)):
         raise DeviceError(
-            f"asked for {rate_hz} records a second, the box stays at {page.rate_hz}",
+            f"{rate_hz} records per second were requested, but the box stays at {page.rate_hz}",
             where=f"{host}:{port}",
             hint="Set the RDT output rate on the box's Communications page",
         )
@@ -116,5 +116,5 @@ def _get(host: str, port: int, path: str, timeout_s: float) -> bytes:
 
 def _positive(word: str) -> float:
     if not (math.isfinite(value := float(word)) and value > 0):
-        raise ValueError(f"{word!r} is no scale")
+        raise ValueError(f"{word!r} is not a scale")
     return value

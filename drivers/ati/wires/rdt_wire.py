@@ -76,7 +76,8 @@ class RdtWire:
                 raise DeviceError(
                     f"the box at {self._pages.host} answers, but no record arrives",
                     where=talk.name,
-                    hint="Check the firewall and that no other program reads this box; else switch the box off and on",
+                    hint="Check the firewall and that no other program reads this box; otherwise switch the box off "
+                    "and on",
                 )
 
     def ask(self, transport: Transport, now_ns: int) -> None:
@@ -113,17 +114,18 @@ class RdtWire:
     def _look_at_box(self, where: str, pages: BoxPages) -> None:
         page = net_box.fetch_page(pages.host, pages.port)
         if pages.serial and page.serial != pages.serial:
-            raise _wrong(where, f"the box uses the calibration of {page.serial}, the rig file names {pages.serial}")
+            raise _wrong(where, f"the box uses the calibration of {page.serial}, but the rig file names {pages.serial}")
         stated = np.array([self._scale[0], self._scale[3]])
         told = np.array([page.counts_per_N, page.counts_per_Nm])
         if np.any(np.abs(told - stated) > _SCALE_TOLERANCE * stated):
             raise _wrong(
                 where,
-                f"the box counts {told[0]:g} per N and {told[1]:g} per N m, "
-                f"the rig file says {stated[0]:g} and {stated[1]:g}",
+                f"the box has {told[0]:g} counts per N and {told[1]:g} per N m, "
+                "but the rig file says "
+                f"{stated[0]:g} and {stated[1]:g}",
             )
         if any(page.tool):
-            raise _wrong(where, f"the box applies a tool transform of its own {page.tool}")
+            raise _wrong(where, f"the box applies its own tool transform {page.tool}")
         if not page.rdt_enabled:
             raise _wrong(where, "the box's RDT interface is switched off")
         self.page = page if page.rate_hz == pages.rate_hz else net_box.set_rate(pages.host, pages.port, pages.rate_hz)

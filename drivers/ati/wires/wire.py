@@ -169,4 +169,4 @@ class Turn:
 
     def health(self) -> tuple[str, ...]:
         """Questions without an answer, in words."""
-        return (f"{self.unanswered} questions without an answer",) if self.unanswered else ()
+        return (f"{self.unanswered} requests without an answer",) if self.unanswered else ()

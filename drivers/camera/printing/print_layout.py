@@ -83,7 +83,7 @@ def sheet_of(prints: Sequence[AnyBoard], paper: str = "A4", places: Sequence[str
         ConfigurationError: no such paper, or the prints do not fit on it.
     """
     if paper not in PAPERS_mm:
-        hint = f"There are {', '.join(PAPERS_mm)}"
+        hint = f"Choose one of {', '.join(PAPERS_mm)}"
         raise ConfigurationError(f"no paper called {paper!r}", where="markers", hint=hint)
     pieces = [_piece(each) for each in prints]
     if places:
@@ -95,9 +95,10 @@ def sheet_of(prints: Sequence[AnyBoard], paper: str = "A4", places: Sequence[str
     widest, highest = max(piece.width_mm for piece in pieces), max(piece.height_mm for piece in pieces)
     room = f"{portrait[0] - 2 * _MARGIN_mm:.0f} x {portrait[1] - 2 * _MARGIN_mm - _FOOT_mm:.0f} mm"
     raise ConfigurationError(
-        f"{len(pieces)} prints of up to {widest:.0f} x {highest:.0f} mm do not fit on {paper}: it has room for {room}",
+        f"{len(pieces)} prints of up to {widest:.0f} x {highest:.0f} mm do not fit on {paper}, which has "
+        f"room for {room}",
         where="markers",
-        hint="Take a larger paper or a smaller side, or print fewer at a time",
+        hint="Choose a larger paper or a smaller side, or print fewer at a time",
     )
 
 

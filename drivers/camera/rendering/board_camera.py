@@ -51,7 +51,7 @@ def draw_board(
 ) -> Image:
     """A picture of a board of true size, shape (height, width). Raises ConfigurationError: the lens states no size."""
     if lens.size_px is None:
-        raise ConfigurationError("the picture size is missing", where="simulated camera", hint="State size_px")
+        raise ConfigurationError("the picture size is missing", where="simulated camera", hint="Set size_px")
     view, texture = view or BoardView(), board_texture(board)
     rays = _rays(lens)
     rotation, place = camera_T_board.rotation().matrix(), np.array(camera_T_board.translation())
@@ -165,7 +165,7 @@ class SimulatedSource:
         elif scene == "board":
             self._poses = board_poses(self._board, self._lens, BOARD_VIEWS, self._rng)
         else:
-            hint = "There are simulated:table and simulated:board"
+            hint = "Choose simulated:table or simulated:board"
             raise ConfigurationError(f"no scene called {scene!r}", where="simulated camera", hint=hint)
         self._start_ns = self._clock.now_ns()
 

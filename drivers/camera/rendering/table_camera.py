@@ -68,7 +68,7 @@ class TableCamera:
 
     def __init__(self, lens: CameraCalibration, settings: CameraSettings, rng: np.random.Generator) -> None:
         if lens.size_px is None:
-            raise ConfigurationError("the picture size is missing", where="simulated camera", hint="State size_px")
+            raise ConfigurationError("the picture size is missing", where="simulated camera", hint="Set size_px")
         self._lens, self._settings, self._rng = lens, settings, rng
         self._size_px = lens.size_px
         self._pose = settings.world_T_camera.pose()

@@ -13,7 +13,7 @@ from contextlib import ExitStack
 from typing import Any, Self
 
 from drivers.ati.protocols import rdt_codec
-from drivers.core.child_process import ChildProcess, say
+from drivers.core.child_process import ChildProcess, errors_said, say
 from drivers.core.errors import DeviceError
 from drivers.emulators.ati.net_box_server import NetBoxServer
 from drivers.emulators.ati.net_box_unit import NetBoxUnit
@@ -24,8 +24,8 @@ _START_s, _END_s = 30.0, 10.0
 
 def main() -> None:
     """Serve."""
-    start = json.loads(sys.stdin.readline())
-    with ExitStack() as running:
+    with errors_said(), ExitStack() as running:
+        start = json.loads(sys.stdin.readline())
         boxes = [
             running.enter_context(
                 NetBoxServer(NetBoxUnit(EmulatedSensor(seed=seed), start["rate_hz"]), host, start["port"])
@@ -62,7 +62,7 @@ class NetBoxProcess:
             self.http_ports = self._child.ready(_START_s)["http_ports"]
         except DeviceError as error:
             where = ", ".join(self._start["hosts"])
-            raise DeviceError("the emulated boxes do not start", where=where, hint=_TAKEN) from error
+            raise DeviceError("the emulated boxes did not start", where=where, hint=_TAKEN) from error
         return self
 
     def __exit__(self, *ended: object) -> None:
@@ -79,7 +79,7 @@ class NetBoxProcess:
             self.sent = json.loads(said)["sent"]
 
 
-_TAKEN = "Another program may hold their addresses; end it"
+_TAKEN = "Another program may be using their addresses: end it"
 
 if __name__ == "__main__":
     main()

@@ -24,6 +24,9 @@ class CableFaults:
         drop_share: share of frames that get lost at random, half on either way.
         hold: so many answers stay behind next and come in a burst with the one after them.
         connected: slaves that are reached, from the first on; None for all.
+        unplugged: the cable to the master is out, so that nothing arrives.
+        damage: so many frames get damaged next, and so lost.
+        damaged_at: on the cable before which slave, 0 for the first.
     """
 
     drop: int = 0
@@ -31,6 +34,9 @@ class CableFaults:
     drop_share: float = 0.0
     hold: int = 0
     connected: int | None = None
+    unplugged: bool = False
+    damage: int = 0
+    damaged_at: int = 0
 
 
 @dataclass
@@ -55,16 +61,21 @@ class EmulatedRing:
         self.faults, self.counts = CableFaults(), CableCounts()
         self._rng = np.random.default_rng(seed)
         self._held: list[bytes] = []
+        self._reached = len(self.slaves)
 
     def process(self, frame: bytes) -> list[bytes]:
         """What comes back when a frame is sent: usually that frame."""
         self.counts.frames += 1
-        if self._loses_frame("drop"):
+        self._note_links()
+        if self.faults.unplugged or self._loses_frame("drop"):
+            self.counts.lost += self.faults.unplugged
             return []
         try:
             telegrams = decode_frame(frame)
         except CodecError:
             self.counts.foreign += 1
+            return []
+        if self._damages(telegrams):
             return []
         source = bytes((source_of(frame)[0] | _LOCAL_BIT,)) + source_of(frame)[1:]
         answer = encode_frame([self._round(telegram) for telegram in telegrams], source)
@@ -80,11 +91,33 @@ class EmulatedRing:
         for slave in self.slaves:
             slave.work()
 
-    def _round(self, telegram: Telegram) -> Telegram:
+    def _round(self, telegram: Telegram, reached: int | None = None) -> Telegram:
         passed = replace(telegram, circulated=False) if telegram.circulated else telegram
-        for slave in self.slaves[: self.faults.connected]:
+        for slave in self.slaves[: self.faults.connected if reached is None else reached]:
             passed = slave.process(passed)
         return passed
+
+    def _note_links(self) -> None:
+        """Both ends of a cable that is out now, and was not before, count a lost link."""
+        connected = self.faults.connected
+        reached = 0 if self.faults.unplugged else len(self.slaves) if connected is None else connected
+        if reached < self._reached:
+            self.slaves[reached].count_lost_link(0)
+            if reached:
+                self.slaves[reached - 1].count_lost_link(1)
+        self._reached = reached
+
+    def _damages(self, telegrams: Sequence[Telegram]) -> bool:
+        """The slave behind a bad cable counts the frame and does not use it; those before it do."""
+        if not self.faults.damage:
+            return False
+        self.faults.damage -= 1
+        self.counts.lost += 1
+        at = self.faults.damaged_at
+        for telegram in telegrams:
+            self._round(telegram, at)
+        self.slaves[at].count_damage(0)
+        return True
 
     def _loses_frame(self, way: str) -> bool:
         left, share = getattr(self.faults, way), self.faults.drop_share

@@ -116,9 +116,9 @@ class HandServer:
 
 def main() -> None:
     """Read the first line, make the hand, serve it."""
-    start = json.loads(sys.stdin.readline())
     clock = MonotonicClock()
     with errors_said():
+        start = json.loads(sys.stdin.readline())
         calibration = JointCalibration.load(Path(start["joints"]))
         can = MotorCanBuses()
         time, port = VirtualClock(clock.now_ns()), StampedPort(start["interface"], clock)

@@ -13,7 +13,7 @@ from drivers.emulators.ethercat.eeprom import SlaveIdentity, bare_eeprom, mapped
 from drivers.emulators.ethercat.free_hand import FreeHand
 from drivers.emulators.ethercat.ring import EmulatedRing
 from drivers.emulators.ethercat.slave import SlaveController
-from drivers.emulators.ethercat.slave_application import Application, NoApplication
+from drivers.emulators.ethercat.slave_application import Application
 from drivers.ethercat.registers import SyncManager
 from drivers.fingertips.kinds import as_palm_kind, palm_kind
 from drivers.shadow.device.tactile_requests import TactileKind
@@ -158,7 +158,7 @@ def _fingertips(kind: TactileKind, hand: FreeHand, rng: np.random.Generator) -> 
 def _ring(palm: PalmApplication, image: PalmImage, clock: Clock, settings: ChainSettings) -> EmulatedRing:
     product = image.products[0] if settings.product is None else settings.product
     identities = (
-        (SlaveIdentity(settings.vendor, BRIDGE_PRODUCT), "bridge", NoApplication()),
+        (SlaveIdentity(settings.vendor, BRIDGE_PRODUCT), "bridge", None),
         (SlaveIdentity(settings.vendor, product, serial=settings.serial), "palm", palm),
     )
     slaves = [_slave(identity, name, part, clock, settings.eeprom) for identity, name, part in identities]
@@ -166,7 +166,8 @@ def _ring(palm: PalmApplication, image: PalmImage, clock: Clock, settings: Chain
 
 
 def _slave(
-    identity: SlaveIdentity, name: str, application: Application, clock: Clock, kind: EepromKind
+    identity: SlaveIdentity, name: str, application: Application | None, clock: Clock, kind: EepromKind
 ) -> SlaveController:
-    eeprom = bare_eeprom(identity) if kind == "bare" else mapped_eeprom(identity, name, application.sync_managers)
+    managers = application.sync_managers if application else ()
+    eeprom = bare_eeprom(identity) if kind == "bare" else mapped_eeprom(identity, name, managers)
     return SlaveController(eeprom, application, clock)

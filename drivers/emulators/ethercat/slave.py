@@ -12,13 +12,14 @@ from dataclasses import replace
 from drivers.core.clock import Clock
 from drivers.emulators.ethercat.eeprom import EepromInterface
 from drivers.emulators.ethercat.guarded_memory import RAM_END, RAM_KIB, RAM_START, SYNC_MANAGERS, Block, GuardedMemory
-from drivers.emulators.ethercat.slave_application import Application, Service, SlaveCounts
-from drivers.emulators.ethercat.states import StateMachine
+from drivers.emulators.ethercat.slave_application import Application, NoApplication, Service, SlaveCounts
+from drivers.emulators.ethercat.states import CopiedStates, StateMachine
 from drivers.ethercat.frames import Command, Telegram, physical
-from drivers.ethercat.registers import FMMU_BYTES, AlState, AlStatus, Register
+from drivers.ethercat.registers import DEVICE_EMULATION, FMMU_BYTES, AlState, AlStatus, Register
 
 _FMMUS = 3
-_READ_ONLY = (range(0x0010), range(0x0110, 0x0112), range(0x0130, 0x0136), range(0x0440, 0x0442))
+_READ_ONLY = (range(0x0010), range(0x0110, 0x0112), range(0x0130, 0x0142), range(0x0440, 0x0442))
+_CLEARED_BY_WRITES = (range(0x0300, 0x0308), range(0x0310, 0x0314))
 _DIVIDER, _WATCHDOG_TICKS, _TICK_ns = 0x09C2, 1000, 40
 
 _READS = {Command.APRD, Command.APRW, Command.FPRD, Command.FPRW, Command.BRD, Command.BRW}
@@ -34,15 +35,19 @@ class SlaveController:
 
     Args:
         eeprom: its content.
-        application: what stands behind it.
+        application: the processor behind it; None for device emulation, where there is none.
         clock: for the watchdog and the application's time.
         eeprom_busy: so many looks at the EEPROM see it busy after each request.
+
+    Attributes:
+        fixed: registers that keep what they hold, whoever writes them.
     """
 
-    def __init__(self, eeprom: bytes, application: Application, clock: Clock, eeprom_busy: int = 1) -> None:
-        self.application, self._clock = application, clock
+    def __init__(self, eeprom: bytes, application: Application | None, clock: Clock, eeprom_busy: int = 1) -> None:
+        self._emulates = application is None
+        self.application, self._clock = application or NoApplication(), clock
         self.eeprom = EepromInterface(eeprom, eeprom_busy)
-        self.counts = SlaveCounts()
+        self.counts, self.fixed = SlaveCounts(), list[int]()
         self._power_up()
 
     def _power_up(self) -> None:
@@ -55,7 +60,8 @@ class SlaveController:
         self._fmmus: list[tuple[int, int, int, int]] = []
         self._ram = GuardedMemory(self._memory, self.counts, self._fill)
         self._load_watchdog()
-        self._states = StateMachine(self._setup_error)
+        self._memory[Register.ESC_CONFIGURATION] = DEVICE_EMULATION if self._emulates else 0
+        self._states = CopiedStates() if self._emulates else StateMachine(self._setup_error)
         self._service: Service | None = None
         self._fed_ns = 0
 
@@ -71,6 +77,17 @@ class SlaveController:
     def fall_to(self, state: AlState, code: int) -> None:
         """The slave leaves its state by itself, with an error."""
         self._states.fall(state, code)
+
+    def count_damage(self, port: int) -> None:
+        """A frame came in damaged."""
+        self._count(Register.ERROR_COUNTERS + 2 * port)
+
+    def count_lost_link(self, port: int) -> None:
+        """The link of a port is gone."""
+        self._count(Register.LOST_LINKS + port)
+
+    def _count(self, register: int) -> None:
+        self._memory[register] = min(self._memory[register] + 1, 0xFF)
 
     # --- telegrams ---------------------------------------------------------------------------------------------
 
@@ -146,6 +163,10 @@ class SlaveController:
             return self._ram.write(address, data)
         if any(address in each for each in _READ_ONLY):
             return False
+        if address in self.fixed:
+            return True
+        if cleared := next((each for each in _CLEARED_BY_WRITES if address in each), None):
+            data, address, end = bytes(len(cleared)), cleared.start, cleared.stop
         self._memory[address:end] = data
         self._react(address, end)
         return True

@@ -39,7 +39,7 @@ class StateMachine:
         else:
             self.status = AlStatus(AlState(wanted))
 
-    def fall(self, state: AlState, code: int) -> None:
+    def fall(self, state: int, code: int) -> None:
         """Go to a state with an error."""
         self.status = AlStatus(state, True, code)
 
@@ -49,3 +49,16 @@ class StateMachine:
 
     def _refuse(self, code: AlCode) -> None:
         self.fall(AlState(self.status.state), code)
+
+
+class CopiedStates(StateMachine):
+    """States of a slave without a processor, in device emulation: the control word appears in the status as it is.
+
+    So any request is granted, and an acknowledge looks like an error from then on.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(lambda: None)
+
+    def request(self, control: int) -> None:
+        self.status = AlStatus(control & AL_STATE_MASK, bool(control & AL_ERROR))

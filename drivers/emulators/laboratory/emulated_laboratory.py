@@ -121,8 +121,8 @@ class EmulatedLaboratory:
             DeviceError: the physics does not run any more; every emulator goes on, in a world that stands still.
         """
         if self._memory.age_ns > _GONE_ns:
-            hint = "Its process has ended, or this computer is far too slow; run again"
-            raise DeviceError("the emulated laboratory stands still", where="plant", hint=hint)
+            hint = "Its process has ended, or this computer is too slow: run again"
+            raise DeviceError("the emulated laboratory does not respond", where="plant", hint=hint)
         return EmulatedTruth(self._memory.world_T_object)
 
     @property

@@ -32,9 +32,9 @@ class EmulatorHost(Protocol):
 
 def main() -> None:
     """Read what to be, be it, and serve."""
-    start: dict[str, Any] = json.loads(sys.stdin.readline())
-    request_real_time(PRIORITY)
     with errors_said():
+        start: dict[str, Any] = json.loads(sys.stdin.readline())
+        request_real_time(PRIORITY)
         load_named_extensions()
         host = _load_host(start.pop("role"), start)
         say({"ready": True})

@@ -86,5 +86,7 @@ def make(start: dict[str, Any], clock: Clock) -> NetBoxHost:
     try:
         return NetBoxHost(NetBoxServer(unit, wiring.host, wiring.port, wiring.http_port))
     except OSError as error:
-        what = f"cannot be served at {wiring.host} ({error.strerror})"
-        raise DeviceError(what, where=f"box {finger}", hint="End the other laboratory, or name a free place") from error
+        what = f"cannot be emulated at {wiring.host} ({error.strerror})"
+        raise DeviceError(
+            what, where=f"box {finger}", hint="End the other emulated laboratory, or choose a free address"
+        ) from error

@@ -68,10 +68,14 @@ class PlantMirror:
         try:
             with path.open("r+b") as file:
                 if os.fstat(file.fileno()).st_size != _MEMORY.itemsize:
-                    raise DeviceError("is no plant's memory", where=str(path), hint="Start the laboratory again")
+                    raise DeviceError(
+                        "is not the memory of a simulated plant", where=str(path), hint="Start the laboratory again"
+                    )
                 self._memory = np.frombuffer(mmap.mmap(file.fileno(), _MEMORY.itemsize), _MEMORY)
         except OSError as error:
-            raise DeviceError(f"no plant's memory ({error.strerror})", where=str(path)) from error
+            raise DeviceError(
+                f"the memory of the simulated plant cannot be opened ({error.strerror})", where=str(path)
+            ) from error
 
     @classmethod
     def create(cls, path: Path, clock: Clock, base: Array) -> PlantMirror:

@@ -20,6 +20,8 @@ def bind_socket(kind: socket.SocketKind, host: str, port: int, where: str) -> so
         made.bind((host, port))
     except OSError as error:
         made.close()
-        what = f"cannot be served at {host}:{port} ({error.strerror})"
-        raise DeviceError(what, where=where, hint="End the other laboratory, or name a free place here") from error
+        what = f"cannot be emulated at {host}:{port} ({error.strerror})"
+        raise DeviceError(
+            what, where=where, hint="End the other emulated laboratory, or choose a free address"
+        ) from error
     return made

@@ -31,7 +31,9 @@ def virtual_cable(near: str, far: str) -> Iterator[None]:
 
 def _make(near: str, far: str) -> None:
     if shutil.which("ip") is None:
-        raise DeviceError("no ip command to make a virtual cable with", where=near, hint="Install iproute2")
+        raise DeviceError(
+            "the ip command, which creates virtual cables, is missing", where=near, hint="Install iproute2"
+        )
     made = _ip("link", "add", near, "type", "veth", "peer", "name", far)
     if made.returncode:
         raise _refusal(near, far, made.stderr.strip() or "ip link add failed")
@@ -45,10 +47,10 @@ def _refusal(near: str, far: str, words: str) -> DeviceError:
     made = f"sudo ip link add {near} type veth peer name {far}"
     up = f"sudo ip link set {near} up; sudo ip link set {far} up"
     hint = (
-        f"Either make it once as root ({made}; {up}) and grant raw sockets, or run the whole command in a network of "
-        "its own: unshare -Urn sh -c 'ip link set lo up; tactile-lab ...'"
+        f"Either create it once as root ({made}; {up}) and grant raw sockets, or run the whole command in a separate "
+        "network namespace: unshare -Urn sh -c 'ip link set lo up; tactile-lab ...'"
     )
-    return DeviceError(f"no right to make a virtual network cable ({words})", where=near, hint=hint)
+    return DeviceError(f"no permission to create a virtual network cable ({words})", where=near, hint=hint)
 
 
 def _ip(*words: str) -> subprocess.CompletedProcess[str]:

@@ -177,7 +177,7 @@ def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Clos
         ConfigurationError: no such closing, or a height the hand cannot work at.
     """
     if name not in CLOSINGS:
-        raise ConfigurationError(f"no closing called {name!r}", hint=f"Choose from {', '.join(sorted(CLOSINGS))}")
+        raise ConfigurationError(f"there is no closing {name!r}", hint=f"Choose from {', '.join(sorted(CLOSINGS))}")
     if not LOWEST_m <= height_m <= HIGHEST_m:
         allowed = f"{LOWEST_m * 1e3:.0f} to {HIGHEST_m * 1e3:.0f} mm"
         raise ConfigurationError(

@@ -28,7 +28,7 @@ class Punctuality:
     def __str__(self) -> str:
         """In words."""
         return (
-            f"{self.cycles} cycles, {self.left_out} left out, started late by {self.median_us:.0f} us (median), "
+            f"{self.cycles} cycles, {self.left_out} skipped, started late by {self.median_us:.0f} us (median), "
             f"{self.p99_us:.0f} us (99 %), {self.worst_us:.0f} us (worst)"
         )
 

@@ -7,11 +7,13 @@ its joint by about two degrees, with a small duty cycle, and back; whatever move
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 from pydantic import Field
 
+from drivers.core.clock import NANOSECONDS, Clock
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from drivers.core.errors import DeviceError
@@ -27,14 +29,14 @@ class FirstMoveSettings(StrictModel):
     Attributes:
         pwm: duty cycle of the nudges, counts of 1023.
         move_rad: a joint that has turned so far has moved.
-        patience_cycles: a motor that moves nothing in so many cycles is tried the other way, then given up.
-        rest_cycles: cycles without demand after each nudge.
+        patience_s: a motor that moves nothing in this time is tried the other way, then given up.
+        rest_s: without demand after each nudge.
     """
 
     pwm: float = Field(default=150.0, gt=0.0, le=LARGEST_NUDGE)
     move_rad: float = Field(default=0.035, gt=0.0, le=0.2)
-    patience_cycles: int = Field(default=300, ge=1)
-    rest_cycles: int = Field(default=5, ge=1)
+    patience_s: float = Field(default=0.6, gt=0.0, le=2.0)
+    rest_s: float = Field(default=0.05, ge=0.0, le=2.0)
 
 
 @dataclass(frozen=True)
@@ -61,11 +63,11 @@ class MoveFinding:
     def __str__(self) -> str:
         """In words: ``motor 5 is said to pull THJ2, but moves FFJ3``."""
         if self.moved is None:
-            return f"motor {self.motor} moves nothing; its map says {self.joint}"
+            return f"motor {self.motor} moves nothing; the motor map says {self.joint}"
         if self.moved != self.joint:
-            return f"motor {self.motor} is said to pull {self.joint}, but moves {self.moved}"
+            return f"motor {self.motor} moves {self.moved}, but the motor map says {self.joint}"
         if self.backwards:
-            return f"motor {self.motor} turns {self.joint} the wrong way: name it under reversed in the motor map"
+            return f"motor {self.motor} turns {self.joint} the wrong way: list it under reversed in the motor map"
         return f"motor {self.motor} moves {self.joint}"
 
 
@@ -73,6 +75,7 @@ def check_motor_map(
     hand: ShadowHand,
     motors: MotorMap,
     cycle: Callable[[], HandSample],
+    clock: Clock,
     joints: Sequence[str] = DRIVEN_JOINTS,
     settings: FirstMoveSettings | None = None,
 ) -> list[MoveFinding]:
@@ -82,6 +85,7 @@ def check_motor_map(
         hand: connected, clear of everything.
         motors: the map to check; the hand's own.
         cycle: one cycle of the hand: exchange, and wait for the next.
+        clock: the hand's.
         joints: driven joints to check.
         settings: how far.
 
@@ -92,7 +96,8 @@ def check_motor_map(
         DeviceError: the hand stopped itself.
     """
     findings = []
-    for finding in _findings(hand, motors, cycle, joints, settings or FirstMoveSettings()):
+    check = _MotorCheck(hand, motors, cycle, clock, settings or FirstMoveSettings())
+    for finding in map(check.find, joints):
         findings.append(finding)
         if finding.moved is not None and not finding.ok:
             break
@@ -110,65 +115,57 @@ def require_motor_map(findings: Sequence[MoveFinding], where: str) -> None:
             raise DeviceError(str(finding), where=where, hint="Use the map that belongs to this hand's serial number")
 
 
-def _findings(
-    hand: ShadowHand,
-    motors: MotorMap,
-    cycle: Callable[[], HandSample],
-    joints: Sequence[str],
-    settings: FirstMoveSettings,
-) -> Iterator[MoveFinding]:
-    for joint in joints:
-        finding = MoveFinding(joint, motors.numbers[joint], None)
+class _MotorCheck:
+    """Nudges one motor after the other; see :func:`check_motor_map`."""
+
+    def __init__(
+        self,
+        hand: ShadowHand,
+        motors: MotorMap,
+        cycle: Callable[[], HandSample],
+        clock: Clock,
+        settings: FirstMoveSettings,
+    ) -> None:
+        self._hand, self._motors, self._cycle, self._clock = hand, motors, cycle, clock
+        self._settings = settings
+
+    def find(self, joint: str) -> MoveFinding:
+        """What the motor of a joint moves, one way or else the other; the joint is brought back."""
         for direction in (1.0, -1.0):
-            turned_rad, cycles = _nudge(hand, motors, cycle, joint, direction * settings.pwm, settings)
+            pwm = direction * self._settings.pwm
+            turned_rad, took_s = self._nudge_until_it_moves(joint, pwm)
             most = int(np.abs(turned_rad).argmax())
-            if abs(turned_rad[most]) >= settings.move_rad:
-                backwards = turned_rad[most] * direction < 0
-                finding = MoveFinding(joint, finding.motor, motors.names[most], bool(backwards))
-                _back(hand, cycle, joint, -direction * settings.pwm, cycles, settings)
-                break
-        yield finding
+            if abs(turned_rad[most]) >= self._settings.move_rad:
+                self._nudge_for(joint, -pwm, took_s)
+                backwards = bool(turned_rad[most] * direction < 0)
+                return MoveFinding(joint, self._motors.numbers[joint], self._motors.names[most], backwards)
+        return MoveFinding(joint, self._motors.numbers[joint], None)
 
+    def _nudge_until_it_moves(self, joint: str, pwm: float) -> tuple[Array, float]:
+        """Angles by which the driven joints turned, shape (20,) by motor number, and the seconds it took."""
+        start_rad = self._motors.from_joints @ self._cycle().joints_rad
+        turned_rad = np.zeros_like(start_rad)
+        with self._nudge(joint, pwm) as elapsed_s:
+            while elapsed_s() < self._settings.patience_s and np.abs(turned_rad).max() < self._settings.move_rad:
+                turned_rad = self._motors.from_joints @ self._cycle().joints_rad - start_rad
+            took_s = elapsed_s()
+        return turned_rad, took_s
 
-def _nudge(
-    hand: ShadowHand,
-    motors: MotorMap,
-    cycle: Callable[[], HandSample],
-    joint: str,
-    pwm: float,
-    settings: FirstMoveSettings,
-) -> tuple[Array, int]:
-    """Angles of the driven joints turned, shape (20,) by motor number, and the cycles it took."""
-    start_rad = motors.from_joints @ cycle().joints_rad
-    hand.nudge(joint, pwm)
-    cycles, turned_rad = 0, np.zeros_like(start_rad)
-    try:
-        while cycles < settings.patience_cycles and np.abs(turned_rad).max() < settings.move_rad:
-            turned_rad = motors.from_joints @ cycle().joints_rad - start_rad
-            cycles += 1
-    finally:
-        hand.nudge(joint, 0.0)
-    _rest(cycle, settings)
-    return turned_rad, cycles
+    def _nudge_for(self, joint: str, pwm: float, duration_s: float) -> None:
+        with self._nudge(joint, pwm) as elapsed_s:
+            while elapsed_s() < duration_s:
+                self._cycle()
 
-
-def _back(
-    hand: ShadowHand,
-    cycle: Callable[[], HandSample],
-    joint: str,
-    pwm: float,
-    cycles: int,
-    settings: FirstMoveSettings,
-) -> None:
-    hand.nudge(joint, pwm)
-    try:
-        for _ in range(cycles):
-            cycle()
-    finally:
-        hand.nudge(joint, 0.0)
-    _rest(cycle, settings)
-
-
-def _rest(cycle: Callable[[], HandSample], settings: FirstMoveSettings) -> None:
-    for _ in range(settings.rest_cycles):
-        cycle()
+    @contextmanager
+    def _nudge(self, joint: str, pwm: float) -> Iterator[Callable[[], float]]:
+        """Within the block the motor is driven; gives the time since its beginning, and a rest in the end."""
+        began_ns = self._clock.now_ns()
+        self._hand.nudge(joint, pwm)
+        try:
+            yield lambda: (self._clock.now_ns() - began_ns) / NANOSECONDS
+        finally:
+            self._hand.nudge(joint, 0.0)
+        rest_ns = self._clock.now_ns() + round(self._settings.rest_s * NANOSECONDS)
+        self._cycle()
+        while self._clock.now_ns() < rest_ns:
+            self._cycle()

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.core.clock import NANOSECONDS, Clock
 from drivers.core.errors import CodecError, DeviceError
-from drivers.core.transports import Datagram, Transport
+from drivers.core.transports import Datagram, Transport, link_health
 from drivers.shadow.device.hand_guard import HandCounters, HandGuard
 from drivers.shadow.device.hand_motion import NO_DEMAND, HandMotion
 from drivers.shadow.device.hand_samples import HandDecoder, HandSample
@@ -19,7 +20,7 @@ from drivers.shadow.device.motor_polling import MotorReadings
 from drivers.shadow.device.motor_watch import Fault
 from drivers.shadow.device.palm_dialogue import PalmDialogue
 from drivers.shadow.model.joint_calibration import JointCalibration
-from drivers.shadow.model.motors import MotorMap
+from drivers.shadow.model.motors import MotorMap, drivable_range_rad
 from drivers.shadow.protocol.motor_configuration import MotorConfiguration, configure_motors, reset_motors
 from drivers.shadow.protocol.motor_data import ToMotor
 from drivers.shadow.protocol.palm_images import PALMS
@@ -28,8 +29,9 @@ from drivers.shadow.protocol.palm_images import PALMS
 class ShadowHand:
     """The hand.
 
-    Nothing moves until :meth:`set_targets`. A serious motor flag, a hot motor or a run of lost cycles stops the hand:
-    demands become zero and every further :meth:`exchange` raises, until :meth:`resume`.
+    Nothing moves until :meth:`set_targets`. A serious motor flag, a hot motor or a link that stays away stops the hand:
+    demands become zero and every further :meth:`exchange` raises, until :meth:`resume`. A link that comes back in time
+    costs the demands meanwhile, which then rise from zero again.
 
     Args:
         transport: whole process images of the palm named in the settings.
@@ -52,8 +54,11 @@ class ShadowHand:
         self._transport, self._clock = transport, clock
         self._settings = settings or HandSettings()
         self._motors, self._boards = motors or MotorMap.load(), boards
-        self._motion = HandMotion(self._motors, self._settings.gains, self._settings.soft_start_s, transport.name)
-        self._guard = HandGuard(self._settings, self._motors, transport.name)
+        gains, margin = self._settings.gains, self._settings.sensors.margin
+        range_rad = drivable_range_rad(self._motors, calibration, margin)
+        self._motion = HandMotion(self._motors, gains, self._settings.soft_start_s, transport.name, range_rad)
+        link = partial(link_health, transport)
+        self._guard = HandGuard(self._settings, self._motors, calibration, transport.name, link)
         self._decoder = HandDecoder(calibration, PALMS[self._settings.palm])
         self._connected = False
         self._reset()
@@ -128,7 +133,7 @@ class ShadowHand:
                 self._last = sample
                 return
         raise DeviceError(
-            f"the palm gave no valid status in {self._settings.connect_tries} cycles",
+            f"the palm sent no valid status in {self._settings.connect_tries} cycles",
             where=self._transport.name,
             hint="Check the hand's power and its cable",
         )
@@ -139,7 +144,9 @@ class ShadowHand:
     # --- motion ------------------------------------------------------------------------------------------------
 
     def set_targets(self, targets_rad: Mapping[str, float]) -> None:
-        """Set targets by driven joint (J0 for J1 + J2), clamped to the joint limits; the others keep theirs.
+        """Set targets by driven joint (J0 for J1 + J2), clamped to its limits and to what its calibration covers.
+
+        The others keep theirs.
 
         Raises:
             DeviceError: a name is not a driven joint, or a target is not a finite number. Nothing is changed then.
@@ -195,16 +202,19 @@ class ShadowHand:
             The new sample, or after a lost cycle the last good one, marked as not fresh.
 
         Raises:
-            DeviceError: not connected; or the hand had stopped itself before this cycle. The message names the motor.
+            DeviceError: not connected; or the hand has stopped itself before this cycle's demands went out, which were
+                zero. The message names the motor.
         """
         if not self._connected or self._last is None:
             raise DeviceError("not connected", where=self._transport.name, hint="Connect the hand first")
+        self._guard.look_at_time(now_ns := self._clock.now_ns(), driven=self._motion.active)
+        words = self._demand(self._last, now_ns)
         fault = self._guard.fault
-        sample = self._cycle(self._demand(self._last))
+        sample = self._cycle(words)
         if sample is None:
             self._last = replace(self._last, fresh=False)
             self._dialogue.on_lost_cycle()
-            self._guard.on_lost_cycle()
+            self._guard.on_lost_cycle(now_ns)
         else:
             self._last = sample
             self._guard.on_status()
@@ -250,17 +260,19 @@ class ShadowHand:
             if sample is not None:
                 newest = sample
                 self._dialogue.on_answer(sample.stamp_ns)
-                self._guard.look(sample.status, settling=self._dialogue.settling)
+                self._guard.look(sample, self._clock.now_ns(), settling=self._dialogue.settling)
         return newest
 
-    def _demand(self, last: HandSample) -> NDArray[np.int16]:
-        if self._stopped or self._guard.forbids_demands:
+    def _demand(self, last: HandSample, now_ns: int) -> NDArray[np.int16]:
+        if not self._stopped:
+            self._guard.look_at_driven(self._motion.driven, now_ns)
+        if self._stopped or self._guard.forbids_demands(now_ns):
             self._motion.pause()
             return NO_DEMAND
         share = self._guard.pwm_share(last.motor.temperature_C)
-        words = self._motion.words(last.joints_rad, share, now_ns := self._clock.now_ns())
-        self._guard.look_at_demand(words, now_ns)
-        return words
+        words = self._motion.words(last.joints_rad, share, now_ns)
+        self._guard.look_at_demand(words, last, now_ns)
+        return words if self._guard.fault is None else NO_DEMAND
 
     # --- state for people --------------------------------------------------------------------------------------
 

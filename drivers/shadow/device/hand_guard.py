@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import Array
 from drivers.shadow.device.hand_samples import HandSample, StatusCounts
 from drivers.shadow.device.hand_settings import HandSettings
+from drivers.shadow.device.joint_watch import JointWatch
 from drivers.shadow.device.motor_load import LoadWatch
 from drivers.shadow.device.motor_watch import Fault, MotorWatch
+from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.motor_data import MAX_PWM
-from drivers.shadow.protocol.palm_codec import MOTORS, PalmStatus
+from drivers.shadow.protocol.palm_codec import MOTORS
+
+STALE_s = 0.05
+"""No demand rests on a status older than this."""
 
 
 @dataclass
@@ -40,12 +47,24 @@ class HandGuard:
     Args:
         settings: of the hand, with all limits.
         motors: which motor pulls which joint.
+        calibration: of the hand's joints.
         where: name of the hand's transport, for messages.
+        link: what the transport knows to be wrong, in words.
     """
 
-    def __init__(self, settings: HandSettings, motors: MotorMap, where: str) -> None:
-        self._settings, self._where = settings, where
-        self._watch = MotorWatch(motors, settings.heat, where)
+    def __init__(
+        self,
+        settings: HandSettings,
+        motors: MotorMap,
+        calibration: JointCalibration,
+        where: str,
+        link: Callable[[], tuple[str, ...]] = tuple,
+    ) -> None:
+        self._settings, self._where, self._link = settings, where, link
+        self._heard_ns: int | None = None
+        self._watch = MotorWatch(motors, settings.heat, where, keep_torque=settings.demand == "torque")
+        largest = np.array([settings.gains.of(name).max_pwm for name in motors.names])
+        self._joints = JointWatch(calibration, motors, largest, settings.sensors, where)
         self._load = LoadWatch(motors, settings.load, _largest_pwm(settings, motors), where)
         self.counters = HandCounters()
         self.fault: Fault | None = None
@@ -53,30 +72,67 @@ class HandGuard:
     def restart(self) -> None:
         """Count from zero, for a new connection."""
         self.counters = HandCounters()
+        self._heard_ns = None
+        self._watch.restart()
 
     def resume(self) -> None:
         """Forget the fault and what led to it."""
         self.fault = None
+        self._heard_ns = None
         self.counters.lost_in_a_row = 0
         self._load.restart()
+        self._joints.restart()
 
-    @property
-    def forbids_demands(self) -> bool:
-        """There is a fault, or nothing has been heard of the hand for several cycles."""
-        return self.fault is not None or self.counters.lost_in_a_row >= self._settings.blind_after
+    def forbids_demands(self, now_ns: int) -> bool:
+        """There is a fault, or what was heard of the hand last is too old, by cycles or by time."""
+        if self.fault is not None or self.counters.lost_in_a_row >= self._settings.blind_after:
+            return True
+        return self._silent_s(now_ns) > STALE_s
+
+    def _silent_s(self, now_ns: int) -> float:
+        return 0.0 if self._heard_ns is None else (now_ns - self._heard_ns) / NANOSECONDS
 
     def blame(self, fault: Fault | None) -> None:
         """Keep a fault unless there is an earlier one."""
         self.fault = self.fault or fault
 
-    def look(self, status: PalmStatus, *, settling: bool) -> None:
-        """Look at a status; while ``settling`` motors may report that they had halted."""
-        self.fault = self.fault or self._watch.fault(status, settling=settling)
-        self.fault = self.fault or self._load.fault(status)
+    def look(self, sample: HandSample, now_ns: int, *, settling: bool) -> None:
+        """Look at a new status; while ``settling`` motors may report that they had halted."""
+        self._heard_ns, status = now_ns, sample.status
+        self._watch.hear(status, now_ns)
+        self._joints.see(status.sensors, sample.joints_rad, sample.stamp_ns)
+        self.blame(self._watch.fault(status, settling=settling))
+        self.blame(self._load.fault(status))
 
-    def look_at_demand(self, words: NDArray[np.int16], now_ns: int) -> None:
-        """Look at the demands that go out, shape (20,): a motor told its most for too long has stalled."""
-        self.blame(self._load.stall(words, now_ns))
+    def look_at_driven(self, driven: NDArray[np.bool_], now_ns: int) -> None:
+        """Look at sensors and motors on which the demands of driven motors, shape (20,), are to rest."""
+        self.blame(self._joints.fault(driven))
+        self.blame(self._watch.silence(driven, now_ns))
+
+    def look_at_time(self, now_ns: int, *, driven: bool) -> None:
+        """Look at how long nothing was heard, before a cycle: the link was gone, or this program stood still.
+
+        Args:
+            now_ns: present time.
+            driven: there are targets or demands, so that a pause of the program matters.
+        """
+        patience_s = self._settings.link_patience_s
+        if self._silent_s(now_ns) <= patience_s:
+            return
+        if self.counters.lost_in_a_row:
+            what = ": ".join([f"stopped: no valid status for {patience_s:g} s", *self._link()[:1]])
+            self.blame(Fault(what, self._where, "Check the cable and the hand's power, then connect again"))
+        elif driven:
+            what = f"stopped: the program stood still for {self._silent_s(now_ns):.1f} s"
+            self.blame(Fault(what, self._where, "Find out what held the computer up, then resume"))
+
+    def look_at_demand(self, words: NDArray[np.int16], last: HandSample, now_ns: int) -> None:
+        """Look at the demands that are to go out, shape (20,), before they do, with the sample that they rest on.
+
+        A motor told its most for too long has stalled; one that pushes against nothing has to move its joint.
+        """
+        self.blame(self._load.stall(words, last.joints_rad, now_ns))
+        self.blame(self._joints.frozen(words, last.motor.torque, now_ns))
 
     def pwm_share(self, temperature_C: Array) -> Array:
         """Share of the duty cycle each motor may have, shape (20,)."""
@@ -86,17 +142,12 @@ class HandGuard:
         """A cycle brought a status."""
         self.counters.lost_in_a_row = 0
 
-    def on_lost_cycle(self) -> None:
+    def on_lost_cycle(self, now_ns: int) -> None:
         """A cycle brought none."""
-        counters = self.counters
-        counters.lost += 1
-        counters.lost_in_a_row += 1
-        if counters.lost_in_a_row >= self._settings.lost_limit and self.fault is None:
-            self.fault = Fault(
-                f"stopped after {counters.lost_in_a_row} cycles in a row without a valid status",
-                self._where,
-                "Check the cable and the hand's power, then connect again",
-            )
+        if self._heard_ns is None:
+            self._heard_ns = now_ns
+        self.counters.lost += 1
+        self.counters.lost_in_a_row += 1
 
     def problems(self, newest: HandSample | None, statuses: StatusCounts, connected_ns: int) -> tuple[str, ...]:
         """What is wrong with the hand, in words; empty when all is well."""
@@ -106,11 +157,11 @@ class HandGuard:
         if self.counters.lost:
             problems.append(f"{self.counters.lost} of {self.counters.cycles} cycles lost")
         if self.counters.malformed:
-            problems.append(f"{self.counters.malformed} messages were no status of a {self._settings.palm} palm")
+            problems.append(f"{self.counters.malformed} messages were not a status of a {self._settings.palm} palm")
         if statuses.stale:
-            problems.append(f"{statuses.stale} statuses were repetitions of old ones")
+            problems.append(f"{statuses.stale} statuses repeated old ones")
         if newest is not None:
-            problems += self._watch.problems(newest, connected_ns)
+            problems += self._watch.problems(newest, connected_ns) + self._joints.problems()
         return tuple(problems)
 
 

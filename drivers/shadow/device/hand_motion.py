@@ -29,15 +29,28 @@ class HandMotion:
         motors: which motor pulls which joint.
         gains: of the position control.
         soft_start_s: after a pause the demands' limits rise from zero in this time.
+        range_rad: see :class:`PositionControl`.
         where: the hand's name, for messages.
     """
 
-    def __init__(self, motors: MotorMap, gains: GainTable, soft_start_s: float, where: str) -> None:
+    def __init__(
+        self, motors: MotorMap, gains: GainTable, soft_start_s: float, where: str, range_rad: Array | None = None
+    ) -> None:
         self._motors, self._where = motors, where
-        self._control = PositionControl(motors, gains)
+        self._control = PositionControl(motors, gains, range_rad)
         self._rise_ns = soft_start_s * NANOSECONDS
         self._nudge: NDArray[np.int16] | None = None
         self._since_ns: int | None = None
+
+    @property
+    def active(self) -> bool:
+        """Whether anything is to be driven."""
+        return self._nudge is not None or self._control.active
+
+    @property
+    def driven(self) -> NDArray[np.bool_]:
+        """Motors that are to be driven, shape (20,)."""
+        return self._control.driven if self._nudge is None else self._nudge != 0
 
     @property
     def targets_rad(self) -> dict[str, float]:
@@ -62,7 +75,7 @@ class HandMotion:
         """
         if joint not in self._motors.numbers or not abs(pwm) <= LARGEST_NUDGE:
             what = f"cannot nudge {joint} with {pwm} counts"
-            raise DeviceError(what, where=self._where, hint=f"At most {LARGEST_NUDGE} for a driven joint")
+            raise DeviceError(what, where=self._where, hint=f"Use at most {LARGEST_NUDGE}, and a driven joint")
         self._control.clear()
         motor = self._motors.numbers[joint]
         self._nudge = np.zeros(MOTORS, dtype=np.int16) if pwm else None

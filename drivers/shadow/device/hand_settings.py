@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from drivers.core.configuration import StrictModel
+from drivers.shadow.device.joint_watch import SensorLimits
 from drivers.shadow.device.motor_load import LoadLimits
 from drivers.shadow.device.motor_polling import PollingRates
 from drivers.shadow.device.motor_watch import HeatLimits
@@ -32,16 +33,19 @@ class HandSettings(StrictModel):
         polling: how often the motors are asked for what.
         tactile: kind of fingertip asked for data through the palm.
         tactile_names: ask the fingertips, after connecting, who they are as well; ``rig check`` does.
-        lost_limit: so many cycles in a row without a valid status stop the hand.
+        link_patience_s: without a valid status for so long the hand stops; what comes back sooner goes on by itself.
         blind_after: so many lost cycles in a row already take the demands away, until a status comes again.
         soft_start_s: after connecting, a resume or a loss the duty cycle limit rises from zero in this time.
         demand_grace_s: after a pause in the demands motors may report for so long that they had halted.
         heat: temperature limits of the motors.
         load: limits of torque and duty cycle.
+        sensors: what the joint sensors of driven joints may say.
         connect_tries: exchanges until the palm must have answered.
         close_cycles: exchanges with zero demands before the transport is closed.
         reset_motors: reset the motor boards when connecting; they then need ``reset_wait_s`` to come back.
     """
+
+    retired: ClassVar[tuple[str, ...]] = ("lost_limit",)
 
     palm: PalmName = USUAL_PALM
     cycle_s: float = Field(default=0.01, gt=0.0, lt=MOTOR_PATIENCE_s)
@@ -50,12 +54,13 @@ class HandSettings(StrictModel):
     polling: PollingRates = PollingRates()
     tactile: TactileKind = "none"
     tactile_names: bool = False
-    lost_limit: int = Field(default=10, ge=1)
+    link_patience_s: float = Field(default=2.0, gt=0.0, le=10.0)
     blind_after: int = Field(default=2, ge=1)
     soft_start_s: float = Field(default=0.5, ge=0.0)
     demand_grace_s: float = Field(default=0.3, ge=0.0)
     heat: HeatLimits = HeatLimits()
     load: LoadLimits = LoadLimits()
+    sensors: SensorLimits = SensorLimits()
     connect_tries: int = Field(default=20, ge=1)
     close_cycles: int = Field(default=5, ge=1)
     reset_motors: bool = False
@@ -77,5 +82,5 @@ class HandSettings(StrictModel):
     def _duty_cycles_exist(self) -> HandSettings:
         largest = max(self.gains.of(joint).max_pwm for joint in DRIVEN_JOINTS)
         if self.demand == "pwm" and largest > MAX_PWM:
-            raise ValueError(f"a duty cycle of {largest:g} counts is more than the full one, {MAX_PWM}")
+            raise ValueError(f"a duty cycle of {largest:g} counts is more than the maximum, {MAX_PWM}")
         return self

@@ -77,7 +77,7 @@ class HandSetup(StrictModel):
         """
         if self.ethercat.palm not in (None, self.hand.palm):
             raise ConfigurationError(
-                "hand.palm and the cable's palm differ", where=self.name, hint="Name the palm under hand alone"
+                "hand.palm and the cable's palm differ", where=self.name, hint="Give the palm under hand only"
             )
         settings = self.ethercat.model_copy(update={"palm": self.hand.palm})
         return (EthercatTransport if self.master == "own" else PysoemTransport)(self.name, settings, clock)

@@ -14,6 +14,7 @@ import json
 import sys
 import time
 
+from drivers.core.child_process import failure
 from drivers.core.clock import NANOSECONDS, Clock, MonotonicClock
 from drivers.core.errors import DeviceError, TactileLabError
 from drivers.core.extensions import load_named_extensions
@@ -103,7 +104,7 @@ class HandWorker:
         silent_ns = self._clock.now_ns() - self._heard_ns
         if silent_ns > self._patience_ns and self._hand.targets_rad and not self._moving_by_itself:
             self._hand.stop()
-            self._tell(f"no order from the session for {silent_ns / NANOSECONDS:.1f} s: demands taken away")
+            self._tell(f"no command from the session for {silent_ns / NANOSECONDS:.1f} s: demands set to zero")
 
     def _tell(self, error: str) -> None:
         if not self._trouble:
@@ -141,7 +142,7 @@ class HandWorker:
     def _check_motor_map(self, joints: list[str]) -> None:
         self._moving_by_itself = True
         try:
-            findings = check_motor_map(self._hand, self._motors, self._sound_turn, joints)
+            findings = check_motor_map(self._hand, self._motors, self._sound_turn, self._clock, joints)
             self._answer(RecordKind.MOVES, {"moved": [dataclasses.asdict(finding) for finding in findings]})
         except DeviceError as error:
             self._answer(RecordKind.MOVES, {"error": str(error)})
@@ -151,7 +152,7 @@ class HandWorker:
     def _sound_turn(self) -> HandSample:
         """A cycle of the motor check, which ends with the session or with the hand."""
         if (sample := self._turn()) is None or self._ended:
-            raise DeviceError(self._trouble or f"{self._transport.name}: the check of its motors was broken off")
+            raise DeviceError(self._trouble or f"{self._transport.name}: the check of its motors was interrupted")
         return sample
 
     def _answer(self, kind: RecordKind, content: dict[str, object]) -> None:
@@ -181,6 +182,9 @@ def main() -> None:
     except TactileLabError as error:
         pipe.put(RecordKind.ERROR, clock.now_ns(), str(error).encode())
         sys.exit(error.exit_code)
+    except Exception as error:
+        pipe.put(RecordKind.ERROR, clock.now_ns(), failure(error).encode())
+        raise
     finally:
         pipe.close()
 

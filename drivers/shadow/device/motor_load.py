@@ -13,6 +13,7 @@ from pydantic import Field
 
 from drivers.core.clock import NANOSECONDS
 from drivers.core.configuration import StrictModel
+from drivers.core.contacts import Array
 from drivers.shadow.device.motor_watch import Fault
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.motor_data import MAX_PWM, FromMotor, as_signed
@@ -33,13 +34,15 @@ class LoadLimits(StrictModel):
         torque_counts: largest strain-gauge difference of a motor, counts; gauges of 12 bits cannot exceed 4095.
         exceptions: the same for single driven joints. The wrist's motors are twenty times as strong as a finger's.
         readings: so many readings in a row over a limit stop the hand; a single one may be a jerk.
-        stall_s: pushing for so long with the largest duty cycle stops the hand.
+        stall_s: pushing for so long with the largest duty cycle stops the hand, unless the joint turns meanwhile.
+        stall_rad: a joint that has turned so far does turn.
     """
 
     torque_counts: float = Field(default=3000.0, gt=0.0)
     exceptions: dict[str, float] = Field(default_factory=_strong_wrist)
     readings: int = Field(default=5, ge=1)
     stall_s: float = Field(default=5.0, gt=0.0)
+    stall_rad: float = Field(default=0.05, gt=0.0)
 
 
 class LoadWatch:
@@ -63,7 +66,7 @@ class LoadWatch:
     def restart(self) -> None:
         """Forget everything seen so far."""
         self._over_torque, self._over_pwm = [0] * MOTORS, [0] * MOTORS
-        self._pushing_since_ns: list[int | None] = [None] * MOTORS
+        self._pushing_since: list[tuple[int, float] | None] = [None] * MOTORS
 
     def fault(self, status: PalmStatus) -> Fault | None:
         """A reason in this status to stop the hand."""
@@ -80,15 +83,26 @@ class LoadWatch:
             return self._fault(worst, f"duty cycle over its limit of {self._largest_pwm[worst]:.0f} counts")
         return None
 
-    def stall(self, words: NDArray[np.int16], now_ns: int) -> Fault | None:
-        """A motor among these demands, shape (20,), that has been pushing for too long; None for none."""
-        self._pushing_since_ns = since_ns = [
-            (now_ns if since is None else since) if abs(word) >= largest else None
-            for word, largest, since in zip(words.tolist(), self._stalling, self._pushing_since_ns, strict=True)
-        ]
-        for motor, since in enumerate(since_ns):
-            if since is not None and now_ns - since > self._stall_ns:
-                return self._fault(motor, f"pushed for {self._limits.stall_s:g} s with its largest duty cycle")
+    def stall(self, words: NDArray[np.int16], joints_rad: Array, now_ns: int) -> Fault | None:
+        """A motor among these demands, shape (20,), that has pushed for too long and turned nothing; None for none.
+
+        Args:
+            words: demands by motor number.
+            joints_rad: measured joint angles, shape (24,), radians.
+            now_ns: present time.
+        """
+        pushing = [abs(word) >= largest for word, largest in zip(words.tolist(), self._stalling, strict=True)]
+        if not any(pushing):
+            self._pushing_since = [None] * MOTORS
+            return None
+        angles_rad = self._motors.from_joints.dot(joints_rad).tolist()
+        for motor, (pushes, angle_rad) in enumerate(zip(pushing, angles_rad, strict=True)):
+            since = self._pushing_since[motor] if pushes else None
+            if pushes and (since is None or abs(angle_rad - since[1]) > self._limits.stall_rad):
+                since = now_ns, angle_rad
+            self._pushing_since[motor] = since
+            if since is not None and now_ns - since[0] > self._stall_ns:
+                return self._fault(motor, f"stalled for {self._limits.stall_s:g} s at its largest duty cycle")
         return None
 
     def _over(
@@ -102,4 +116,4 @@ class LoadWatch:
 
     def _fault(self, motor: int, what: str) -> Fault:
         where = f"{self._where}, {self._motors.names[motor]} (motor {motor})"
-        return Fault(f"stopped: {what}", where, "Look at the hand before going on, then resume")
+        return Fault(f"stopped: {what}", where, "Check the hand, then resume")

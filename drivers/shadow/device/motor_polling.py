@@ -70,9 +70,9 @@ class PollingRates(StrictModel):
     def _meaningful(self) -> PollingRates:
         for name, rate in self.model_dump(exclude_none=True).items():
             if rate <= 0.0 and rate not in (_EVERY_TURN, _AT_FIRST):
-                raise ValueError(f"{name}: a rate is -1, -2 or a period above 0 s")
+                raise ValueError(f"{name}: a rate must be -1, -2 or a period above 0 s")
         if self.flags == _AT_FIRST or self.flags > 1.0 or self.temperature == _AT_FIRST:
-            raise ValueError("flags and temperature have to be asked again and again")
+            raise ValueError("flags and temperature must be requested periodically")
         return self
 
     @property

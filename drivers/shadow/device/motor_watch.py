@@ -14,13 +14,24 @@ from drivers.core.contacts import Array
 from drivers.core.errors import DeviceError
 from drivers.shadow.device.hand_samples import HandSample
 from drivers.shadow.model.motors import MotorMap
-from drivers.shadow.protocol.motor_data import SERIOUS_FLAGS, FromMotor, MotorFlag, celsius, describe_flags
+from drivers.shadow.protocol.motor_data import (
+    SERIOUS_FLAGS,
+    FromMotor,
+    MOTOR_PATIENCE_s,
+    MotorFlag,
+    celsius,
+    describe_flags,
+)
 from drivers.shadow.protocol.palm_codec import PalmStatus
 
-SILENT_AFTER_s = 0.5
-"""A motor not heard for this long is called silent; each is asked every second cycle."""
+SILENT_AFTER_s = 0.05
+"""A motor not heard for this long may not be driven; each is asked every second cycle."""
 
-_SERIOUS_SETTLING = SERIOUS_FLAGS & ~int(MotorFlag.NO_DEMAND)
+_MISSED = 2  # questions in a row left unanswered at least, where cycles are long
+_TOLD_SILENT_s = 0.5  # some answers hold no torque, which is what a sample remembers
+
+_NO_TORQUE = int(MotorFlag.GAUGE_LEFT_FAULT | MotorFlag.GAUGE_RIGHT_FAULT | MotorFlag.MOTOR_ID_INVALID)
+"""Flags with which a motor cannot keep a torque."""
 
 SPARE_TIME_us = 50
 """A healthy palm has at least this much spare time in its cycle."""
@@ -54,16 +65,46 @@ class Fault:
 
 
 class MotorWatch:
-    """Judges the motors' flags and temperatures.
+    """Judges the motors' answers: flags, temperatures, and whether they come at all.
 
     Args:
         motors: names of the motors.
         heat: temperature limits.
         where: name of the hand in messages.
+        keep_torque: the motors are told torques, which some flags forbid.
     """
 
-    def __init__(self, motors: MotorMap, heat: HeatLimits, where: str) -> None:
+    def __init__(self, motors: MotorMap, heat: HeatLimits, where: str, *, keep_torque: bool = False) -> None:
         self._motors, self._heat, self._where = motors, heat, where
+        self._serious = SERIOUS_FLAGS | (_NO_TORQUE if keep_torque else 0)
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget who was heard."""
+        self._status_ns: int | None = None
+        self._heard_ns = np.zeros(len(self._motors.names), dtype=np.int64)
+        self._missed = np.zeros(len(self._motors.names), dtype=np.int64)
+
+    def hear(self, status: PalmStatus, now_ns: int) -> None:
+        """Take note of who answered; after a gap in the statuses everyone has time again."""
+        if self._status_ns is None or now_ns - self._status_ns > MOTOR_PATIENCE_s * NANOSECONDS:
+            self._heard_ns.fill(now_ns)
+            self._missed.fill(0)
+        self._status_ns = now_ns
+        self._missed[status.which_motors & 1 :: 2] += 1
+        answered, _ = status.heard_places
+        self._heard_ns[answered], self._missed[answered] = now_ns, 0
+
+    def silence(self, driven: NDArray[np.bool_], now_ns: int) -> Fault | None:
+        """A motor among the driven ones, shape (20,), that has not answered for too long."""
+        late = driven & (self._missed >= _MISSED)
+        if not late.any() or not (late := late & (now_ns - self._heard_ns > SILENT_AFTER_s * NANOSECONDS)).any():
+            return None
+        motors = np.flatnonzero(late).tolist()
+        others = f", and {len(motors) - 1} other motors" if len(motors) > 1 else ""
+        what = f"stopped: not heard for {1000 * SILENT_AFTER_s:.0f} ms{others}"
+        hint = "Ten of one bus, or all: look at the hand's power; one: its board or connector"
+        return Fault(what, self._name(motors[0]), hint)
 
     def fault(self, status: PalmStatus, *, settling: bool) -> Fault | None:
         """A reason in this status to stop the hand.
@@ -85,18 +126,18 @@ class MotorWatch:
 
     def problems(self, sample: HandSample, connected_ns: int) -> list[str]:
         """What is wrong with palm and motors in this sample, in words."""
-        problems = [f"only {sample.idle_us} us of spare time in the palm"] if sample.idle_us < SPARE_TIME_us else []
+        problems = [f"only {sample.idle_us} us of idle time in the palm"] if sample.idle_us < SPARE_TIME_us else []
         for motor, flags in enumerate(sample.motor.flags.tolist()):
             problems += [f"{self._name(motor)}: {words}" for words in describe_flags(flags)]
         for motor in np.flatnonzero(sample.motor.temperature_C >= self._heat.warm_C).tolist():
             problems.append(f"{self._name(motor)}: warm, {sample.motor.temperature_C[motor]:.0f} C")
         silent_ns = sample.stamp_ns - np.maximum(sample.motor.torque_stamps_ns, connected_ns)
-        for motor in np.flatnonzero(silent_ns > SILENT_AFTER_s * NANOSECONDS).tolist():
+        for motor in np.flatnonzero(silent_ns > _TOLD_SILENT_s * NANOSECONDS).tolist():
             problems.append(f"{self._name(motor)}: silent")
         return problems
 
     def _flag_fault(self, motors: NDArray[np.intp], flags: NDArray[np.uint16], settling: bool) -> Fault | None:
-        looked_at = _SERIOUS_SETTLING if settling else SERIOUS_FLAGS
+        looked_at = self._serious & ~int(MotorFlag.NO_DEMAND) if settling else self._serious
         serious = [word & looked_at for word in flags.tolist()]
         if not any(serious):
             return None

@@ -30,13 +30,17 @@ class PositionControl:
     Args:
         motors: which motor pulls which joint.
         gains: how hard.
+        range_rad: angles that targets are clamped to, by motor number, shape (20, 2), radians; the published limits of
+            the joints unless given.
 
     Attributes:
         active: whether any target or demand is set.
+        driven: motors with a target or a demand of their own, shape (20,).
     """
 
-    def __init__(self, motors: MotorMap, gains: GainTable) -> None:
+    def __init__(self, motors: MotorMap, gains: GainTable, range_rad: Array | None = None) -> None:
         self._motors = motors
+        self._range_rad = motors.limits_rad if range_rad is None else range_rad
         table = [gains.of(name) for name in motors.names]
         self._gain = np.array([each.pwm_per_rad for each in table])
         self._deadband_rad = np.array([each.deadband_rad for each in table])
@@ -59,7 +63,7 @@ class PositionControl:
             DeviceError: a name is not a driven joint, or a target is not a finite number. Nothing is changed then.
         """
         numbers, wanted_rad = self._numbers_and_values(targets_rad, "joint target")
-        lowest_rad, highest_rad = self._motors.limits_rad[numbers].T
+        lowest_rad, highest_rad = self._range_rad[numbers].T
         self._targets_rad[numbers] = np.minimum(np.maximum(wanted_rad, lowest_rad), highest_rad)
         self._is_set[numbers], self._is_direct[numbers] = True, False
         self._choose()
@@ -86,6 +90,7 @@ class PositionControl:
         """What every cycle needs of the choice between targets, demands and nothing."""
         self._idle = ~(self._is_set | self._is_direct)
         self._any_direct = bool(self._is_direct.any())
+        self.driven = ~self._idle
         self.active = not self._idle.all()
 
     @property

@@ -17,7 +17,7 @@ def request_real_time(priority: int = PRIORITY) -> str:
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except PermissionError:
-        return "usual scheduling: no right to SCHED_FIFO (grant it with an rtprio line in limits.conf)"
+        return "normal scheduling: no permission for SCHED_FIFO (grant it with an rtprio line in limits.conf)"
     return f"SCHED_FIFO, priority {priority}"
 
 
@@ -43,5 +43,5 @@ def _take_turns(policy: int, priority: int) -> str:
     try:
         os.sched_setscheduler(0, policy, os.sched_param(priority))
     except PermissionError:
-        return "usual scheduling of the session's cycle"
-    return f"the session's cycle in turns with priority {priority}"
+        return "normal scheduling of the session's cycle"
+    return f"round-robin scheduling of the session's cycle, priority {priority}"

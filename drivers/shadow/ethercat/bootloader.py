@@ -37,7 +37,7 @@ def bootloader_version(bus: can.BusABC, motor: int, tries: int = TRIES) -> bytes
             if answer.arbitration_id == wanted and answer.channel == wire:
                 return bytes(answer.data)
     hint = "Only a motor in its bootloader answers; check that it has power"
-    raise DeviceError(f"motor {motor} does not tell its bootloader's version", where=f"motor bus {wire}", hint=hint)
+    raise DeviceError(f"motor {motor} does not report its bootloader's version", where=f"motor bus {wire}", hint=hint)
 
 
 def bootloader_versions(bus: can.BusABC, tries: int = 1) -> dict[int, bytes | None]:

@@ -106,7 +106,8 @@ class ShadowBridgeBus(can.BusABC):
                 return
             if deadline_ns is not None and self._clock.now_ns() >= deadline_ns:
                 break
-        raise can.CanOperationError("the palm did not take the frame. Check the hand's power and cable")
+        what = ": ".join(["the palm did not accept the frame", *link_health(self._transport)[:1]])
+        raise can.CanOperationError(f"{what}. Check the hand's power and cable")
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         deadline_ns = None if timeout is None else self._clock.now_ns() + round(timeout * NANOSECONDS)
@@ -167,7 +168,7 @@ class ShadowBridgeBus(can.BusABC):
         """What the motors may have said without anyone hearing it, in words; empty when nothing was lost."""
         problems = [f"{self.lost} of {self.cycles} cycles without a status"] if self.lost else []
         if self.damaged:
-            problems.append(f"{self.damaged} messages were no status of a {self._image.name} palm")
+            problems.append(f"{self.damaged} messages were not a status of a {self._image.name} palm")
         if self.surplus:
             problems.append(f"{self.surplus} statuses more than cycles")
         return tuple(problems) + link_health(self._transport)
@@ -191,13 +192,13 @@ class ShadowBridgeBus(can.BusABC):
             raise can.CanOperationError("the motor buses have 11-bit data frames only")
         bus = self._default_bus if msg.channel is None else _BUS_NAMES.get(str(msg.channel))
         if bus is None:
-            raise can.CanOperationError(f"no motor bus {msg.channel}. Set the message's channel to 1 or 2")
+            raise can.CanOperationError(f"there is no motor bus {msg.channel}. Set the message's channel to 1 or 2")
         return CanFrame(bus, len(msg.data), msg.arbitration_id, bytes(msg.data).ljust(8, b"\0"))
 
 
 def _checked_bus(motor_bus: int | str) -> int:
     if str(motor_bus) not in {"1", "2"}:
-        raise can.CanInitializationError(f"no motor bus {motor_bus}. Set motor_bus to 1 or 2")
+        raise can.CanInitializationError(f"there is no motor bus {motor_bus}. Set motor_bus to 1 or 2")
     return int(motor_bus)
 
 
@@ -205,11 +206,11 @@ def _checked_palm(palm: PalmName | int | str) -> PalmName:
     """python-can's command line turns 0220 into a number on its way here."""
     named = next((name for name in PALMS if name == str(palm).zfill(4)), None)
     if named is None:
-        raise can.CanInitializationError(f"no palm {palm}. Set palm to one of {', '.join(PALMS)}")
+        raise can.CanInitializationError(f"unknown palm {palm}. Set palm to one of {', '.join(PALMS)}")
     return named
 
 
 def _ethercat(channel: Any, palm: PalmName | None, clock: Clock) -> Transport:
     if not channel:
-        raise can.CanInitializationError("no channel. Name the network interface the hand is plugged into")
+        raise can.CanInitializationError("no channel. Give the network interface that the hand is connected to")
     return EthercatTransport("hand", EthercatSettings(interface=str(channel), palm=palm), clock)

@@ -67,7 +67,7 @@ def checked_image(
     """
     for name, board in (("first", bridge), ("second", palm)):
         if board.vendor != SHADOW_VENDOR:
-            what = f"the {name} slave is of vendor 0x{board.vendor:X}, not of Shadow Robot (0x{SHADOW_VENDOR:X})"
+            what = f"the {name} slave is from vendor 0x{board.vendor:X}, not from Shadow Robot (0x{SHADOW_VENDOR:X})"
             raise DeviceError(what, where=where, hint="Plug the hand itself into this interface")
     if bridge.product != BRIDGE_PRODUCT:
         what = f"the first slave is {describe_product(bridge.product)} (product {bridge.product:#x}), not the bridge"
@@ -79,6 +79,6 @@ def checked_image(
         hint = f'Set hand.palm to "{image.name}", or leave it out'
         raise DeviceError(f"a {image.name} palm, not a {stated}", where=where, hint=hint)
     if serial not in (None, palm.serial):
-        hint = "Use the rig file and the calibration of the hand that is plugged in"
+        hint = "Use the rig file and the calibration of the connected hand"
         raise DeviceError(f"hand {palm.serial}, not hand {serial}", where=where, hint=hint)
     return image

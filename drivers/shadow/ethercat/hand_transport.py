@@ -2,8 +2,10 @@
 
 A frame is taken only for the answer of the cycle it was sent in. The palm's buffers hold one image each, so a working
 counter below 3 means a palm that was late, not a lost frame: the status is then empty, and counted. Every so many
-cycles, and whenever something is odd, the frame also carries the state of all slaves; a slave that has left OP or a
-changed ring ends the transport with its reason in words, until it is opened again.
+cycles, and whenever something is odd, the frame also asks for the state of all slaves and for the errors their ports
+have counted. A slave that has left OP or one too many on the ring ends the transport with its reason in words, until it
+is opened again. A link that is gone does not: cycles are lost until it is back, and a palm whose watchdog tripped
+meanwhile is brought back to OP with demands of zero. How long to wait for that is for the device to say.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from drivers.core.transports import Datagram
 from drivers.ethercat.frames import Command, Telegram, physical
 from drivers.ethercat.master import EtherCatMaster, MasterSettings, Slave
 from drivers.ethercat.ports import Port, RawPort
-from drivers.ethercat.registers import AlState, AlStatus, Register
+from drivers.ethercat.registers import AlCode, AlState, AlStatus, Register
+from drivers.shadow.ethercat.cables import CableWatch
 from drivers.shadow.ethercat.hand_identity import HandIdentity
 from drivers.shadow.ethercat.ring import HandRing, image_telegram
 from drivers.shadow.protocol.palm_images import PalmName
@@ -63,6 +66,7 @@ class EthercatCounts:
         refused: the palm had not taken the command before, so this one did not reach it.
         empty: the palm had not written a new status.
         openings: how often the ring was brought up.
+        restarts: how often the palm's watchdog tripped, and the palm was brought back.
         misread: looks at the ring, while it was brought up, that did not show the hand; SOEM alone has such.
     """
 
@@ -73,6 +77,7 @@ class EthercatCounts:
     refused: int = 0
     empty: int = 0
     openings: int = 0
+    restarts: int = 0
     misread: int = 0
 
     def problems(self) -> tuple[str, ...]:
@@ -81,9 +86,10 @@ class EthercatCounts:
             f"{self.lost} of {self.cycles} frames lost": self.lost,
             f"{self.stale} frames came back late": self.stale,
             f"{self.damaged} frames came back damaged": self.damaged,
-            f"{self.refused} commands not taken by a late palm": self.refused,
+            f"{self.refused} commands not accepted by a late palm": self.refused,
             f"{self.empty} cycles without a new status": self.empty,
-            f"the hand was not seen in the first {self.misread} of the looks at its ring": self.misread,
+            f"the palm's watchdog tripped {self.restarts} times because no commands came": self.restarts,
+            f"the hand was not found in the first {self.misread} scans of its EtherCAT ring": self.misread,
         }
         return tuple(words for words, count in remarks.items() if count)
 
@@ -122,6 +128,8 @@ class EthercatTransport:
         self.name, self._settings, self._clock = name, settings, clock
         self._master = EtherCatMaster(port or RawPort(settings.interface), clock, settings.master)
         self._ring = HandRing(self._master, settings.palm, settings.serial, settings.watchdog_s)
+        self._cables = CableWatch(HandRing.BRIDGE, HandRing.PALM)
+        self._incomplete = ""
         self._hand: HandIdentity | None = None
         self._known: HandIdentity | None = None
         self._failure: DeviceError | None = None
@@ -144,10 +152,11 @@ class EthercatTransport:
         self._master.open()
         try:
             self._hand = self._known = self._same(self._ring.bring_up())
+            self._cables.clear(self._master)
         except BaseException:
             self._master.close()
             raise
-        self._failure, self._until_poll = None, 0
+        self._failure, self._incomplete, self._until_poll = None, "", 0
         self._counts = EthercatCounts(openings=openings + 1)
 
     def close(self) -> None:
@@ -178,8 +187,8 @@ class EthercatTransport:
         """The hand that was found, when it is the one that was there before: its calibration is in use."""
         known = self._known or found
         if (known.bridge, known.palm) != (found.bridge, found.palm):
-            what = f"hand {found.serial}, palm {found.image.name}, answers where hand {known.serial} did before"
-            hint = "Put the cable back, or start again with the rig file of this hand"
+            what = f"hand {found.serial}, palm {found.image.name}, answers instead of hand {known.serial}"
+            hint = "Reconnect the former hand, or start again with the rig file of this hand"
             raise DeviceError(what, where=self.name, hint=hint)
         return found
 
@@ -200,15 +209,17 @@ class EthercatTransport:
         self._polled = self._until_poll <= 0
         if self._polled:
             telegrams.append(Telegram(Command.BRD, physical(0, Register.AL_STATUS), bytes(AlStatus.SIZE)))
+            telegrams += self._cables.questions()
         self._until_poll = (self._settings.poll_every if self._polled else self._until_poll) - 1
         self._counts.cycles += 1
         self._master.start(telegrams)
 
     def receive(self) -> list[Datagram]:
-        """The status of this cycle; nothing when the frame was lost.
+        """The status of this cycle; nothing when the frame was lost, or the link inside the hand is gone.
 
         Raises:
-            DeviceError: a slave has left OP, or the ring has changed; every call, until the transport is opened again.
+            DeviceError: a slave has left OP other than by its watchdog, or the ring has grown; every call, until the
+                transport is opened again.
         """
         image = self.hand.image
         answers = self._master.finish(self._settings.master.answer_s)
@@ -220,7 +231,10 @@ class EthercatTransport:
             return []
         self._judge(answers[0].working_counter)
         if self._polled:
-            self._check_states(answers[1])
+            self._cables.on_answers(answers[2:])
+            if not self._is_operating(answers[1]):
+                self._until_poll = 0
+                return []
         return [Datagram(answers[0].data[image.command_bytes :], stamp_ns)]
 
     def _judge(self, working_counter: int) -> None:
@@ -229,17 +243,38 @@ class EthercatTransport:
         if not working_counter:
             self._until_poll = 0
 
-    def _check_states(self, states: Telegram) -> None:
+    def _is_operating(self, states: Telegram) -> bool:
         """All slaves write their state into the same bytes, bit upon bit."""
-        if states.working_counter != _SLAVES:
-            self._fail(f"{states.working_counter} EtherCAT slaves answer instead of {_SLAVES}")
+        count = states.working_counter
+        self._incomplete = f"{count} EtherCAT slaves answer instead of {_SLAVES}" if count != _SLAVES else ""
+        if count > _SLAVES:
+            self._fail(self._incomplete)
+        if count < _SLAVES:
+            return False
         together = AlStatus.decode(states.data)
         if together.state == AlState.OP and not together.error:
-            return
+            return True
+        lost = self._master.counts.lost
+        try:
+            self._bring_back()
+        except DeviceError as error:
+            if self._master.counts.lost == lost:
+                self._fail(error.what)
+        return False  # the link was gone again, or no status has come yet
+
+    def _bring_back(self) -> None:
+        """Find out who has left OP; a palm whose watchdog has tripped returns to it.
+
+        Raises:
+            DeviceError: it was for another reason, it refuses, or the link is gone meanwhile.
+        """
         for name, place in (("palm", HandRing.PALM.position), ("bridge", HandRing.BRIDGE.position)):
             status = self._master.al_status(Slave(place))  # by position: after a power cut it has no address
-            if status.state != AlState.OP or status.error:
-                self._fail(f"the {name} has left operation: it is in {status}")
+            if (status.state, status.code) == (AlState.SAFEOP, AlCode.WATCHDOG):
+                self._counts.restarts += 1
+                self._ring.resume(self.hand.image)
+            elif status.state != AlState.OP or status.error:
+                raise DeviceError(f"the {name} has left operation: it is in {status}", where=self.name)
 
     def _fail(self, what: str) -> None:
         self._failure = DeviceError(what, where=self.name, hint="Check power and cable, then connect again")
@@ -255,5 +290,5 @@ class EthercatTransport:
 
     def health(self) -> tuple[str, ...]:
         """What is wrong with the wire, in words; empty when all is well."""
-        problems = self.counts.problems()
-        return ((str(self._failure),) if self._failure else ()) + problems
+        first = (str(self._failure),) if self._failure else (self._incomplete,) if self._incomplete else ()
+        return first + self._cables.problems() + self.counts.problems()

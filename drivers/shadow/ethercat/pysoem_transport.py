@@ -1,7 +1,7 @@
 """The hand's transport over SOEM, the widespread EtherCAT master in C, by way of pysoem (the ``[ethercat]`` extra).
 
 SOEM's licence is the GPL with an exception, or a commercial one: that is why it is optional. It maps process data
-from the slaves' EEPROMs; a hand whose EEPROM holds its identity alone needs our own master
+from the slaves' EEPROMs; a hand whose EEPROM holds its identity alone needs the built-in master
 (:class:`~drivers.shadow.ethercat.hand_transport.EthercatTransport`), and is refused here with that advice.
 
 Four weaknesses of SOEM are made good. A lost frame blocks it for several milliseconds, unless its socket is set not
@@ -46,7 +46,7 @@ class PysoemTransport:
 
     Args:
         name: the device's name in the rig.
-        settings: as for our own master; ``watchdog_s`` has to be left out.
+        settings: as for the built-in master; ``watchdog_s`` has to be left out.
         clock: the session's.
 
     Raises:
@@ -55,7 +55,7 @@ class PysoemTransport:
 
     def __init__(self, name: str, settings: EthercatSettings, clock: Clock) -> None:
         if settings.watchdog_s is not None:
-            hint = "Leave watchdog_s out, or use our own master"
+            hint = "Leave watchdog_s out, or use the built-in master"
             raise ConfigurationError("pysoem does not set the palm's watchdog", where=name, hint=hint)
         self.name, self._settings, self._clock = name, settings, clock
         self._soem = _pysoem(name)
@@ -126,7 +126,7 @@ class PysoemTransport:
         arrived = select.select(self._sockets, [], [], patience_s)[0]
         counter = self._master.receive_processdata(round(patience_s * 1e6) if arrived else 0, release_gil=True)
         stamp_ns = self._clock.now_ns()
-        if self.counts.cycles % self._settings.poll_every == 0:
+        if counter >= 0 and self.counts.cycles % self._settings.poll_every == 0:  # a link that is gone tells no state
             self._check_states()
         expected, self._taken = self._taken, self._sent if counter > 0 and counter & _WRITTEN else self._taken
         if counter < 0:
@@ -165,11 +165,11 @@ class PysoemTransport:
         interface = self._settings.interface
         present = [name for _, name in socket.if_nameindex()]
         if interface not in present:
-            raise self._wrong(f"no network interface {interface}", f"Present are {', '.join(present)}")
+            raise self._wrong(f"no network interface {interface}", f"Available interfaces: {', '.join(present)}")
         try:
             master.open(interface)
         except ConnectionError as error:
-            hint = "pysoem needs the rights cap_net_raw and cap_net_admin"
+            hint = "pysoem needs the capabilities cap_net_raw and cap_net_admin"
             raise self._wrong(f"cannot open {interface} ({error})", hint) from error
 
     @contextmanager
@@ -192,7 +192,7 @@ class PysoemTransport:
             except DeviceError as error:
                 self.counts.misread += 1
                 if self.counts.misread == LOOKS:
-                    raise self._wrong(f"{error.what}, at the last of {LOOKS} looks at the ring", error.hint) from error
+                    raise self._wrong(f"{error.what}, at the last of {LOOKS} scans of the ring", error.hint) from error
 
     def _map(self, master: Any) -> HandIdentity:
         """One look: who is there, with process data as SOEM maps them."""
@@ -205,7 +205,7 @@ class PysoemTransport:
         master.config_map()
         if (len(palm.output), len(palm.input)) != (image.command_bytes, image.status_bytes):
             what = f"its EEPROM describes {len(palm.output)} + {len(palm.input)} bytes of process data"
-            raise self._wrong(what, "Use our own master, which knows the palm's process image")
+            raise self._wrong(what, "Use the built-in master, which knows the palm's process image")
         return HandIdentity(bridge, board, image, None)
 
     def _operate(self, master: Any) -> None:
@@ -247,7 +247,7 @@ def _pysoem(name: str) -> Any:
         return importlib.import_module("pysoem")
     except ImportError as error:
         install = f"python3 -m pip --python {sys.executable} install pysoem"
-        hint = f"Install it: {install}; or use our own master"
+        hint = f"Install it: {install}; or use the built-in master"
         raise ConfigurationError("pysoem is not installed", where=name, hint=hint) from error
 
 

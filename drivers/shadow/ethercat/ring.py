@@ -18,6 +18,7 @@ _ALL_REGISTERS = bytes(256)
 _FIRST_EXCHANGES = 20
 _LOOP_CONTROL_MASK = 0x3FFF
 _NANOSECONDS_PER_TICK = 40
+_SHORTEST_WATCHDOG_s = 0.02  # a change of state alone takes half of it
 
 
 class HandRing:
@@ -58,6 +59,16 @@ class HandRing:
         self._all_to(AlState.OP)
         self._exchange_zeros(image)
         return HandIdentity(bridge, palm, image, watchdog_s)
+
+    def resume(self, image: PalmImage) -> None:
+        """Back to OP from SAFEOP, where the palm's watchdog has left it; all it is told are zeros.
+
+        Raises:
+            DeviceError: the palm refuses, or does not answer.
+        """
+        for state in (AlState.SAFEOP, AlState.OP):
+            self._master.change_state(self.PALM, state)
+        self._exchange_zeros(image)
 
     # --- who is there ------------------------------------------------------------------------------------------
 
@@ -108,12 +119,24 @@ class HandRing:
         self._write_all(Register.FMMU, FMMU_BYTES, (each.encode() for each in image.fmmus()))
         managers = image.sync_managers(watched=watched)
         self._write_all(Register.SYNC_MANAGER, SYNC_MANAGER_BYTES, (each.encode() for each in managers))
-        if self._watchdog_s is None:
-            return None
-        ticks = max(round(self._watchdog_s / self._watchdog_tick_s()), 1)
-        self._master.write(self.PALM, Register.WATCHDOG_TIME, struct.pack("<H", min(ticks, 0xFFFF)))
-        (set_ticks,) = struct.unpack("<H", self._master.read(self.PALM, Register.WATCHDOG_TIME, 2))
-        return float(set_ticks * self._watchdog_tick_s())
+        return None if self._watchdog_s is None else self._set_watchdog(self._watchdog_s)
+
+    def _set_watchdog(self, wanted_s: float) -> float:
+        """Ask for the watchdog's time; what it reads back, which is less where the slave's divider is small."""
+        tick_s = self._watchdog_tick_s()
+        ticks = min(max(round(wanted_s / tick_s), 1), 0xFFFF)
+        self._master.write(self.PALM, Register.WATCHDOG_TIME, struct.pack("<H", ticks))
+        (found,) = struct.unpack("<H", self._master.read(self.PALM, Register.WATCHDOG_TIME, 2))
+        if not found or found > ticks:
+            reads = f"reads back {1000 * found * tick_s:.1f} ms" if found else "reads back as switched off"
+            what = f"the palm's watchdog {reads} where {1000 * wanted_s:.1f} ms were asked for"
+            hint = "Leave watchdog_s out to rely on the motors' own halt after 20 ms, or ask for what it can do"
+            raise self._wrong(what, hint)
+        found_s = float(found * tick_s)
+        if found_s < min(wanted_s, _SHORTEST_WATCHDOG_s):
+            what = f"the palm's watchdog can wait {1000 * found_s:.1f} ms only, {1000 * wanted_s:.1f} ms were asked for"
+            raise self._wrong(what, "Leave watchdog_s out: the motors halt by themselves after 20 ms")
+        return found_s
 
     def _watchdog_tick_s(self) -> float:
         (divider,) = struct.unpack("<H", self._master.read(self.PALM, Register.WATCHDOG_DIVIDER, 2))
@@ -129,7 +152,7 @@ class HandRing:
                 return
             self._master.wait(0.001)
         hint = "Switch the hand off and on, and connect again"
-        raise self._wrong(f"the palm took no process image in {_FIRST_EXCHANGES} tries", hint)
+        raise self._wrong(f"the palm accepted no process image in {_FIRST_EXCHANGES} tries", hint)
 
     def _wrong(self, what: str, hint: str) -> DeviceError:
         return DeviceError(what, where=self._master.where, hint=hint)

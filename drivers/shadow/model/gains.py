@@ -108,12 +108,12 @@ def load_gains(path: Path) -> PublishedGains:
     content = strict_yaml.load(path)
     if not isinstance(content, dict):
         hint = "Use sr_edc_joint_position_controllers_PWM.yaml"
-        raise ConfigurationError("no position controllers in it", where=str(path), hint=hint)
+        raise ConfigurationError("contains no position controllers", where=str(path), hint=hint)
     controllers = [strict_yaml.validate(entry, _Controller, where=f"{path}, {name}") for name, entry in content.items()]
     named = {controller.joint.rpartition("_")[2].upper(): controller.pid for controller in controllers}
     wrong = sorted(set(DRIVEN_JOINTS) ^ set(named))
     if wrong or len(named) != len(controllers):
-        hint = f"It has to name each of {', '.join(DRIVEN_JOINTS)} once"
+        hint = f"It must name each of {', '.join(DRIVEN_JOINTS)} once"
         what = f"missing or unknown: {', '.join(wrong)}" if wrong else "a joint is named twice"
         raise ConfigurationError(what, where=str(path), hint=hint)
     gains = {joint: _gains(pid, joint, path) for joint, pid in named.items()}
@@ -124,8 +124,8 @@ def load_gains(path: Path) -> PublishedGains:
 def _gains(pid: _Pid, joint: str, path: Path) -> JointGains:
     sign = -1.0 if pid.p < 0.0 else 1.0
     if (pid.p == 0.0 and pid.max_force) or sign * pid.i < 0.0 or sign * pid.d < 0.0:
-        what = f"gains p {pid.p:g}, i {pid.i:g}, d {pid.d:g} of {joint} do not push the same way"
-        raise ConfigurationError(what, where=str(path), hint="All three have one sign, and p is not zero")
+        what = f"gains p {pid.p:g}, i {pid.i:g}, d {pid.d:g} of {joint} have different signs"
+        raise ConfigurationError(what, where=str(path), hint="All three need the same sign, and p must not be zero")
     content = {
         "pwm_per_rad": abs(pid.p),
         "deadband_rad": pid.position_deadband,

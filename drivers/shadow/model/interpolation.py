@@ -63,7 +63,7 @@ class Plane:
         nodes, values = np.vstack([source, ring]), np.vstack([target, _homogeneous(ring) @ fitted])
         triangles = Delaunay(nodes).simplices.astype(np.intp)
         if _folds(nodes, values, triangles[(triangles < len(source)).all(axis=1)]):
-            raise ValueError("folds over itself: some points may be interchanged")
+            raise ValueError("folds over itself: some points may be swapped")
         self._forward = _TriangleMap(nodes, values, triangles, fitted)
         upright = np.abs(_doubled_areas(values, triangles)) > _FLAT
         self.invertible = bool(upright.any())

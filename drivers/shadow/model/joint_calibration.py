@@ -49,6 +49,11 @@ class JointCalibration:
         coupled: tables of pairs of joints. Together every one of the 24 joints appears exactly once.
         where: the file, for error messages.
 
+    Attributes:
+        range_counts: smallest and largest calibrated count of each joint, shape (24, 2), order of
+            :data:`~drivers.shadow.model.kinematics.JOINTS`; of a joint with two sensors their average.
+        range_rad: the same for the angles, radians.
+
     Raises:
         ConfigurationError: a joint is missing, unknown or given twice, or a table cannot be used.
     """
@@ -63,6 +68,15 @@ class JointCalibration:
             (np.array([JOINT_INDEX[joint] for joint in pair]), _plane(pair, points, where))
             for pair, points in coupled.items()
         ]
+
+        ends = {joint: _ends(table) for joint, table in tables.items()}
+        for pair, points in coupled.items():
+            ends |= {
+                joint: _ends([(counts[at], angles[at]) for counts, *angles in points]) for at, joint in enumerate(pair)
+            }
+        in_order = np.array([ends[joint] for joint in JOINTS])
+        self.range_counts: Array = in_order[:, 0]
+        self.range_rad: Array = np.radians(in_order[:, 1])
 
     @classmethod
     def load(cls, path: Path) -> JointCalibration:
@@ -85,7 +99,7 @@ class JointCalibration:
         Returns:
             Angles, shape (24,), order of :data:`~drivers.shadow.model.kinematics.JOINTS`, radians.
         """
-        counts = _JOINT_FROM_SENSOR.dot(np.asarray(sensors, dtype=float))
+        counts = joint_counts(sensors)
         angles_deg = np.empty(len(JOINTS))
         angles_deg[self._plain] = self._curves(counts[self._plain])
         for joints, plane in self._pairs:
@@ -117,8 +131,19 @@ class JointCalibration:
         for joints, plane in self._pairs:
             counts[joints] = plane.inverse(angles_deg[joints])
         sensors = _IDLE_SENSORS.copy()
-        sensors[_SENSOR_HAS_JOINT] = counts[_JOINT_OF_SENSOR]
+        sensors[SENSOR_HAS_JOINT] = counts[JOINT_OF_SENSOR]
         return sensors
+
+
+def joint_counts(sensors: NDArray[np.uint16] | Array) -> Array:
+    """Counts of each joint, shape (24,), from the palm's 37 channels: THJ5 and WRJ1 are averages of two sensors."""
+    return np.asarray(_JOINT_FROM_SENSOR.dot(np.asarray(sensors, dtype=float)))
+
+
+def _ends(points: Table) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Smallest and largest count, and smallest and largest angle in degrees, of a table."""
+    counts, degrees = zip(*points, strict=True)
+    return (min(counts), max(counts)), (min(degrees), max(degrees))
 
 
 def _checked_table(joint: str, table: Table, where: str) -> Array:
@@ -151,7 +176,7 @@ def _check_complete(joints: Sequence[str], where: str) -> None:
             f"{word} {', '.join(names)}" for word, names in (("misses", missing), ("has unknown", unknown)) if names
         ]
         raise ConfigurationError(
-            " and ".join(problems), where=where, hint="A hand's calibration names each of the 24 joints once"
+            " and ".join(problems), where=where, hint="A hand's calibration must name each of the 24 joints once"
         )
 
 
@@ -171,6 +196,10 @@ def _joint_from_sensor() -> Array:
 
 
 _JOINT_FROM_SENSOR = _joint_from_sensor()
-_SENSOR_HAS_JOINT = _JOINT_FROM_SENSOR.any(axis=0)
-_JOINT_OF_SENSOR = _JOINT_FROM_SENSOR.argmax(axis=0)[_SENSOR_HAS_JOINT]
+SENSOR_HAS_JOINT = _JOINT_FROM_SENSOR.any(axis=0)
+"""Which of the palm's 37 channels are joint sensors."""
+
+JOINT_OF_SENSOR = _JOINT_FROM_SENSOR.argmax(axis=0)[SENSOR_HAS_JOINT]
+"""The joints of those channels, as indices."""
+
 _IDLE_SENSORS = np.array([float(channel) if channel in OPTIONAL_CHANNELS else 0.0 for channel in range(len(SENSORS))])

@@ -99,7 +99,7 @@ def joint_vector(joints_rad: Mapping[str, float]) -> Array:
     """
     unknown = sorted(set(joints_rad) - set(JOINTS))
     if unknown:
-        raise ConfigurationError(f"no joint called {', '.join(unknown)}", hint=f"Joints are {', '.join(JOINTS)}")
+        raise ConfigurationError(f"unknown joints {', '.join(unknown)}", hint=f"Joints are {', '.join(JOINTS)}")
     return np.array([joints_rad.get(name, 0.0) for name in JOINTS], dtype=float)
 
 

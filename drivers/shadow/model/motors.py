@@ -14,6 +14,7 @@ from drivers.core import configuration as strict_yaml
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
+from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS, JOINT_LIMITS_rad
 from drivers.shadow.protocol.palm_codec import MOTORS
 
@@ -108,11 +109,30 @@ class MotorMap:
         return matrix
 
 
+def drivable_range_rad(motors: MotorMap, calibration: JointCalibration, margin: float) -> Array:
+    """Angles that driven joints may be sent to: within published limits and what the hand's own calibration covers.
+
+    Args:
+        motors: which motor pulls which joint.
+        calibration: of the hand's joints.
+        margin: how far beyond its calibrated angles a joint may go, as a share of their span.
+
+    Returns:
+        Lower and upper limit by motor number, shape (20, 2), radians. A joint whose calibration lies beside the
+        published limits altogether has those.
+    """
+    own = motors.from_joints @ calibration.range_rad
+    own = own + margin * np.diff(own, axis=1) * np.array([-1.0, 1.0])
+    low, high = np.maximum(own[:, 0], motors.limits_rad[:, 0]), np.minimum(own[:, 1], motors.limits_rad[:, 1])
+    common = np.column_stack([low, high])
+    return np.asarray(np.where((low <= high)[:, None], common, motors.limits_rad))
+
+
 def _check_one_to_one(numbers: Mapping[str, int], backwards: tuple[str, ...], where: str) -> None:
     hint = f"Name each of the {MOTORS} motors once: {', '.join(DRIVEN_JOINTS)}"
     if missing := sorted(set(DRIVEN_JOINTS) - set(numbers)):
         raise ConfigurationError(f"no motor for {', '.join(missing)}", where=where, hint=hint)
     if unknown := sorted((set(numbers) | set(backwards)) - set(DRIVEN_JOINTS)):
-        raise ConfigurationError(f"no driven joint called {', '.join(unknown)}", where=where, hint=hint)
+        raise ConfigurationError(f"unknown driven joints {', '.join(unknown)}", where=where, hint=hint)
     if sorted(numbers.values()) != list(range(MOTORS)):
-        raise ConfigurationError(f"motor numbers are not 0 to {MOTORS - 1}, each once", where=where, hint=hint)
+        raise ConfigurationError(f"the motor numbers must be 0 to {MOTORS - 1}, each once", where=where, hint=hint)

@@ -73,7 +73,7 @@ class MotorIdentifier:
             CodecError: more than eleven bits.
         """
         if not 0 <= identifier <= 0x7FF:
-            raise CodecError(f"identifier 0x{identifier:X} is not of eleven bits", where="motor CAN bus")
+            raise CodecError(f"identifier 0x{identifier:X} has more than eleven bits", where="motor CAN bus")
         return cls(Direction(identifier >> 9), identifier >> 5 & 0xF, identifier & 0xF, bool(identifier & 0x10))
 
     def motor(self, bus: int) -> int:
@@ -94,7 +94,7 @@ class MotorIdentifier:
         if self.direction is Direction.TO_MOTOR:
             return f"{motor} is sent {ToMotor(self.kind).name}"
         if self.direction is Direction.REQUEST:
-            return f"motors are asked for {FromMotor(self.kind).name}"
+            return f"request for {FromMotor(self.kind).name} from the motors"
         command = BootCommand(self.kind).name if self.kind in set(BootCommand) else f"command {self.kind}"
         return f"{motor} acknowledges {command}" if self.acknowledged else f"bootloader of {motor}: {command}"
 

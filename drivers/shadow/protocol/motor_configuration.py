@@ -83,10 +83,10 @@ def load_configurations(path: Path) -> dict[str, MotorConfiguration]:
     """
     content = strict_yaml.load(path)
     if not isinstance(content, dict):
-        raise ConfigurationError("no motors in it", where=str(path), hint="Use motor_board_effort_controllers.yaml")
+        raise ConfigurationError("contains no motors", where=str(path), hint="Use motor_board_effort_controllers.yaml")
     named = {str(name).upper(): value for name, value in content.items()}
     if wrong := sorted(set(DRIVEN_JOINTS) ^ set(named)):
-        hint = f"It has to name {', '.join(DRIVEN_JOINTS)}"
+        hint = f"It must name {', '.join(DRIVEN_JOINTS)}"
         raise ConfigurationError(f"missing or unknown: {', '.join(wrong)}", where=str(path), hint=hint)
     return {
         joint: strict_yaml.validate(named[joint], MotorConfiguration, where=f"{path}, {joint.lower()}")
@@ -148,7 +148,7 @@ def _insist(exchange: Exchange, kind: ToMotor, words: NDArray[np.int16], where: 
     for _ in range(_LOST_IN_A_ROW):
         if (readings := exchange(kind, words)) is not None:
             return readings
-    what = f"{_LOST_IN_A_ROW} cycles in a row lost while the motors were set up"
+    what = f"{_LOST_IN_A_ROW} cycles in a row were lost while configuring the motors"
     raise DeviceError(what, where=where, hint="Check the cable and the hand's power, then connect again")
 
 

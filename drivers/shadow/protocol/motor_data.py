@@ -184,7 +184,9 @@ def config_crc(words: Sequence[int]) -> int:
         CodecError: not ten words of 16 bits.
     """
     if len(words) != len(CONFIG_TYPES) or not all(0 <= word <= 0xFFFF for word in words):
-        raise CodecError(f"a motor configuration is {len(CONFIG_TYPES)} words of 16 bits", where="motor configuration")
+        raise CodecError(
+            f"a motor configuration must have {len(CONFIG_TYPES)} words of 16 bits", where="motor configuration"
+        )
     return crc16(b"".join(int(word).to_bytes(2, "little") for word in words)) or 1
 
 

@@ -101,14 +101,14 @@ PALMS: dict[PalmName, PalmImage] = {
 USUAL_PALM: PalmName = "0220"
 """That of most hands, and of emulated ones that nobody wants otherwise."""
 
-WHICH_PALMS = "Palms 0220, 0230 and 0240 can be driven; ask Shadow Robot which of their process images this board has"
+WHICH_PALMS = "Palms 0220, 0230 and 0240 are supported; ask Shadow Robot which of their process images this board has"
 """Advice for a product code that is none of theirs."""
 
 _OTHER_PRODUCTS = {
     BRIDGE_PRODUCT: "a bridge, not a palm",
     5: "a dummy without a hand",
-    0x01000002: "a muscle hand, which this program does not drive",
-    0x01000003: "a muscle hand, which this program does not drive",
+    0x01000002: "a muscle hand, which this program does not support",
+    0x01000003: "a muscle hand, which this program does not support",
 }
 
 

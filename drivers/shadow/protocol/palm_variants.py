@@ -151,7 +151,7 @@ def _unpack(image: struct.Struct, payload: bytes, palm: str, what: str) -> tuple
         raise CodecError(
             f"a palm {what} of {len(payload)} bytes instead of {image.size}",
             where=f"palm {palm}",
-            hint="Check that hand.palm in the rig file names the palm that is fitted",
+            hint="Check that hand.palm in the rig file is the installed palm",
         )
     return image.unpack(payload)
 

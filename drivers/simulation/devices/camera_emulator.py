@@ -75,7 +75,7 @@ class CameraEmulator:
             CodecError: something else than a trigger.
         """
         if payload != TRIGGER:
-            raise CodecError(f"{len(payload)} bytes that are no trigger", where="simulated camera")
+            raise CodecError(f"{len(payload)} bytes that are not a trigger", where="simulated camera")
         if self._period_ns is None:
             self._take(with_picture=True)
         else:

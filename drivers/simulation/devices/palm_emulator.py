@@ -21,6 +21,7 @@ from drivers.shadow.protocol.motor_data import FromMotor
 from drivers.shadow.protocol.palm_codec import (
     MOTORS,
     MOTORS_PER_STATUS,
+    SENSORS,
     CanFrame,
     EdcCommand,
     PalmAuxiliary,
@@ -76,15 +77,21 @@ class NoCan:
 
 @dataclass
 class PalmFaults:
-    """What can be wrong with the motors' answers, to be changed while it runs.
+    """What can be wrong with the sensors and with the motors' answers, to be changed while it runs.
 
     Attributes:
         silent: motors that do not answer.
         wrong_type: motors that answer another type than was asked.
+        stuck: counts that channels of joint sensors read whatever their joints do.
+        frozen: channels that keep what they read last.
+        torque: strain-gauge differences that motors report whatever they pull.
     """
 
     silent: set[int] = field(default_factory=set)
     wrong_type: set[int] = field(default_factory=set)
+    stuck: dict[int, int] = field(default_factory=dict)
+    frozen: set[int] = field(default_factory=set)
+    torque: dict[int, int] = field(default_factory=dict)
 
 
 class PalmEmulator:
@@ -120,6 +127,7 @@ class PalmEmulator:
         self._buffer = self._unwritten
         self._outbox: list[Datagram] = []
         self._last_packet = (np.int16(0), np.uint16(0))
+        self._shown = np.zeros(len(SENSORS), np.uint16)
         self.faults = PalmFaults()
 
     def write(self, payload: bytes) -> None:
@@ -154,7 +162,7 @@ class PalmEmulator:
         valid, slots = self._tactile.answer(command.tactile_data_type)
         return PalmStatus(
             edc_command=EdcCommand.SENSOR_DATA,
-            sensors=self._joints.counts(self._plant.joints_rad),
+            sensors=self._sensors(),
             motor_data_type=command.from_motor_data_type,
             which_motors=parity,
             arrived=arrived,
@@ -168,9 +176,20 @@ class PalmEmulator:
             auxiliary=self._auxiliary(command),
         )
 
+    def _sensors(self) -> NDArray[np.uint16]:
+        counts = self._joints.counts(self._plant.joints_rad)
+        for channel in self.faults.frozen:
+            counts[channel] = self._shown[channel]
+        for channel, stuck in self.faults.stuck.items():
+            counts[channel] = stuck
+        self._shown = counts
+        return counts
+
     def _packets(self, kind: int, parity: int) -> tuple[int, int, NDArray[np.int16], NDArray[np.uint16]]:
         """Arrived and error masks, and the ten packets' words."""
         torques, miscs = self._motors.answer(kind)
+        for motor, counts in self.faults.torque.items():
+            torques[motor] = counts
         torque, misc = torques[parity::2].copy(), miscs[parity::2].copy()
         if kind == FromMotor.INVALID:
             return 0, 0, torque, misc

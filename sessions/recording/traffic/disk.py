@@ -1,7 +1,7 @@
-"""Where a recording meets the disk: files that can go back to their last complete point, and the thread that writes.
+"""Writing a recording to disk: files that can be truncated to their last complete point, and the writing threads.
 
-The control thread only hands over finished chunks. Compressing and writing them is the work of one thread, forcing
-them to the disk that of another, so that a disk that stands still for a while delays no cycle. What waits is bounded.
+The control thread only queues finished chunks. One thread compresses and writes them, another flushes them to disk, so
+that a disk that stalls for a while delays no cycle. The queue is bounded.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ SYNC_PERIOD_s = 1.0
 
 
 class CutBackFile:
-    """An unbuffered new file that can go back to the last point declared complete.
+    """An unbuffered new file that can be truncated to the last point declared complete.
 
-    It is locked while it is open, so that others can tell a session that is being recorded from one that was left
-    open by a crash (see :func:`being_written`).
+    It is locked while it is open, to distinguish a session that is being recorded from one left open by a crash (see
+    :func:`being_written`).
     """
 
     def __init__(self, path: Path) -> None:
@@ -53,7 +53,7 @@ class CutBackFile:
         return self._position
 
     def keep(self) -> None:
-        """What the file holds now is complete."""
+        """Declare the present content complete."""
         self.kept = self._position
 
     def cut_back(self) -> None:
@@ -61,7 +61,7 @@ class CutBackFile:
         os.ftruncate(self._descriptor, self.kept)
 
     def sync(self) -> None:
-        """Force the file to the disk. Raises OSError."""
+        """Flush the file to disk. Raises OSError."""
         os.fdatasync(self._descriptor)
 
     def close(self) -> None:
@@ -70,7 +70,7 @@ class CutBackFile:
 
 
 def being_written(path: Path) -> bool:
-    """Whether a program that is still alive has a file open for recording."""
+    """Whether a running program has a file open for recording."""
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     except OSError:
@@ -86,7 +86,7 @@ def being_written(path: Path) -> bool:
 
 @dataclass
 class Segment:
-    """One file of a recording and what writes it."""
+    """One file of a recording and its writer."""
 
     path: Path
     file: CutBackFile
@@ -107,10 +107,10 @@ class DiskThread(threading.Thread):
 
     Args:
         first: the segment to begin with.
-        next_segment: makes the segment after the one at hand when that is full; called in this thread.
-        segment_bytes: size from which a segment is full.
+        next_segment: creates the segment after a full one; called in this thread.
+        segment_bytes: size at which a segment is full.
         queue_bytes: uncompressed bytes that may wait.
-        idle: called at least every ``idle_s`` seconds while nothing waits.
+        idle: called at least every ``idle_s`` seconds while the queue is empty.
 
     Attributes:
         failure: why writing ended; nothing is written after that.
@@ -142,7 +142,7 @@ class DiskThread(threading.Thread):
     # --- for the recording thread ------------------------------------------------------------------------------
 
     def put(self, segment: Segment, chunk: PendingChunk, patience_s: float) -> bool:
-        """Hand over a chunk; False when there is no room for it even after ``patience_s`` seconds."""
+        """Queue a chunk. Returns False if there is no room for it even after ``patience_s`` seconds."""
         size = len(chunk.records)
         with self._condition:
             if not self._condition.wait_for(lambda: self._has_room(size), patience_s):
@@ -151,22 +151,22 @@ class DiskThread(threading.Thread):
         return True
 
     def end_segment(self, segment: Segment) -> None:
-        """Finish a segment after all its chunks; takes no room in the queue."""
+        """Finish a segment after all its chunks; needs no room in the queue."""
         with self._condition:
             self._enqueue(_Job(segment, None, 0))
 
     def take_prepared(self) -> Segment | None:
-        """The next segment, once the one at hand is full."""
+        """The next segment, once the current one is full."""
         prepared, self._prepared = self._prepared, None
         return prepared
 
     def settle(self, timeout_s: float) -> bool:
-        """Wait until everything handed over is written, or writing has failed."""
+        """Wait until everything queued is written, or writing has failed."""
         with self._condition:
             return self._condition.wait_for(lambda: not self._jobs and not self._busy, timeout_s)
 
     def end(self, timeout_s: float) -> bool:
-        """Write what waits, and end; False when that takes longer than the time-out."""
+        """Write the queue, and end. Returns False if that takes longer than the timeout."""
         with self._condition:
             self._ended = True
             self._condition.notify_all()
@@ -174,7 +174,7 @@ class DiskThread(threading.Thread):
         return not self.is_alive()
 
     def sync(self) -> None:
-        """Force the segment at hand to the disk. Raises OSError."""
+        """Flush the current segment to disk. Raises OSError."""
         self._current.file.sync()
 
     # --- the thread itself -------------------------------------------------------------------------------------
@@ -245,7 +245,7 @@ def _defect(error: Exception, segment: Segment) -> SessionError:
 
 
 class Syncer(threading.Thread):
-    """Forces a recording to the disk once a second; an error waits in ``error`` for the next write."""
+    """Flushes a recording to disk once a second; an error is kept in ``error`` for the next write."""
 
     def __init__(self, sync: Callable[[], None]) -> None:
         super().__init__(name="traffic sync", daemon=True)
@@ -262,7 +262,7 @@ class Syncer(threading.Thread):
                 return
 
     def stop(self, timeout_s: float) -> bool:
-        """End it; False when the disk holds it up for longer than the time-out."""
+        """End the thread. Returns False if the disk blocks it for longer than the timeout."""
         self._ended.set()
         self.join(timeout_s)
         return not self.is_alive()

@@ -1,4 +1,4 @@
-"""The files of a recording: their names, the session events of their form, and what is said when a disk fails."""
+"""The files of a recording: their names, format identifiers, and the error for a failing disk."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def segment_path(path: Path, number: int) -> Path:
 
 
 def disk_failure(path: Path, error: OSError | SessionError, kept: int) -> SessionError:
-    """The error that ends a recording, from what the system said; ``kept`` bytes of the file stay."""
+    """The error that ends a recording, from the system's error; ``kept`` bytes of the file remain."""
     if isinstance(error, SessionError):
         return error
     advice = "free some space and start a new session" if disk_full(error) else "check the disk"

@@ -1,7 +1,7 @@
-"""Versions of what a session is written in, and how an older one is read.
+"""Format versions of sessions, and conversion of older ones.
 
-Each version has one converter to the version after it; reading goes through all that are needed, so that a converter
-is never touched again. A recording of a newer version than this program is refused by name.
+Each version has one converter to the next version; reading applies all that are needed, so that a converter never
+changes. A recording of a newer version is refused with its name.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ TRAFFIC_FORMATS = ("tactile-traffic/1", "tactile-traffic/2")
 MANIFEST_FORMATS = ("tactile-session/1", "tactile-session/2", "tactile-session/3")
 
 Message: TypeAlias = tuple[str, bytes, int]
-"""Topic, content as it stands in the file, stamp in nanoseconds."""
+"""Topic, content as stored in the file, stamp in nanoseconds."""
 
 
 def _frames_without_head(message: Message) -> Message:
-    """Version 1 kept the bytes of a transport bare."""
+    """Version 1 stored the bytes of a transport without an envelope."""
     topic, data, stamp_ns = message
     return (topic, raw_frames.encode(data, stamp_ns), stamp_ns) if schemas.is_raw(topic) else message
 
@@ -29,12 +29,12 @@ _TRAFFIC_CONVERTERS: Mapping[str, Callable[[Message], Message]] = {"tactile-traf
 
 
 def _without_streams(content: dict[str, Any]) -> dict[str, Any]:
-    """Version 1 did not say what was lost on each stream."""
+    """Version 1 did not store the losses of each stream."""
     return {**content, "streams": {}}
 
 
 def _without_origin(content: dict[str, Any]) -> dict[str, Any]:
-    """Version 2 did not say, but in its notes, whether it was made of another session: it counts as recorded."""
+    """Version 2 stored only in its notes whether it was derived from another session: it counts as recorded."""
     return {**content, "derived": []}
 
 
@@ -45,7 +45,7 @@ _MANIFEST_CONVERTERS: Mapping[str, Callable[[dict[str, Any]], dict[str, Any]]] =
 
 
 def traffic_converter(written_in: str | None, where: str) -> Callable[[Message], Message]:
-    """Turns messages of a version into those of the present one.
+    """Converts messages of a version into those of the present one.
 
     Raises:
         SessionError: a version that this program does not know.
@@ -61,7 +61,7 @@ def traffic_converter(written_in: str | None, where: str) -> Callable[[Message],
 
 
 def converted_manifest(content: Any, where: str) -> Any:
-    """The content of ``session.yaml`` in the present version; what is no such document is left as it is.
+    """The content of ``session.yaml`` in the present version; other documents are unchanged.
 
     Raises:
         SessionError: a version that this program does not know.
@@ -75,13 +75,13 @@ def converted_manifest(content: Any, where: str) -> Any:
 
 
 def _steps(written_in: Any, known: tuple[str, ...], where: str) -> tuple[str, ...]:
-    """The versions that have to be converted, oldest first."""
+    """The versions to convert, oldest first."""
     if written_in in known:
         return known[known.index(written_in) : -1]
     newer = _number(written_in) > _number(known[-1]) and str(written_in).startswith(known[-1].split("/")[0])
-    what = "a newer version of the program" if newer else "a form that this program does not know"
+    what = "a newer version of the program" if newer else "a format that this program does not know"
     raise SessionError(
-        f"written in {written_in!r}, {what}; this one reads {known[0]} to {known[-1]}",
+        f"written in {written_in!r}, {what}; this version reads {known[0]} to {known[-1]}",
         where=where,
         hint="Use the version of tactile-lab that recorded it" + (", or a newer one" if newer else ""),
     )

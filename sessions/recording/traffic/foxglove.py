@@ -1,6 +1,6 @@
 """Values and JSON schemas of Foxglove's larger types: joint states, point clouds, scene updates, camera calibration.
 
-Field names are Foxglove's published ones; its viewers recognise a schema by its name.
+Field names are Foxglove's published ones; its viewers recognize a schema by its name.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def contact_cloud(stamp_ns: int, contacts: Sequence[Contact]) -> Json:
 
 
 def contact_scene(stamp_ns: int, index: int, contacts: Iterable[Contact]) -> Json:
-    """The contacts of a grasp as a ``foxglove.SceneUpdate``: an arrow along each normal; grasps before it stay."""
+    """The contacts of a grasp as a ``foxglove.SceneUpdate``: an arrow along each normal; earlier grasps remain."""
     entity = {
         "timestamp": time(stamp_ns),
         "frame_id": "world",

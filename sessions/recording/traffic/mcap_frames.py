@@ -1,4 +1,4 @@
-"""The records of an MCAP file one after another, whole or torn."""
+"""Reads the records of an MCAP file one by one, complete or truncated."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _FRAME = struct.Struct("<BQ")
 
 
 def ends_well(path: Path) -> bool:
-    """Whether a file ends as a finished MCAP file does; nothing else of it is looked at."""
+    """Whether a file ends like a finished MCAP file; nothing else is checked."""
     with path.open("rb") as file:
         size = file.seek(0, 2)
         file.seek(max(0, size - len(MCAP0_MAGIC)))
@@ -22,7 +22,7 @@ def ends_well(path: Path) -> bool:
 
 
 class Frames:
-    """Iterates over the records of an MCAP file, torn or not, as opcode and content."""
+    """Iterates over the records of an MCAP file, truncated or not, as opcode and content."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -31,7 +31,7 @@ class Frames:
         magic = file.read(len(MCAP0_MAGIC))
         self.is_mcap = MCAP0_MAGIC.startswith(magic)
         self.complete = False
-        """The closing magic was reached."""
+        """Whether the closing magic was reached."""
         self.unreadable_bytes = 0
 
     def __iter__(self) -> Iterator[tuple[int, bytes]]:

@@ -1,8 +1,8 @@
 """MCAP files for a stream of many small messages.
 
-Writes what the library's own writer would write, byte for byte, but puts a message into the chunk at hand in one go:
-hundreds come a second, and the library spends ten times as long on each. The records of which there are few are the
-library's. A chunk can be taken from the writer and compressed and written later, by another thread.
+Writes what the library's own writer would write, byte for byte, but appends a message to the current chunk in one step:
+there are hundreds per second, and the library needs ten times as long for each. Rare records are written by the
+library. A chunk can be taken from the writer and compressed and written later, by another thread.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _FOOTER_BYTES = 20
 
 
 class Output(Protocol):
-    """A file that is written from its beginning to its end."""
+    """A file that is written sequentially."""
 
     def write(self, data: bytes) -> int:
         """Append all of it."""
@@ -57,8 +57,8 @@ class McapWriter:
     """An MCAP file with zstd-compressed, indexed chunks, a summary and checksums.
 
     Args:
-        output: where it goes; not closed here.
-        chunk_bytes: a chunk is written when it has grown beyond this; None where the caller takes the chunks.
+        output: the file to write; not closed here.
+        chunk_bytes: size at which a chunk is written; None if the caller takes the chunks.
         profile, library: for the header.
     """
 
@@ -83,7 +83,7 @@ class McapWriter:
         self._metadata_indices.append(MetadataIndex(offset=offset, length=len(record), name=name))
 
     def add_closing_metadata(self, name: str, content: Mapping[str, str]) -> None:
-        """Named texts that stand behind the last message: :meth:`finish` writes them."""
+        """Set named texts to follow the last message: :meth:`finish` writes them."""
         self._closing = (name, content)
 
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
@@ -95,18 +95,18 @@ class McapWriter:
 
     @property
     def pending_bytes(self) -> int:
-        """Size of the chunk at hand, uncompressed."""
+        """Uncompressed size of the current chunk."""
         return len(self._chunk.records)
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
-        """Describe a kind of message; gives its number."""
+        """Register a schema. Returns its number."""
         schema = Schema(id=len(self._schemas) + 1, data=data, encoding=encoding, name=name)
         self._schemas.append(schema)
         self._chunk.define(_encode(schema))
         return schema.id
 
     def add_channel(self, topic: str, message_encoding: str, schema: int = 0) -> int:
-        """Begin a channel, with the number of its schema or 0 for none; gives its number."""
+        """Register a channel, with the number of its schema or 0 for none. Returns its number."""
         number = len(self._channels) + 1
         channel = Channel(id=number, topic=topic, message_encoding=message_encoding, schema_id=schema, metadata={})
         self._channels.append(channel)
@@ -129,31 +129,30 @@ class McapWriter:
             self.flush()
 
     def flush(self) -> None:
-        """Write the chunk at hand, unless it has no message."""
+        """Write the current chunk, unless it has no message."""
         if (chunk := self.detach()) is not None:
             self.write_chunk(chunk)
 
     def detach(self) -> PendingChunk | None:
-        """Give away the chunk at hand, for :meth:`write_chunk` or :meth:`drop`; None when it has no message."""
+        """Take the current chunk, for :meth:`write_chunk` or :meth:`drop`; None if it has no message."""
         if not self._chunk.entries:
             return None
         chunk, self._chunk = self._chunk, PendingChunk()
         return chunk
 
     def drop(self, chunk: PendingChunk) -> None:
-        """A chunk is not going to be written: what it described is described again in the chunk at hand.
-
-        The chunk at hand must have no message yet.
+        """Drop a chunk that will not be written: its schemas and channels are repeated in the current chunk, which must
+        have no message yet.
         """
         self._chunk.define(bytes(chunk.definitions))
         self._counts.subtract(chunk.message_counts())
 
     def discard(self) -> None:
-        """Forget the chunk at hand: writing a message into it was broken off."""
+        """Discard the current chunk: writing a message into it was interrupted."""
         self._chunk = PendingChunk()
 
     def finish(self) -> None:
-        """Write what is left, and the summary."""
+        """Write the remaining data and the summary."""
         self.flush()
         if self._closing is not None:
             self.add_metadata(*self._closing)
@@ -199,7 +198,7 @@ class McapWriter:
         )
 
     def _summary(self, start: int) -> tuple[bytes, list[SummaryOffset]]:
-        """The records of the summary, which begins at ``start``, and where each kind of them stands."""
+        """The records of the summary, which begins at ``start``, and the offset of each kind."""
         groups: list[tuple[Opcode, bytes]] = [
             (Opcode.SCHEMA, _all_encoded(self._schemas)),
             (Opcode.CHANNEL, _all_encoded(self._channels)),
@@ -229,7 +228,7 @@ class McapWriter:
 
 
 class PendingChunk:
-    """Messages on their way to the file: their records, and by channel the index entries."""
+    """Messages not yet written: their records, and the index entries by channel."""
 
     def __init__(self) -> None:
         self.records = bytearray()
@@ -238,7 +237,7 @@ class PendingChunk:
         self.first_ns = self.last_ns = 0
 
     def define(self, records: bytes) -> None:
-        """Put in the description of schemas or channels."""
+        """Add records of schemas or channels."""
         self.records += records
         self.definitions += records
 
@@ -247,7 +246,7 @@ class PendingChunk:
         return {channel: len(entries) // _INDEX_ENTRY.size for channel, entries in self.entries.items()}
 
     def index(self, start: int) -> tuple[dict[int, int], bytes]:
-        """Where in the file each channel's index stands, and the indices, which begin at ``start``."""
+        """File offset of each channel's index, and the indices, which begin at ``start``."""
         offsets, indices = {}, bytearray()
         for channel, entries in self.entries.items():
             offsets[channel] = start + len(indices)

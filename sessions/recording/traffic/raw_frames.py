@@ -1,8 +1,8 @@
-"""A message of a transport as it stands in a traffic file: its bytes, and what is known about when they arose.
+"""A transport's message as stored in a traffic file: its bytes and stamps.
 
-The form is CDR, the one of ROS 2, so that any MCAP reader with a decoder for it reads the fields without knowing us.
-Devices that number or date their messages do so inside the bytes; a :data:`Stamper` reads that out, without decoding
-the rest, so that a gap shows even when nothing else of the message can be understood.
+The format is ROS 2 CDR, so that any MCAP reader with a CDR decoder can read the fields. Devices that number or stamp
+their messages do so inside the bytes; a :data:`Stamper` extracts that without decoding the rest, so that a gap shows
+even if the message cannot be decoded.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ _SECONDS_MASK = 0x7FFF_FFFF
 
 @dataclass(frozen=True)
 class DeviceStamp:
-    """What a device says about when a message arose.
+    """A device's own stamp of a message.
 
     Attributes:
         counter: its own number of the (first) reading in the message, or None.
         clock_ns: its own time, or None.
-        readings: how many consecutive numbers the message stands for.
+        readings: how many consecutive numbers the message covers.
     """
 
     counter: int | None = None
@@ -53,11 +53,11 @@ class DeviceStamp:
 UNSTAMPED = DeviceStamp()
 
 Stamper: TypeAlias = Callable[[bytes], DeviceStamp]
-"""Reads a device's own stamp out of a message; never raises, whatever the bytes are."""
+"""Reads a device's own stamp from a message; never raises, whatever the bytes are."""
 
 
 def encode(payload: bytes, stamp_ns: int, device: DeviceStamp = UNSTAMPED) -> bytes:
-    """A message as it stands in the file."""
+    """A message as stored in the file."""
     seconds, nanoseconds = divmod(stamp_ns, NANOSECONDS)
     counter = NOT_GIVEN if device.counter is None else device.counter
     clock_ns = NOT_GIVEN if device.clock_ns is None else device.clock_ns
@@ -69,7 +69,7 @@ def decode(data: bytes) -> tuple[bytes, DeviceStamp]:
     """The bytes on the wire, and the device's own stamp.
 
     Raises:
-        ValueError: not a message of this form.
+        ValueError: not a message of this format.
     """
     if len(data) < _HEAD.size:
         raise ValueError(f"a raw frame has at least {_HEAD.size} bytes, not {len(data)}")

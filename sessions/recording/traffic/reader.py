@@ -1,9 +1,9 @@
-"""Reading a traffic file, whole or torn.
+"""Reading a traffic file, complete or damaged.
 
-A file that was cut off (killed process, full disk, power cut) has no summary, and its last record may be torn. Every
-complete chunk is read, and :attr:`TrafficReader.loss` says what was not. A chunk that was damaged on the disk is left
-out and counted; the chunks after it are read. A recording in several files is read as one. Recordings of older
-versions are converted while they are read (see :mod:`sessions.recording.traffic.formats`).
+A truncated file (killed process, full disk, power cut) has no summary, and its last record may be incomplete. Every
+complete chunk is read, and :attr:`TrafficReader.loss` says what was not. A chunk that was damaged on disk is skipped
+and counted; the chunks after it are read. A recording in several files is read as one. Recordings of older versions are
+converted while they are read (see :mod:`sessions.recording.traffic.formats`).
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ class Loss:
     """What could not be read.
 
     Attributes:
-        truncated: the file ends too early; the last tenth of a second was never written.
+        truncated: the file ends too early; up to the last tenth of a second was not written.
         unreadable_bytes: bytes after the last complete record.
-        damaged_chunks: chunks left out.
+        damaged_chunks: chunks skipped.
         missing_messages: gaps in the numbering of what was read.
         by_topic: messages of damaged chunks whose index could be read, by topic; part of ``missing_messages``.
     """
@@ -69,19 +69,19 @@ class Loss:
         return self.truncated or self.damaged_chunks > 0 or self.missing_messages > 0
 
     def describe(self) -> str:
-        """The loss in words; empty when nothing was lost."""
+        """The loss in words; empty if nothing was lost."""
         parts = []
         if self.truncated:
             torn = f" ({self.unreadable_bytes} bytes of an incomplete record)" if self.unreadable_bytes else ""
             parts.append(f"the file ends too early{torn}")
         if self.damaged_chunks:
-            parts.append(f"{self.damaged_chunks} damaged chunks left out")
+            parts.append(f"{self.damaged_chunks} damaged chunks skipped")
         if self.missing_messages:
             parts.append(f"{self.missing_messages} messages missing")
         return "; ".join(parts)
 
     def counts(self) -> dict[str, int]:
-        """The loss as numbers by kind, for a session's record; empty when nothing was lost."""
+        """The loss as counts by kind, for a session's manifest; empty if nothing was lost."""
         kinds = {
             "truncated": int(self.truncated),
             "unreadable_bytes": self.unreadable_bytes,
@@ -95,24 +95,24 @@ class TrafficReader:
     """Streams the messages of a recording in the order in which they happened.
 
     Args:
-        path: of its first file; those that follow it stand beside it.
+        path: of its first file; the following files are in the same folder.
 
     Raises:
-        SessionError: the file is missing, no MCAP file, not one of a session, or of a version that is not known.
+        SessionError: the file is missing, not an MCAP file, not one of a session, or of an unknown version.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.info: dict[str, str] = {}
-        """What the writer noted about the session."""
+        """The writer's facts about the session."""
         self.end: dict[str, str] = {}
-        """What the writer noted at the end; complete once :meth:`messages` has been read to the end."""
+        """The writer's facts at the end; complete once :meth:`messages` has been read to the end."""
         self.loss = Loss()
         """Complete once :meth:`messages` has been read to the end."""
         self._convert = self._read_preamble(path)
 
     def messages(self) -> Iterator[TrafficMessage]:
-        """All messages that can be read, from the beginning."""
+        """All readable messages, from the beginning."""
         self.loss, self.end, expected = Loss(), {}, 0
         for path in segment_paths(self.path):
             segment = _SegmentMessages(path, self.loss)
@@ -127,7 +127,7 @@ class TrafficReader:
         self.loss.truncated |= not self.end and self.info.get("format") != formats.TRAFFIC_FORMATS[0]
 
     def streams(self) -> dict[str, dict[str, int]]:
-        """What the writer counted on each stream, by its record at the end; empty when there is none."""
+        """The writer's counts of each stream, from its record at the end; empty if there is none."""
         try:
             found = json.loads(self.end.get("streams", "{}"))
         except ValueError:
@@ -135,7 +135,7 @@ class TrafficReader:
         return found if isinstance(found, dict) else {}
 
     def attachments(self) -> Iterator[Attachment]:
-        """The files kept inside the recording. Raises SessionError."""
+        """The files stored inside the recording. Raises SessionError."""
         with _open(self.path) as file:
             for opcode, content in Frames(file):
                 if opcode == Opcode.CHUNK:
@@ -147,7 +147,7 @@ class TrafficReader:
                         raise SessionError(f"an attachment is damaged ({error})", where=str(self.path)) from error
 
     def _as_now(self, topic: str, message: Message) -> TrafficMessage:
-        """A message in the present form, taken out of its envelope."""
+        """A message in the present format, without its envelope."""
         topic, data, stamp_ns = self._convert((topic, message.data, message.publish_time))
         if not schemas.is_raw(topic):
             return TrafficMessage(topic, data, stamp_ns, message.sequence)
@@ -185,14 +185,14 @@ class TrafficReader:
 
 
 def segment_paths(path: Path) -> list[Path]:
-    """The files of a recording, in their order; a hole in their numbers shows as missing messages."""
+    """The files of a recording in order; a gap in their numbers shows as missing messages."""
     numbered = re.compile(rf"{re.escape(path.stem)}-([1-9][0-9]{{0,8}}){re.escape(path.suffix)}")
     numbers = [int(found[1]) for item in path.parent.glob("*") if (found := numbered.fullmatch(item.name))]
     return [path, *(segment_path(path, number) for number in sorted(numbers) if number > 1)]
 
 
 class _SegmentMessages:
-    """The messages of one file with their topics (None where that is not known)."""
+    """The messages of one file with their topics (None if unknown)."""
 
     def __init__(self, path: Path, loss: Loss) -> None:
         self.end: dict[str, str] = {}
@@ -254,7 +254,7 @@ def may_hold(path: Path, topics: Collection[str]) -> bool:
         topics: to look for.
 
     Returns:
-        False only when every file of it has a summary, and none names one of the topics.
+        False only if every file of it has a summary without these topics.
     """
     return any(_names_one(segment, topics) for segment in segment_paths(path))
 

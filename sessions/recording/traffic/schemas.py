@@ -1,9 +1,9 @@
-"""Topics of a traffic file, their JSON schemas, and how values are written in them.
+"""Topics of a traffic file, their JSON schemas, and the encoding of values.
 
 Schemas whose names begin with ``foxglove.`` follow Foxglove's published field names, so that standard viewers show
 images, poses, transforms, joints, point clouds, scenes and the log without a plug-in; the larger ones are in
-:mod:`sessions.recording.traffic.foxglove`. Those that begin with ``tactile_lab.`` are our own, described in
-``docs/sessions.md``. Bytes of transports stand in the envelope of :mod:`sessions.recording.traffic.raw_frames`.
+:mod:`sessions.recording.traffic.foxglove`. Those that begin with ``tactile_lab.`` are this project's own, described in
+``docs/sessions.md``. Bytes of transports have the envelope of :mod:`sessions.recording.traffic.raw_frames`.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ def biotac_topic(finger: str) -> str:
 
 
 def schema_by_form(topic: str) -> Schema | None:
-    """Schema of the topics that there is one of for each finger."""
+    """Schema of the topics that exist once per finger."""
     kind = {"wrench": _WRENCH, "readings": _BIOTAC}.get(topic.rpartition("/")[2])
     return kind if topic.startswith(("/ft/", "/biotac/")) else None
 
@@ -158,12 +158,12 @@ def is_raw(topic: str) -> bool:
 
 
 def received_topic(transport: str) -> str:
-    """Topic of the bytes that came from a transport's device."""
+    """Topic of the bytes received from a transport's device."""
     return f"/link/{transport}/rx"
 
 
 def transmitted_topic(transport: str) -> str:
-    """Topic of the bytes that went to a transport's device."""
+    """Topic of the bytes sent to a transport's device."""
     return f"/link/{transport}/tx"
 
 
@@ -173,7 +173,7 @@ def received_transport(topic: str) -> str | None:
 
 
 def stamper_of(topic: str) -> str | None:
-    """Name of the transport that stamps a topic's messages; None where the program does."""
+    """Name of the transport that stamps a topic's messages; None if the program stamps them."""
     return "camera" if topic == IMAGE_TOPIC else received_transport(topic)
 
 
@@ -221,7 +221,7 @@ def contacts(items: Iterable[Contact]) -> list[Json]:
 
 
 def encode(content: Json) -> bytes:
-    """Compact JSON. Numbers that JSON has no word for (NaN) become null."""
+    """Compact JSON. Numbers that JSON cannot represent (NaN) become null."""
     try:
         return _ENCODER.encode(content).encode()
     except ValueError:
@@ -231,7 +231,7 @@ def encode(content: Json) -> bytes:
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} has no JSON form")
+    raise TypeError(f"{type(value).__name__} cannot be written as JSON")
 
 
 _ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False, default=_plain)

@@ -1,4 +1,4 @@
-"""How a recording is kept, and what goes into it beside the messages."""
+"""How a recording is stored, and what it contains besides messages."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from sessions.recording.traffic.disk import CutBackFile
 
 @dataclass(frozen=True)
 class TrafficSettings:
-    """How a recording is kept.
+    """How a recording is stored.
 
     Attributes:
-        segment_bytes: size at which the next file is begun; it bounds the index that is kept in memory, too.
-        queue_bytes: uncompressed bytes that may wait for the disk; at 2 MB/s half a minute.
-        when_full: "wait" delays the recording thread, for a rig whose time waits with it; "drop" leaves out whole
-            chunks and counts their messages, for real time.
+        segment_bytes: size at which the next file is started; it also bounds the index in memory.
+        queue_bytes: uncompressed bytes that may wait for the disk; half a minute at 2 MB/s.
+        when_full: "wait" delays the recording thread, for a rig whose time waits with it; "drop" discards whole chunks
+            and counts their messages, for real time.
         patience_s: how long "wait" waits before the recording ends with an error.
-        tell_streams: whether to write once a second what was lost so far; not for a copy of a recording.
-        open_file: makes the files; another one than usual tries out what a bad disk does.
+        tell_streams: whether to write the losses so far once a second; not for a copy of a recording.
+        open_file: creates the files; replaceable to test a bad disk.
     """
 
     segment_bytes: int = 256 << 20
@@ -34,7 +34,7 @@ class TrafficSettings:
 
 @dataclass(frozen=True)
 class Attached:
-    """A file to be kept inside the recording."""
+    """A file to store inside the recording."""
 
     name: str
     media_type: str

@@ -1,4 +1,4 @@
-"""What went missing on each stream of a recording: gaps, late messages, and what the recorder itself had to drop."""
+"""Losses on each stream of a recording: gaps, late messages, and messages that the recorder dropped."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sessions.recording.traffic import schemas
 from sessions.recording.traffic.raw_frames import DeviceStamp
 
 LATE_ns = 100_000_000
-"""A message counts as late when its stamp lies this far behind the newest one that is not a single transport's word."""
+"""A message counts as late if its stamp is this far behind the session's time."""
 
 
 class StreamCounts:
@@ -17,10 +17,10 @@ class StreamCounts:
 
     Attributes:
         messages: recorded.
-        gaps: readings that the device numbered and that never came.
-        late: messages that came so late that they stand out of order.
+        gaps: readings that the device numbered but that never arrived.
+        late: messages that arrived so late that they are out of order.
         dropped: messages that did not fit into the recorder's queue.
-        unwritten: messages that the disk did not take when it failed.
+        unwritten: messages not written when the disk failed.
     """
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class StreamCounts:
         """One message was recorded.
 
         Args:
-            device: what the device says of it. A counter that goes back has begun anew, which is no gap.
+            device: the device's own stamp. A counter that goes back has restarted, which is not a gap.
         """
         self.messages[topic] += 1
         if self._behind_ns(topic, stamp_ns) > LATE_ns:
@@ -58,11 +58,11 @@ class StreamCounts:
 
     @property
     def now_ns(self) -> int:
-        """The session's time, which a transport whose clock has jumped does not carry along; 0 before any message."""
+        """The session's time, robust against a transport's clock jump; 0 before any message."""
         return self._time.now_ns
 
     def losses(self) -> dict[str, int]:
-        """Everything that is not zero, by kind and topic, for a session's record."""
+        """All non-zero counts, by kind and topic, for a session's manifest."""
         kinds = {
             "sequence gaps": self.gaps,
             "late": self.late,
@@ -72,7 +72,7 @@ class StreamCounts:
         return {f"{kind} {topic}": n for kind, counts in kinds.items() for topic, n in sorted(counts.items()) if n}
 
     def plain(self) -> dict[str, dict[str, int]]:
-        """All counters by topic, as plain data: of the transports, and of whatever else lost anything."""
+        """All counters by topic, as plain data: of the transports, and of other topics with losses."""
         lossy = {topic for counts in (self.gaps, self.late, self.dropped) for topic, number in counts.items() if number}
         topics = [topic for topic in sorted(self.messages) if topic.startswith("/link/") or topic in lossy]
         return {

@@ -1,13 +1,12 @@
 """Writing a traffic file: MCAP, in small compressed chunks that survive a crash.
 
-Messages stand in the file in the exact order in which they happened and are numbered across all topics, so that a
-gap shows. ``publish_time`` is a message's own stamp; ``log_time`` never decreases, so that readers that sort by it
-keep the order. A chunk is closed after 64 KiB, after 80 ms of session time or after 80 ms of real time, whichever
-comes first, which bounds what a killed process loses to a tenth of a second; once a second the file is forced to the
-disk for the case of a power cut. Both happen in threads of their own (see :mod:`sessions.recording.traffic.disk`).
-
-A recording that has grown beyond its limit goes on in ``traffic-2.mcap`` and so on; each of these files can be
-opened by itself. The last one ends with a record that says what was lost.
+Messages are stored in the exact order in which they happened and are numbered across all topics, so that a gap shows.
+``publish_time`` is a message's own stamp; ``log_time`` never decreases, so that readers that sort by it keep the order.
+A chunk is closed after 64 KiB, after 80 ms of session time or after 80 ms of real time, whichever comes first, which
+bounds what a killed process loses to a tenth of a second; once a second the file is flushed to disk in case of a power
+cut. Both happen in separate threads (see :mod:`sessions.recording.traffic.disk`). A recording that exceeds the size
+limit continues in ``traffic-2.mcap`` and so on; each of these files can be opened separately. The last one ends with a
+record of the losses.
 """
 
 from __future__ import annotations
@@ -43,13 +42,13 @@ class TrafficWriter:
 
     Args:
         path: of its first file; must not exist.
-        info: facts about the session, kept in each file beside the format's name.
-        attachments: files kept in each file.
-        stampers: by transport, what reads the device's own stamp out of its messages.
+        info: facts about the session, stored in each file with the format's name.
+        attachments: files stored in each file.
+        stampers: by transport, the reader of the device's own stamp.
         settings: see there.
 
     Raises:
-        SessionError: the file exists or cannot be made.
+        SessionError: the file exists or cannot be created.
     """
 
     def __init__(
@@ -63,7 +62,7 @@ class TrafficWriter:
     ) -> None:
         self.path, self.streams = path, StreamCounts()
         self.complete = False
-        """The recording was finished with everything in it."""
+        """Whether the recording was finished completely."""
         self._settings = settings or TrafficSettings()
         self._stampers = {schemas.received_topic(transport): stamper for transport, stamper in (stampers or {}).items()}
         self._info, self._attachments = dict(info or {}), attachments
@@ -95,10 +94,10 @@ class TrafficWriter:
         """Append one message.
 
         Args:
-            device: the device's own stamp; read out of the message where it is not given.
+            device: the device's own stamp; by default read from the message.
 
         Raises:
-            SessionError: the disk is full or failed; what was recorded before is kept and readable.
+            SessionError: the disk is full or failed; the earlier recording stays readable.
         """
         with self._lock:
             self._check()
@@ -111,7 +110,9 @@ class TrafficWriter:
                 raise
 
     def flush(self) -> None:
-        """Hand everything so far to the operating system, and wait for that. Raises SessionError as :meth:`write`."""
+        """Pass everything so far to the operating system, and wait for it. Raises SessionError
+        as :meth:`write` does.
+        """
         with self._lock:
             self._check()
             self._hand_over()
@@ -120,14 +121,14 @@ class TrafficWriter:
             self._check()
 
     def settle(self) -> None:
-        """Wait until everything that was handed over is written, or cannot be."""
+        """Wait until everything queued is written, or writing has failed."""
         self._disk.settle(CLOSE_TIMEOUT_s)
 
     def close(self, end: Mapping[str, str] | None = None) -> None:
-        """Finish the file; idempotent. After a failed write the file stays as it was then.
+        """Finish the file; idempotent. After a failed write the file remains unchanged.
 
         Args:
-            end: facts for the record at the end, beside what was lost on each stream.
+            end: facts for the record at the end, besides the losses of each stream.
 
         Raises:
             SessionError: the last part could not be written, or the disk does not answer.
@@ -179,7 +180,7 @@ class TrafficWriter:
         return channel
 
     def _tell_streams(self) -> None:
-        """What was lost so far, once a second, so that a crash does not take it along."""
+        """Write the losses so far, once a second, so that they survive a crash."""
         now_ns = self.streams.now_ns
         if self._told_ns is None:
             self._told_ns = now_ns
@@ -213,10 +214,10 @@ class TrafficWriter:
         self._segment.writer.drop(chunk)
         self._count(self.streams.dropped, self._segment, chunk)
         if self._settings.when_full == "wait":
-            raise self._end(f"the disk has taken nothing for {self._settings.patience_s:g} s", "check the disk")
+            raise self._end(f"the disk has written nothing for {self._settings.patience_s:g} s", "check the disk")
 
     def _flush_in_time(self) -> None:
-        """Nothing was handed over for a while: do it now, unless the recording thread is just at it."""
+        """Nothing was queued for a while: queue the current chunk now, unless the recording thread is doing so."""
         if self._lock.acquire(blocking=False):
             try:
                 if self._failure is None and not self._closed:
@@ -264,7 +265,7 @@ class TrafficWriter:
     # --- failures ----------------------------------------------------------------------------------------------
 
     def _check(self) -> None:
-        """Raise the failure that ended the recording, if one did."""
+        """Raise the failure that ended the recording, if any."""
         if self._failure is not None:
             raise self._failure
         self._check_disk()
@@ -276,10 +277,10 @@ class TrafficWriter:
             raise self._failure
 
     def _abandon(self) -> None:
-        """Something (a second Ctrl+C) broke into a write: the chunk at hand may be torn and is not to be written."""
+        """A write was interrupted (by a second Ctrl+C): the current chunk may be incomplete and must not be written."""
         self._segment.writer.discard()
         if self._failure is None:
-            self._end("writing was broken off", "start a new session")
+            self._end("writing was interrupted", "start a new session")
 
     def _end(self, what: str, advice: str) -> SessionError:
         hint = f"The {self._segment.file.kept} bytes recorded so far are kept; {advice}"

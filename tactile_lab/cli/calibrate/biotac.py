@@ -1,4 +1,4 @@
-"""``tactile-lab calibrate biotac``: contact normals learned from presses."""
+"""``tactile-lab calibrate biotac``: learn contact normals from presses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tactile_lab.cli.options import Json, NoInput
 
 
 class Finger(StrEnum):
-    """Fingers, as calibration files name them."""
+    """Finger names used in calibration files."""
 
     FF = "FF"
     MF = "MF"
@@ -28,28 +28,34 @@ class Finger(StrEnum):
 def biotac(
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="Table of presses: e1,...,e19,nx,ny,nz.")],
     normals: Annotated[
-        Path | None, typer.Option(help="Text file of normals, when RECORDING is a text file of electrodes alone.")
+        Path | None, typer.Option(help="Text file of normals, if RECORDING is a text file with electrodes only.")
     ] = None,
     finger: Annotated[Finger, typer.Option(help="Finger that carries the sensor.")] = Finger.FF,
-    measurer: Annotated[str, typer.Option("--rig", help="Name of the rig (its station) that the file is for.")] = "sim",
+    measurer: Annotated[
+        str, typer.Option("--rig", help="Installation (of the rig file) that the calibration is for.")
+    ] = "sim",
     serial: Annotated[str, typer.Option(help="Serial number of the sensor.")] = "",
     out: Annotated[
-        Path | None, typer.Option(help="File to write, or to add the finger to; without it methods are compared only.")
+        Path | None,
+        typer.Option(help="File to write or to add the finger to. Without it the methods are only compared."),
     ] = None,
     sensor_frame: Annotated[
-        bool, typer.Option("--sensor-frame", help="The normals are in the BioTac frame; otherwise the turn is found.")
+        bool,
+        typer.Option(
+            "--sensor-frame", help="The normals are in the BioTac frame; otherwise the rotation is estimated."
+        ),
     ] = False,
-    notes: Annotated[str, typer.Option(help="The operator's notes.")] = "",
+    notes: Annotated[str, typer.Option(help="Notes to store with the result.")] = "",
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Learn a BioTac's contact normals from presses on a plate whose normal is known.
+    """Learn a BioTac's contact normals from presses on a plate with a known normal.
 
-    Every method is trained on the first half of the recording and judged on the second; what is stored has learned
-    from all of it. A rig uses the file that its "calibration.normals" names. Rows without a normal are untouched ones,
-    and tare the others.
+    Every method is trained on the first half of the recording and tested on the second half; the stored model is
+    trained on all of it. A rig uses the file named by "calibration.normals" in its rig file. Rows without a normal are
+    untouched samples, used as the tare.
 
-    Exit code 0: PASS; 3: FAIL, what was learned is written beside the file; 2: the recording cannot be used.
+    Exit code 0: PASS; 3: FAIL, the model is written as NAME.failed.yaml; 2: the recording cannot be used.
     """
     from dataclasses import asdict
 
@@ -71,7 +77,7 @@ def biotac(
         columns = ["method", "median", "90 %", "sigma", "in 68 %", "in 95 %"]
         cells = [_cells(row) for row in found.methods]
         show_table("Angle to the measured normal on the second half, degrees", columns, cells, right=(1, 2, 3, 4, 5))
-        say(f"learned: {found.share:.2f} of the median error of equation 2.24 with squeezed electrodes")
+        say(f"median error of the learned normals: {found.share:.2f} of that of equation 2.24 with squeezed electrodes")
         say("PASS" if found.passed else "FAIL", "bold green" if found.passed else "bold red")
     if not found.passed:
         raise typer.Exit(OUTSIDE)

@@ -1,6 +1,7 @@
-"""``tactile-lab calibrate``: wizards that end with a number, and the store of what they found.
+"""``tactile-lab calibrate``: calibration wizards, and the store of their results.
 
-The wizards' steps are in the package :mod:`calibration` and print nothing; here they are shown and asked for.
+The wizards' steps are in the package :mod:`calibration`, which prints nothing; this module shows them and asks the
+questions.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from tactile_lab.cli.calibrate.forearm import forearm
 from tactile_lab.cli.calibrate.hand import electrodes, joints
 from tactile_lab.cli.options import Json, NoInput
 
-app = typer.Typer(help="Calibrations: make one, look at one.", no_args_is_help=True)
+app = typer.Typer(help="Calibrate devices and show stored calibrations.", no_args_is_help=True)
 app.command("biotac")(biotac)
 app.command("forearm")(forearm)
 app.command("joints")(joints)
@@ -28,13 +29,13 @@ app.command("camera")(camera)
 
 @app.command("show")
 def show(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Stored calibrations.")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Stored calibration files.")],
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Show stored calibrations: what was found, how well, when, on which devices.
+    """Show stored calibrations: their values, accuracy, date and devices.
 
-    Exit code 0; 2: a file is no stored calibration, or was changed by hand.
+    Exit code 0; 2: a file is not a stored calibration, or was changed by hand.
     """
     from calibration.store.store import read_record
     from drivers.core.calibration_file import plain

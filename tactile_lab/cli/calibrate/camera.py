@@ -1,4 +1,4 @@
-"""``tactile-lab calibrate camera``: the lens, from a board held before the camera or from its pictures."""
+"""``tactile-lab calibrate camera``: the lens, from a board held in front of the camera or from recorded pictures."""
 
 from __future__ import annotations
 
@@ -23,21 +23,25 @@ def camera(
         typer.Argument(help="Camera (0, /dev/video0), folder of pictures, video, gstreamer:PIPELINE, simulated:board."),
     ],
     board: Annotated[
-        Path | None, typer.Option(help="Description of the board, as 'tactile-lab markers' wrote it.")
+        Path | None, typer.Option(help="Description of the board, written by 'tactile-lab markers'.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/camera.yaml")
+        Path | None, typer.Option(help="File to write the result to.", show_default="calibrations/STATION/camera.yaml")
     ] = None,
-    measurer: Annotated[str, typer.Option(help="Installation it belongs to (a rig file's station).")] = "laboratory",
+    measurer: Annotated[
+        str, typer.Option(help="Installation (of the rig file) that the camera belongs to.")
+    ] = "laboratory",
     serial: Annotated[str, typer.Option(help="Serial number of the camera.")] = "",
-    size: Annotated[str, typer.Option(help="Size of a camera's pictures.")] = "1280x720",
-    exposure_ms: Annotated[float | None, typer.Option(help="Hold a camera's exposure.")] = None,
-    focus: Annotated[float | None, typer.Option(help="Hold a camera's focus, in its driver's units.")] = None,
-    views: Annotated[int, typer.Option(min=5, help="Fewest views for a PASS.")] = 12,
-    most: Annotated[int, typer.Option(min=5, help="Stop after so many views.")] = 60,
-    third_radial: Annotated[bool, typer.Option("--k3", help="A third radial coefficient, for wide lenses.")] = False,
-    replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
-    notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
+    size: Annotated[str, typer.Option(help="Image size to request from the camera, such as 1280x720.")] = "1280x720",
+    exposure_ms: Annotated[float | None, typer.Option(help="Fix the camera's exposure.")] = None,
+    focus: Annotated[float | None, typer.Option(help="Fix the camera's focus, in its driver's units.")] = None,
+    views: Annotated[int, typer.Option(min=5, help="Minimum number of views for a PASS.")] = 12,
+    most: Annotated[int, typer.Option(min=5, help="Stop after this many views.")] = 60,
+    third_radial: Annotated[
+        bool, typer.Option("--k3", help="Estimate a third radial distortion coefficient, for wide lenses.")
+    ] = False,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace an existing result without asking.")] = False,
+    notes: Annotated[str, typer.Option(help="Notes to store with the result.")] = "",
     view: View = False,
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
@@ -45,12 +49,13 @@ def camera(
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Calibrate a lens, guided by what is still missing, and store it with its errors and a verdict.
+    """Calibrate a camera lens, showing which views are still missing, and store the result with its errors and a
+    verdict.
 
     Ctrl+C or q at any step stores nothing.
 
-    Exit code 0: PASS; 2: nothing could be computed; 3: FAIL, outside its limits (kept as NAME.failed.yaml, which
-    sessions refuse); 4: the camera; 130: ended by the operator.
+    Exit code 0: PASS; 2: no result could be computed; 3: FAIL, outside its limits (stored as NAME.failed.yaml, which
+    sessions refuse); 4: the camera failed; 130: ended by the operator.
     """
     from calibration.camera.intrinsics import LensLimits, calibrate_lens
     from drivers.camera.boards import load_board
@@ -88,30 +93,30 @@ def _usual_board() -> AnyBoard:
 
 
 def _begin(board: AnyBoard, asker: Asker) -> None:
-    """Tell what is to be done. Raises InterruptionError when the person quits."""
+    """Explain what to do. Raises InterruptionError when the person quits."""
     from tactile_lab.cli.console import say, warn
 
     if board.measured_bar_mm is None:
-        warn("the board's check bar was not measured: the lens does not depend on it, distances would")
-    say("Show the board in all parts of the picture, tilted each way, near and far.")
-    asker.choose("While pictures are taken, d and Enter is done, q and Enter quits.", {"": "begin"}, "")
-    asker.offer("Show the board in all parts of the picture, tilted each way, near and far.", {"d": "done"})
+        warn("the board's check bar was not measured. The lens calibration does not depend on it, but distances would")
+    say("Show the board in all parts of the picture, tilted in every direction, near and far.")
+    asker.choose("While pictures are taken: d and Enter to finish, q and Enter to quit.", {"": "begin"}, "")
+    asker.offer("Show the board in all parts of the picture, tilted in every direction, near and far.", {"d": "done"})
 
 
 def _guide(found: Gathering) -> None:
-    """One line a view: how many there are, and what is missing next."""
+    """One line per view: how many there are, and what is missing next."""
     from tactile_lab.cli.console import count, say
 
     name = f"picture {found.pictures}"
     if name in found.refused:
-        say(f"{name}: not used, {found.refused[name]}", "dim")
+        say(f"{name}: rejected, {found.refused[name]}", "dim")
         return
     missing = found.coverage.missing
     rest = f"; and {len(missing) - 1} more" if len(missing) > 1 else ""
     say(
         f"{count(len(found.views), 'view')}; next: {missing[0]}{rest}"
         if missing
-        else f"{count(len(found.views), 'view')}; all is covered"
+        else f"{count(len(found.views), 'view')}; coverage complete"
     )
 
 
@@ -125,13 +130,13 @@ def _show(found: Gathering, result: LensResult) -> None:
     show_table("Lens", ["parameter", "value", "standard deviation"], rows, right=(1, 2))
     worst = max(result.per_view_px, key=result.per_view_px.__getitem__)
     facts = [
-        ("views", f"{len(result.per_view_px)} used of {found.pictures} pictures, {found.alike} of them alike"),
+        ("views", f"{len(result.per_view_px)} of {found.pictures} pictures used, {found.alike} too similar"),
         ("reprojection", f"{result.reprojection_px:.3f} px; worst {result.per_view_px[worst]:.3f} px ({worst})"),
         ("held-out views", f"{result.held_out_px:.3f} px"),
     ]
     show_facts("Errors", facts)
     for name, error in result.left_out.items():
-        warn(f"{name} disagrees with the others ({error:.2f} px) and was left out")
+        warn(f"{name} disagrees with the others ({error:.2f} px) and was excluded")
     for problem in result.problems:
         complain(problem)
 
@@ -139,5 +144,5 @@ def _show(found: Gathering, result: LensResult) -> None:
 def _size(text: str) -> tuple[int, int]:
     width, cross, height = text.partition("x")
     if not (cross and width.isdigit() and height.isdigit()):
-        raise typer.BadParameter(f"{text!r} is no size like 1280x720", param_hint="'--size'")
+        raise typer.BadParameter(f"{text!r} is not a size such as 1280x720", param_hint="'--size'")
     return int(width), int(height)

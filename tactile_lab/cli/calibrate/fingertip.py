@@ -21,19 +21,20 @@ if TYPE_CHECKING:
 
 def fingertip(
     rig: RigName = "sim",
-    finger: Annotated[Finger, typer.Option(help="Long finger to measure on the rig.")] = Finger.FF,
+    finger: Annotated[Finger, typer.Option(help="Finger to measure on the rig (not the thumb).")] = Finger.FF,
     source: Annotated[
         Path | None, typer.Option("--from", help="Solve recorded wrenches instead of measuring (any finger).")
     ] = None,
-    record: Annotated[Path | None, typer.Option(help="Keep the measured wrenches in this file too.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Also write the measured wrenches to this file.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/fingertips.yaml")
+        Path | None,
+        typer.Option(help="File to write the result to.", show_default="calibrations/STATION/fingertips.yaml"),
     ] = None,
-    settings: Annotated[Path | None, typer.Option(help="Settings: limits, speeds, force.")] = None,
-    presses: Annotated[int, typer.Option(min=6, help="Presses on the table.")] = 10,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
-    replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
-    notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
+    settings: Annotated[Path | None, typer.Option(help="Settings file: limits, speeds, force.")] = None,
+    presses: Annotated[int, typer.Option(min=6, help="Number of presses on the table.")] = 10,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of a simulated rig.")] = 0,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace an existing result without asking.")] = False,
+    notes: Annotated[str, typer.Option(help="Notes to store with the result.")] = "",
     view: View = False,
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
@@ -41,13 +42,13 @@ def fingertip(
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Find a force fingertip's mounting, sign, weight and shape, step by step.
+    """Calibrate a force fingertip's mounting, sign, weight and shape, step by step.
 
-    The hand is turned with free fingers, then presses the table and rolls about. The other fingers keep what the
-    rig's file says. Ctrl+C or q at any step stores nothing.
+    The hand is turned with its fingers free, then presses the fingertip on the table and rolls it. The other fingers
+    keep the values of the rig's calibration file. Ctrl+C or q at any step stores nothing.
 
-    Exit code 0: PASS; 2: the input, or too few orientations; 3: FAIL, outside a limit (kept as NAME.failed.yaml,
-    which sessions refuse); 4: a device; 130: ended by the operator.
+    Exit code 0: PASS; 2: bad input or too few orientations; 3: FAIL, outside a limit (stored as NAME.failed.yaml, which
+    sessions refuse); 4: a device failed; 130: ended by the operator.
     """
     from calibration.fingertip.data import load_fingertip_data, save_fingertip_data
     from calibration.fingertip.fit import fit_fingertip
@@ -88,14 +89,18 @@ def _measure(request: FingertipRequest, asker: Asker) -> FingertipData:
     from tactile_lab.workflow.calibrating_fingertip import fingertip_wizard
 
     with fingertip_wizard(request, asker.onlooker) as (wizard, measurer):
-        say(f"Fingertip {request.finger} on rig {request.rig}: {len(wizard.plan)} wrenches, free and pressed", "bold")
-        asker.choose("The hand will move, and turn. Is its way clear?", {"y": "begin"}, "y")
+        say(
+            f"Fingertip {request.finger} on rig {request.rig}: {len(wizard.plan)} wrenches, with free and "
+            "pressed fingertip",
+            "bold",
+        )
+        asker.choose("The hand will move and turn. Is its path clear?", {"y": "begin"}, "y")
         measure_all(wizard, measurer, asker)
         return wizard.measured
 
 
 def _show(data: FingertipData, fit: FingertipFit, limits: FingertipLimits) -> None:
-    """What was found, and the figures against their limits."""
+    """The result, and the checks against their limits."""
     from math import degrees
 
     from calibration.fingertip.record import judge_fingertip
@@ -105,7 +110,7 @@ def _show(data: FingertipData, fit: FingertipFit, limits: FingertipLimits) -> No
     new = fit.calibration
     facts = [
         ("mounting", "  ".join(f"{degrees(angle):.2f}" for angle in new.distal_T_sensor.rpy_rad) + " deg"),
-        ("turned by", f"{degrees(fit.turned_rad):.2f} deg"),
+        ("rotation", f"{degrees(fit.turned_rad):.2f} deg"),
         ("mass", f"{1e3 * new.mass_kg:.2f} g"),
         ("centre of mass", _millimetres(new.com_distal_m)),
         ("ellipsoid's centre", _millimetres(new.centre_distal_m)),

@@ -1,4 +1,4 @@
-"""``tactile-lab calibrate forearm``: where the forearm's mount stands in the world, and how well that is known."""
+"""``tactile-lab calibrate forearm``: the pose of the forearm's mount in the world, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class ForearmMethod(StrEnum):
-    """Ways to find where the mount stands."""
+    """Methods to find the pose of the mount."""
 
     TOUCH = "touch"
     MARKER = "marker"
@@ -33,29 +33,40 @@ def forearm(
     rig: RigName = "sim",
     method: Annotated[
         ForearmMethod,
-        typer.Option(help="touch: fingertips press known geometry; marker: a board on the hand; manual: stated."),
+        typer.Option(
+            help="touch: fingertips press known geometry; marker: a camera sees a board on the hand; "
+            "manual: enter the pose."
+        ),
     ] = ForearmMethod.TOUCH,
     out: Annotated[
-        Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/forearm.yaml")
+        Path | None, typer.Option(help="File to write the result to.", show_default="calibrations/STATION/forearm.yaml")
     ] = None,
     source: Annotated[
-        Path | None, typer.Option("--from", help="Solve recorded poses instead of measuring (any method but manual).")
+        Path | None, typer.Option("--from", help="Solve recorded poses instead of measuring (not with manual).")
     ] = None,
-    record: Annotated[Path | None, typer.Option(help="Keep the measured poses in this file too.")] = None,
-    settings: Annotated[Path | None, typer.Option(help="Settings: limits, least motion, errors, speeds.")] = None,
-    geometry: Annotated[Path | None, typer.Option(help="What is pressed, instead of the rig's.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Also write the measured poses to this file.")] = None,
+    settings: Annotated[Path | None, typer.Option(help="Settings file: limits, least motion, errors, speeds.")] = None,
+    geometry: Annotated[Path | None, typer.Option(help="Geometry to press, instead of the rig's.")] = None,
     board: Annotated[Path | None, typer.Option(help="Board on the hand, instead of the rig's.")] = None,
-    fingers: Annotated[str, typer.Option(help="Long fingers that press.")] = "FF,MF",
-    touches: Annotated[int, typer.Option(min=1, help="Touches of each face.")] = 8,
-    pictures: Annotated[int | None, typer.Option(min=3, help="Pictures of the board.", show_default="20")] = None,
-    translation_mm: Annotated[Triple, typer.Option(help="manual: world_T_mount, x y z.")] = (0.0, 0.0, 0.0),
-    rpy_deg: Annotated[Triple, typer.Option(help="manual: roll pitch yaw about fixed axes.")] = (0.0, 0.0, 0.0),
-    sigma_mm: Annotated[float | None, typer.Option(min=0.0, help="manual: standard deviation per axis.")] = None,
-    sigma_deg: Annotated[float | None, typer.Option(min=0.0, help="manual: the same of the rotation.")] = None,
-    valid_days: Annotated[float, typer.Option(min=0.01, help="How long the result may be used.")] = 90.0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
-    replace: Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")] = False,
-    notes: Annotated[str, typer.Option(help="The operator's notes, kept with the result.")] = "",
+    fingers: Annotated[str, typer.Option(help="Fingers that press (not the thumb).")] = "FF,MF",
+    touches: Annotated[int, typer.Option(min=1, help="Number of touches per face.")] = 8,
+    pictures: Annotated[
+        int | None, typer.Option(min=3, help="Number of pictures of the board.", show_default="20")
+    ] = None,
+    translation_mm: Annotated[Triple, typer.Option(help="manual: position x y z of world_T_mount.")] = (0.0, 0.0, 0.0),
+    rpy_deg: Annotated[
+        Triple, typer.Option(help="manual: rotation of world_T_mount as roll pitch yaw about fixed axes.")
+    ] = (0.0, 0.0, 0.0),
+    sigma_mm: Annotated[
+        float | None, typer.Option(min=0.0, help="manual: standard deviation of the position per axis.")
+    ] = None,
+    sigma_deg: Annotated[
+        float | None, typer.Option(min=0.0, help="manual: standard deviation of the rotation per axis.")
+    ] = None,
+    valid_days: Annotated[float, typer.Option(min=0.01, help="How long the result stays valid.")] = 90.0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of a simulated rig.")] = 0,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace an existing result without asking.")] = False,
+    notes: Annotated[str, typer.Option(help="Notes to store with the result.")] = "",
     view: View = False,
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
@@ -63,13 +74,13 @@ def forearm(
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Find where the forearm's mount stands in the world, step by step, and say how good the answer is.
+    """Calibrate the pose of the forearm's mount in the world, step by step, with its accuracy.
 
-    The motion is checked before anything is solved, and what is missing is told. Ctrl+C or q at any step stores
-    nothing. With --view a page in the browser shows the hand and the steps, and takes the answers too.
+    The motion is checked before solving; missing motion is reported. Ctrl+C or q at any step stores
+    nothing. With --view a page in the browser shows the hand and the steps, and accepts answers.
 
-    Exit code 0: PASS; 2: the input, or too little motion; 3: FAIL, outside a limit (kept as NAME.failed.yaml, which
-    sessions refuse); 4: a device; 130: ended by the operator.
+    Exit code 0: PASS; 2: bad input or too little motion; 3: FAIL, outside a limit (stored as NAME.failed.yaml, which
+    sessions refuse); 4: a device failed; 130: ended by the operator.
     """
     from calibration.forearm.record import manual_record, record_of, transform_of
     from calibration.forearm.recordings import save_data
@@ -97,7 +108,7 @@ def forearm(
             result = _solve(data, wanted)
             show_result(result)
             found = record_of(result, here, notes=notes, valid_days=valid_days)
-        comment = "Forearm to world: pose of the positioner's mount in the world frame."
+        comment = "Forearm calibration: pose of the positioner's mount in the world frame."
         store_result(file, found, asker, as_json, comment)
 
 
@@ -108,7 +119,7 @@ def _stated_sigma(sigma_mm: float | None, sigma_deg: float | None) -> tuple[floa
     from drivers.core.errors import ConfigurationError
 
     if not sigma_mm or not sigma_deg:
-        hint = "Give --sigma-mm and --sigma-deg: how far the figures may be off, one standard deviation, above 0"
+        hint = "Give --sigma-mm and --sigma-deg, the standard deviations of the pose, above 0"
         raise ConfigurationError("a pose without its uncertainty", where="--method manual", hint=hint)
     return sigma_mm / 1e3, radians(sigma_deg)
 
@@ -121,7 +132,7 @@ def _settings(path: Path | None) -> CalibrationSettings:
 
 
 def _load_recorded(path: Path, here: object) -> ForearmData:
-    """Recorded poses of this rig. Raises ConfigurationError for another's."""
+    """Recorded poses of this rig. Raises ConfigurationError for those of another rig."""
     from calibration.forearm.record import check_origin
     from calibration.forearm.recordings import load_data
     from calibration.store.admission import Installation
@@ -151,7 +162,7 @@ def _measure(
     request = ForearmRequest(load_rig(rig), method.value, seed, geometry, board, fingers, touches, pictures, settings)
     with forearm_wizard(request, asker.onlooker) as (wizard, measurer):
         _tell_plan(rig, wizard)
-        asker.choose("The hand will move. Is its way clear?", {"y": "begin"}, "y")
+        asker.choose("The hand will move. Is its path clear?", {"y": "begin"}, "y")
         measure_all(wizard, measurer, asker)
         return wizard.measured
 
@@ -160,7 +171,7 @@ def _tell_plan(rig: str, wizard: ForearmWizard) -> None:
     from tactile_lab.cli.console import say
 
     what = "touches of known geometry" if wizard.method == "touch" else "pictures of the board on the hand"
-    say(f"Forearm to world on rig {rig}: {len(wizard.plan)} {what}", "bold")
+    say(f"Forearm calibration on rig {rig}: {len(wizard.plan)} {what}", "bold")
 
 
 def _solve(data: ForearmData, settings: CalibrationSettings) -> ForearmResult:
@@ -170,12 +181,12 @@ def _solve(data: ForearmData, settings: CalibrationSettings) -> ForearmResult:
     from tactile_lab.cli.console import people
 
     with Progress(console=people, transient=True, disable=not people.is_terminal) as progress:
-        task = progress.add_task("solving, and leaving out one after the other", total=solving_steps(data))
+        task = progress.add_task("solving, and repeating without each pose", total=solving_steps(data))
         return solve_forearm(data, settings.wizard, lambda: progress.advance(task))
 
 
 def show_result(result: ForearmResult) -> None:
-    """Residuals of every pose, the figures against their limits, and the transform."""
+    """Residuals of every pose, checks against their limits, and the transform."""
     from math import degrees
 
     from tactile_lab.cli.calibrate.tables import show_quality
@@ -210,7 +221,7 @@ def _show_pose(result: ForearmResult) -> None:
         ("sigma", _three([1e3 * value for value in sigmas[3:]], "mm")),
         ("", _three([degrees(value) for value in sigmas[:3]], "deg")),
         ("mount_T_world", _three([1e3 * value for value in inverse], "mm")),
-        ("noise", f"{sqrt(result.solution.variance_factor):.2f} of what was stated"),
+        ("noise", f"{sqrt(result.solution.variance_factor):.2f} of the stated errors"),
     ]
     for joint, offset in result.solution.offsets.items():
         if offset.observable:

@@ -1,4 +1,4 @@
-"""``tactile-lab calibrate joints`` and ``calibrate electrodes``: from touches of a block, known poses, and counts."""
+"""``tactile-lab calibrate joints`` (touches of a block, or known poses) and ``calibrate electrodes`` (counts)."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ if TYPE_CHECKING:
     from tactile_lab.workflow.calibrating_joints import FoundJoints, JointRequest
 
 Source = Annotated[Path, typer.Option("--from", help="Recorded data.")]
-Replace = Annotated[bool, typer.Option("--replace", help="Replace an older result without asking.")]
-Notes = Annotated[str, typer.Option(help="The operator's notes, kept with the result.")]
+Replace = Annotated[bool, typer.Option("--replace", help="Replace an existing result without asking.")]
+Notes = Annotated[str, typer.Option(help="Notes to store with the result.")]
 
 
 def joints(
     source: Annotated[
-        Path | None, typer.Option("--from", help="Known poses, or recorded touches, instead of measuring.")
+        Path | None, typer.Option("--from", help="Use known poses or recorded touches instead of measuring.")
     ] = None,
     rig: RigName = "sim",
     block: Annotated[Path | None, typer.Option(help="Geometry file with the block, instead of the rig's.")] = None,
-    fingers: Annotated[str, typer.Option(help="Long fingers that press the block.")] = "FF,MF,RF",
-    rounds: Annotated[int, typer.Option(min=1, help="How often every face is pressed in every posture.")] = 1,
-    settings: Annotated[Path | None, typer.Option(help="Settings: limits, errors, speeds.")] = None,
-    record: Annotated[Path | None, typer.Option(help="Keep the measured touches or poses in this file too.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of a simulated rig.")] = 0,
+    fingers: Annotated[str, typer.Option(help="Fingers that press the block (not the thumb).")] = "FF,MF,RF",
+    rounds: Annotated[int, typer.Option(min=1, help="Number of presses per face and posture.")] = 1,
+    settings: Annotated[Path | None, typer.Option(help="Settings file: limits, errors, speeds.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Also write the measured touches or poses to this file.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of a simulated rig.")] = 0,
     out: Annotated[
-        Path | None, typer.Option(help="File of the result.", show_default="calibrations/STATION/joints.yaml")
+        Path | None, typer.Option(help="File to write the result to.", show_default="calibrations/STATION/joints.yaml")
     ] = None,
     replace: Replace = False,
     notes: Notes = "",
@@ -49,13 +49,13 @@ def joints(
 ) -> None:
     """Correct the offsets and gains in the hand's joint tables.
 
-    Several fingers press one rigid block at a known place, stretched and bent; the forearm has to be calibrated. Those
-    joints are corrected whose offset the contacts tell, the others are named. Or --from: poses whose angles are known
-    (tactile-joint-poses/1: by a jig or a plate), or touches as --record here or in calibrate forearm writes them. Poses
-    without measured angles are read from the hand, step by step, while you hold it in them.
+    Several fingers press a rigid block at a known pose, stretched and bent; the forearm must be calibrated. Joints
+    whose offsets the contacts determine are corrected; the others are listed. With --from: poses with known angles
+    (tactile-joint-poses/1, from a jig or a plate), or touches written by --record here or in calibrate forearm. Poses
+    without measured angles are read from the hand, step by step, while you hold it in each pose.
 
-    Exit code 0: PASS; 2: the data cannot be used; 3: FAIL, outside a limit (kept as NAME.failed.yaml, which sessions
-    refuse); 4: a device; 130: ended by the operator.
+    Exit code 0: PASS; 2: the data cannot be used; 3: FAIL, outside a limit (stored as NAME.failed.yaml, which sessions
+    refuse); 4: a device failed; 130: ended by the operator.
     """
     from calibration.forearm.recordings import save_data
     from calibration.hand.joints import joints_record, judge_joints
@@ -111,7 +111,7 @@ def _measure_touches(request: JointRequest, rig: Rig, asker: Asker) -> ForearmDa
     here = rig.installation
     with joint_wizard(request, asker.onlooker) as (wizard, measurer):
         say(f"Joints on rig {request.rig}: {len(wizard.plan)} touches of the block", "bold")
-        asker.choose("The hand will move. Stands the block in its place?", {"y": "begin"}, "y")
+        asker.choose("The hand will move. Is the block in its place?", {"y": "begin"}, "y")
         measure_all(wizard, measurer, asker)
         return ForearmData(here.rig, dict(here.devices), touches=wizard.touches)
 
@@ -119,7 +119,7 @@ def _measure_touches(request: JointRequest, rig: Rig, asker: Asker) -> ForearmDa
 def _read(
     poses: Sequence[JointPose], rig: Rig, limits: JointLimits, seed: int, record: Path | None, asker: Asker
 ) -> list[JointPose]:
-    """All poses measured: those that were not are read from the hand, step by step. Raises TactileLabError."""
+    """All poses with measured angles: missing ones are read from the hand, step by step. Raises TactileLabError."""
     from calibration.hand.pose_steps import save_poses
     from tactile_lab.cli.calibrate.steps import measure_all
     from tactile_lab.cli.console import say
@@ -127,7 +127,7 @@ def _read(
 
     with pose_wizard(rig, poses, limits, seed, asker.onlooker) as (steps, hand):
         say(f"Joints on rig {rig.description.name}: {len(steps.plan)} known poses to hold the hand in", "bold")
-        say("Its motors stay without demands: put it into each pose by hand", "dim")
+        say("The motors are passive: put the hand into each pose yourself", "dim")
         measure_all(steps, hand, asker)
         measured = [*(pose for pose in poses if not pose.unread), *steps.poses]
     if record is not None and measured:
@@ -136,18 +136,18 @@ def _read(
 
 
 def _show_joints(found: FoundJoints, faults: Mapping[str, tuple[str, ...]]) -> None:
-    """The corrections, the joints that nothing tells, and the touches against their limits."""
+    """The corrections, the joints that the data do not determine, and the touches against their limits."""
     from math import degrees
 
     from tactile_lab.cli.console import say, show_table
 
     rows = [_joint_row(joint, correction, faults[joint]) for joint, correction in found.corrections.items()]
     rows += [
-        [joint, "", f"{degrees(offset.sigma_rad):.2f}", "", "", "", "not told by these contacts: left as it was"]
+        [joint, "", f"{degrees(offset.sigma_rad):.2f}", "", "", "", "not determined by these contacts: unchanged"]
         for joint, offset in found.offsets.items()
         if not offset.observable
     ]
-    columns = ["joint", "shift, deg", "sigma", "gain", "left, deg", "poses", ""]
+    columns = ["joint", "shift, deg", "sigma", "gain", "residual, deg", "poses", ""]
     show_table("Joints", columns, rows, right=(1, 2, 3, 4, 5))
     for judgement in found.judgements:
         say(f"touches: {judgement}", "dim" if judgement.ok else "bold red")
@@ -161,9 +161,9 @@ def _joint_row(joint: str, found: JointCorrection, faults: tuple[str, ...]) -> l
 
 
 def electrodes(source: Source, as_json: Json = False, no_input: NoInput = False) -> None:
-    """Look for dead, open and noisy electrodes of a BioTac, in a table of counts recorded untouched.
+    """Find dead, open and noisy electrodes of a BioTac in a table of counts recorded without contact.
 
-    A line a sample, a column an electrode. Exit code 0: all well; 2: the table cannot be used; 3: some are faulty.
+    One line per sample, one column per electrode. Exit code 0: all OK; 2: the table cannot be used; 3: some are faulty.
     """
     from calibration.fingertip.electrodes import faulty_electrodes, load_untouched
     from tactile_lab.cli.console import emit_json, say, show_table
@@ -179,6 +179,6 @@ def electrodes(source: Source, as_json: Json = False, no_input: NoInput = False)
         emit_json({"tare": counts.mean(axis=0).tolist(), "faults": {str(i + 1): text for i, text in faults.items()}})
     else:
         show_table("Electrodes", ["electrode", "tare", "noise", ""], rows, right=(0, 1, 2))
-        say("all well" if not faults else f"{len(faults)} faulty", "bold red" if faults else "bold green")
+        say("all OK" if not faults else f"{len(faults)} faulty", "bold red" if faults else "bold green")
     if faults:
         raise typer.Exit(3)

@@ -1,4 +1,4 @@
-"""What calibration wizards share in a terminal: steps to measure, skip and undo, enough motion or not, the verdict."""
+"""Shared parts of the calibration wizards: measuring, skipping and undoing steps, checking the motion, the verdict."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class Guided(Protocol[P, T]):
 
 
 def measure_all(wizard: Guided[P, T], measurer: EmulatorHost[P, T], asker: Asker) -> None:
-    """Go through the steps; when all are done, tell what is missing, and let a person add or give up.
+    """Go through the steps; when all are done, say what is missing, and let a person measure more or give up.
 
     Raises:
         InterruptionError: the person quits.
-        SafetyError: a limit was passed.
+        SafetyError: a limit was exceeded.
     """
     steps, index = wizard.steps(), 0
     while index < len(steps):
@@ -45,9 +45,9 @@ def measure_all(wizard: Guided[P, T], measurer: EmulatorHost[P, T], asker: Asker
 def _one_step(
     wizard: Guided[P, T], steps: tuple[Step[P], ...], index: int, measurer: EmulatorHost[P, T], asker: Asker
 ) -> int:
-    """Do, skip or take back a step; gives the number of the next one."""
+    """Measure, skip or undo a step. Returns the number of the next one."""
     step = steps[index]
-    answers = {"": "measure", "s": "skip", "u": "undo the last", "d": "done measuring"}
+    answers = {"": "measure", "s": "skip", "u": "undo the last step", "d": "done measuring"}
     answer = asker.choose(f"{step.number}/{step.count} {step.instruction}", answers, "")
     if answer == "d":
         return len(steps)
@@ -60,7 +60,7 @@ def _one_step(
 
 
 def _measure(wizard: Guided[P, T], step: Step[P], measurer: EmulatorHost[P, T], asker: Asker) -> bool:
-    """Measure one step; False to ask for it again."""
+    """Measure one step. Returns False to ask for it again."""
     from drivers.core.errors import DeviceError
     from tactile_lab.cli.console import say, warn
 
@@ -68,7 +68,7 @@ def _measure(wizard: Guided[P, T], step: Step[P], measurer: EmulatorHost[P, T], 
         wizard.measure(step, measurer)
     except DeviceError as error:
         warn(str(error))
-        return asker.choose("Not measured. Again, or skip it?", {"s": "skip", "a": "again"}, "s") == "s"
+        return asker.choose("Not measured. Try again, or skip this step?", {"s": "skip", "a": "again"}, "s") == "s"
     motion = wizard.motion()
     missing = ", ".join(check.name for check in motion.checks if not check.ok)
     say(f"{step.number}/{step.count} {step.instruction}: done{missing and f'; not enough yet: {missing}'}", "dim")
@@ -84,7 +84,7 @@ def _tell_motion(report: MotionReport) -> None:
 
 
 def _motion_table(report: MotionReport) -> tuple[list[str], list[list[str]], tuple[int, ...]]:
-    """What there is of the motion, and what is missing: columns, rows, and which columns hold numbers."""
+    """Measured and missing motion as a table: columns, rows, and which columns hold numbers."""
     rows = [
         [check.name, f"{check.value:.4g} {check.unit}", f"{check.needed:.4g}", "enough" if check.ok else check.advice]
         for check in report.checks
@@ -99,12 +99,12 @@ def store_result(
     as_json: bool,
     comment: str = "",
 ) -> None:
-    """Tell the verdict, ask, and write (a failed result beside the file).
+    """Show the verdict, ask, and write the file (a failed result as NAME.failed.yaml).
 
-    Whether an older file may be replaced was asked before anything was measured, see :func:`may_write`.
+    Whether an existing file may be replaced was asked before measuring, see :func:`may_write`.
 
     Args:
-        comment: at the head of the file.
+        comment: at the top of the file.
 
     Raises:
         Exit: code 3, the result failed.

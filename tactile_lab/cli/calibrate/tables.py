@@ -1,4 +1,4 @@
-"""How calibrations are shown to people."""
+"""Calibrations as tables for people."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def show_record(title: str, record: CalibrationRecord) -> None:
         ("rig", record.rig),
         ("method", record.method),
         ("made", record.created_utc),
-        ("valid until", record.valid_until_utc or "for ever"),
+        ("valid until", record.valid_until_utc or "no expiry"),
         ("devices", ", ".join(f"{device} {serial}" for device, serial in record.devices.items())),
         *_lines(record.parameters),
         *_lines(record.details),
@@ -34,12 +34,12 @@ def show_record(title: str, record: CalibrationRecord) -> None:
 
 
 def tell_verdict(record: CalibrationRecord) -> None:
-    """PASS or FAIL, in its colour."""
+    """PASS or FAIL, coloured."""
     say(record.verdict, "bold green" if record.verdict == "PASS" else "bold red")
 
 
 def show_quality(judgements: Iterable[Judgement]) -> None:
-    """Figures against their limits."""
+    """Checks against their limits."""
     rows = [[j.name, f"{j.value:.2f} {j.unit}", f"{j.limit:.2f}", "ok" if j.ok else "OUTSIDE"] for j in judgements]
     show_table("Quality", ["", "is", "limit", ""], rows, right=(1, 2))
 

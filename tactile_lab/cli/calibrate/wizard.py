@@ -1,4 +1,4 @@
-"""Questions of a wizard: one key, or one word, each with what it means; answered in the terminal or on its page."""
+"""Questions of a wizard, answered by a key or a word in the terminal or on its page."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from tactile_lab.cli.running.page_address import PageAddress
 
 _LOOK_s, _RENEW = 0.05, 20
-"""How often one looks for an answer, and after how many looks the page is shown everything again."""
+"""Interval between looks for an answer, and number of looks after which the page is refreshed."""
 
 
 class Asker:
-    """Asks a person, or takes the usual answer where nobody may be asked.
+    """Asks a person, or takes the default answer if nobody may be asked.
 
     Args:
         silent: never ask (``--no-input``).
         where: the wizard's name, for messages.
-        page: where the person may answer too.
+        page: also takes answers.
     """
 
     def __init__(self, silent: bool, where: str, page: WizardFeed | None = None) -> None:
@@ -41,11 +41,11 @@ class Asker:
 
     @property
     def onlooker(self) -> TrafficSink:
-        """Where the hand's state is shown while it moves."""
+        """Shows the hand's state while it moves."""
         return self._page or NullTraffic()
 
     def choose(self, question: str, answers: Mapping[str, str], usual: str) -> str:
-        """One of some keys, or the word for it; Enter takes the usual one.
+        """Ask for one of some keys, or the word for it; Enter takes the default.
 
         Raises:
             InterruptionError: the person quits, or there is nobody to ask.
@@ -61,37 +61,37 @@ class Asker:
             answer = self._answer(usual)
             if (key := _key_of(answer, known)) is not None:
                 return self._take(key)
-            warn(f"{answer!r} is none of the answers")
+            warn(f"{answer!r} is not one of the answers")
 
     def agree(self, question: str, usual: bool = True) -> bool:
         """Yes or no. Raises InterruptionError when the person quits."""
         return self.choose(question, {"y": "yes", "n": "no"}, "y" if usual else "n") == "y"
 
     def offer(self, what: str, answers: Mapping[str, str]) -> None:
-        """From here on these may be typed or pressed at any time, see :meth:`taken`; nobody waits for them."""
+        """From now on these may be typed or pressed at any time, see :meth:`taken`, without waiting for them."""
         self._offered = {**answers, QUIT: "quit"}
         if self._page is not None:
             self._page.ask(what, self._offered, "")
 
     def take_answer(self) -> str | None:
-        """What is typed or pressed now of what is offered. Raises InterruptionError when the person quits."""
+        """The offered key that was typed or pressed, if any. Raises InterruptionError when the person quits."""
         answer = None if self._silent else self._next(0.0)
         key = None if answer is None else _key_of(answer, self._offered)
         return None if key is None else self._take(key)
 
     def show_beside(self, title: str, columns: list[str], rows: list[list[str]], right: tuple[int, ...]) -> None:
-        """A table that changes all the time: on the page, where it takes the place of the older one."""
+        """A table that is updated all the time: on the page, it replaces the older one."""
         if self._page is not None:
             self._page.table(title, columns, rows, right)
 
     def part(self) -> None:
-        """Leave the page open until the person has read it."""
+        """Keep the page open until the person has read it."""
         if self._page is not None and not self._silent:
             with suppress(InterruptionError, KeyboardInterrupt):
-                self.choose("The page shows how it ended.", {"": "close it"}, "")
+                self.choose("The page shows the result.", {"": "close it"}, "")
 
     def quit_error(self) -> InterruptionError:
-        """What a person who quits is told."""
+        """The error for a person who quits."""
         return InterruptionError("ended by the operator", where=self._where, hint="Nothing was stored")
 
     def _take(self, answer: str) -> str:
@@ -102,7 +102,7 @@ class Asker:
         return answer
 
     def _answer(self, usual: str) -> str:
-        """Wait for what is typed, or pressed; what was pressed is shown in the terminal too."""
+        """Wait for a typed or pressed answer; pressed ones are shown in the terminal too."""
         looks = 0
         while (answer := self._next(_LOOK_s)) is None:
             looks += 1
@@ -111,7 +111,7 @@ class Asker:
         return answer or usual
 
     def _next(self, seconds: float) -> str | None:
-        """What was typed or pressed next; None when nothing was within a time. Raises InterruptionError."""
+        """The next typed or pressed answer; None after a timeout. Raises InterruptionError."""
         if self._page is not None and (pressed := self._page.answer()) is not None:
             people.print("(on the page)")
             return pressed
@@ -128,18 +128,18 @@ class Asker:
         return lines
 
     def _nobody(self) -> InterruptionError:
-        hint = "Nothing was stored. Give --no-input where nobody answers"
-        return InterruptionError("there is nobody to ask", where=self._where, hint=hint)
+        hint = "Nothing was stored. Use --no-input to run without a person"
+        return InterruptionError("standard input has ended, so nobody can answer", where=self._where, hint=hint)
 
 
 @contextmanager
 def wizard(where: str, no_input: bool, page: PageAddress | None) -> Iterator[Asker]:
-    """Who may be asked while a wizard runs: a person at the terminal, and on its page.
+    """Ask a person at the terminal, and on the wizard's page, while the wizard runs.
 
     Args:
         where: the wizard's name.
-        no_input: nobody is asked.
-        page: where its page is to be; None for none.
+        no_input: ask nobody.
+        page: address of its page; None for no page.
 
     Raises:
         ConfigurationError, DeviceError: the page cannot be opened there.
@@ -156,7 +156,7 @@ def wizard(where: str, no_input: bool, page: PageAddress | None) -> Iterator[Ask
 
 @contextmanager
 def _until_read(asker: Asker, feed: WizardFeed) -> Iterator[None]:
-    """The page stays until its end was read, be it an error; but not when the person left."""
+    """Keeps the page open until the result or error was read, but not after the person quit."""
     try:
         yield
     except InterruptionError:
@@ -172,12 +172,12 @@ def _until_read(asker: Asker, feed: WizardFeed) -> Iterator[None]:
 
 
 def _key_of(answer: str, known: Mapping[str, str]) -> str | None:
-    """The key that was meant: typed as such, or the word that stands for it ("yes" as well as "y")."""
+    """The key meant by an answer: the key itself or its word ("yes" as well as "y")."""
     return next((key for key, meaning in known.items() if answer in (key, meaning)), None)
 
 
 def may_write(out: Path, replace: bool, asker: Asker, silent: bool) -> None:
-    """Whether a file may be written: a new one always, an old one when it is agreed to.
+    """Whether a file may be written: a new one always, an existing one if the person agrees.
 
     Raises:
         ConfigurationError: it exists, and nobody agreed to replace it.
@@ -186,6 +186,8 @@ def may_write(out: Path, replace: bool, asker: Asker, silent: bool) -> None:
     if replace or not out.exists():
         return
     if silent:
-        raise ConfigurationError("exists already", where=str(out), hint="Name another with --out, or give --replace")
+        raise ConfigurationError(
+            "exists already", where=str(out), hint="Choose another file with --out, or use --replace"
+        )
     if not asker.agree(f"{out} exists. Replace it?", usual=False):
         raise asker.quit_error()

@@ -1,1 +1,1 @@
-"""``tactile-lab run`` and ``sweep``, and who is present."""
+"""``tactile-lab run`` and ``sweep``."""

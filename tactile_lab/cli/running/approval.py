@@ -13,9 +13,9 @@ _LOOK_s = 0.05
 
 
 class TerminalApproval:
-    """Shows the grasp that would come next and takes a veto: Enter or y does it, n asks for the next best.
+    """Shows the next grasp and accepts a veto: Enter or y executes it, n asks for the next best.
 
-    When standard input ends nobody is there any more, and the session goes on by itself. Ctrl+C ends the question.
+    When standard input ends, the session continues without asking. Ctrl+C ends the question.
     """
 
     def __init__(self) -> None:
@@ -27,7 +27,7 @@ class TerminalApproval:
         if self._alone:
             return True
         say(_in_words(proposal), "bold")
-        people.print("do it? [Y/n] ", end="")
+        people.print("execute it? [Y/n] ", end="")
         while not (self._typed or self._input.closed or proposal.withdrawn()):
             self._input.wait(_LOOK_s)
             self._typed.extend(self._input.lines())
@@ -36,7 +36,7 @@ class TerminalApproval:
         say("")
         if not proposal.withdrawn():
             self._alone = True
-            say("standard input has ended: the session goes on without asking", "yellow")
+            say("standard input has ended: the session continues without asking", "yellow")
         return True
 
 

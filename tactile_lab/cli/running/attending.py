@@ -1,4 +1,4 @@
-"""Who is at a session, by what was asked for on the command line."""
+"""Who attends a session, as chosen on the command line."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from tactile_lab.workflow.attending import Attendance
 
 @dataclass(frozen=True)
 class GuidedWay:
-    """How a session is guided, as asked for.
+    """How a session is guided, as chosen on the command line.
 
     Attributes:
-        led_by: how the hand is moved; None for what the rig says.
-        automatic: captures come by themselves; None for what the rig says.
-        pedal: a further key that captures.
-        pace: simulated seconds for a real one.
-        no_input: nobody is there: a simulated operator does what the prompts say.
+        led_by: how the hand is moved; None for the rig's setting.
+        automatic: capture automatically; None for the rig's setting.
+        pedal: additional key that captures.
+        pace: simulated seconds per real second.
+        no_input: a simulated operator follows the prompts.
     """
 
     led_by: Literal["keys", "hand"] | None
@@ -37,15 +37,15 @@ class GuidedWay:
 
 @contextmanager
 def attendance(way: GuidedWay | None, page: PageAddress | None, title: str) -> Iterator[Attendance]:
-    """Who is there, for as long as the session runs; the terminal is as it was afterwards.
+    """The people attending while the session runs; the terminal is restored afterwards.
 
     Args:
         way: None for an autonomous session.
-        page: where the live page is to be; None for none.
-        title: of the page.
+        page: address of the live page; None for no page.
+        title: title of the page.
 
     Raises:
-        ConfigurationError: there is no such key for a pedal.
+        ConfigurationError: the pedal's key is unknown.
         ConfigurationError, DeviceError: the page cannot be opened there.
     """
     with ExitStack() as stack:
@@ -74,4 +74,4 @@ def _page(page: PageAddress, title: str) -> Iterator[ViewFeed]:
         say(f"page: {feed.url}")
         yield feed
     if feed.dropped:
-        warn(f"the page was slower than the session: {feed.dropped} messages were not shown; all of them are recorded")
+        warn(f"the page was slower than the session: {feed.dropped} messages were not shown, but all are recorded")

@@ -1,4 +1,4 @@
-"""The keys of a guided session, and the words that do the same where keys cannot be read one by one."""
+"""The keys of a guided session, and equivalent words for terminals that cannot read single keys."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ SPACE = " "
 
 @dataclass(frozen=True)
 class Binding:
-    """A key, the word for it, and what it asks for.
+    """A key, the equivalent word, and the request it makes.
 
     Attributes:
-        key: the character, or the name of a key without one.
-        word: what may be typed in place of the key.
-        request: what it asks for.
+        key: the character, or the name of a key without a character.
+        word: typed in place of the key.
+        request: the request it makes.
         wants_text: a line of text follows.
-        help: for people.
+        help: description for people.
     """
 
     key: str
@@ -44,25 +44,25 @@ def _fingers() -> list[Binding]:
 
 
 BINDINGS: tuple[Binding, ...] = (
-    Binding(SPACE, "next", Request(Ask.NEXT), "this step is done; in the hold: capture"),
+    Binding(SPACE, "next", Request(Ask.NEXT), "finish this step; while holding: capture"),
     Binding(ENTER, "capture", Request(Ask.NEXT), "the same"),
-    Binding(PAGE_DOWN, "pedal", Request(Ask.NEXT), "the same: what most foot pedals and presenters send"),
-    Binding("g", "go", Request(Ask.GO), "let the rig do this step by itself"),
-    Binding("u", "undo", Request(Ask.UNDO), "take the last grasp back; before the capture: give this one up"),
-    Binding("x", "give-up", Request(Ask.GIVE_UP), "open the hand and lift, without a capture"),
-    Binding("p", "pause", Request(Ask.PAUSE), "pause, and go on"),
-    Binding("e", "end", Request(Ask.END), "end the session (twice)"),
-    Binding("a", "automatic", Request(Ask.AUTOMATIC), "capture by itself when the contacts are steady, on or off"),
-    Binding("n", "note", Request(Ask.NOTE), "note: a line of text kept with the session", wants_text=True),
+    Binding(PAGE_DOWN, "pedal", Request(Ask.NEXT), "the same; sent by most foot pedals and presenters"),
+    Binding("g", "go", Request(Ask.GO), "let the rig do this step automatically"),
+    Binding("u", "undo", Request(Ask.UNDO), "undo the last grasp; before the capture: give up this one"),
+    Binding("x", "give-up", Request(Ask.GIVE_UP), "give up: open the hand and lift without a capture"),
+    Binding("p", "pause", Request(Ask.PAUSE), "pause or resume"),
+    Binding("e", "end", Request(Ask.END), "end the session (press twice)"),
+    Binding("a", "automatic", Request(Ask.AUTOMATIC), "automatic capture when the contacts are steady: on or off"),
+    Binding("n", "note", Request(Ask.NOTE), "note: a line of text stored with the session", wants_text=True),
     Binding("m", "marker", Request(Ask.MARKER), "marker: number this instant in the recording"),
-    Binding("i", "image", Request(Ask.PHOTO), "keep a picture of the rig's camera"),
-    Binding("t", "attach", Request(Ask.ATTACH), "attach a file, such as a photograph: its name", wants_text=True),
-    Binding(UP, "far", Request(Ask.MOVE, x=1), "hand a step away from the arm"),
-    Binding(DOWN, "near", Request(Ask.MOVE, x=-1), "hand a step towards the arm"),
-    Binding(LEFT, "left", Request(Ask.MOVE, y=1), "hand a step to the left, seen from the arm"),
-    Binding(RIGHT, "right", Request(Ask.MOVE, y=-1), "hand a step to the right"),
-    Binding("r", "raise", Request(Ask.MOVE, z=1), "hand a step up"),
-    Binding("f", "lower", Request(Ask.MOVE, z=-1), "hand a step down"),
+    Binding("i", "image", Request(Ask.PHOTO), "store a picture from the rig's camera"),
+    Binding("t", "attach", Request(Ask.ATTACH), "attach a file, such as a photograph, by its name", wants_text=True),
+    Binding(UP, "far", Request(Ask.MOVE, x=1), "move the hand a step away from the arm"),
+    Binding(DOWN, "near", Request(Ask.MOVE, x=-1), "move the hand a step towards the arm"),
+    Binding(LEFT, "left", Request(Ask.MOVE, y=1), "move the hand a step to the left, seen from the arm"),
+    Binding(RIGHT, "right", Request(Ask.MOVE, y=-1), "move the hand a step to the right"),
+    Binding("r", "raise", Request(Ask.MOVE, z=1), "move the hand a step up"),
+    Binding("f", "lower", Request(Ask.MOVE, z=-1), "move the hand a step down"),
     Binding(",", "turn-left", Request(Ask.MOVE, turn=1), "turn the hand a step to the left"),
     Binding(".", "turn-right", Request(Ask.MOVE, turn=-1), "turn the hand a step to the right"),
     Binding("c", "close", Request(Ask.FINGERS, fingers=FINGERS, steps=1), "close all fingers a step"),
@@ -81,7 +81,7 @@ _SPARE = {
     "\x1b[3~": "delete",
     "\x1b[5~": "page up",
 }
-"""Keys without a meaning of their own, for pedals."""
+"""Unassigned keys that a pedal can use."""
 
 _SEQUENCES = {
     **_SPARE,
@@ -100,7 +100,7 @@ _NAMED = {"\r": ENTER, "\n": ENTER, "\x1b": ESCAPE, "\t": "tab"}
 
 
 def split_keys(text: str) -> list[str]:
-    """The keys in what a terminal sent; sequences that are not known count as nothing."""
+    """The keys in a terminal's input; unknown sequences are ignored."""
     keys: list[str] = []
     while text:
         length = next((n for n in range(_LONGEST, 1, -1) if text[:n] in _SEQUENCES), 0)
@@ -124,17 +124,17 @@ def _unknown_length(text: str) -> int:
 
 
 def pedal_key(name: str) -> str:
-    """The key of a pedal: a character, or the name of a key without one. Raises ConfigurationError."""
+    """The key of a pedal: a character, or the name of a key without a character. Raises ConfigurationError."""
     named = sorted({"tab", *_SEQUENCES.values()})
     key = name if len(name) == 1 else name.lower().replace("-", " ")
     if key and len(key) != 1 and key not in named:
-        hint = f"A character, or one of: {', '.join(named)}"
-        raise ConfigurationError(f"no key is called {name!r}", where="--pedal", hint=hint)
+        hint = f"Use a character or one of: {', '.join(named)}"
+        raise ConfigurationError(f"unknown key {name!r}", where="--pedal", hint=hint)
     return key
 
 
 def request_of_line(line: str) -> Request | None:
-    """What a typed line asks for: a word or a key, then text or a number of steps; None where it is not known."""
+    """The request of a typed line: a word or a key, then text or a number of steps; None if it is unknown."""
     first, _, rest = line.strip().partition(" ")
     binding = BY_WORD.get(first.lower()) or BY_KEY.get(first.lower() or ENTER)
     if binding is None:
@@ -146,7 +146,7 @@ def request_of_line(line: str) -> Request | None:
 
 
 def _times(request: Request, count: str) -> Request | None:
-    """A step so many times over, at most 20."""
+    """A step repeated up to 20 times."""
     if not count:
         return request
     if not count.isdecimal() or not 1 <= int(count) <= 20:

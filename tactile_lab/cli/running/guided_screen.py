@@ -1,4 +1,4 @@
-"""What a guided session shows in a terminal: a panel that stays below the grasps, or plain lines."""
+"""Terminal display of a guided session: a panel below the list of grasps, or plain lines."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ KEYS = "SPACE next · g go · u undo · x give up · p pause · e end · a autom
 _BAR_N, _BAR_WIDTH = 1.0, 4  # five fingers fit beside one another in 80 columns
 _FORCE_WIDTH = _BAR_WIDTH + len(" 0.00 N")
 _SAID = {Stage.PLACE: ("object", "suggested"), Stage.HOLD: ("stability", "observability")}
-"""Facts that plain lines tell at a step, beside the contacts."""
+"""Facts that plain lines show at a step, besides the contacts."""
 
 
 def as_panel(panel: Panel, typing: str = "") -> RenderableType:
-    """The panel as a frame; ``typing`` is a text that is being typed."""
+    """The panel as a frame; ``typing`` is the text being typed."""
     rows: list[RenderableType] = [_steps(panel.stage), Text(panel.prompt, style="bold"), Text(), _forces(panel)]
     rows += [_fact(name, value) for name, value in facts(panel)]
     rows.append(Text())
@@ -30,24 +30,24 @@ def as_panel(panel: Panel, typing: str = "") -> RenderableType:
 
 
 def facts(panel: Panel) -> list[tuple[str, str]]:
-    """What is seen and known, by name; what is empty is left out."""
+    """Current readings and facts by name, without empty ones."""
     seen = panel.view
     told = [
         ("paused", panel.paused),
         ("contacts", seen.words()),
         ("silent", ", ".join(seen.silent)),
         ("stability", panel.capture or f"steady for {seen.steady_s:.1f} s"),
-        ("observability", "" if seen.observability is None else f"{seen.observability:.2f} of this grasp as it stands"),
+        ("observability", "" if seen.observability is None else f"{seen.observability:.2f} of the current grasp"),
         ("object", panel.unknown),
         ("suggested", panel.suggestion),
-        ("capture", "automatic when steady" if panel.automatic else "on a key"),
+        ("capture", "automatic when contacts are steady" if panel.automatic else "on a key"),
         ("last", panel.message),
     ]
     return [(name, value) for name, value in told if value]
 
 
 def as_lines(panel: Panel) -> list[str]:
-    """The same for a terminal without abilities: the prompt, what is seen, and what the step is decided by."""
+    """The same as plain lines: the prompt, the readings, and the facts that matter at this step."""
     told, names = dict(facts(panel)), _SAID.get(panel.stage, ())
     said = [f"  {name}: {told[name]}" for name in names if name in told]
     return [f"[{panel.grasp} {panel.stage}] {panel.prompt}", f"  {panel.view.words()}", *said]

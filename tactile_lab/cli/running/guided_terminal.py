@@ -25,15 +25,15 @@ _BACKSPACES = ("\x7f", "\x08")
 
 
 class KeyTerminal:
-    """Single keys, and a panel that is renewed in place.
+    """Single keys, and a panel that is updated in place.
 
-    The panel is drawn by a thread of its own, so that a slow terminal delays nothing.
+    A separate thread draws the panel, so that a slow terminal does not delay the session.
 
     Args:
-        pedal: a key that captures, beside those that always do, see :func:`pedal_key`; "" for none.
+        pedal: an additional key that captures, see :func:`pedal_key`; "" for none.
 
     Raises:
-        ConfigurationError: there is no such key.
+        ConfigurationError: the pedal's key is unknown.
     """
 
     attended = True
@@ -87,7 +87,7 @@ class KeyTerminal:
         return binding.request
 
     def _on_text_key(self, binding: Binding, text: str, key: str) -> Request | None:
-        """One key of a text: ENTER ends it, ESC gives it up."""
+        """One key of a text: ENTER ends the text, ESC cancels it."""
         if key in (ENTER, ESCAPE):
             self._typing = None
             return replace(binding.request, text=text) if key == ENTER and text.strip() else None
@@ -97,7 +97,7 @@ class KeyTerminal:
 
 
 class LineTerminal:
-    """Whole lines, for a terminal without abilities and for pipes: what changes is said, words are read."""
+    """Whole lines, for simple terminals and pipes: prints changes and reads words."""
 
     attended = True
 
@@ -110,16 +110,19 @@ class LineTerminal:
         self._told_closed = False
 
     def __enter__(self) -> Self:
-        say("Type a word and ENTER: next, go, undo, give-up, pause, end, note TEXT; docs/guided-sessions.md has all")
+        say(
+            "Type a word and ENTER: next, go, undo, give-up, pause, end, note TEXT; full list in "
+            "docs/guided-sessions.md"
+        )
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Nothing to put back."""
+        """Nothing to restore."""
 
     def requests(self) -> Sequence[Request]:
-        """One line at a time: the next one is read when a panel has been shown."""
+        """Read one line at a time: the next one after a panel was shown."""
         self._waiting.extend(self._input.lines())
         if self._waiting and self._shown:
             self._shown = False
@@ -151,6 +154,6 @@ class LineTerminal:
 
 
 def terminal_for(pedal: str = "") -> KeyTerminal | LineTerminal:
-    """What fits standard input and standard error as they are. Raises ConfigurationError as :class:`KeyTerminal`."""
+    """The display that standard input and output allow. Raises ConfigurationError as :class:`KeyTerminal` does."""
     able = sys.stdin.isatty() and people.is_terminal and not people.is_dumb_terminal
     return KeyTerminal(pedal) if able else LineTerminal()

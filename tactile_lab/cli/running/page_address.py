@@ -1,4 +1,4 @@
-"""Where a page is to be, by what was asked for on the command line."""
+"""Address of a page, from command line options."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import typer
 from drivers.core.errors import ConfigurationError
 
 HERE, PORT = "127.0.0.1", 8090
-_PANEL = "Page in the browser"
+_PANEL = "Browser page"
 LEAST_TOKEN = 16
 
-View = Annotated[bool, typer.Option("--view", help="Show and lead this in a browser too.", rich_help_panel=_PANEL)]
+View = Annotated[bool, typer.Option("--view", help="Also show and control this in a browser.", rich_help_panel=_PANEL)]
 Port = Annotated[
     int,
-    typer.Option("--view-port", min=0, max=65535, help="Port of the page; 0 takes a free one.", rich_help_panel=_PANEL),
+    typer.Option("--view-port", min=0, max=65535, help="Port of the page; 0: any free port.", rich_help_panel=_PANEL),
 ]
 Listen = Annotated[
     str,
     typer.Option(
         "--listen",
         metavar="ADDRESS",
-        help="Address of the page; others than this computer's need --token.",
+        help="Address of the page; --token is required for addresses other than this computer's loopback.",
         rich_help_panel=_PANEL,
     ),
 ]
@@ -32,7 +32,7 @@ Token = Annotated[
     typer.Option(
         "--token",
         envvar="TACTILE_LAB_TOKEN",
-        help="What a visitor of the page must show; 'new' makes one.",
+        help="Access token that visitors of the page must give; 'new' creates one.",
         rich_help_panel=_PANEL,
     ),
 ]
@@ -48,10 +48,10 @@ class PageAddress:
 
     @classmethod
     def if_wanted(cls, view: bool, address: str, port: int, token: str) -> PageAddress | None:
-        """The address when a page was asked for. Raises BadParameter for one without a page."""
+        """The address if a page was requested. Raises BadParameter for an address without a page."""
         for option, given in (("--listen", address != HERE), ("--view-port", port != PORT)):
             if given and not view:
-                raise typer.BadParameter("belongs to --view", param_hint=f"'{option}'")
+                raise typer.BadParameter("needs --view", param_hint=f"'{option}'")
         return cls(address, port, token) if view else None
 
     def check(self) -> tuple[str, int, str]:
@@ -60,13 +60,13 @@ class PageAddress:
 
         token = new_token() if self.token == "new" else self.token
         if not token and not is_loopback(self.address):
-            hint = "Give --token new, or listen on 127.0.0.1"
+            hint = "Use --token new, or listen on 127.0.0.1"
             raise ConfigurationError(
-                "whoever reaches this address could press the buttons", where=self.address, hint=hint
+                "anyone who can reach this address could control the session", where=self.address, hint=hint
             )
         if token and (
             len(token) < LEAST_TOKEN or not all(c.isalnum() or c in "-_" for c in token) or not token.isascii()
         ):
-            text = f"a token has at least {LEAST_TOKEN} letters, digits, - or _"
-            raise ConfigurationError(text, where="--token", hint="Give --token new to have one made")
+            text = f"a token needs at least {LEAST_TOKEN} letters, digits, - or _"
+            raise ConfigurationError(text, where="--token", hint="Use --token new to create one")
         return self.address, self.port, token

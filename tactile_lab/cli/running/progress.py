@@ -1,4 +1,4 @@
-"""What a running session shows: a line a grasp, and on a terminal what is happening now."""
+"""Display of a running session: one line per grasp, and on a terminal the current step."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from tactile_lab.cli.console import people, say
 
 HEAD = ("grasp", "closing", *FINGERS, "±mm", "±deg", "known", "verdict")
 WIDTHS = (6, -8, *([5] * len(FINGERS)), 6, 6, 7, -1)
-"""Of the columns, in characters; negative where text stands to the left."""
-INTERRUPTED = "Ctrl+C: finishing this grasp, then closing the session; once more to end at once"
+"""Column widths in characters; negative for left-aligned text."""
+INTERRUPTED = "Ctrl+C: finishing this grasp, then closing the session. Press again to stop immediately"
 LEGEND = "fingertip forces in N, uncertainty of the pose, share of the surface known"
 
 
 class LiveProgress:
-    """Told what happens in a session, tells people.
+    """Shows the events of a session to people.
 
-    A grasp is one line that stays, in a terminal and in a file alike; the step in hand is a line that a terminal
-    shows below them and that leaves no trace.
+    Each grasp is a permanent line, in a terminal or a file; the current step is a temporary line below them on a
+    terminal.
 
     Args:
-        title: of the session.
-        live: show the step in hand; a guided session shows it itself.
-        reasons: say below each grasp why it was chosen.
+        title: title of the session.
+        live: show the current step; a guided session shows it itself.
+        reasons: show below each grasp why it was chosen.
     """
 
     def __init__(self, title: str, *, live: bool = True, reasons: bool = False) -> None:
@@ -49,7 +49,7 @@ class LiveProgress:
             self._live.stop()
 
     def phase(self, number: int, name: str) -> None:
-        """A grasp has come to a step of its cycle."""
+        """A grasp has reached a step of its cycle."""
         if not self._begun:
             self._begun = True
             say(self._title, "bold")
@@ -71,21 +71,23 @@ class LiveProgress:
             say(f"        {report.reason}", "dim")
 
     def on_message(self, message: str) -> None:
-        """Something a person should know at once."""
+        """Something a person should know immediately."""
         say(message, "yellow")
 
     def on_interrupt(self) -> None:
-        """Ctrl+C was pressed: the line of the step in hand says so at once, a line that stays at the next step."""
+        """Ctrl+C was pressed: the current step's line says so immediately, and a permanent line follows at the next
+        step.
+        """
         self._is_interrupted = True
 
     def _render(self) -> Text:
-        """What is happening now."""
+        """The current step."""
         told_here = self._is_interrupted and not self._interruption_told
         return Text(INTERRUPTED, style="yellow") if told_here else self._now
 
 
 def _line(cells: tuple[str, ...], style: str = "") -> None:
-    """A row of the table; in a terminal the verdict is cut where the line ends."""
+    """A row of the table; on a terminal the verdict is cut off at the end of the line."""
     columns = zip(cells, WIDTHS, strict=True)
     padded = [cell.rjust(width) if width > 0 else "  " + cell.ljust(-width) for cell, width in columns]
     text = Text("".join(padded).rstrip(), style=style)

@@ -1,4 +1,4 @@
-"""How a finished session is shown, and the exit code it deserves."""
+"""Output of a finished session, and its exit code."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ FILES = (
 
 
 def conclude(finished: FinishedSession, as_json: bool, extra: Mapping[str, Any] | None = None) -> None:
-    """Show the outcome, the evaluation and the files; raise the exit code that fits (see :mod:`cli.main`).
+    """Show the outcome, the evaluation and the files, and raise the exit code (see :mod:`cli.main`).
 
-    With ``as_json`` there is always one document: the evaluation (with ``extra`` behind it), or
+    With ``as_json`` there is always one document: the evaluation (followed by ``extra``), or
     ``{"error": ..., "session": ...}`` when there is none.
     """
     _tell_outcome(finished.outcome)
@@ -40,7 +40,7 @@ def conclude(finished: FinishedSession, as_json: bool, extra: Mapping[str, Any] 
     _tell_files(finished)
     _tell_losses(finished)
     for objection in finished.overlooked:
-        warn(f"{objection}: allowed, and recorded")
+        warn(f"{objection}: allowed, and recorded with the session")
     for reservation in finished.evaluation.warnings if finished.evaluation else ():
         warn(reservation)
     if finished.problem:
@@ -78,7 +78,7 @@ def _tell_files(finished: FinishedSession) -> None:
 def _tell_losses(finished: FinishedSession) -> None:
     if finished.data_loss:
         losses = losses_in_words(finished.data_loss)
-        warn(f"not recorded as it happened (lost, or late beyond {LATE_ns // 1_000_000} ms): {losses}")
+        warn(f"incomplete recording (lost, or more than {LATE_ns // 1_000_000} ms late): {losses}")
     if finished.unread:
         warn(f"the recording is damaged: {finished.unread}")
 

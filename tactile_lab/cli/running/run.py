@@ -1,4 +1,4 @@
-"""``tactile-lab run``: the main job."""
+"""``tactile-lab run``: run a session."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _GUIDED, _EXPLORATION = "Guided sessions", "Choice of the grasps"
 
 
 class Mode(StrEnum):
-    """Who decides in a session."""
+    """Who decides about the grasps of a session."""
 
     AUTONOMOUS = "autonomous"
     GUIDED = "guided"
@@ -33,39 +33,41 @@ class LedBy(StrEnum):
 def run(
     rig: RigName = "sim",
     object_name: Annotated[
-        str, typer.Option("--object", help="Object of the simulated rig's catalogue, or mesh:FILE (metres).")
+        str, typer.Option("--object", help="Simulated rig: an object of its catalogue, or mesh:FILE (metres).")
     ] = "box-10x6x4",
     grasps: Annotated[
-        int | None, typer.Option(min=1, help="Number of grasps.", show_default="the rig's, 16 on sim")
+        int | None, typer.Option(min=1, help="Number of grasps.", show_default="from the rig, 16 on sim")
     ] = None,
-    dimension: Annotated[int, typer.Option(min=2, max=3, help="2: horizontal contour; 3: surface.")] = 2,
+    dimension: Annotated[int, typer.Option(min=2, max=3, help="2: estimate a horizontal contour; 3: a surface.")] = 2,
     method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0,
-    out: Annotated[Path, typer.Option(help="Folder in which the session's folder is made.")] = Path("runs"),
-    notes: Annotated[str, typer.Option(help="The operator's notes, kept with the session.")] = "",
-    mode: Annotated[Mode, typer.Option(help="autonomous: the program decides; guided: a person.")] = Mode.AUTONOMOUS,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the session.")] = 0,
+    out: Annotated[Path, typer.Option(help="Folder in which the session's folder is created.")] = Path("runs"),
+    notes: Annotated[str, typer.Option(help="Notes to store with the session.")] = "",
+    mode: Annotated[
+        Mode, typer.Option(help="autonomous: the program decides; guided: a person decides.")
+    ] = Mode.AUTONOMOUS,
     led_by: Annotated[
         LedBy | None,
         typer.Option(
-            help="The hand is moved by keys, or by hands.",
-            show_default="the rig's, keys on sim",
+            help="Guided: the hand is moved by keys, or by hand.",
+            show_default="from the rig, keys on sim",
             rich_help_panel=_GUIDED,
         ),
     ] = None,
     automatic_capture: Annotated[
         bool,
         typer.Option(
-            "--automatic-capture", help="Capture as soon as the contacts are steady.", rich_help_panel=_GUIDED
+            "--automatic-capture", help="Guided: capture as soon as the contacts are steady.", rich_help_panel=_GUIDED
         ),
     ] = False,
     pedal: Annotated[
-        str, typer.Option(help="A further key that captures, as a foot pedal sends it.", rich_help_panel=_GUIDED)
+        str, typer.Option(help="Guided: additional key that captures, sent by a foot pedal.", rich_help_panel=_GUIDED)
     ] = "",
     pace: Annotated[
         float | None,
         typer.Option(
             min=0.0,
-            help="Simulated rig: its seconds for a real one; 0: as fast as it goes.",
+            help="Guided on a simulated rig: simulated seconds per real second; 0: as fast as possible.",
             show_default="1",
             rich_help_panel=_GUIDED,
         ),
@@ -77,9 +79,8 @@ def run(
     policy: Annotated[
         str | None,
         typer.Option(
-            help="Exploration policy that chooses the grasps: information, or one to compare with it "
-            "(docs/exploration.md).",
-            show_default="the rig's",
+            help="Exploration policy that chooses the grasps, such as information; docs/exploration.md lists all.",
+            show_default="from the rig",
             rich_help_panel=_EXPLORATION,
         ),
     ] = None,
@@ -87,26 +88,29 @@ def run(
         bool,
         typer.Option(
             "--bounding-box",
-            help="Feel the object's bounding box before the first grasp.",
+            help="Measure the object's bounding box by touch before the first grasp.",
             rich_help_panel=_EXPLORATION,
         ),
     ] = False,
     confirm: Annotated[
         bool,
         typer.Option(
-            "--confirm", help="Ask before every grasp; a veto takes the next best.", rich_help_panel=_EXPLORATION
+            "--confirm",
+            help="Ask before every grasp; after a veto the next best is proposed.",
+            rich_help_panel=_EXPLORATION,
         ),
     ] = False,
     allow_uncalibrated: AllowUncalibrated = False,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Run a session: grasp, estimate, choose the next grasp, and judge the result.
+    """Run a session: grasp, estimate, choose the next grasp, and evaluate the result.
 
-    A guided session (docs/guided-sessions.md) says what to do, shows what the sensors see, and captures on a key; with
-    --no-input a simulated operator does what it says.
+    A guided session (docs/guided-sessions.md) says what to do, shows the sensor readings, and captures on a key; with
+    --no-input a simulated operator follows the prompts.
 
-    Ctrl+C once finishes the step in hand and closes the session; twice ends at once. Both leave a readable session.
+    Ctrl+C finishes the current grasp and closes the session; pressed twice, it stops immediately. Either way the
+    session can be read.
     """
     from tactile_lab.cli.running.approval import TerminalApproval
     from tactile_lab.cli.running.attending import GuidedWay, attendance
@@ -117,7 +121,7 @@ def run(
 
     guided = mode is Mode.GUIDED
     if confirm and (no_input or guided):
-        raise typer.BadParameter("asks before every grasp of an autonomous session", param_hint="'--confirm'")
+        raise typer.BadParameter("needs an autonomous session", param_hint="'--confirm'")
     if not guided:
         _refuse_guided_options(
             {
@@ -143,10 +147,10 @@ def run(
 
 
 def _refuse_guided_options(given: Mapping[str, bool]) -> None:
-    """Whoever means to lead the hand must not meet one that moves by itself. Raises BadParameter."""
+    """Refuse guided options in an autonomous session, whose hand moves by itself. Raises BadParameter."""
     for option, is_given in given.items():
         if is_given:
-            raise typer.BadParameter("belongs to --mode guided", param_hint=f"'{option}'")
+            raise typer.BadParameter("needs --mode guided", param_hint=f"'{option}'")
 
 
 def _leader(chosen: LedBy | None) -> Literal["keys", "hand"] | None:

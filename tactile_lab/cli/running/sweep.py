@@ -1,4 +1,4 @@
-"""``tactile-lab sweep``: many sessions, one table."""
+"""``tactile-lab sweep``: many simulated sessions in one table."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from tactile_lab.cli.options import METHOD_HELP, Json, Method, NoInput, RigName
 
 def sweep(
     objects: Annotated[str, typer.Option(help="Comma-separated object names, or 'all'.")] = "all",
-    seeds: Annotated[str, typer.Option(help="Comma-separated seeds.")] = "1,2,3",
-    dimensions: Annotated[str, typer.Option(help="2, 3 or 2,3.")] = "2,3",
+    seeds: Annotated[str, typer.Option(help="Comma-separated random seeds.")] = "1,2,3",
+    dimensions: Annotated[str, typer.Option(help="Comma-separated dimensions: 2, 3 or 2,3.")] = "2,3",
     method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
-    grasps: Annotated[int, typer.Option(min=1, help="Grasps a session.")] = 16,
+    grasps: Annotated[int, typer.Option(min=1, help="Number of grasps per session.")] = 16,
     rig: RigName = "sim",
-    jobs: Annotated[int, typer.Option(min=1, help="Sessions side by side.")] = 2,
-    out: Annotated[Path, typer.Option(help="Folder of the sessions and of table.md.")] = Path("runs/sweep"),
+    jobs: Annotated[int, typer.Option(min=1, help="Number of parallel sessions.")] = 2,
+    out: Annotated[Path, typer.Option(help="Folder for the sessions and table.md.")] = Path("runs/sweep"),
     check_replay: Annotated[
-        bool, typer.Option("--check-replay", help="Replay every session; one that differs counts as failed.")
+        bool,
+        typer.Option("--check-replay", help="Replay every session; a session whose replay differs counts as failed."),
     ] = False,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Run a session for every object, seed and dimension, and tabulate errors with spread and failures."""
+    """Run a simulated session for every object, seed and dimension, and tabulate errors and failures."""
     from concurrent.futures import ProcessPoolExecutor
     from functools import partial
 
@@ -54,7 +55,7 @@ def sweep(
     if as_json:
         emit_json([row.as_json() for row in rows])
     else:
-        show_table("Median / 90 % below / maximum", summary_titles(), map(summary_cells, found))
+        show_table("Median / 90th percentile / maximum", summary_titles(), map(summary_cells, found))
     write_whole(out / "table.md", markdown_table(found))
     say(f"table  {out / 'table.md'}")
     if all(row.evaluation is None for row in rows):
@@ -62,13 +63,13 @@ def sweep(
 
 
 def _leave_ctrl_c_to_the_parent() -> None:
-    """Ctrl+C reaches every process of a terminal: outside a session's own guard only the parent answers."""
+    """Ctrl+C reaches every process of the terminal: outside a session only the parent process handles it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _numbers(text: str, option: str, smallest: int = 0, largest: int | None = None) -> tuple[int, ...]:
     """Whole numbers from a comma-separated list. Raises BadParameter."""
-    wanted = f"of {smallest} to {largest}" if largest is not None else f"not below {smallest}"
+    wanted = f"from {smallest} to {largest}" if largest is not None else f"of at least {smallest}"
     try:
         numbers = tuple(int(part) for part in text.split(","))
     except ValueError:

@@ -1,4 +1,4 @@
-"""``tactile-lab evaluate``: judge sessions again, with another truth, or beside one another."""
+"""``tactile-lab evaluate``: evaluate sessions again, with another ground truth, or compare them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Basis(StrEnum):
-    """What truth is recomputed from."""
+    """Source of the ground truth."""
 
     CORNERS = "corners"
     PICTURES = "pictures"
@@ -27,23 +27,33 @@ def evaluate(
     ],
     results: Annotated[
         list[str] | None,
-        typer.Option(help="Folder of results inside the sessions, or anywhere; again for more (all when comparing)."),
+        typer.Option(
+            help="Results folder inside the sessions, or any path. Can be repeated (default when comparing: all)."
+        ),
     ] = None,
-    lens: Annotated[Path | None, typer.Option(help="Lens calibration for the truth, instead of the session's.")] = None,
-    markers: Annotated[Path | None, typer.Option(help="Marker file for the truth, instead of the session's.")] = None,
+    lens: Annotated[
+        Path | None, typer.Option(help="Lens calibration for the ground truth, instead of the session's.")
+    ] = None,
+    markers: Annotated[
+        Path | None, typer.Option(help="Marker file for the ground truth, instead of the session's.")
+    ] = None,
     basis: Annotated[
-        Basis, typer.Option("--from", help="Truth from the recorded corners, or from the pictures again.")
+        Basis,
+        typer.Option(
+            "--from",
+            help="Compute the ground truth from the recorded corners, or detect markers in the pictures again.",
+        ),
     ] = Basis.CORNERS,
-    out: Annotated[Path | None, typer.Option(help="Folder of table, CSV, JSON and plot of a comparison.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the comparison: table, CSV, JSON and plot.")] = None,
     root: Root = Path("runs"),
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Judge results against the markers in the recorded frames and the object's true mesh.
+    """Evaluate results against the markers in the recorded pictures and the object's true mesh.
 
-    One session alone is judged again with its own calibration, and its results are renewed. With several sessions,
-    --results, another calibration, --from or --out nothing in the sessions is changed: all results are judged beside
-    one another, by method, with confidence intervals.
+    A single session is evaluated again with its own calibration, and its evaluation files are updated. With several
+    sessions, --results, another calibration, --from or --out, the sessions are not changed: all results are compared by
+    method, with confidence intervals.
     """
     from sessions.recording.listing import find_session
     from tactile_lab.workflow.judging import TruthChoice
@@ -75,15 +85,15 @@ def _tell(comparison: Comparison, files: list[Path], as_json: bool) -> None:
         show_table(f"{len(comparison.judged)} evaluations", head, body)
     for session, report in comparison.truths.items():
         if report is None:
-            warn(f"{session}: no camera, so no truth")
+            warn(f"{session}: no camera, so no ground truth")
             continue
-        world = f"{report.world_frames} frames in the world marker's mean"
+        world = f"world marker averaged over {report.world_frames} frames"
         say(f"truth    {session}: from {report.basis}, {report.frames} frames, {world}")
         for reason, count in report.refused.items():
-            warn(f"{session}: {count} frames refused: {reason}")
+            warn(f"{session}: {count} frames rejected: {reason}")
     for session, offset in comparison.clocks.items():
         known = offset.offset_ms is not None and offset.sigma_ms is not None
-        words = f"{offset.offset_ms:+.1f} ms ± {offset.sigma_ms:.1f} ms" if known else f"not known: {offset.reason}"
+        words = f"{offset.offset_ms:+.1f} ms ± {offset.sigma_ms:.1f} ms" if known else f"unknown: {offset.reason}"
         say(f"clocks   {session}: camera to hand {words}")
     for session, lost in comparison.unread.items():
         warn(f"{session}: the recording is damaged: {lost}")

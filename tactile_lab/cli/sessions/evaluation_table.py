@@ -1,4 +1,4 @@
-"""The evaluation for people, in 80 columns: shape, pose, and what else there is to know."""
+"""The evaluation as text of 80 columns: shape, pose and other metrics."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from tactile_lab.evaluation.table import further_text
 UNKNOWN = "–"
 
 _SHAPE = (
-    ("Hausdorff distance", "hausdorff_mm", 2, "mm", "largest, both directions"),
-    ("Mean distance", "mean_distance_mm", 2, "mm", "of both directions"),
-    ("Chamfer distance", "chamfer_mm", 2, "mm", "sum of both means"),
-    ("F-score at 5 mm", "fscore_5mm", 3, "  ", "share of both surfaces"),
+    ("Hausdorff distance", "hausdorff_mm", 2, "mm", "maximum, both directions"),
+    ("Mean distance", "mean_distance_mm", 2, "mm", "both directions"),
+    ("Chamfer distance", "chamfer_mm", 2, "mm", "sum of both directions"),
+    ("F-score at 5 mm", "fscore_5mm", 3, "  ", "both surfaces"),
     ("Overlap", "iou", 3, "  ", "intersection over union"),
 )
 _POSE = (("Position error", "mm", "mm"), ("Rotation error", "deg", "° "))
 
 
 def show_evaluation(content: Mapping[str, Any]) -> None:
-    """Print the content of ``evaluation.json``; what is unknown shows as a dash."""
+    """Print the content of ``evaluation.json``; unknown values show as a dash."""
     made = f"{content['dimension']}-D, method {content['method']}, seed {content['seed']}"
     basis = f"{count(content['grasps'], 'grasp')}, {count(content['contacts'], 'contact')}"
     people.print()
@@ -48,7 +48,7 @@ def _shape(content: Mapping[str, Any]) -> Table:
 
 
 def _pose(pose: Mapping[str, Any]) -> Table:
-    grid = _grid(("pose", "RMS", "at the end", "step by step", "drift a grasp"))
+    grid = _grid(("pose", "RMS", "at the end", "between grasps", "drift per grasp"))
     for label, key, unit in _POSE:
         keys = (f"rmse_{key}", f"final_{key}", f"step_{key}", f"drift_{key}_per_grasp")
         grid.add_row(label, *(_figure(pose.get(name), unit) for name in keys))
@@ -57,16 +57,16 @@ def _pose(pose: Mapping[str, Any]) -> Table:
 
 def _rest(content: Mapping[str, Any]) -> Table:
     sensing, loops, time, truth = (content.get(key) or {} for key in ("sensing", "loops", "time", "truth"))
-    share = f"off the true surface, 95 % below {_figure(sensing.get('p95_mm'), 'mm')}"
+    share = f"from the true surface, 95 % below {_figure(sensing.get('p95_mm'), 'mm')}"
     spread = f"95 % below {_figure(time.get('step_ms_p95'), 'ms', 0)}; {_figure(time.get('total_s'), 's', 1)} in all"
     wrong = f"accepted of {_count(loops.get('tested'))} tested, {_count(loops.get('wrong'))} of them wrong"
     seen = f"of {count(content['grasps'], 'grasp')} known"
-    grid = _grid(("other figures", ""), "")
+    grid = _grid(("other metrics", ""), "")
     grid.add_row("Registration error", _figure(content.get("registration_rms_mm"), "mm"), _verdict(content))
     grid.add_row("Contact error, median", _figure(sensing.get("median_mm"), "mm"), share)
     grid.add_row("Loops", _figure(loops.get("accepted"), "  ", 0), wrong)
     grid.add_row("True poses", _figure(truth.get("seen"), "  ", 0), seen)
-    grid.add_row("Time a step, median", _figure(time.get("step_ms_median"), "ms", 0), spread)
+    grid.add_row("Time per step, median", _figure(time.get("step_ms_median"), "ms", 0), spread)
     grid.add_row("Tracking", f"{content.get('status', UNKNOWN)}   ", "")
     for name, value in (content.get("further") or {}).items():
         grid.add_row(name, f"{further_text(value)}   ", "")
@@ -76,13 +76,13 @@ def _rest(content: Mapping[str, Any]) -> Table:
 def _verdict(content: Mapping[str, Any]) -> Text:
     error_mm = content.get("registration_rms_mm")
     if error_mm is None:
-        return Text("not known without truth")
+        return Text("unknown without ground truth")
     passed, words = registration_verdict(error_mm, content.get("own_turns"))
     return Text(words, style="green" if passed else "bold red")
 
 
 def _grid(titles: tuple[str, ...], *notes: str) -> Table:
-    """A table without rules: a label, figures to the right, notes to the left."""
+    """A table without rules: a label, right-aligned figures, left-aligned notes."""
     grid = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
     grid.add_column(titles[0], min_width=21, no_wrap=True)
     for title in titles[1:]:

@@ -1,4 +1,4 @@
-"""``tactile-lab session extract|export|import``: sessions and contacts as files for others, and from others."""
+"""``tactile-lab session extract|export|import``: exchange sessions and contacts as files."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from tactile_lab.cli.options import Json, NoInput, Root, SessionName
 
 def extract(
     session: SessionName,
-    into: Annotated[Path, typer.Option(help="Folder of the piece, a new session; its name is the new session's.")],
+    into: Annotated[Path, typer.Option(help="Folder of the new session; its name becomes the session's name.")],
     root: Root = Path("runs"),
-    begin: Annotated[float | None, typer.Option("--from", help="Seconds since the first message.")] = None,
-    end: Annotated[float | None, typer.Option("--to", help="Seconds since the first message.")] = None,
-    links: Annotated[str | None, typer.Option(help="Comma-separated links, for example hand,ft/FF.")] = None,
-    samples: Annotated[bool, typer.Option("--samples", help="Keep what viewers show, too.")] = False,
-    bare: Annotated[bool, typer.Option("--bare", help="No calibration inside the recording.")] = False,
+    begin: Annotated[float | None, typer.Option("--from", help="In seconds after the first message.")] = None,
+    end: Annotated[float | None, typer.Option("--to", help="In seconds after the first message.")] = None,
+    links: Annotated[str | None, typer.Option(help="Comma-separated transports, for example hand,ft/FF.")] = None,
+    samples: Annotated[bool, typer.Option("--samples", help="Also keep the topics for viewers.")] = False,
+    bare: Annotated[bool, typer.Option("--bare", help="Leave the calibration out of the recording.")] = False,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Cut a piece out of a session: some seconds, some links."""
+    """Extract part of a session: a time span, some transports."""
     from sessions.exchange.extracting import Piece, extract
     from sessions.recording.listing import find_session
     from tactile_lab.cli.console import emit_json, say
@@ -32,31 +32,36 @@ def extract(
     counts = extract(find_session(root, session), into, Piece(begin, end, wanted, samples, not bare))
     if as_json:
         emit_json({"session": str(into), "messages": counts})
-    say(f"{sum(counts.values())} messages of {len(counts)} topics: {into}")
+    say(f"{sum(counts.values())} messages on {len(counts)} topics: {into}")
 
 
 def export(
     session: SessionName,
-    contacts: Annotated[Path | None, typer.Option(help="Contact log to write, JSON (tactile-contacts/1).")] = None,
-    csv: Annotated[Path | None, typer.Option(help="New folder for CSV tables and pictures.")] = None,
-    hdf5: Annotated[Path | None, typer.Option(help="New HDF5 file with all samples and pictures.")] = None,
-    rosbag: Annotated[Path | None, typer.Option(help="New folder for a ROS 2 bag (needs the package rosbags).")] = None,
-    archive: Annotated[Path | None, typer.Option(help="New ZIP file with the whole session.")] = None,
+    contacts: Annotated[
+        Path | None, typer.Option(help="Write a contact log to this file: JSON (tactile-contacts/1).")
+    ] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write CSV tables and pictures to this new folder.")] = None,
+    hdf5: Annotated[Path | None, typer.Option(help="Write all samples and pictures to this new HDF5 file.")] = None,
+    rosbag: Annotated[
+        Path | None, typer.Option(help="Write a ROS 2 bag to this new folder (needs the package rosbags).")
+    ] = None,
+    archive: Annotated[Path | None, typer.Option(help="Write the whole session to this new ZIP file.")] = None,
     root: Root = Path("runs"),
     dimension: Annotated[
-        int | None, typer.Option(min=2, max=3, help="Of the contact log: 2 or 3.", show_default="the session's")
+        int | None,
+        typer.Option(min=2, max=3, help="Dimension of the contact log: 2 or 3.", show_default="from the session"),
     ] = None,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Write a session in a form that others read: its grasps as a contact log, its samples as tables, or all of it."""
+    """Export a session to other formats: its grasps as a contact log, its samples as tables, or the whole session."""
     from sessions.recording.listing import find_session
     from tactile_lab.cli.console import count, emit_json, say
     from tactile_lab.workflow import exporting
 
     del no_input
     if not any((contacts, csv, hdf5, rosbag, archive)):
-        raise typer.BadParameter("name at least one of --contacts, --csv, --hdf5, --rosbag, --archive")
+        raise typer.BadParameter("give at least one of --contacts, --csv, --hdf5, --rosbag, --archive")
     found, told = find_session(root, session), dict[str, object]()
     if contacts is not None:
         log = exporting.export_contacts(found, contacts, dimension)
@@ -73,24 +78,34 @@ def export(
 
 
 def bring_in(
-    file: Annotated[Path, typer.Argument(help="A session's ZIP archive, or timed contacts as CSV or JSON.")],
+    file: Annotated[Path, typer.Argument(help="ZIP archive of a session, or timed contacts as CSV or JSON.")],
     root: Root = Path("runs"),
-    name: Annotated[str | None, typer.Option(help="Of the new session.", show_default="the archive's")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the new session.", show_default="from the archive")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Contact log made of timed contacts.", show_default="FILE-log.json")
+        Path | None,
+        typer.Option(help="Write the contact log made from timed contacts to this file.", show_default="FILE-log.json"),
     ] = None,
-    mesh: Annotated[Path | None, typer.Option(help="True object of timed contacts: a closed mesh in metres.")] = None,
-    point_sigma_mm: Annotated[float, typer.Option(min=0.001, help="Of timed contacts that state none.")] = 2.0,
+    mesh: Annotated[
+        Path | None, typer.Option(help="Timed contacts: mesh of the true object, closed, in metres.")
+    ] = None,
+    point_sigma_mm: Annotated[
+        float, typer.Option(min=0.001, help="Timed contacts: standard deviation of points that state none.")
+    ] = 2.0,
     normal_sigma_deg: Annotated[
-        float | None, typer.Option(min=0.1, help="Of normals that state none.", show_default="6; 20 for forces")
+        float | None,
+        typer.Option(
+            min=0.1,
+            help="Timed contacts: standard deviation of normals that state none.",
+            show_default="6; 20 for forces",
+        ),
     ] = None,
-    gap_s: Annotated[float, typer.Option(min=0.0, help="A longer pause begins a new grasp.")] = 0.5,
+    gap_s: Annotated[float, typer.Option(min=0.0, help="Timed contacts: a longer pause starts a new grasp.")] = 0.5,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Bring in a session from an archive, or other people's contacts as a log for 'reconstruct'.
+    """Import a session from an archive, or contacts from other sources as a contact log for 'reconstruct'.
 
-    Nothing of an archive is trusted: names, links, sizes and hashes are checked, and nothing is left of a bad one.
+    An archive's names, links, sizes and hashes are checked; nothing is kept of an invalid one.
     """
     from math import radians
 
@@ -113,4 +128,4 @@ def bring_in(
     if as_json:
         emit_json({"log": str(target), "dimension": log.dimension, "grasps": len(log.grasps), "contacts": touched})
     say(f"{count(len(log.grasps), 'grasp')} with {count(touched, 'contact')}: {target}")
-    say(f"estimate with: tactile-lab reconstruct {target} --out RESULTS")
+    say(f"next: tactile-lab reconstruct {target} --out RESULTS")

@@ -1,4 +1,4 @@
-"""``tactile-lab reconstruct``: recorded contacts through any method."""
+"""``tactile-lab reconstruct``: estimate shape and trajectory from recorded contacts."""
 
 from __future__ import annotations
 
@@ -17,31 +17,34 @@ def reconstruct(
             metavar="LOG.json|SESSION", help=f"A contact log, a session's folder, its name under --root, or {LAST}."
         ),
     ],
-    method: Annotated[Method | None, typer.Option(help=METHOD_HELP, show_default="joint, or the session's own")] = None,
+    method: Annotated[Method | None, typer.Option(help=METHOD_HELP, show_default="joint, or from the session")] = None,
     shape: Annotated[str | None, typer.Option(metavar="MODEL", help=SHAPE_HELP, show_default="auto")] = None,
     dimension: Annotated[
-        int | None, typer.Option(min=2, max=3, help="2: contour; 3: surface.", show_default="the data's")
+        int | None,
+        typer.Option(min=2, max=3, help="2: estimate a contour; 3: a surface.", show_default="from the data"),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed of the estimation.", show_default="0, or the session's")
+        int | None, typer.Option(min=0, help="Random seed of the estimation.", show_default="0, or from the session")
     ] = None,
     settings: Annotated[
-        Path | None, typer.Option(help="YAML file with parameters of the estimation, by the names in slam.json.")
+        Path | None, typer.Option(help="YAML file with estimation parameters, named as in slam.json.")
     ] = None,
     largest_sigma: Annotated[
         float | None,
-        typer.Option(metavar="MM", help="Write the parts of the shape that are known so well once more: known.ply."),
+        typer.Option(
+            metavar="MM", help="Also write the part of the shape with a standard deviation below this: known.ply."
+        ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the results.", show_default="beside the data, named by method")
+        Path | None, typer.Option(help="Folder for the results.", show_default="next to the data, named by method")
     ] = None,
     root: Root = Path("runs"),
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Estimate shape and trajectory from recorded contacts, and judge them where the truth is known.
+    """Estimate shape and trajectory from recorded contacts, and evaluate them if the ground truth is known.
 
-    The truth in a log or session is read by the evaluation alone; only known-pose is given its poses.
+    The ground truth in a log or session is used by the evaluation only, and by the method known-pose.
     """
     from tactile_lab.cli.running.progress import LiveProgress
     from tactile_lab.cli.running.results import conclude

@@ -1,4 +1,4 @@
-"""``tactile-lab session``: what was recorded, and understanding it again."""
+"""``tactile-lab session``: list, show and replay recorded sessions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tactile_lab.cli.sessions import slips as session_slips
 if TYPE_CHECKING:
     from sessions.recording.session import Session
 
-app = typer.Typer(help="Recorded sessions: list them, look at one, understand one again.", no_args_is_help=True)
+app = typer.Typer(help="Recorded sessions: list, show, replay, recover, export and import.", no_args_is_help=True)
 app.command("extract")(session_files.extract)
 app.command("export")(session_files.export)
 app.command("import")(session_files.bring_in)
@@ -41,7 +41,7 @@ def list_all(root: Root = Path("runs"), as_json: Json = False, no_input: NoInput
 
 @app.command("show")
 def show(session: SessionName, root: Root = Path("runs"), as_json: Json = False, no_input: NoInput = False) -> None:
-    """Show what a session was done with, how it ended and what it recorded."""
+    """Show a session's devices and settings, how it ended and what it recorded."""
     from sessions.recording.listing import find_session
     from tactile_lab.cli.console import emit_json
     from tactile_lab.cli.sessions.tables import show_session
@@ -58,21 +58,25 @@ def show(session: SessionName, root: Root = Path("runs"), as_json: Json = False,
 def replay(
     session: SessionName,
     root: Root = Path("runs"),
-    into: Annotated[Path | None, typer.Option(help="Folder of the new results.", show_default="SESSION/replay")] = None,
-    method: Annotated[Method | None, typer.Option(help=METHOD_HELP, show_default="the session's")] = None,
-    dimension: Annotated[int | None, typer.Option(min=2, max=3, help="2 or 3.", show_default="the session's")] = None,
+    into: Annotated[
+        Path | None, typer.Option(help="Folder for the new results.", show_default="SESSION/replay")
+    ] = None,
+    method: Annotated[Method | None, typer.Option(help=METHOD_HELP, show_default="from the session")] = None,
+    dimension: Annotated[
+        int | None, typer.Option(min=2, max=3, help="Dimension: 2 or 3.", show_default="from the session")
+    ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed of the estimation.", show_default="the session's")
+        int | None, typer.Option(min=0, help="Random seed of the estimation.", show_default="from the session")
     ] = None,
     speed: Annotated[
-        float, typer.Option(min=0.0, help="1: the original pace; 4: four times as fast; 0: as fast as possible.")
+        float, typer.Option(min=0.0, help="1: original speed; 4: four times as fast; 0: as fast as possible.")
     ] = 0.0,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Understand a session again from its raw bytes; by default the result is identical, byte for byte.
+    """Replay a session from its raw bytes; by default the result is identical, byte for byte.
 
-    A session that was killed before it had results gets them by its first replay, in its own folder of results.
+    The first replay of a session that was killed before it had results writes them to its own results folder.
     """
     from sessions.recording.listing import find_session
     from tactile_lab.cli.console import say
@@ -105,11 +109,11 @@ def recover(
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Make a whole session of one that a crash left open, or whose recording is torn; the torn one is kept.
+    """Recover a session that a crash left open or whose recording is damaged, as a new session; the damaged one is
+    kept.
 
-    Results of the torn recording stay with it, and are named; 'session replay' makes those of the new one.
-
-    Ends with exit code 3 when anything is lost, and says of which topic.
+    Results of the damaged session stay there and are listed; 'session replay' makes those of the new one. Exit code 3
+    if any data are lost, with the topics listed.
     """
     from sessions.recording.listing import session_folder
     from sessions.recording.recovery import recover
@@ -126,7 +130,7 @@ def recover(
 
 
 def _tell_identity(recorded: Session, out: Path) -> bool:
-    """Whether a replay gave the session's own results; tells people."""
+    """Whether a replay reproduced the session's results; prints the comparison."""
     from sessions.recording.manifest import installed_versions
     from tactile_lab.cli.console import say, warn
     from tactile_lab.workflow.judging import differing_files

@@ -1,4 +1,4 @@
-"""``tactile-lab session slips``: how far objects move beside the hand, by recorded sessions."""
+"""``tactile-lab session slips``: how far objects slip relative to the hand, from recorded sessions."""
 
 from __future__ import annotations
 
@@ -20,16 +20,18 @@ def slips(
     sessions: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="SESSION...", help="Sessions of one rig: folders, or names under --root.", show_default="all closed"
+            metavar="SESSION...",
+            help="Sessions of one rig: folders, or names under --root.",
+            show_default="all closed sessions",
         ),
     ] = None,
     root: Root = Path("runs"),
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Measure how far objects slip, by the marker camera, and print the 'motion' for the rig file that fits.
+    """Measure with the marker camera how far objects slip, and print matching 'motion' settings for the rig file.
 
-    A slip is what the object moved between two grasps beside the hand's own motion.
+    A slip is the object's motion between two grasps relative to the hand's motion.
     """
     from drivers.core.errors import SessionError
     from tactile_lab.cli.console import emit_json
@@ -39,8 +41,8 @@ def slips(
     measured = _measure(_choose_sessions(root, sessions))
     told = [name for name, found in measured.items() if len(found.carried) + len(found.left)]
     if not told:
-        hint = "Slips are told where the marker camera saw the object at two grasps in a row"
-        raise SessionError("no session shows a slip", where=str(root), hint=hint)
+        hint = "Slips need a marker camera that sees the object at two grasps in a row"
+        raise SessionError("slips cannot be measured in any of the sessions", where=str(root), hint=hint)
     found = Slips.join(measured.values())
     if as_json:
         emit_json(_document(found, told))
@@ -49,7 +51,7 @@ def slips(
 
 
 def _choose_sessions(root: Path, names: list[str] | None) -> list[Session]:
-    """The sessions named, or all that were closed; of one rig."""
+    """The given sessions, or all closed ones; of one rig."""
     from drivers.core.errors import ConfigurationError, SessionError
     from sessions.recording.listing import find_session, list_sessions
     from sessions.recording.session import Session
@@ -59,16 +61,16 @@ def _choose_sessions(root: Path, names: list[str] | None) -> list[Session]:
     else:
         found = [Session.open(each.folder) for each in list_sessions(root) if each.status == "closed"]
     if not found:
-        raise SessionError("holds no closed session", where=str(root), hint="Record one with: tactile-lab run")
+        raise SessionError("contains no closed session", where=str(root), hint="Record one with: tactile-lab run")
     rigs = sorted({session.manifest.rig for session in found})
     if len(rigs) > 1:
-        hint = "Name sessions of one rig, or have each rig's in a folder of its own (--root)"
+        hint = "Give sessions of one rig, or keep each rig's sessions in a separate folder (--root)"
         raise ConfigurationError(f"sessions of several rigs: {', '.join(rigs)}", where=str(root), hint=hint)
     return found
 
 
 def _measure(sessions: list[Session]) -> dict[str, Slips]:
-    """Slips of each session by its name; one that cannot be used is told and left out if there are others."""
+    """Slips of each session by its name; unusable sessions are skipped with a warning if there are others."""
     from drivers.core.errors import TactileLabError
     from tactile_lab.cli.console import warn
     from tactile_lab.workflow.measuring_slips import session_slips
@@ -80,7 +82,7 @@ def _measure(sessions: list[Session]) -> dict[str, Slips]:
         except TactileLabError as error:
             if len(sessions) == 1:
                 raise
-            warn(f"{session.manifest.name} is left out: {error}")
+            warn(f"{session.manifest.name} is skipped: {error}")
     return found
 
 
@@ -89,17 +91,21 @@ def _show(found: Slips, sessions: list[str]) -> None:
     from tactile_lab.evaluation.slips import LEAST_STEPS
 
     titles = ["the object was", "steps", "mm, rms", "mm", "°, rms", "°"]
-    rows = [_row("carried", found.carried), _row("left where it was", found.left)]
+    rows = [_row("carried", found.carried), _row("left in place", found.left)]
     title = f"Slips in {count(len(sessions), 'session')} (rms per axis; median / p90 / maximum)"
     show_table(title, titles, rows, right=(1, 2, 3, 4, 5))
     motion = found.motion
     if motion is None:
         carried = count(len(found.carried), "step")
-        say(f"the object was carried in {carried}; at least {LEAST_STEPS} are needed to tell a rig's motion", "yellow")
+        say(
+            f"the object was carried in {carried}; at least {LEAST_STEPS} are needed to estimate the rig's "
+            "motion settings",
+            "yellow",
+        )
         return
     if len(found.left) >= LEAST_STEPS:
-        say(f"pushed by the closing hand where it was to be left: {found.pushed_count(motion)} of {len(found.left)}")
-    say("in the rig file:", "bold")
+        say(f"pushed by the closing hand although left in place: {found.pushed_count(motion)} of {len(found.left)}")
+    say("for the rig file:", "bold")
     for line in ("motion:", *(f"  {name}: {value}" for name, value in _settings(motion).items())):
         say(line)
 
@@ -118,7 +124,7 @@ def _row(name: str, slips: Array) -> tuple[str, ...]:
 
 
 def _settings(motion: MotionNoise) -> dict[str, float]:
-    """As one writes them."""
+    """In plain notation."""
     return {name: float(f"{value:.2g}") for name, value in motion.model_dump().items()}
 
 

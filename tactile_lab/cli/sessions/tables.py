@@ -17,11 +17,11 @@ from tactile_lab.cli.console import say, show_facts, show_table, warn
 
 NEVER_CLOSED = "open: still running, or killed before it was closed"
 _FLAGS = {"truncated": "the file ends too early", "traffic_cut_short": "the recording was cut short"}
-"""Losses that are there or not, and have no number."""
+"""Losses without a count."""
 
 
 def show_sessions(root: Path, summaries: Sequence[SessionSummary]) -> None:
-    """A line a session; problems below the table, where there is room for them."""
+    """One line per session; problems are listed below the table."""
     rows = [
         (
             summary.folder.name,
@@ -41,21 +41,21 @@ def show_sessions(root: Path, summaries: Sequence[SessionSummary]) -> None:
 
 
 def _status_cell(summary: SessionSummary) -> str:
-    """Status, whether something was lost, and how it was made of another session where the status does not say it."""
+    """Status, data loss, and how the session was derived from another one if the status does not say it."""
     made = [how for how in summary.derived if how != summary.status]
     return ", ".join([summary.status + (" !" if summary.data_loss else ""), *made])
 
 
 def tell_left_open(root: Path) -> None:
-    """Say which sessions a crash left open, so that nobody forgets them."""
+    """List the sessions that a crash left open."""
     for summary in left_open(root):
         warn(f"{summary.folder.name}: {summary.problem}")
 
 
 def show_recovery(recovery: Recovery) -> None:
-    """What was brought back of each topic and what was not."""
+    """Recovered and lost messages of each topic."""
     if recovery.folder is None:
-        say(f"{recovery.source} is closed and whole: nothing to recover")
+        say(f"{recovery.source} is closed and complete: nothing to recover")
         return
     rows = [
         (
@@ -71,8 +71,8 @@ def show_recovery(recovery: Recovery) -> None:
     show_table(f"Recovered from {recovery.source}", titles, rows, right=(1, 2, 3, 4))
     say(f"session  {recovery.folder}")
     if recovery.left_out:
-        kept = f"results of the torn recording stay with it ({', '.join(recovery.left_out)})"
-        say(f"{kept}; new ones: tactile-lab session replay {recovery.folder}", "yellow")
+        kept = f"results of the damaged session stay there ({', '.join(recovery.left_out)})"
+        say(f"{kept}; make new ones with: tactile-lab session replay {recovery.folder}", "yellow")
     if recovery.lossy:
         warn(f"lost: {recovery.loss.describe()}")
     else:
@@ -92,7 +92,7 @@ def recovery_document(recovery: Recovery) -> dict[str, Any]:
 
 
 def show_session(session: Session) -> None:
-    """What a session was done with, how it ended and what it recorded."""
+    """A session's devices and settings, how it ended and what it recorded."""
     manifest = session.manifest
     slam = manifest.settings.get("slam")
     estimation = slam if isinstance(slam, dict) else {}
@@ -124,12 +124,12 @@ def show_session(session: Session) -> None:
 
 
 def losses_in_words(data_loss: Mapping[str, int]) -> str:
-    """What a session lost: how much of each kind."""
+    """Data losses of a session by kind."""
     return ", ".join(_FLAGS.get(kind, f"{number} {kind.replace('_', ' ')}") for kind, number in data_loss.items())
 
 
 def _calibration(manifest: Manifest) -> str:
-    """Each file with the beginning of its hash."""
+    """Each file with the first characters of its hash."""
     copies = list(manifest.calibration.values())
     width = max((len(copy.file) for copy in copies), default=0)
     return "\n".join(f"{copy.file:<{width}}  {copy.sha256[:12]}" for copy in copies)
@@ -144,7 +144,7 @@ def _status(manifest: Manifest) -> str:
 
 
 def _moment(iso: str | None) -> str:
-    """A time as people write it; as it stands where it is none."""
+    """A time in readable form; other text unchanged."""
     try:
         return "" if iso is None else f"{datetime.fromisoformat(iso):%Y-%m-%d %H:%M:%S %Z}"
     except ValueError:
@@ -160,4 +160,4 @@ def _grasps(manifest: Manifest) -> str:
 
 def _messages(manifest: Manifest) -> str:
     topics = [number for name, number in manifest.counts.items() if name.startswith("/")]
-    return f"{sum(topics)} messages of {len(topics)} topics" if topics else "not counted"
+    return f"{sum(topics)} messages on {len(topics)} topics" if topics else "not counted"

@@ -14,15 +14,16 @@ from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port
 def view(
     session: SessionName,
     root: Root = Path("runs"),
-    speed: Annotated[float, typer.Option(min=0.0, help="Times the session's own pace; 0: its end, at once.")] = 0.0,
+    speed: Annotated[
+        float, typer.Option(min=0.0, help="Playback speed as a multiple of real time; 0: jump to the end.")
+    ] = 0.0,
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
     token: Token = "",
 ) -> None:
-    """Show a recorded session in the browser, or follow one that is running, until Ctrl+C.
+    """Show a recorded session in the browser, or follow a running one, until Ctrl+C.
 
-    Reading disturbs nobody: a running session does not know that it is watched. Its buttons are on the page of
-    ``tactile-lab run --view``.
+    Viewing does not affect a running session. To control one, use ``tactile-lab run --view``.
     """
     from drivers.core.clock import MonotonicClock
     from sessions.recording.listing import find_session

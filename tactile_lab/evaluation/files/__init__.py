@@ -1,1 +1,1 @@
-"""The files of a folder of results."""
+"""The files of a results folder."""

@@ -1,4 +1,4 @@
-"""Meshes from and to files: truth meshes in, estimated surfaces with their uncertainty out."""
+"""Mesh files: reads true meshes, writes estimated surfaces with their uncertainty."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
 SMALLEST_EXTENT_m, LARGEST_EXTENT_m = 0.005, 1.0
-"""A hand cannot explore objects outside this range; a mesh outside it is in other units."""
+"""A hand cannot explore objects outside this range; such a mesh must be in other units."""
 
 COLOUR_RANGE_m = 0.010
-"""Standard deviation at the bright end of the colour scale; the same for all meshes, so that they compare."""
+"""Standard deviation at the bright end of the colour scale; the same for all meshes, so that they can be compared."""
 
 _COLOURS = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37)], dtype=float)
 """Viridis, dark (certain) to bright (uncertain)."""
@@ -27,8 +27,8 @@ def read_mesh(path: Path | str) -> trimesh.Trimesh:
     """Read a closed mesh in metres (PLY, STL, OBJ, GLB); equal vertices are merged, faces turned outward.
 
     Raises:
-        ShapeError: missing or unreadable file, no faces, coordinates that are not numbers, not closed, or a
-            size that no hand could explore.
+        ShapeError: missing or unreadable file, no faces, coordinates that are not numbers, not closed, or an
+        implausible size.
     """
     mesh = _load(Path(path))
     if len(mesh.faces) == 0:
@@ -99,7 +99,7 @@ def _load(path: Path) -> trimesh.Trimesh:
         raise ShapeError(
             f"cannot be read as a mesh ({type(error).__name__}: {error})",
             where=str(path),
-            hint="PLY, STL, OBJ and GLB files are understood",
+            hint="Supported formats are PLY, STL, OBJ and GLB",
         ) from error
 
 

@@ -24,7 +24,7 @@ def plain(value: Any) -> Any:
     4 x 4 (3 x 3) matrices row by row; NaN and infinity become null.
 
     Raises:
-        TypeError: a type that has no plain form.
+        TypeError: a type that cannot be converted.
     """
     if value is None or isinstance(value, bool | int | str):
         return value.value if isinstance(value, Enum) else value
@@ -50,7 +50,7 @@ def _plain_object(value: Any) -> Any:
         return plain(value.value)
     if is_dataclass(value):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-    raise TypeError(f"no plain form for {type(value).__name__}")
+    raise TypeError(f"cannot convert {type(value).__name__} to plain data")
 
 
 def json_text(value: Any) -> str:
@@ -62,7 +62,7 @@ def read_json_object(path: Path, *, hint: str) -> dict[str, Any]:
     """Read a JSON object.
 
     Raises:
-        SessionError: the file is missing, unreadable or not a JSON object; ``hint`` says what to do.
+        SessionError: the file is missing, unreadable or not a JSON object; ``hint`` tells the user what to do.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -71,5 +71,5 @@ def read_json_object(path: Path, *, hint: str) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise SessionError(f"is not readable JSON ({error})", where=str(path), hint=hint) from error
     if not isinstance(content, dict):
-        raise SessionError("does not hold a JSON object", where=str(path), hint=hint)
+        raise SessionError("does not contain a JSON object", where=str(path), hint=hint)
     return content

@@ -1,4 +1,4 @@
-"""The files a session's SLAM leaves in ``results/``.
+"""The files that a session's SLAM writes to ``results/``.
 
 ==================  ===============================================================================
 ``trajectory.csv``  stamp and 16 entries of ``world_T_object`` a grasp; empty where not placed
@@ -11,7 +11,7 @@
 ``timing.json``     seconds a step: the only file that two runs of one session do not share
 ==================  ===============================================================================
 
-All but ``timing.json`` are functions of the result: the same result gives the same bytes.
+All except ``timing.json`` depend on the result only: the same result gives the same bytes.
 """
 
 from __future__ import annotations
@@ -43,14 +43,15 @@ def write_results(
     settings: Mapping[str, Any] | None = None,
     largest_sigma_m: float | None = None,
 ) -> list[Path]:
-    """Write all result files of one SLAM run; the files written, in the order of the table above.
+    """Write all result files of one SLAM run. Returns the files written, in the order of the table above.
 
     Args:
-        folder: the session's ``results/`` folder, made when absent.
+        folder: the session's ``results/`` folder, created if missing.
         result: the finished run.
-        grasps: the grasps it was made from, in order.
-        settings: the SLAM settings, kept in ``slam.json``.
-        largest_sigma_m: write what is known so well once more, apart; None for not.
+        grasps: its grasps, in order.
+        settings: the SLAM settings, stored in ``slam.json``.
+        largest_sigma_m: also write the part of the shape with a standard deviation below this to a separate file; None:
+            do not.
 
     Raises:
         WriteError: the folder cannot be written.
@@ -96,8 +97,8 @@ def _write_known_mesh(folder: Path, result: SlamResult, largest_sigma_m: float |
 def upright_contour(result: SlamResult, grasps: Sequence[Grasp]) -> SurfaceMesh | None:
     """The contour extruded from the table to the highest contact, in the object frame; None without a contour.
 
-    A planar session feels no top; the highest contact is the height the object is known to reach. A contact log of the
-    plane has no heights, and gets no solid.
+    A planar session does not measure the top; the highest contact is the known height of the object. A planar contact
+    log has no heights, and gets no solid.
     """
     heights = np.concatenate([grasp.points_world_m[:, 2] for grasp in grasps] or [np.zeros(0)])
     placed = next((pose for pose in result.world_T_object if pose is not None), None)
@@ -111,7 +112,7 @@ def upright_contour(result: SlamResult, grasps: Sequence[Grasp]) -> SurfaceMesh 
 
 
 def _ring_with_sigma(contour: Contour) -> tuple[Array, Array]:
-    """The contour as ``contour.csv`` has it, with the standard deviation at each point."""
+    """The contour as in ``contour.csv``, with the standard deviation at each point."""
     ring = open_ring(contour.points_m)
     nearest = np.argmin(np.sum((ring[:, None] - contour.points_m[None]) ** 2, axis=2), axis=1)
     return ring, contour.sigma_m[nearest]
@@ -144,7 +145,7 @@ def _slam_record(result: SlamResult, settings: Mapping[str, Any]) -> dict[str, A
 
 
 def _sigma_quantiles(result: SlamResult) -> Array | None:
-    """Standard deviation of the contour or surface, from its smallest to its largest, in hundredths."""
+    """Standard deviation of the contour or surface, as percentiles from smallest to largest."""
     shape = result.contour if result.contour is not None else result.mesh
     return None if shape is None else np.quantile(shape.sigma_m, np.linspace(0.0, 1.0, 101))
 

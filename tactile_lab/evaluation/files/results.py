@@ -1,4 +1,4 @@
-"""The results of a SLAM run as evaluation and report read them back from ``results/``."""
+"""Reads the results of a SLAM run from ``results/``, for evaluation and report."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tactile_lab.evaluation.trajectory import Trajectory, read_trajectory
 
 @dataclass(frozen=True)
 class Results:
-    """What evaluation and report read back from ``results/``."""
+    """The results of a SLAM run."""
 
     trajectory: Trajectory
     contacts: tuple[ContactRows, ...]
@@ -27,7 +27,7 @@ class Results:
 
     @property
     def sigma_quantiles_m(self) -> Array | None:
-        """Standard deviation over the contour or surface, every hundredth of it; None without a shape."""
+        """Standard deviation over the contour or surface as percentiles; None without a shape."""
         quantiles = self.slam.get("sigma_quantiles_m")
         return None if quantiles is None else np.array(quantiles, dtype=float)
 
@@ -38,10 +38,10 @@ class Results:
 
 
 def read_results(folder: Path) -> Results:
-    """Read ``results/`` back.
+    """Read ``results/``.
 
     Raises:
-        SessionError: a file is missing or not as :func:`write_results` leaves it.
+        SessionError: a file is missing or not as :func:`write_results` writes it.
     """
     trajectory = read_trajectory(folder / "trajectory.csv")
     slam = read_json_object(folder / "slam.json", hint=RERUN)

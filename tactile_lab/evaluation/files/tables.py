@@ -1,4 +1,4 @@
-"""Contacts and contours as CSV: forms that a spreadsheet and ten lines of any language can read."""
+"""Contacts and contours as CSV, for spreadsheets and other programs."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ CONTACT_COLUMNS = (
     *("grasp", "stamp_s", "finger", "x_world_m", "y_world_m", "z_world_m"),
     *("normal_x_world", "normal_y_world", "normal_z_world", "point_sigma_m", "normal_sigma_rad", "force_N"),
 )
-RERUN = "Run the session or replay it to write its results"
+RERUN = "Replay the session to write its results"
 
 
 @dataclass(frozen=True)
 class ContactRows:
-    """The contacts of one grasp as ``contacts.csv`` keeps them, world frame.
+    """The contacts of one grasp as in ``contacts.csv``, world frame.
 
     Attributes:
-        fingers: names, one a contact.
+        fingers: names, one per contact.
         points_world_m: shape (n, 3).
         normals_world: shape (n, 3), pointing out of the object.
         point_sigma_m: shape (n,), root mean variance of the point over the three axes.
@@ -68,10 +68,10 @@ def _csv_text(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def read_contacts(path: Path, grasp_count: int) -> tuple[ContactRows, ...]:
-    """Read ``contacts.csv``: one entry a grasp, in order.
+    """Read ``contacts.csv``: one entry per grasp, in order.
 
     Raises:
-        SessionError: the file is missing or not in the form of :func:`contacts_text`.
+        SessionError: the file is missing or not in the format of :func:`contacts_text`.
     """
     grasps: list[list[list[str]]] = [[] for _ in range(grasp_count)]
     for number, row in enumerate(_read_csv(path, CONTACT_COLUMNS), start=2):
@@ -111,7 +111,7 @@ def read_contour(path: Path) -> Array:
     try:
         return np.array([[float(x), float(y)] for x, y in _read_csv(path, ("x_m", "y_m"))]).reshape(-1, 2)
     except ValueError as error:
-        raise SessionError(f"does not hold two numbers a line ({error})", where=str(path), hint=RERUN) from error
+        raise SessionError(f"does not have two numbers per line ({error})", where=str(path), hint=RERUN) from error
 
 
 def _read_csv(path: Path, columns: Sequence[str]) -> list[list[str]]:

@@ -1,1 +1,1 @@
-"""Where the object truly was, by the marker camera."""
+"""Ground truth of the object's pose from the marker camera."""

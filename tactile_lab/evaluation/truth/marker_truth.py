@@ -1,8 +1,8 @@
-"""Where the object was by the marker camera, recomputed from what was recorded of it.
+"""The object's true poses, recomputed from the recorded marker camera.
 
-The recording holds the corners of every frame as they were found, and the pictures that were asked for. So the truth
-can be computed again with another lens or other markers from the corners, or with another detection from the pictures.
-The world marker is averaged over the whole session first, as far as it stood still; then every grasp's frame is judged.
+The recording contains the detected corners of every frame, and the requested pictures. So the truth can be computed
+again with another lens or other markers from the corners, or with another detector from the pictures. First the world
+marker is averaged over the session while it stood still; then every grasp's frame is evaluated.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ Basis = Literal["corners", "pictures"]
 
 @dataclass
 class TruthReport:
-    """What the marker camera was worth, for people.
+    """Quality of the marker camera's truth, for people.
 
     Attributes:
         basis: computed from recorded corners, or from the pictures again.
         frames: frames of the recording.
-        world_frames: those in the mean of the world marker.
+        world_frames: frames averaged for the world marker.
         world_reprojection_px: error of that mean.
-        refused: reasons and how many of the frames asked for had to be refused for each.
-        position_sigma_mm, yaw_sigma_deg: largest standard deviation of a pose that was given; None without one.
+        refused: number of rejected frames by reason.
+        position_sigma_mm, yaw_sigma_deg: largest standard deviation of a pose; None without poses.
     """
 
     basis: Basis
@@ -46,18 +46,18 @@ class TruthReport:
     yaw_sigma_deg: float | None = None
 
     def note(self, sighting: ObjectSighting) -> None:
-        """Take the uncertainty of one more pose."""
+        """Include the uncertainty of another pose."""
         self.position_sigma_mm = max(self.position_sigma_mm or 0.0, 1e3 * sighting.position_sigma_m)
         self.yaw_sigma_deg = max(self.yaw_sigma_deg or 0.0, 57.29578 * sighting.yaw_sigma_rad)
 
 
 class MarkerTruth:
-    """Finds the object in recorded datagrams of the camera; called with one, it gives ``world_T_object`` or None.
+    """Finds the object in recorded datagrams of the camera; called with one, it returns ``world_T_object`` or None.
 
     Args:
         lens, markers: the calibration to use.
-        recorded: all datagrams of the camera, for the world marker; each is looked at once.
-        basis: from the corners as they were found then, or from the pictures again.
+        recorded: all datagrams of the camera, for the world marker; each is read once.
+        basis: from the recorded corners, or from the pictures again.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class MarkerTruth:
             self.report.world_reprojection_px = self._tracker.world.reprojection_px()
 
     def __call__(self, datagram: Datagram) -> Pose3 | None:
-        """The object's pose in one frame; None where it cannot be told, counted under its reason."""
+        """The object's pose in one frame; None if it cannot be determined, counted by reason."""
         sighting = self.sighting(datagram)
         return None if sighting is None else sighting.world_T_object
 

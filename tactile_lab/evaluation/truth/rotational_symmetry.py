@@ -1,9 +1,9 @@
-"""Turns of an object about its own vertical axis that leave it as it is: no contact can tell them.
+"""Rotations of an object about its vertical axis that leave it unchanged, so that no contact can distinguish them.
 
-A cylinder that was turned by 20 degrees between two grasps feels as before, and so does a hexagonal prism after a sixth
-of a turn. A method cannot follow such turns, and is not judged by them: its poses are turned towards the true heading
-before contacts are compared. A sixth of a turn is three slips of full motion noise; a box, which a half turn leaves as
-it is, has to be followed.
+A cylinder rotated by 20 degrees between two grasps feels the same, and so does a hexagonal prism after a sixth of a
+turn. A method cannot follow such rotations, and is not evaluated by them: its poses are rotated towards the true
+heading before contacts are compared. A sixth of a turn is three times the motion noise; a box, with its symmetry of
+half a turn, must be followed.
 """
 
 from __future__ import annotations
@@ -21,18 +21,19 @@ ANY_TURN = 0
 _FEWEST = 6
 _MOST = 12
 _SOME_TURNS_rad = np.deg2rad([7.0, 20.0, 45.0, 77.0, 131.0])
-"""None of them takes a prism of up to twelve sides to itself."""
+"""None of these rotations maps a prism of up to twelve sides to itself."""
 _ALIKE_m = 0.001
-"""As far as a fingertip can tell places apart: a dented can is round."""
+"""Resolution of a fingertip: a dented can is round."""
 _POINTS = 1000
 _UPRIGHT = 1e-3
 
 
 def symmetry_turns(mesh: trimesh.Trimesh) -> int | None:
-    """How many turns of a full one about its frame's z axis leave an object as it is, to a millimetre RMS.
+    """Order of an object's rotational symmetry about its frame's z axis, to a millimetre RMS.
 
     Returns:
-        :data:`ANY_TURN` for a round object, a number from 6 on, or None for an object whose turns can be told.
+        :data:`ANY_TURN` for a round object, a number from 6 on, or None for an object whose rotations can be
+        distinguished.
     """
     points = sample_mesh(mesh, _POINTS)
 
@@ -46,15 +47,15 @@ def symmetry_turns(mesh: trimesh.Trimesh) -> int | None:
 
 
 def modulo_symmetry(estimate: Poses, world_T_object: Poses, turns: int | None) -> tuple[Pose3 | None, ...]:
-    """Estimated poses, turned about the object's axis towards the heading it truly has.
+    """Estimated poses, rotated about the object's axis towards the true heading.
 
-    The axis in the estimated object frame is where the estimates place the true axis, in the mean over all grasps. An
-    object that does not always stand upright is left alone.
+    The axis in the estimated object frame is the true axis as placed by the estimates, averaged over all grasps. Poses
+    of an object that does not always stand upright are unchanged.
 
     Args:
-        estimate: estimated poses, None where there is none.
-        world_T_object: true poses, None where unknown.
-        turns: see :func:`symmetry_turns`; None leaves the poses as they are.
+        estimate: estimated poses, None if unknown.
+        world_T_object: true poses, None if unknown.
+        turns: see :func:`symmetry_turns`; None leaves the poses unchanged.
     """
     known = zip(estimate, world_T_object, strict=True)
     pairs = [(pose, truth) for pose, truth in known if pose is not None and truth is not None]
@@ -72,7 +73,7 @@ def modulo_symmetry(estimate: Poses, world_T_object: Poses, turns: int | None) -
 
 
 def _nearest_turn(estimated: Rot3, true: Rot3, turns: int) -> Rot3:
-    """The rotation that looks like the estimated one and is nearest to the true one."""
+    """The rotation equivalent to the estimated one that is nearest to the true one."""
     if turns == ANY_TURN:
         return true
     step_rad = 2 * np.pi / turns

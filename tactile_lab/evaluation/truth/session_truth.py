@@ -22,10 +22,10 @@ from tactile_lab.evaluation.files.mesh_io import read_mesh
 from tactile_lab.evaluation.judged import Truth
 
 TRUTH_TRAJECTORY = "truth.csv"
-"""The true poses in ``results/``, in the form of ``trajectory.csv``."""
+"""The true poses in ``results/``, in the format of ``trajectory.csv``."""
 
 Look = Callable[[Datagram], Pose3 | None]
-"""Finds the object in one recorded camera datagram: ``world_T_object``, or None where it is not seen."""
+"""Finds the object in one recorded camera datagram: ``world_T_object``, or None if it is not seen."""
 
 
 def session_truth(session: Session, grasp_count: int, look: Look | None, traffic: TrafficReader | None = None) -> Truth:
@@ -35,10 +35,10 @@ def session_truth(session: Session, grasp_count: int, look: Look | None, traffic
         session: the recorded session.
         grasp_count: number of grasps.
         look: the marker detector; None for a rig without a camera.
-        traffic: reader of the session's traffic, for a caller who asks it afterwards what was lost.
+        traffic: reader of the session's traffic, for a caller who needs its losses afterwards.
 
     Raises:
-        SessionError: the traffic file or a mark in it cannot be read.
+        SessionError: the traffic file or a session event in it cannot be read.
         ShapeError: the mesh cannot be used.
     """
     pictures = {} if look is None else marked_pictures((traffic or session.traffic()).messages())
@@ -47,15 +47,15 @@ def session_truth(session: Session, grasp_count: int, look: Look | None, traffic
 
 
 def read_truth_mesh(session: Session) -> trimesh.Trimesh | None:
-    """The object's own mesh, None where the session has none. Raises ShapeError."""
+    """The object's mesh, None if the session has none. Raises ShapeError."""
     return None if session.truth_mesh is None else read_mesh(session.truth_mesh)
 
 
 def marked_pictures(messages: Iterable[TrafficMessage]) -> dict[int, Datagram]:
-    """The camera's datagram that was marked as truth for each grasp.
+    """The camera datagram that shows the truth of each grasp.
 
-    An event means the newest picture since the last mark, and the grasp whose capture is open, else the last one;
-    the first picture of a grasp counts.
+    A session event refers to the newest picture since the last event, and to the grasp being captured, otherwise the
+    last one; the first picture of a grasp counts.
     """
     found: dict[int, Datagram] = {}
     picture: Datagram | None = None
@@ -76,7 +76,7 @@ def marked_pictures(messages: Iterable[TrafficMessage]) -> dict[int, Datagram]:
 
 
 def _better(before: Datagram | None, now: Datagram) -> Datagram:
-    """The newest frame with a picture in it; without any, the newest with corners alone."""
+    """The newest frame with a picture; if there is none, the newest with corners only."""
     return now if before is None or picture_of(now.payload) or not picture_of(before.payload) else before
 
 
@@ -88,13 +88,13 @@ def camera_datagrams(messages: Iterable[TrafficMessage]) -> Iterator[Datagram]:
 
 
 class _GraspCounter:
-    """Numbers the grasps as perception does: one for every capture that was ended and not taken back."""
+    """Numbers the grasps as perception does: one for every completed capture that was not undone."""
 
     def __init__(self) -> None:
         self.finished, self._is_open = 0, False
 
     def take(self, kind: EventKind) -> None:
-        """Follow one mark."""
+        """Process one session event."""
         if kind is EventKind.CAPTURE_BEGIN:
             self._is_open = True
         elif kind is EventKind.CAPTURE_END:

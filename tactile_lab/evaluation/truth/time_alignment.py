@@ -1,8 +1,8 @@
-"""How far the camera's stamps are behind the hand's, from the object's motion while the hand holds it.
+"""Offset between the stamps of camera and hand, from the object's motion while the hand holds it.
 
-While it is held the object goes with the palm. With the right offset its place in the palm's frame is the same in
-every picture of one hold; with a wrong one it wanders, the more the faster the hand moves. The offset is the one with
-the least wandering, its standard deviation comes from how sharp that least is.
+A held object moves with the palm. With the correct offset its position in the palm's frame is the same in every picture
+of a hold; with a wrong one it varies, the more the faster the hand moves. The offset minimizes this variation; its
+standard deviation follows from the curvature at the minimum.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from scipy.spatial.transform import Rotation, Slerp
 from drivers.core.contacts import Array
 
 _RANGES_s, _STEP_s = (0.3, 0.15), 0.005
-"""How far offsets are looked for, larger first: pictures so near to the ends of a hold have to be left out."""
+"""Search ranges of the offset, larger first: pictures this close to the ends of a hold are left out."""
 _FEWEST, _LEAST_MOTION_m = 8, 0.005
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Poses over time: stamps (n,) in seconds, places (n, 3) in metres, rotation matrices (n, 3, 3); world frame."""
+    """Poses over time: stamps (n,) in seconds, positions (n, 3) in metres, rotation matrices (n, 3, 3); world frame."""
 
     stamps_s: Array
     places_m: Array
@@ -32,13 +32,13 @@ class Track:
 
 @dataclass(frozen=True)
 class ClockOffset:
-    """What is known of the offset.
+    """The estimated offset.
 
     Attributes:
-        offset_ms: add it to a camera stamp to get the hand's time of the same moment; None where it cannot be known.
+        offset_ms: add it to a camera stamp to get the hand's time of the same moment; None if it cannot be determined.
         sigma_ms: its standard deviation.
-        pictures: pictures of the moving object that it was found from.
-        reason: why it cannot be known, "" otherwise.
+        pictures: number of pictures of the moving object used.
+        reason: why it cannot be determined, "" otherwise.
     """
 
     offset_ms: float | None
@@ -51,7 +51,7 @@ def clock_offset(palm: Track, stamps_s: Array, places_m: Array, holds_s: Sequenc
     """The offset between a camera's clock and the hand's.
 
     Args:
-        palm: the hand's own track.
+        palm: the hand's trajectory.
         stamps_s, places_m: the object as the camera saw it, shapes (n,) and (n, 2): x and y in the world.
         holds_s: begin and end of each stretch in which the hand held the object.
     """
@@ -64,7 +64,7 @@ def clock_offset(palm: Track, stamps_s: Array, places_m: Array, holds_s: Sequenc
     if count < _FEWEST:
         return ClockOffset(None, None, count, f"{count} pictures of the moving object, {_FEWEST} are needed")
     if max(float(np.ptp(places_m[rows], axis=0).max()) for rows in groups) < _LEAST_MOTION_m:
-        return ClockOffset(None, None, count, "the object hardly moved while it was held")
+        return ClockOffset(None, None, count, "the object moved too little while it was held")
     offsets = np.arange(-range_s, range_s + _STEP_s / 2, _STEP_s)
     costs = np.array([_wandering(palm, stamps_s, places_m, groups, offset) for offset in offsets])
     best = int(np.argmin(costs))
@@ -80,7 +80,7 @@ def clock_offset(palm: Track, stamps_s: Array, places_m: Array, holds_s: Sequenc
 def _piece(
     palm: Track, stamps_s: Array, places_m: Array, hold_s: tuple[float, float], range_s: float
 ) -> NDArray[np.intp]:
-    """Rows of the pictures inside one hold, as far as the palm is known around them."""
+    """Indices of the pictures inside one hold for which the palm's pose is known."""
     low = max(hold_s[0], palm.stamps_s[0]) + range_s
     high = min(hold_s[1], palm.stamps_s[-1]) - range_s
     return np.flatnonzero((stamps_s >= low) & (stamps_s <= high) & np.isfinite(places_m).all(axis=1))
@@ -89,7 +89,7 @@ def _piece(
 def _wandering(
     palm: Track, stamps_s: Array, places_m: Array, groups: Sequence[NDArray[np.intp]], offset_s: float
 ) -> float:
-    """Sum of squared distances of the object from its mean place in the palm's frame, over all holds."""
+    """Sum of squared distances of the object from its mean position in the palm's frame, over all holds."""
     total = 0.0
     for rows in groups:
         turns, places = _at(palm, stamps_s[rows] + offset_s)
@@ -104,7 +104,7 @@ def _wandering(
 
 
 def _at(palm: Track, stamps_s: Array) -> tuple[Array, Array]:
-    """Rotations and places of the palm between its samples."""
+    """Rotations and positions of the palm, interpolated between its samples."""
     inside = np.clip(stamps_s, palm.stamps_s[0], palm.stamps_s[-1])
     places = np.column_stack([np.interp(inside, palm.stamps_s, palm.places_m[:, axis]) for axis in range(3)])
     return Slerp(palm.stamps_s, Rotation.from_matrix(palm.rotations))(inside).as_matrix(), places

@@ -51,8 +51,8 @@ def outline(shape: str) -> Array:
         ConfigurationError: no such shape.
     """
     if shape not in OUTLINES_m:
-        hint = f"Shapes are {', '.join(OUTLINES_m)}"
-        raise ConfigurationError(f"no planar shape called {shape!r}", where="shape", hint=hint)
+        hint = f"Available shapes: {', '.join(OUTLINES_m)}"
+        raise ConfigurationError(f"there is no planar shape {shape!r}", where="shape", hint=hint)
     return OUTLINES_m[shape]
 
 

@@ -82,7 +82,7 @@ def solid(name: str) -> Solid:
     if name in CATALOGUE:
         return Solid(name, object_model(name).mesh)
     known = ", ".join([*SOLIDS, *CATALOGUE, *(YCB_PREFIX + ycb for ycb in (*YCB_NAMES, *MORE_YCB_NAMES))])
-    raise ConfigurationError(f"no solid called {name!r}", where="shape", hint=f"Solids are {known}")
+    raise ConfigurationError(f"there is no solid {name!r}", where="shape", hint=f"Available solids: {known}")
 
 
 def ycb_path(name: str) -> Path:
@@ -93,8 +93,8 @@ def ycb_path(name: str) -> Path:
     """
     folder = os.environ.get(DATA_VARIABLE)
     if not folder:
-        hint = f"Set {DATA_VARIABLE} to the folder that holds ycb_meshes"
-        raise ConfigurationError(f"the mesh of {YCB_PREFIX}{name} is not known", where=DATA_VARIABLE, hint=hint)
+        hint = f"Set {DATA_VARIABLE} to the folder that contains ycb_meshes"
+        raise ConfigurationError(f"the mesh of {YCB_PREFIX}{name} is missing", where=DATA_VARIABLE, hint=hint)
     path = Path(folder) / "ycb_meshes" / f"ycb_{name}.ply"
     if not path.is_file():
         raise ConfigurationError(

@@ -151,8 +151,8 @@ class StoredResult:
                 raise ValueError(f"format {found['format']!r}")
             return cls(found["name"], found["sentence"], tuple(map(Part.from_json, found["parts"])))
         except (OSError, ValueError, KeyError, TypeError) as error:
-            hint = "Take it from the repository again, or store the result anew"
-            raise SessionError(f"is no stored result ({error!r})", where=str(file), hint=hint) from error
+            hint = "Restore it from the repository, or store the result again"
+            raise SessionError(f"is not a stored result ({error!r})", where=str(file), hint=hint) from error
 
     def write(self, folder: Path) -> Path:
         """Write the file ``NAME.json`` into a folder and give its path. Raises WriteError."""

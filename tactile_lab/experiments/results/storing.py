@@ -28,8 +28,8 @@ def store(docs: Path, name: str, sentence: str, part: Part, *, forget: bool = Fa
     """
     folder = docs / RESULTS / DATA
     if not folder.is_dir():
-        hint = "Work in the folder of the repository, or name its documents with --docs"
-        raise SessionError("has no stored results", where=str(docs), hint=hint)
+        hint = "Run the command in the repository, or give its documentation folder with --docs"
+        raise SessionError("contains no stored results", where=str(docs), hint=hint)
     file = folder / f"{name}.json"
     before = StoredResult.read(file).parts if file.is_file() and not forget else ()
     return StoredResult(name, sentence, combine(part, before)).write(folder)

@@ -11,7 +11,6 @@ import os
 import random
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from collections import Counter
@@ -21,6 +20,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from drivers.core.child_process import child_command, child_environment
 from drivers.core.errors import SessionError
 from sessions.recording.recovery import recover
 from sessions.recording.session import Session
@@ -138,15 +138,9 @@ class _Load:
         self.settings, self.told = settings, ""
         self._root, self._status = folder / "disk", folder / "status"
         self._root.mkdir(exist_ok=True)
-        words = [
-            sys.executable,
-            "-m",
-            "tactile_lab.experiments.data.recorder_load",
-            self._root,
-            self._status,
-            json.dumps(asdict(settings)),
-        ]
-        self.process = subprocess.Popen(list(map(str, words)), stderr=subprocess.PIPE, text=True)
+        words = (str(self._root), str(self._status), json.dumps(asdict(settings)))
+        command = child_command("tactile_lab.experiments.data.recorder_load", *words)
+        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=child_environment())
 
     def wait_for_tick(self, tick: int) -> None:
         """Return once so many milliseconds of load are recorded. Raises SessionError."""

@@ -12,7 +12,7 @@ from drivers.core.calibration_file import is_stored
 from drivers.core.configuration import load
 from tactile_lab.rigs.checks.findings import Finding
 
-_PLAIN = "plain figures, of unknown age"
+_PLAIN = "plain values of unknown age"
 
 
 def check_calibrations(files: Mapping[str, Path], here: Installation) -> list[Finding]:
@@ -60,6 +60,6 @@ def _age(file: Path, now: datetime) -> tuple[str, dict[str, float | str]]:
         return _PLAIN, {}
     record = read_record(file)
     days = (now - record.created).total_seconds() / 86400.0
-    until = "for ever" if record.valid_until_utc is None else f"until {record.valid_until_utc}"
+    until = "no expiry" if record.valid_until_utc is None else f"until {record.valid_until_utc}"
     told = {"valid_until_utc": record.valid_until_utc or "", "verdict": record.verdict}
     return f"{days:.1f} days old, valid {until}, {record.method}", {"age_days": days, **told}

@@ -60,7 +60,7 @@ def check_rig(name: str, seed: int = 0, *, move: bool = False) -> list[Finding]:
 
 def _refuse_to_move(name: str, move: bool) -> None:
     if move:
-        raise ConfigurationError("has no real motors to move", where=name, hint="Leave --move out")
+        raise ConfigurationError("has no real motors to move", where=name, hint="Omit --move")
 
 
 def _fingertip_rig(rig: FingertipRig) -> list[Finding]:

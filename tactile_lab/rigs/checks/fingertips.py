@@ -94,7 +94,7 @@ def _noise_problem(tip: Nano17, usable: Array) -> list[str]:
     allowed = _NOISY * np.repeat([known.force_sigma_N, known.moment_sigma_Nm], 3)
     if np.all(noise <= allowed):
         return []
-    return ["noisier than its calibration says: is it touched, or is a cable loose?"]
+    return ["noisier than its calibration says: is it being touched, or is a cable loose?"]
 
 
 def _other_baud(rig: FingertipRig, finger: str, clock: Clock) -> str:

@@ -28,7 +28,9 @@ _ONCE = -2.0  # in the words of motor_data_polling.yaml
 _COUNTS = range(1, 4095)
 _JOINT_CHANNELS = 26
 _HALTED = "halted, no demand for 20 ms"  # the hand goes on: it knows that it made a pause
-_PAUSED = "the cycle paused until motors halted: close other programs, or permit real-time scheduling (limits.conf)"
+_PAUSED = (
+    "the cycle paused so long that motors halted: close other programs, or permit real-time scheduling (limits.conf)"
+)
 
 
 def check_hand(rig: HandRig, clock: Clock, *, move: bool = False) -> list[Finding]:
@@ -88,7 +90,7 @@ def _motor_map(hand: ShadowHand, motors: MotorMap, clock: Clock, cycle_s: float)
         clock.sleep_until_ns(clock.now_ns() + round(cycle_s * NANOSECONDS))
         return hand.exchange()
 
-    moved = check_motor_map(hand, motors, cycle)
+    moved = check_motor_map(hand, motors, cycle, clock)
     wrong = [str(finding) for finding in moved if not finding.ok]
     return Finding("motor map", not wrong, "; ".join(wrong) or f"each of {len(moved)} motors moves its own joint")
 
@@ -133,7 +135,7 @@ def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
     temperature, supply = sample.motor.temperature_C, sample.motor.voltage_V
     heard = np.isfinite(temperature)
     if not heard.any():
-        return Finding("motors", False, "; ".join((*problems, "none has told its temperature")))
+        return Finding("motors", False, "; ".join((*problems, "no motor has reported its temperature")))
     hottest = int(np.nanargmax(temperature))
     figures = f"{int(heard.sum())} of 20 answer, warmest {motors.names[hottest]} {temperature[hottest]:.0f} C"
     if np.isfinite(supply).any():

@@ -1,1 +1,1 @@
-"""Which grasp would tell most (thesis chapter 4)."""
+"""Choice of the most informative grasp (thesis chapter 4)."""

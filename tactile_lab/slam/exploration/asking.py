@@ -1,4 +1,4 @@
-"""Asking a policy that may be anybody's: what cannot be followed becomes a decision that says so."""
+"""Asks a policy, possibly an extension's: an invalid answer becomes a decision that says so."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def ask(policy: Policy, candidates: Sequence[Candidate], belief: Belief, rng: np
 
 
 def _problem(decision: object, offered: int) -> str:
-    """Why a decision cannot be followed, in words; empty when it can."""
+    """Why a decision is invalid; empty if it is valid."""
     if not isinstance(decision, Decision):
         return f"answers a {type(decision).__name__} where a Decision belongs"
     if len(decision.scores) != offered:

@@ -23,8 +23,8 @@ class ClosingRays:
         starts_m: shape (n, 3), grasp frame: x along the fingers, z up, z = 0 the table.
         directions: unit vectors, shape (n, 3).
         lengths_m: how far each finger closes, shape (n,).
-        radius_m: of the fingertips, taken as balls; 0 for points. A ball that comes upon a face at an angle touches it
-            beside its way, at 45 degrees by its radius.
+        radius_m: of the fingertips, taken as balls; 0 for points. A ball that meets a face at an angle touches it
+            beside its path.
     """
 
     fingers: tuple[str, ...]
@@ -36,14 +36,14 @@ class ClosingRays:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A grasp that could be done next.
+    """A possible next grasp.
 
     Attributes:
         world_T_grasp: grasp frame on the table.
         closing: name of the closing ("pinch", "radial").
         rays: its closing rays in the grasp frame.
-        time_s: how long it takes to go there from where the hand is, to close, and to open again.
-        pushes: a part of the hand that feels nothing is expected to meet the object, and may push it along.
+        time_s: time to move there from the hand's present position, to close, and to open again.
+        pushes: a part of the hand without sensors is expected to meet the object, and may push it.
     """
 
     world_T_grasp: Pose2
@@ -107,7 +107,7 @@ def ring_of_candidates(
 
 
 def predict_contacts(candidate: Candidate, known: ModelledObject) -> PredictedContacts:
-    """Where the field first falls to the fingertips' radius along each closing ray; others are left out.
+    """Where the field first falls to the fingertips' radius along each closing ray; other rays are left out.
 
     Close to the surface the field is the distance from it.
     """
@@ -131,7 +131,7 @@ def predict_contacts(candidate: Candidate, known: ModelledObject) -> PredictedCo
 
 
 def outward(field: Field, points_m: Array) -> Array:
-    """Unit vectors along the field's gradient at points of shape (n, d), which is theirs too."""
+    """Unit vectors along the field's gradient at points of shape (n, d); the same shape."""
     if len(points_m) == 0:
         return points_m
     slopes = field.predict(points_m, gradient=True).gradient

@@ -1,14 +1,15 @@
-"""What a grasp is expected to tell about shape and pose together (beyond thesis section 4.5.2).
+"""Expected information of a grasp about shape and pose together (beyond thesis section 4.5.2).
 
-What a grasp z tells about the pose x and the shape f is, by the chain rule, ``I(x, f; z) = I(x; z) + I(f; z | x)``.
+The information of a grasp z about the pose x and the shape f is, by the chain rule, ``I(x, f; z) = I(x; z) + I(f; z |
+x)``.
 
 - The first term is that of the linearised contacts, with the covariance P of the particles at the time of the grasp,
   what it becomes, and the precision G at which the pose is good enough (its finer digits are nobody's gain):
   ``log det(1 + P / G) / 2 - log det(1 + P' / G) / 2``, ``P' = (1 / P + J' J / r)^-1``. Here r is the variance of a
   contact *on an uncertain surface*: where the surface is not known, a contact says nothing about the pose.
-- The second is summed over the surface: every patch of the size that one contact tells about (``reach``) hides a
-  deviation of its own, beside what the field is uncertain about, until a contact has been there. A contact reveals it
-  up to the sensor's noise and the pose's remaining uncertainty.
+- The second is summed over the surface: every patch of the size that one contact determines (``reach``) hides its own
+  deviation, besides the field's uncertainty, until it has been touched. A contact reveals it up to the sensor's noise
+  and the pose's remaining uncertainty.
 
 Both are averages over sampled worlds (:mod:`tactile_lab.slam.exploration.prediction`): surfaces, poses and errors of
 execution are drawn, and the candidates' fingers closed on each.
@@ -50,15 +51,15 @@ class InformationSettings(StrictModel):
 
     Attributes:
         worlds, worlds_in_space: how many are sampled for a decision, for a contour and for a surface.
-        execution: how well the hand does what is planned.
-        reach_m, reach_in_space_m: so far along a contour, or a surface, a contact tells about it.
-        detail_m: standard deviation of what the field does not foresee between contacts (edges, corners).
+        execution: errors of the hand relative to the plan.
+        reach_m, reach_in_space_m: distance along a contour, or a surface, for which a contact is informative.
+        detail_m: standard deviation of what the field does not predict between contacts (edges, corners).
         point_sigma_m, normal_sigma_rad: of a contact's measurement.
         accuracy_m, accuracy_in_space_m: a contour, or a surface, known to this is good enough, as its finer digits are
             nobody's gain; 0 where all of them count.
         pose_sigma_m: a pose known to this (a turn with an arm of 30 mm) is good enough.
         pose_weight: of the pose's information against the shape's; 1 is the chain rule, 0 asks for the shape alone.
-        least_gain: stop when no grasp promises so many nats; 0 never does.
+        least_gain: stop when no grasp is expected to gain this many nats; 0: never.
         known_sigma_m: stop when the surface is explored to ``enough`` and known so well everywhere; None never does.
         enough: share of the surface near contacts at which that question is asked.
         push_worth, push_worth_in_space: share that counts of what a grasp promises which is expected to push the
@@ -84,11 +85,11 @@ class InformationSettings(StrictModel):
     push_worth_in_space: float = Field(default=0.15, ge=0, le=1)
 
     def reach(self, dimension: int) -> float:
-        """How far a contact tells about a contour (2) or a surface (3), metres."""
+        """Distance for which a contact is informative, on a contour (2) or a surface (3), metres."""
         return self.reach_m if dimension == 2 else self.reach_in_space_m
 
     def worth_of_push(self, dimension: int) -> float:
-        """Share that counts of a grasp that is expected to push the object."""
+        """Weight of the information of a grasp that is expected to push the object."""
         return self.push_worth if dimension == 2 else self.push_worth_in_space
 
     def accuracy(self, dimension: int) -> float:
@@ -98,15 +99,15 @@ class InformationSettings(StrictModel):
 
 @dataclass(frozen=True)
 class Promise:
-    """What every candidate is expected to tell.
+    """The expected information of every candidate.
 
     Attributes:
         pose: nats about the pose, shape (c,).
         shape: nats about the shape, shape (c,).
-        together: nats about the shape that all candidates together could tell, one after the other.
+        together: nats about the shape that all candidates together could give, one after the other.
         touching: expected number of contacts, shape (c,).
-        new_share: expected share of the surface that is newly touched, shape (c,): of all that fingers could touch,
-            what comes within a contact's reach for the first time.
+        new_share: expected share of the touchable surface that comes within a contact's reach for the first time, shape
+            (c,).
     """
 
     pose: Array
@@ -123,7 +124,7 @@ def predict_promise(
     settings: InformationSettings,
     rng: np.random.Generator,
 ) -> Promise:
-    """What each candidate is expected to tell, over sampled worlds."""
+    """The expected information of each candidate, over sampled worlds."""
     count = settings.worlds if belief.dimension == 2 else settings.worlds_in_space
     worlds = possible_worlds(belief, surface, most_fingers(candidates), count, settings.execution, rng)
     touches = expected_touches(candidates, belief, worlds)
@@ -143,7 +144,7 @@ def predict_promise(
 
 
 def pose_nats(covariance: Array, settings: InformationSettings) -> float:
-    """How much there is to be learned of a pose with this covariance (x m, y m, yaw rad), nats."""
+    """Information missing about a pose with this covariance (x m, y m, yaw rad), nats."""
     return float(0.5 * _log_det(covariance * _wanted_precision(settings)))
 
 
@@ -175,7 +176,7 @@ def _patches(surface: Surface, reach_m: float) -> Array:
 
 
 def _hope(surface: Surface, belief: Belief, reach_m: float) -> Array:
-    """Halved at every vertex for each finger that met nothing where a contact had been expected, shape (n,)."""
+    """Weight of each vertex, halved for each finger that met nothing where a contact had been expected, shape (n,)."""
     if len(belief.missed_m) == 0:
         return np.ones(len(surface.points_m))
     near = cKDTree(belief.missed_m).query_ball_point(surface.points_m, 2 * reach_m, return_length=True)

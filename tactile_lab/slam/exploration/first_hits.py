@@ -25,7 +25,7 @@ def hits_on_outlines(corners: Any, starts: Any, ways: Any, longest: Any) -> Any:
         longest: shape (r,).
 
     Returns:
-        Distances along the rays, shape (s, r); infinite where nothing is met.
+        Distances along the rays, shape (s, r); infinite if nothing is hit.
     """
     samples, count = starts.shape[0], starts.shape[1]
     found = np.full((samples, count), np.inf)
@@ -108,7 +108,7 @@ def passes(sphere: Any, start: Any, way: Any, longest: Any) -> Any:
 
 @compile_when_called
 def nearest_hit(vertices: Any, faces: Any, spheres: Any, block: Any, start: Any, way: Any, best: Any) -> Any:
-    """Distance of a ray's first hit with a block's triangles, if it is below ``best``; else that."""
+    """Distance of a ray's first hit with a block's triangles, if it is below ``best``; otherwise ``best``."""
     for m in range(block * _BLOCK, min((block + 1) * _BLOCK, faces.shape[0])):
         if passes(spheres[m], start, way, best):
             a, b, c = faces[m]

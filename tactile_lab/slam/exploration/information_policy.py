@@ -1,6 +1,6 @@
-"""Ours: the grasp that is expected to tell most about shape and pose together, per second.
+"""The default policy: the grasp with the most expected information about shape and pose together, per second.
 
-What a grasp tells stands in :mod:`tactile_lab.slam.exploration.expected_information`.
+See :mod:`tactile_lab.slam.exploration.expected_information`.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from tactile_lab.slam.exploration.expected_information import (
 from tactile_lab.slam.exploration.policy import Belief, Decision, Surface, best_of, surface_to_foresee
 
 _AHEAD = 3
-"""Grasps that a place of the object is judged by before it is carried there."""
+"""Number of grasps by which a pose of the object is rated before it is carried there."""
 
 
 @dataclass(frozen=True)
 class InformationPolicy:
-    """Expected information per second; see the module's text."""
+    """Expected information per second; see the module's docstring."""
 
     settings: InformationSettings = field(default_factory=InformationSettings)
     name: str = "information"
@@ -46,15 +46,15 @@ class InformationPolicy:
         lost_nats: float = 0.0,
         seconds: float = 0.0,
     ) -> float:
-        """The largest expected information per second over the next few grasps, 1/s; 0 where nothing can be foreseen.
+        """The largest expected information per second over the next few grasps, 1/s; 0 if nothing can be predicted.
 
-        Knowledge of the pose is lost and won back once; sides that only these candidates reach are there for several
-        grasps, as far as there is so much to be seen of them.
+        Information about the pose is lost and regained once; sides that only these candidates reach can be used by
+        several grasps, as long as they have more to tell.
 
         Args:
             candidates, belief, rng: as for a choice.
             lost_nats: knowledge of the pose that is lost on the way to these candidates.
-            seconds: that the way takes, beside the candidates' own times.
+            seconds: duration of the carrying, besides the candidates' own times.
         """
         if not candidates or belief.surface is None:
             return 0.0
@@ -86,7 +86,7 @@ class InformationPolicy:
         return Decision(self.name, "grasp", best, decision.scores, reason, float(promise.new_share[best]))
 
     def _worth(self, candidates: Sequence[Candidate], belief: Belief) -> Array:
-        """Share of what each candidate promises that counts."""
+        """Weight of each candidate's expected information."""
         pushing = self.settings.worth_of_push(belief.dimension)
         return np.where([candidate.pushes for candidate in candidates], pushing, 1.0)
 

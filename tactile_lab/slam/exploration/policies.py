@@ -60,7 +60,7 @@ def _by_pose(name: str, gain: Gain) -> Callable[[], Policy]:
 
 
 POLICIES: Registry[Callable[[], Policy]] = Registry("policy", "policies")
-"""How each policy is made, by its name. See ``docs/extending.md`` for adding one."""
+"""Constructors of the policies, by name. See ``docs/extending.md`` for adding one."""
 
 POLICIES.register("random", RandomPolicy)
 POLICIES.register("variance", _variance)
@@ -78,11 +78,11 @@ POLICIES.register("information", InformationPolicy)
 
 
 def make_policy(name: str, information: InformationSettings | None = None) -> Policy:
-    """The policy called ``name``.
+    """Make the policy ``name``.
 
     Args:
-        information: settings of the policy ``information``; the usual ones when None. The others are the thesis's, and
-            stay as it has them, so that a comparison with them is one with it.
+        information: settings of the policy ``information``; the defaults if None. The others are the thesis's policies
+            and stay unchanged for comparison.
 
     Raises:
         ConfigurationError: there is no policy of that name, or it cannot be made; names its file.

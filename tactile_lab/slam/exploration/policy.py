@@ -1,4 +1,4 @@
-"""What every policy shares: what it is told, what it answers, and what it does where there is nothing to choose.
+"""The interface of policies: their input, their answer, and the default if there is nothing to choose.
 
 A policy sees candidate grasps and the present belief, and never the truth. It answers with a :class:`Decision`: one
 candidate, or none, with the score of each and the reason in a sentence. Policies are made by name, see
@@ -66,7 +66,7 @@ class Surface:
         return np.asarray(np.bincount(self.cells.ravel(), shares, minlength=len(self.points_m)), dtype=float)
 
     def touchable(self, origin_height_m: float) -> NDArray[np.bool_]:
-        """Which vertices fingers could touch, shape (n,): not what faces the table or is, as yet, below it.
+        """Which vertices fingers could touch, shape (n,): not those that face the table or are below it.
 
         Args:
             origin_height_m: height of the object frame's origin over the table.
@@ -82,17 +82,17 @@ def _nothing_2d() -> Array:
 
 @dataclass(frozen=True)
 class Belief:
-    """All that is known when a grasp is chosen. Points are in the object frame, metres.
+    """The belief by which a grasp is chosen. Points are in the object frame, metres.
 
     Attributes:
         field: the implicit surface.
-        surface: extracted from it; None where the contacts enclose nothing yet.
+        surface: extracted from it; None if the contacts enclose nothing yet.
         contacts_m, normals: all contacts so far with their outward normals, shape (n, d).
         grasp_indices: which grasp each contact belongs to, shape (n,); the largest is the latest.
-        world_T_object: where the object is thought to be on the table.
+        world_T_object: estimated pose of the object on the table.
         pose_covariance: of the present estimate (x m, y m, yaw rad) in the world, shape (3, 3).
-        particles: where the object may be when the next grasp closes, rows (x, y, yaw) in the world, shape (p, 3):
-            the present particles, moved as it may move until then. Empty if there are none: then the Gaussian counts.
+        particles: possible poses when the next grasp closes, rows (x, y, yaw) in the world, shape (p, 3):
+            the present particles, moved as it may move until then. Empty if there are none: then the Gaussian is used.
         weights: of the particles, summing to one, shape (p,).
         displacements_m: sampled surfaces: how far each vertex of ``surface`` moves along its normal, shape (s, n).
         missed_m: where contacts were expected and fingers met nothing, shape (k, d).
@@ -127,18 +127,17 @@ class Belief:
 
 @dataclass(frozen=True)
 class Decision:
-    """What a policy answers.
+    """A policy's answer.
 
     Attributes:
         policy: its name.
-        outcome: "grasp"; "stop", nothing more is to be gained or allowed; "nothing", no candidate can be used, so the
-            caller does something else (re-orients the object, follows its fixed rule).
+        outcome: "grasp"; "stop", no further gain, or no grasp left; "nothing", no feasible candidate, so that the
+            caller does something else (re-orients the object, or follows its fixed rule).
         chosen: index of the candidate, None unless the outcome is "grasp".
         scores: of every candidate, the higher the better; minus infinity for those that cannot be used.
         reason: one sentence.
-        promised_gain: what the chosen candidate is expected to bring, in the policy's own unit; None if it expects
-            nothing in particular.
-        failure: what is wrong with the policy itself, in words; empty for an answer that can be followed.
+        promised_gain: expected gain of the chosen candidate, in the policy's own unit; None if it has none.
+        failure: what is wrong with the policy itself; empty for a valid answer.
     """
 
     policy: str
@@ -155,14 +154,14 @@ class Policy(Protocol):
 
     @property
     def name(self) -> str:
-        """As the command line and the records call it."""
+        """The name used by the command line and in recordings."""
 
     def choose(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Decision:
-        """The next grasp, or why there is none. Never raises for what a belief may contain."""
+        """The next grasp, or why there is none. Never raises, whatever the belief contains."""
 
 
 def nothing_to_choose(name: str, candidates: Sequence[Candidate], belief: Belief) -> Decision | None:
-    """The decision where no policy has a choice: the budget is spent, or there is no candidate."""
+    """The decision if there is no choice: the budget is spent, or there is no candidate."""
     if belief.grasps_left is not None and belief.grasps_left <= 0:
         scores = (float("-inf"),) * len(candidates)
         return Decision(name, "stop", None, scores, "the budget of grasps is spent")
@@ -174,7 +173,7 @@ def nothing_to_choose(name: str, candidates: Sequence[Candidate], belief: Belief
 def surface_to_foresee(
     name: str, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator
 ) -> Surface | Decision:
-    """The surface by which a policy foresees contacts, or the decision where it has no choice or nothing to go by."""
+    """The surface by which a policy predicts contacts, or the decision if it has no choice or no surface."""
     if settled := nothing_to_choose(name, candidates, belief):
         return settled
     if belief.surface is None:
@@ -184,13 +183,13 @@ def surface_to_foresee(
 
 
 def best_of(name: str, scores: Array, reason: str, rng: np.random.Generator) -> Decision:
-    """The candidate of highest score; among equal ones, and where all are equal, chance decides and the reason says so.
+    """The candidate with the highest score; ties are broken at random, which the reason says.
 
     Args:
         name: of the policy.
-        scores: one a candidate; minus infinity or NaN for those that cannot be used.
+        scores: one per candidate; minus infinity or NaN for infeasible ones.
         reason: for the winner, a sentence.
-        rng: decides between equals.
+        rng: breaks ties.
     """
     usable = np.where(np.isnan(scores), -np.inf, scores)
     shown = tuple(float(score) for score in usable)

@@ -1,8 +1,8 @@
-"""The thesis's policies for shape and pose (section 4.5.2.2): act for the pose while it is uncertain, else by (4.20).
+"""The thesis's policies for shape and pose (section 4.5.2.2): for an uncertain pose first, then by (4.20).
 
-While the determinant of the pose's covariance is above a threshold, every candidate's contacts are imagined where the
-estimate expects them, the particles are weighted by them, and the candidate wins whose weighting tells most:
-det (4.21), its form for several modes (section 4.6), KL (4.6), mutual information (4.5), or Renyi's entropy (4.4).
+While the determinant of the pose's covariance is above a threshold, every candidate's contacts are predicted by the
+estimate, the particles are weighted by them, and the candidate with the most informative weighting wins: det (4.21),
+its form for several modes (section 4.6), KL (4.6), mutual information (4.5), or Renyi's entropy (4.4).
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ _MARGIN_m = 0.030
 
 
 class PoseSwitchSettings(StrictModel):
-    """When a policy acts for the pose, and how it imagines measurements.
+    """When a policy acts for the pose, and how it simulates measurements.
 
     Attributes:
         translation_m, rotation_rad: the threshold is the determinant of a pose known to these standard deviations.
-        particles: so many are weighted for each candidate.
-        point_sigma_m, normal_sigma_rad: of an imagined contact.
+        particles: number weighted for each candidate.
+        point_sigma_m, normal_sigma_rad: of a simulated contact.
         contour_grid_m, surface_grid_m: spacing of the grid on which the particles look the surface up.
         likelihood: the calibrated measurement model.
     """
@@ -58,17 +58,17 @@ class PoseSwitchSettings(StrictModel):
 
 
 Gain = Callable[[Array, Array, Array], float]
-"""What a weighting tells, from the particles (p, 3) and their weights before and after."""
+"""The information of a weighting, from the particles (p, 3) and their weights before and after."""
 
 
 def determinant_gain(rows: Array, before: Array, after: Array) -> float:
-    """By how much the determinant of (4.21) shrinks: half the difference of logarithms, nats."""
+    """Reduction of the determinant of (4.21): half the difference of logarithms, nats."""
     found = [determinant(weighted_covariance(rows, weights)) + _SMALLEST for weights in (before, after)]
     return float(0.5 * np.log(found[0] / found[1]))
 
 
 def mixture_gain(rows: Array, before: Array, after: Array) -> float:
-    """By how much the entropy shrinks of the particles taken as several Gaussians, nats."""
+    """Reduction of the entropy of the particles as several Gaussians, nats."""
     return mixture_entropy(modes(rows, before)) - mixture_entropy(modes(rows, after))
 
 
@@ -96,9 +96,9 @@ class PoseSwitchPolicy:
 
     Attributes:
         name: of the policy.
-        gain: of an imagined weighting.
+        gain: of a simulated weighting.
         otherwise: chooses while the pose is known well enough.
-        settings: the threshold and the imagined measurements.
+        settings: the threshold and the simulated measurements.
     """
 
     name: str

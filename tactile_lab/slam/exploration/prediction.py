@@ -1,8 +1,8 @@
-"""Where candidates would touch, over sampled surfaces, poses and errors of execution: what "predictive" means here.
+"""Predicts where candidates would touch, over sampled surfaces, poses and errors of execution.
 
-No truth is asked. One sample is one possible world: a surface drawn around the estimated one, a pose of the object
-drawn from the particles, and an error of the hand's own placement. All candidates meet the same worlds, so that their
-differences are their own and not chance's.
+No ground truth is used. One sample is one possible world: a surface drawn around the estimated one, a pose of the
+object drawn from the particles, and an error of the hand's own placement. All candidates are tested in the same worlds,
+so that their differences are not random.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class ExecutionNoise(StrictModel):
 
     Attributes:
         palm_m, palm_rad: of the palm's place per axis, and its heading.
-        finger_m: of each finger's way, sideways.
+        finger_m: of each finger's path, sideways.
     """
 
     palm_m: float = Field(default=0.003, ge=0)
@@ -42,7 +42,7 @@ class ExecutionNoise(StrictModel):
 
 @dataclass(frozen=True)
 class PossibleWorlds:
-    """What may turn out to be true.
+    """Sampled possible worlds.
 
     Attributes:
         surface: the estimated one.
@@ -61,7 +61,7 @@ class PossibleWorlds:
 
 @dataclass(frozen=True)
 class ExpectedTouches:
-    """Where the fingers of every candidate touch in every world, object frame.
+    """Contacts of every candidate in every world, object frame.
 
     Attributes:
         vertices: nearest vertex of the estimated surface, -1 for a finger that meets nothing, shape (c, s, fingers).
@@ -100,7 +100,7 @@ def sampled_displacements(gpis: Gpis, surface: Surface, count: int, rng: np.rand
 def possible_worlds(
     belief: Belief, surface: Surface, fingers: int, count: int, noise: ExecutionNoise, rng: np.random.Generator
 ) -> PossibleWorlds:
-    """Draw worlds from a belief whose surface is known to exist."""
+    """Draw worlds from a belief that has a surface."""
     moves = np.zeros((count, len(surface.points_m)))
     if len(belief.displacements_m):
         moves = belief.displacements_m[rng.integers(len(belief.displacements_m), size=count)]
@@ -130,7 +130,7 @@ def most_fingers(candidates: Sequence[Candidate]) -> int:
 
 
 def expected_touches(candidates: Sequence[Candidate], belief: Belief, worlds: PossibleWorlds) -> ExpectedTouches:
-    """Cast the fingers' ways of all candidates in all worlds; candidates with fewer fingers touch with fewer.
+    """Cast the fingers' paths of all candidates in all worlds; candidates with fewer fingers touch with fewer.
 
     A fingertip's centre comes to rest on the surface moved outward by its radius, which all candidates share, and
     touches the place that this part of it was moved from.
@@ -155,7 +155,7 @@ def expected_touches(candidates: Sequence[Candidate], belief: Belief, worlds: Po
 
 
 def _pad(rays: ClosingRays, fingers: int) -> tuple[Array, Array, Array]:
-    """Starts, directions and lengths for so many fingers; those that are not there have no way to go."""
+    """Starts, directions and lengths for so many fingers; missing fingers have paths of length zero."""
     absent = fingers - len(rays.fingers)
     if absent == 0:
         return rays.starts_m, rays.directions, rays.lengths_m
@@ -193,7 +193,7 @@ def _in_worlds(
 
 
 def nominal_world(belief: Belief, surface: Surface, fingers: int) -> PossibleWorlds:
-    """The one world in which everything is as estimated and executed as planned."""
+    """The single world in which everything is as estimated and executed as planned."""
     return PossibleWorlds(
         surface,
         surface.points_m[None],

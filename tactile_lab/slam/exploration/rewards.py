@@ -1,4 +1,4 @@
-"""What a candidate grasp promises, and how much of the object is known (thesis section 4.5.2)."""
+"""Reward of a candidate grasp, and the known share of the object (thesis section 4.5.2)."""
 
 from __future__ import annotations
 

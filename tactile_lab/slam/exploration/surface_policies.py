@@ -27,12 +27,12 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 _BESIDE_m = 0.008
 """A contact this near to a region's vertices explores the region."""
 _PATIENCE = 3
-"""So many fingers that met nothing in a region put it behind the others."""
+"""After this many fingers that met nothing in a region it ranks behind the others."""
 
 
 @dataclass(frozen=True)
 class RandomPolicy:
-    """Any candidate, all alike."""
+    """Chooses a candidate at random."""
 
     name: str = "random"
 
@@ -98,7 +98,7 @@ class ClustersPolicy:
         return best_of(self.name, rewards, f"{why}: the largest variance counts instead", rng)
 
     def _in_turn(self, belief: Belief, surface: Surface) -> list[Region]:
-        """Nearest first; regions in which fingers have met nothing again and again come last."""
+        """Nearest first; regions in which fingers repeatedly met nothing come last."""
         latest = belief.contacts_m[belief.latest_contacts]
         place = latest.mean(axis=0) if len(latest) else surface.points_m.mean(axis=0)
         ordered = nearest_first(unexplored_regions(surface, self.settings), place)
@@ -106,7 +106,7 @@ class ClustersPolicy:
 
 
 def expected_contacts(candidates: Sequence[Candidate], belief: Belief, surface: Surface) -> list[Array]:
-    """Where each candidate touches if all is as estimated and executed as planned, object frame, each (m, d)."""
+    """Contacts of each candidate if everything is as estimated and executed as planned, object frame, each (m, d)."""
     world = nominal_world(belief, surface, most_fingers(candidates))
     touches = expected_touches(candidates, belief, world)
     return [points[0][met[0]] for points, met in zip(touches.points_m, touches.touching, strict=True)]

@@ -16,7 +16,8 @@ TEN_PALMS: Array = np.column_stack(
     ]
 )
 """Palm poses in the object's frame (x m, y m, yaw rad), x along its long side. The thesis shows its own only in a
-picture; these are ten directions around the object with offsets along it, and need as many random actions."""
+picture; these ten directions around the object, with offsets along it, need as many random actions.
+"""
 
 
 def candidates_at(palms: Array, world_T_object: Pose2, rays: ClosingRays) -> tuple[Candidate, ...]:

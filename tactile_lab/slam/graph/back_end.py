@@ -1,4 +1,4 @@
-"""The back end of the tracker: finds loops in the map and corrects all poses when that helps."""
+"""The back end of the tracker: finds loops in the map and corrects all poses if that improves them."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class BackEndSettings(StrictModel):
     """Parameters of the back end.
 
     Attributes:
-        enabled: without it the filter's poses stand.
+        enabled: if not, the filter's poses are kept.
         faces: segmentation of the object.
         graph: loops and optimisation.
         contour_resolution_m: of the contour that is divided into faces (2-D).
-        tests: what loops have to pass beyond the tests on their own pairs; not asked of the thesis's variant.
+        tests: further tests of loops beyond those on their own pairs; not used by the thesis's variant.
     """
 
     enabled: bool = True

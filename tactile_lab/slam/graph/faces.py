@@ -22,14 +22,14 @@ NO_FACE = -1
 
 
 class FaceSettings(StrictModel):
-    """How contacts are divided into faces; the thesis leaves these figures open.
+    """How contacts are divided into faces; the thesis does not give these values.
 
     Attributes:
         tolerance_m: largest distance of the contour from its polygon (Douglas-Peucker).
         shortest_segment_m: shorter segments are rounded corners, not faces.
         largest_distance_m: contacts farther from every segment belong to none.
         normal_angle_rad: largest angle between a contact's normal and its face's.
-        neighbours: in space, each contact is linked to so many nearest ones for the paths of appendix A.
+        neighbours: in space, each contact is linked to this many nearest ones for the paths of appendix A.
     """
 
     tolerance_m: float = Field(default=0.004, gt=0)

@@ -1,9 +1,9 @@
-"""Which loops belong together, judged by headings alone: the start of the robust graph, without trust in odometry.
+"""Finds consistent sets of loops from headings alone, to initialize the robust graph without trusting odometry.
 
-A wrong association turns the object (by 90 or 180 degrees on a box), and after a few steps of 20 degrees the
-sum of the steps can no longer tell. So loops are taken one by one, the one whose outcome is known best first, and
-each is taken as right (possibly with a full turn more than odometry says) or as wrong. The likeliest combinations
-are kept. Headings are linear, so a combination is a Gaussian, and a loop is one rank-one update of it.
+A wrong association turns the object (by 90 or 180 degrees on a box), and after a few steps of 20 degrees odometry
+cannot detect this. So loops are added one by one, the most predictable first, and each is assumed right (possibly with
+a full turn more than odometry says) or as wrong. The likeliest combinations are kept. Headings are linear, so a
+combination is a Gaussian, and a loop is one rank-one update of it.
 """
 
 from __future__ import annotations

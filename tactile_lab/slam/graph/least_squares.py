@@ -1,4 +1,4 @@
-"""Planar pose graphs with known edges: all poses by least squares (thesis eq. 3.19 to 3.25), and how sure they are."""
+"""Planar pose graphs with known edges: all poses by least squares (thesis eq. 3.19 to 3.25), and their covariance."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""Which of the loops found may be believed: place, precision, and agreement with all others.
+"""Tests which of the loops found can be trusted: placement, precision, and consistency with all others.
 
 A loop found from faces (:func:`~tactile_lab.slam.graph.pose_graph.find_loops`) has passed the tests on its own pairs.
 Three more follow, in this order, and the first that fails is the reason reported:
 
-1. both grasps lie where they are believed to for sure (:mod:`placement`),
-2. the relative pose is known well enough to tell a wrong loop by its size,
+1. both grasps are placed with certainty (:mod:`placement`),
+2. the relative pose is known well enough to detect a wrong loop,
 3. it belongs to the combination of loops that agree with each other and with the hand's own motion
    (:func:`~tactile_lab.slam.graph.robust.solve_robustly`).
 
@@ -34,8 +34,8 @@ class LoopTestSettings(StrictModel):
     """Parameters of the tests.
 
     Attributes:
-        placement: when a grasp's place is sure.
-        robust: agreement of the loops.
+        placement: when a grasp's placement is certain.
+        robust: consistency of the loops.
         largest_sigma_m, largest_sigma_rad: standard deviations of a loop above which it is refused as vague.
     """
 
@@ -52,7 +52,7 @@ def test_together(
 
     Args:
         contact_map: all grasps, planar poses.
-        loops: found from faces; those refused already stay refused with their reason.
+        loops: found from faces; those already refused keep their reason.
         noise: of the motion from grasp to grasp.
         settings: see there.
     """

@@ -1,10 +1,9 @@
-"""How sure is it where each grasp lies on the object?
+"""Tests how certain the placement of each grasp on the object is.
 
-Loops are made from pairs of contacts on the same face, and which face that is follows from the present poses. So
-a grasp that was put to the wrong place makes loops that all agree with each other and with the wrong place: they
-confirm what they were made from. Each grasp is therefore judged by evidence of its own first: its contacts are
-compared with the shape made from all other grasps, here and at every other place where they fit, and the motion to
-the grasp before and after is counted in.
+Loops are made from pairs of contacts on the same face, which follows from the present poses. So a wrongly placed grasp
+makes loops that all agree with each other and with the wrong placement. Each grasp is therefore first tested by
+independent evidence: its contacts are compared with the shape made from all other grasps, here and at every other place
+where they fit, and the motion from the previous and to the next grasp is included.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, devi
 
 
 class PlacementSettings(StrictModel):
-    """When a grasp's place counts as known.
+    """When a grasp's placement counts as certain.
 
     Attributes:
-        relocation: how other places are looked for.
+        relocation: how other places are searched.
         same_place_m, same_place_rad: proposals closer than both are the same place.
-        least_margin: the best other place has to be so much less likely (natural logarithm).
-        largest_sigma_m, largest_sigma_rad: the place itself may not be less certain than that.
+        least_margin: the best other place must be this much less likely (natural logarithm).
+        largest_sigma_m, largest_sigma_rad: largest standard deviation of the placement itself.
         unexplained_cost: negative log likelihood of a contact that fits nothing; no contact costs more.
         normal_length_m: a map uncertain by sigma predicts normals to ``sigma / normal_length_m`` radians.
     """
@@ -47,14 +46,14 @@ class PlacementSettings(StrictModel):
 
 @dataclass(frozen=True)
 class Placement:
-    """One grasp's place.
+    """One grasp's placement.
 
     Attributes:
-        sure: its loops may be believed.
+        sure: whether its loops can be trusted.
         margin: how much less likely the best other place is (natural logarithm); infinite if there is none.
         other: the best other place, a row, or None.
         covariance: of (x, y, yaw) in the world, from the other grasps' shape alone, shape (3, 3).
-        reason: why not sure, in words; empty if sure.
+        reason: why it is not certain; empty if it is.
     """
 
     sure: bool
@@ -65,7 +64,7 @@ class Placement:
 
 
 def judge_placements(contact_map: ContactMap, noise: MotionNoise, settings: PlacementSettings) -> tuple[Placement, ...]:
-    """Judge the place of every grasp of a map with planar poses.
+    """Test the placement of every grasp of a map with planar poses.
 
     Args:
         contact_map: all grasps.
@@ -115,7 +114,7 @@ def _doubt(
 
 
 def _contact_costs(rows: Array, contacts: ContactSet, shape: Gpis, settings: PlacementSettings) -> Array:
-    """Negative log likelihood of the contacts at each pose, each contact on its own, shape (k,)."""
+    """Negative log likelihood of the contacts at each pose, each contact independently, shape (k,)."""
     seen = [contacts.in_object_frame(row) for row in rows]
     points = np.concatenate([one.points_m for one in seen])
     found = shape.predict(points, gradient=True, variance=True)

@@ -40,8 +40,8 @@ class PoseGraphSettings(StrictModel):
         similarity: which grasps are compared.
         confidence: loops are refused above this quantile of the chi-square distribution of their test value.
         robust_scale: whitened error at which a loop's weight has fallen to a quarter (Geman-McClure).
-        least_translation_m, least_rotation_rad: standard deviations below which no covariance is believed; a
-            sampled or linearised covariance knows nothing of the model's own errors.
+        least_translation_m, least_rotation_rad: minimum standard deviations; a sampled or linearised covariance does
+            not include the model's own errors.
     """
 
     similarity: SimilaritySettings = SimilaritySettings()
@@ -59,12 +59,12 @@ class LoopReport:
         earlier, later: numbers of the grasps in the map.
         faces: how many faces they share.
         test_value: squared Mahalanobis distance between the loop and the filter's poses.
-        limit: what it may be.
-        accepted: whether it went into the graph.
-        reason: why, in words.
-        earlier_T_later: the relative pose of the object's frames that the shared contacts speak for (3.26). It holds
+        limit: its limit.
+        accepted: whether it is in the graph.
+        reason: the reason as text.
+        earlier_T_later: the relative pose of the object's frames from the shared contacts (3.26). It holds
             for the earlier pose as it was estimated: its heading enters, times the way between the grasps.
-        displacement: what the contacts told by themselves: the motion in the world that brings the object from where
+        displacement: the measurement of the contacts alone: the motion in the world that brings the object from where
             it was at the later grasp to where it was at the earlier one.
     """
 
@@ -99,7 +99,7 @@ def find_loops(
         later_grasps: numbers of the grasps to compare.
 
     Returns:
-        A loop for every pair with the faces asked for; pairs without are not worth a report.
+        A loop for every pair with enough shared faces; other pairs are not reported.
     """
     contacts, grasp_of = contact_map.contacts, contact_map.grasp_indices
     loops = []
@@ -164,7 +164,7 @@ def _believable(covariance: Array, settings: PoseGraphSettings) -> Array:
 
 
 def _path_covariance(contact_map: ContactMap, earlier: int, later: int, settings: PoseGraphSettings) -> Array:
-    """Uncertainty gathered between two grasps: each step's covariance, in the object frame, added up."""
+    """Uncertainty accumulated between two grasps: each step's covariance, in the object frame, added up."""
     return np.asarray(sum(_step_covariance(contact_map, index, settings) for index in range(earlier + 1, later + 1)))
 
 
@@ -201,7 +201,7 @@ def optimise_poses(contact_map: ContactMap, loops: list[Loop], settings: PoseGra
 
 
 def loop_edge(loop: Loop, rows: Array) -> RelativePose:
-    """A loop between inverse poses; its covariance, told in the earlier object frame, follows it to the world."""
+    """A loop between inverse poses; its covariance is transformed from the earlier object frame to the world."""
     report = loop.report
     carried = report.displacement.inverse().compose(row_pose(rows[report.earlier])).AdjointMap()
     covariance = carried @ loop.covariance @ carried.T
@@ -209,7 +209,7 @@ def loop_edge(loop: Loop, rows: Array) -> RelativePose:
 
 
 def _step(contact_map: ContactMap, index: int, settings: PoseGraphSettings) -> RelativePose:
-    """The filter's motion of the object since the grasp before, between inverse poses (3.23)."""
+    """The filter's motion of the object since the previous grasp, between inverse poses (3.23)."""
     before, pose = (row_pose(row) for row in contact_map.rows[[index - 1, index]])
     carried = pose.AdjointMap()
     covariance = carried @ _step_covariance(contact_map, index, settings) @ carried.T

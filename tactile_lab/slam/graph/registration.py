@@ -1,6 +1,6 @@
 """Relative pose between two sets of associated contacts (eq. 3.26), on the table and in space.
 
-Each pair tells two distances between the moved point and its partner: along the partner's normal, and along
+Each pair gives two distances between the moved point and its partner: along the partner's normal, and along
 the moved point's own, rotated normal. Their squares are minimised by Gauss-Newton over small motions about
 the centre of the contacts. Contacts in the plane are treated as contacts in space at height zero, so one
 implementation serves SE(2) and SE(3): only the set of free motions differs.
@@ -23,7 +23,7 @@ LEAST_EIGENVALUE = 1e-3
 """Directions with a smaller eigenvalue of (3.18) are not observed: they are neither moved along nor trusted."""
 
 UNKNOWN_VARIANCE_m2 = 1.0
-"""Variance given to directions that are not observed: a metre says nothing about an object in a hand."""
+"""Variance of directions that are not observed: a metre is uninformative for an object in a hand."""
 
 _FREE_MOTIONS = {True: [2, 3, 4], False: [0, 1, 2, 3, 4, 5]}
 _MOST_STEPS = 30
@@ -40,7 +40,7 @@ class Alignment:
             on the table, (rotation, translation) in space; radians and metres.
         rms_m: root mean square of the remaining distances of (3.26).
         chi_square: remaining squared distances over their variances, counted once a pair.
-        degrees_of_freedom: the mean of ``chi_square`` if pairs and noise are what they are taken for.
+        degrees_of_freedom: the mean of ``chi_square`` if pairs and noise are correct.
         observable: the pairs resist every free motion.
     """
 
@@ -55,7 +55,7 @@ class Alignment:
 def align(source: ContactSet, target: ContactSet, *, on_table: bool) -> Alignment:
     """Minimise (3.26) over the motion of ``source`` onto ``target``; equal indices are pairs.
 
-    Distances are weighted by what is known of them: the noise of both points and, as partners touch a face at
+    Distances are weighted by their uncertainty: the noise of both points and, as partners touch a face at
     different places, the normals' noise times the distance between the places.
 
     Args:

@@ -1,4 +1,4 @@
-"""Edges of a planar pose graph: how one node's pose looks from another."""
+"""Edges of a planar pose graph: relative poses between nodes."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""Where on the known object may a grasp have landed, wherever the hand believes it to be?
+"""Finds poses at which a grasp fits the known object, independent of the hand's motion.
 
 Two contacts on sides that are not parallel fix a planar pose, once each is matched to a side of the map. All such
 matches are tried at once: every well conditioned pair of the new contacts against every pair of the map's contacts
 with the same angle between their normals. The poses are scored by how the other contacts fit, the best are refined
-by point-to-side distances and normals, and equal ones are merged. Nothing is assumed about the hand's motion; whoever
-asks weighs the proposals with what is known of it.
+by point-to-side distances and normals, and equal ones are merged. Nothing is assumed about the hand's motion; the
+caller weighs the proposals by it.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from tactile_lab.slam.tracking.contacts.motion import deviation
 Indices = NDArray[np.intp]
 
 _SIDEWAYS = 0.5
-"""Contacts with a smaller horizontal part of the normal do not hold a pose on the table."""
+"""Contacts with a smaller horizontal part of the normal do not constrain a pose on the table."""
 
 
 class RelocationSettings(StrictModel):
     """Parameters of the search.
 
     Attributes:
-        side_contacts: the map is thinned out to so many contacts, spread over it.
-        contact_pairs: so many pairs of new contacts are matched, the ones nearest to a right angle.
+        side_contacts: the map is thinned to this many contacts, spread over it.
+        contact_pairs: number of pairs of new contacts that are matched, the ones nearest to a right angle.
         normal_tolerance_rad: how much the angle between a pair's normals may differ from that in the map.
-        reach_m: a side is believed to go on so far around a contact of the map without cost.
-        reach_sigma_m: beyond that, the standard deviation of how much further it goes.
+        reach_m: a side is assumed to extend this far around a contact of the map without cost.
+        reach_sigma_m: standard deviation of its extent beyond that.
         unexplained_cost: half the squared deviation of a contact that fits nowhere.
-        refined: so many poses are refined.
+        refined: number of poses that are refined.
         steps: Gauss-Newton steps.
-        kept: at most so many poses are returned.
-        distinct_m, distinct_rad: poses closer than both are the same.
+        kept: largest number of poses returned.
+        distinct_m, distinct_rad: poses closer than both count as equal.
     """
 
     side_contacts: int = Field(default=48, ge=2)
@@ -155,7 +155,7 @@ def _matched_poses(new: ContactSet, sides: ContactSet, settings: RelocationSetti
 
 
 def _one_per_cell(rows: Array, settings: RelocationSettings) -> Array:
-    """One pose of each cell of a grid as fine as poses are told apart: thousands of matches say the same."""
+    """One pose per cell of a grid with the resolution of distinct poses, since thousands of matches are equal."""
     cells = np.round(rows / [settings.distinct_m, settings.distinct_m, settings.distinct_rad]).astype(np.int64)
     keys = cells @ np.array([1, 1 << 20, 1 << 40])
     return rows[np.sort(np.unique(keys, return_index=True)[1])]

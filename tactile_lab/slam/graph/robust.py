@@ -1,12 +1,13 @@
-"""A planar pose graph with wrong loops in it.
+"""Robust solution of a planar pose graph with wrong loops.
 
-The hand carries the object by 20 degrees at a time with an uncertainty of as much, so odometry is no start, and
-a wrong association (another side of a box) fits as well as a right one until others contradict it. The solver
+The hand carries the object by 20 degrees at a time with an uncertainty of as much, so odometry is no useful
+initialization, and a wrong association (another side of a box) fits as well as a right one until others contradict it.
+The solver
 
 1. finds the likeliest combinations of right loops from headings alone (:mod:`heading_hypotheses`),
 2. solves each for all poses (eq. 3.19 to 3.25, Levenberg-Marquardt),
 3. tests every loop against all others: the loops in the graph by leaving each out, those outside by their gap;
-   admits and refuses, and solves again until nothing changes,
+   accepts and rejects, and solves again until nothing changes,
 4. keeps the combination that explains most at least cost.
 
 Graphs too large for step 1 start from odometry, with a redescending cost on loops that is tightened step by step;
@@ -41,12 +42,12 @@ class RobustSettings(StrictModel):
 
     Attributes:
         wrong_share: share of loops expected to be wrong.
-        hypotheses: combinations of loops carried along.
-        refined: so many of them are solved for all poses.
+        hypotheses: number of combinations of loops kept.
+        refined: number of them that are solved for all poses.
         confidence: loops are refused above this quantile of the chi-square distribution of their test value.
-        wrong_spread_m: a wrong loop may put the object anywhere within a square of this side; a loop has to be
-            more likely than that.
-        rounds: admitting, refusing and solving is repeated so often at most.
+        wrong_spread_m: a wrong loop may put the object anywhere within a square of this side; a loop must be more
+            likely than that.
+        rounds: largest number of repetitions of testing and solving.
         most_nodes: graphs with more nodes start from odometry.
     """
 
@@ -61,13 +62,13 @@ class RobustSettings(StrictModel):
 
 @dataclass(frozen=True)
 class LoopVerdict:
-    """What became of a loop.
+    """The verdict on a loop.
 
     Attributes:
-        accepted: it is part of the solution.
+        accepted: whether it is part of the solution.
         test_value: its squared Mahalanobis distance from what all other accepted edges say.
-        limit: what it may be.
-        reason: the verdict in words.
+        limit: its limit.
+        reason: the verdict as text.
     """
 
     accepted: bool
@@ -104,13 +105,13 @@ def solve_robustly(
     settings: RobustSettings | None = None,
     first: Array | None = None,
 ) -> RobustSolution:
-    """Solve for all poses and tell right loops from wrong ones.
+    """Solve for all poses and separate right loops from wrong ones.
 
     Args:
         odometry: edge k leads from node k to node k + 1.
         loops: edges between any two nodes, some of them wrong.
         settings: see there.
-        first: pose of node 0, which stays; the identity if not given.
+        first: pose of node 0, which is fixed; the identity if not given.
     """
     settings = settings or RobustSettings()
     problem = _Problem(odometry, loops, settings, np.zeros(3) if first is None else first)
@@ -150,7 +151,7 @@ class _Problem:
         ]
 
     def _tighten(self) -> Array:
-        """From odometry, the pull of loops far away weakened more and more."""
+        """Start from odometry, reducing the weight of distant loops step by step."""
         rows = chain(self.odometry, self.first)
         for scale in _TIGHTENING:
             rows = solve(self.odometry, self.loops, rows, robust_scale=scale)
@@ -175,7 +176,7 @@ class _Problem:
         return np.column_stack([np.vstack([np.zeros(2), places]) + self.first[:2], headings])
 
     def refine(self, rows: Array, accepted: Mask) -> _State:
-        """Solve, test, admit and refuse until nothing changes."""
+        """Solve, test, accept and reject until nothing changes."""
         for _ in range(self.settings.rounds):
             rows = self._solve(rows, accepted)
             tested = self._admissible(rows, accepted)
@@ -199,7 +200,7 @@ class _Problem:
         return (values <= self.limit) & self._is_supported(values, spreads)
 
     def _is_supported(self, values: Array, spreads: Array) -> Mask:
-        """More likely right than wrong: a loop that nothing contradicts may still say nothing."""
+        """Whether a loop is more likely right than wrong: an uncontradicted loop may still be uninformative."""
         density = -0.5 * (values + np.linalg.slogdet(2 * np.pi * spreads)[1])
         wrong = -np.log(2 * np.pi * self.settings.wrong_spread_m**2)
         share = self.settings.wrong_share
@@ -232,7 +233,7 @@ class _Problem:
         return np.asarray(both @ blocks @ both.transpose(0, 2, 1))
 
     def explain(self, state: _State) -> RobustSolution:
-        """Reasons for everything."""
+        """The verdicts with their reasons."""
         values, spreads = self._tests(state.rows, state.accepted)
         supported = self._is_supported(values, spreads)
         verdicts = [

@@ -37,7 +37,7 @@ class SharedContacts:
         faces: number of different faces.
         eigenvalue: smallest eigenvalue of (3.18) of the earlier contacts.
         similar: enough faces and observable.
-        reason: why not, in words; empty if similar.
+        reason: why not; empty if similar.
     """
 
     earlier: Indices

@@ -1,4 +1,4 @@
-"""What every shape model can do, whatever it is made of."""
+"""The interface of shape models."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ class FittedShape(Protocol):
     """A shape made from contacts, in the frame of the contacts.
 
     Attributes:
-        name: of the model, as a person writes it.
+        name: name of the model in settings.
         log_evidence: logarithm of how probable the model makes the contacts (values and normals), comparable among
-            models that have one; None for those without a likelihood.
+            models that have one; None for models without a likelihood.
     """
 
     @property

@@ -1,10 +1,11 @@
-"""Right angles, parallel faces, upright and level ones, where the contacts allow them.
+"""Regularities of faces:
 
-Made things are full of regularities. One is taken where it is the likelier explanation: any angle within a quarter turn
-costs more than the misfit that the regularity adds (Bayes factor, both as likely before). The directions of all faces
-are one Gaussian state; a regularity is an exact measurement of it, with the usual gate, so that what one wall knows
-helps all walls tied to it. After each one the state is conditioned anew on all of them, linearised where they hold
-exactly: elsewhere a regularity that follows from others would seem to tell something, and freeze what is still open.
+right angles, parallel, upright and level faces, if the contacts allow them. Manufactured objects are full of
+regularities. One is accepted if it is the more likely explanation: any angle within a quarter turn costs more than the
+misfit that the regularity adds (Bayes factor, both as likely before). The directions of all faces are one Gaussian
+state; a regularity is an exact measurement of it, with the usual gate, so that information about one wall improves all
+walls related to it. After each one the state is conditioned anew on all of them, linearised where they hold exactly:
+elsewhere a regularity that follows from others would seem informative, and fix what is still undetermined.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class Stated(NamedTuple):
 
 
 class Regularity(NamedTuple):
-    """What two faces are to each other; the vertical is the other of a level or an upright one.
+    """A relation of two faces, or of a level or upright face to the vertical.
 
     Attributes:
         kind: of regularity.
@@ -83,7 +84,7 @@ class RegularNormals:
 
 
 def offsets_of_faces(points_m: Array, sigma_m: Array, labels: NDArray[np.int64], normals: Array) -> Array:
-    """Where faces of given normals (s, d) lie by their contacts: means weighted by their sigmas, shape (s,)."""
+    """Offsets of faces with given normals (s, d) from their contacts: means weighted by their sigmas, shape (s,)."""
     weights = sigma_m**-2.0
     heights_m = np.einsum("nd,nd->n", normals[labels], points_m)
     totals = np.bincount(labels, weights, len(normals))
@@ -91,7 +92,7 @@ def offsets_of_faces(points_m: Array, sigma_m: Array, labels: NDArray[np.int64],
 
 
 def regular_normals(normals: Array, covariance: Array, *, upright: bool) -> RegularNormals:
-    """Turn normals until they are as regular as what is known of them allows.
+    """Rotate normals until they are as regular as their uncertainty allows.
 
     Args:
         normals: unit normals of faces, shape (s, d).

@@ -1,4 +1,4 @@
-"""The trackers to choose from, behind one interface, and what a person may set."""
+"""The trackers behind one interface, and their settings."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from tactile_lab.slam.tracking.joint.settings import JointSettings
 GRID_MARGIN_m = 0.040
 
 Method: TypeAlias = Literal["joint", "particle", "thesis-pf", "thesis-pf-graph", "known-pose", "odometry", "icp"]
-"""The ways to follow the object, by the names that settings, command line and tables use; see TrackingSettings."""
+"""The tracking methods, by the names in settings, command line and tables; see TrackingSettings."""
 
 THESIS_METHODS: tuple[Method, ...] = ("thesis-pf", "thesis-pf-graph")
 PLANAR_METHODS: tuple[Method, ...] = ("thesis-pf", "thesis-pf-graph", "particle")
@@ -61,13 +61,13 @@ class Tracker(Protocol):
 
     @property
     def refined(self) -> ContactMap:
-        """The same with what takes too long to be done in every step: what is told of the object between grasps."""
+        """The same with refinements that take too long for every step, for the shape shown between grasps."""
 
     def predict(self, motion: Array) -> None:
         """Move the belief by the hand's motion (eq. 3.7)."""
 
     def weigh(self, contacts: ContactSet) -> bool:
-        """Weight the belief by a grasp's contacts in the world (eq. 3.6); False when nothing fits."""
+        """Weight the belief by a grasp's contacts in the world (eq. 3.6); returns False if nothing fits."""
 
     def estimate(self) -> PoseEstimate:
         """The present pose."""
@@ -76,17 +76,17 @@ class Tracker(Protocol):
         """Add the grasp to the map. A tracker with one hypothesis keeps uncertain contacts out of the shape."""
 
     def resample(self) -> None:
-        """Concentrate the belief on what is likely."""
+        """Concentrate the belief on likely states."""
 
     def adopt(self, corrected: ContactMap) -> None:
         """Take over a map whose poses were corrected from outside."""
 
     def finish(self) -> None:
-        """No further grasp will come: make the best of all of them."""
+        """No further grasp follows: final estimation from all of them."""
 
 
 class TrackingSettings(StrictModel):
-    """What concerns following the object.
+    """Settings of tracking.
 
     Attributes:
         method: "joint" keeps several trajectories, proposed by the measurement and smoothed with the shape;
@@ -95,15 +95,15 @@ class TrackingSettings(StrictModel):
             "odometry" believes the hand's motion, "icp" registers each grasp to those before.
         dimension: 2 for the horizontal contour, 3 for the surface.
         freedom: "table", the object stands on the table and only turns and slides; "space", it is held free.
-        motion: what the object does beside the hand's motion.
+        motion: slip of the object relative to the hand's motion.
         particles: their number.
         shape: the shape model; None for the method's own.
         gate: of the thesis's measurement model.
         likelihood: of the calibrated one.
         joint: parameters of the hypotheses.
         icp: parameters of the registration baseline.
-        kernel_every: kernel parameters are estimated anew after so many grasps.
-        contour_grid_m, surface_grid_m: spacing of the grid that particles look the field up in.
+        kernel_every: kernel parameters are estimated again after this many grasps. contour_grid_m, surface_grid_m:
+            spacing of the grid that particles look the field up in.
     """
 
     method: Method = "joint"
@@ -122,7 +122,7 @@ class TrackingSettings(StrictModel):
 
     @property
     def space(self) -> PoseVectors:
-        """What poses are made of."""
+        """The kind of pose vectors."""
         return PLANAR if self.freedom == "table" else SPATIAL
 
     @model_validator(mode="after")
@@ -151,7 +151,7 @@ def make_tracker(
 
     Args:
         settings: see there.
-        first: the grasp in which the object frame is born.
+        first: the grasp that defines the object frame.
         rng: source of all random numbers.
         known_poses: for "known-pose": true ``world_T_object`` of the first grasp and of all that follow.
         relocate: for "joint": proposes poses anywhere on the object.
@@ -172,10 +172,10 @@ def make_tracker(
 
 
 def poses_to_be_told(method: Method, poses: Sequence[Pose3 | None] | None) -> tuple[Pose3 | None, ...] | None:
-    """Truth reaches the one method that is about it, and no other.
+    """Check that only the method that needs true poses gets them.
 
     Raises:
-        ConfigurationError: the method needs poses and has none, or is given poses that it must not know.
+        ConfigurationError: the method needs poses and has none, or is given poses that it must not use.
     """
     if method == "known-pose" and (poses is None or all(pose is None for pose in poses)):
         hint = "Take data with the true poses, or another method"

@@ -120,7 +120,7 @@ def test_a_session_with_fingertips_and_a_positioner_of_its_own(written: Written,
 
     for path in rig_extensions:
         unload_extension(path)
-    with pytest.raises(ConfigurationError, match=r"no fingertip kind is called 'six-floats'.*--extension .*six-floats"):
+    with pytest.raises(ConfigurationError, match=r"there is no fingertip kind 'six-floats'.*--extension .*six-floats"):
         tactile_lab("session", "replay", session.folder)
     kept = [session.calibration_file(f"extension-{path.stem}") for path in rig_extensions]
     loaded = [word for path in kept for word in ("--extension", path)]

@@ -1,1 +1,1 @@
-"""How much is known, and how much an action would tell (thesis section 4.4)."""
+"""Measures of uncertainty and information gain (thesis section 4.4)."""

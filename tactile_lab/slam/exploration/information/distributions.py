@@ -38,7 +38,7 @@ def renyi_entropy(weights: Array, order: float) -> float:
 
 
 def mutual_information(prior: Array, posterior: Array) -> float:
-    """Equation 4.5, ``H(x) - H(x | z)``: what a measurement took from the entropy; negative where it added doubt."""
+    """Equation 4.5, ``H(x) - H(x | z)``: reduction of entropy by a measurement; may be negative."""
     return shannon_entropy(prior) - shannon_entropy(posterior)
 
 
@@ -56,7 +56,7 @@ def kl_divergence(of: Array, to: Array) -> float:
 
 
 def _normalise(weights: Array) -> Array:
-    """Shares of the whole. Raises ValueError for weights that are no distribution."""
+    """Normalized weights. Raises ValueError if they are not a distribution."""
     weights = np.asarray(weights, dtype=float)
     total = float(weights.sum()) if len(weights) else 0.0
     if not (np.isfinite(total) and total > 0 and weights.min() >= 0):

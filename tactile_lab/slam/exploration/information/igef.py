@@ -1,7 +1,8 @@
 """Information gain estimation function: four metrics of a place on the surface, multiplied (thesis 4.11-4.15).
 
 The thesis prints (4.14) with ``arccos(n, n*)``, an angle without its inner product; read here as the angle between
-the normals. Its observation holds: values are high near the contacts and low far away, whatever is known there.
+the normals. As the thesis observes, values are high near the contacts and low far away, regardless of what is known
+there.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ class IgefSettings(StrictModel):
     Attributes:
         far_m: sigma 1: beyond this distance a place counts as new.
         beside_m, beside_sigma_m: mu 3 and sigma 3: the favoured distance to what is explored, and its width.
-        turn_sigma: sigma 4: how far a fingertip likes to turn, as twice the sine of half the angle.
+        turn_sigma: sigma 4: preferred rotation of a fingertip, as twice the sine of half the angle.
     """
 
     far_m: float = Field(default=0.010, gt=0)
@@ -95,7 +96,7 @@ def nearest_vertices(surface: Surface, points_m: Array) -> Array:
 def path_lengths(surface: Surface, sources: Array) -> Array:
     """Length of the shortest way along the edges from each source vertex to every vertex, shape (k, n), metres.
 
-    Infinite between parts that do not hang together.
+    Infinite between unconnected parts.
     """
     edges = np.vstack([surface.cells[:, [i, j]] for i, j in _sides(surface.cells.shape[1])])
     edges = np.unique(np.sort(edges, axis=1), axis=0)

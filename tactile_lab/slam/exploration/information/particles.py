@@ -1,4 +1,4 @@
-"""How far particles of a planar pose are spread, as one Gaussian and as several.
+"""Spread of particles of a planar pose, as one Gaussian and as several.
 
 Rows are (x m, y m, yaw rad); angles are averaged on the circle.
 """
@@ -22,12 +22,12 @@ _SMALLEST_VARIANCE = 1e-12
 
 @dataclass(frozen=True)
 class Mode:
-    """One heap of particles.
+    """One cluster of particles.
 
     Attributes:
         weight: its share of all.
         mean: shape (3,).
-        covariance: within the heap, shape (3, 3).
+        covariance: within the cluster, shape (3, 3).
     """
 
     weight: float
@@ -66,7 +66,7 @@ def gaussian_entropy(covariance: Array) -> float:
 
 
 def modes(rows: Array, weights: Array, apart_m: float = 0.020) -> tuple[Mode, ...]:
-    """Heaps of particles whose gaps exceed ``apart_m`` (a turn counts with :data:`ARM_m`), the heaviest first.
+    """Clusters of particles whose gaps exceed ``apart_m`` (a turn counts with :data:`ARM_m`), the heaviest first.
 
     Section 4.6 of the thesis asks for this: one Gaussian misjudges a belief with several modes. Up to 150 evenly
     chosen particles are linked (single linkage); the others join the nearest of them.
@@ -81,10 +81,10 @@ def modes(rows: Array, weights: Array, apart_m: float = 0.020) -> tuple[Mode, ..
 
 
 def mixture_entropy(parts: tuple[Mode, ...]) -> float:
-    """Entropy of a mixture of well separated Gaussians, nats: which mode it is, and where within it.
+    """Entropy of a mixture of well separated Gaussians, nats: of the choice of mode, and within it.
 
-    Exact where the modes do not overlap, an upper bound otherwise. A determinant of (4.21) would take the empty room
-    between the modes for uncertainty; this does not.
+    Exact where the modes do not overlap, an upper bound otherwise. The determinant of (4.21) would count the empty
+    space between the modes as uncertainty; this does not.
     """
     return float(sum(part.weight * (gaussian_entropy(part.covariance) - np.log(part.weight)) for part in parts))
 

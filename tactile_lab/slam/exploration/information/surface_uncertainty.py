@@ -1,4 +1,4 @@
-"""How well a Gaussian process knows the surface (thesis section 4.4.4)."""
+"""Uncertainty of the surface by the Gaussian process (thesis section 4.4.4)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from drivers.core.contacts import Array
 
 POINT_SIGMA_m = 0.001
-"""Of a contact along its normal, where nothing else is said."""
+"""Default standard deviation of a contact along its normal."""
 
 _JITTER = 1e-9
 
 
 def log_determinant(covariance: Array) -> float:
-    """Of a covariance, shape (q, q); entries that rounding made singular count as very small, not as minus infinity."""
+    """Log determinant of a covariance, shape (q, q); a very small number if rounding made it singular."""
     size = max(float(np.trace(covariance)) / max(len(covariance), 1), np.finfo(float).tiny)
     return float(np.linalg.slogdet(covariance + _JITTER * size * np.eye(len(covariance)))[1])
 

@@ -1,1 +1,1 @@
-"""How far shapes are from each other (thesis appendix C)."""
+"""Distances between shapes (thesis appendix C)."""

@@ -1,4 +1,4 @@
-"""Best rigid alignment of an estimated shape to the true one, for errors that leave the pose aside."""
+"""Best rigid alignment of an estimated shape to the true one, for errors without the pose."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _FINALISTS = 3
 _PLANAR_STARTS = 8
 _SETTLED_m = 1e-7
 _WEAKEST_DIRECTION = 1e-4
-"""Motions that the data determine less than this, relative to the best, are left alone (a sphere's turns)."""
+"""Motions that the data determine less than this, relative to the best, are ignored (a sphere's rotations)."""
 
 
 def align_contours(estimated_m: Array, truth_m: Array) -> Pose2:
-    """``truth_T_estimated`` that lays one closed polygon of shape (n, 2) best onto another.
+    """``truth_T_estimated`` that fits one closed polygon of shape (n, 2) best to another.
 
     Least squares over nearest points in both directions (iterated closest points, at the end along the
     normals), from the given pose and from eight turns about the middles; repeatable.
@@ -36,13 +36,13 @@ def align_contours(estimated_m: Array, truth_m: Array) -> Pose2:
 
 
 def align_meshes(estimated: TriangleMesh, truth: TriangleMesh, *, upright: bool) -> Pose3:
-    """``truth_T_estimated`` that lays one mesh best onto another, as :func:`align_contours`.
+    """``truth_T_estimated`` that fits one mesh best to another, as :func:`align_contours` does.
 
     Args:
         estimated: the mesh to move.
         truth: the mesh that stays.
-        upright: True turns about the vertical axis only, as on a table; False turns freely, starting from
-            the 24 ways in which the principal axes can be laid onto each other.
+        upright: True turns about the vertical axis only, as on a table; False turns freely, starting from the 24
+            assignments of the principal axes.
     """
     source, target = (_mesh_surface(mesh) for mesh in (estimated, truth))
     turns = list(_planar_turns(3)) if upright else list(_spatial_turns(source.points, target.points))
@@ -92,14 +92,14 @@ class _ClosestPoints:
         self._source_tree, self._target_tree = cKDTree(source.points), cKDTree(target.points)
 
     def run(self, pose: _Rigid, steps: int) -> _Rigid:
-        """Least squares of the pairs' distances: slow to settle, but finds its way from afar."""
+        """Least squares of the pairs' distances: slow to converge, but from far away."""
         for _ in range(steps):
             sources, targets, _ = self._pairs(pose)
             pose = _fit_rigid(sources, targets, upright=self._upright)
         return pose
 
     def run_along_normals(self, pose: _Rigid, steps: int) -> _Rigid:
-        """Least squares of the pairs' distances along the normals, by Gauss-Newton: quick and exact from nearby."""
+        """Least squares of the pairs' distances along the normals, by Gauss-Newton: fast near the solution."""
         start = pose
         for _ in range(steps):
             sources, targets, normals = self._pairs(pose)
@@ -168,7 +168,7 @@ def _planar_turns(dimension: int) -> Iterator[Array]:
 
 
 def _spatial_turns(source: Array, target: Array) -> Iterator[Array]:
-    """Rotations that lay the principal axes of one set onto those of the other, in all 24 ways."""
+    """Rotations that align the principal axes of one set with those of the other, in all 24 ways."""
     axes_source, axes_target = (
         np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2] for points in (source, target)
     )

@@ -1,4 +1,4 @@
-"""How far an estimated shape is from the true one (appendix C)."""
+"""Errors of an estimated shape relative to the true one (appendix C)."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class ShapeErrors:
 
     Attributes:
         hausdorff_m: (C.1), the larger of the two directed maxima.
-        estimated_to_truth_m: (C.2) with A the estimate: how far the estimate strays from the truth.
-        truth_to_estimated_m: (C.3): how far the truth is from being covered.
+        estimated_to_truth_m: (C.2) with A the estimate: distance of the estimate from the truth.
+        truth_to_estimated_m: (C.3): distance of the truth from the estimate.
         mean_distance_m: average of the two directed mean distances.
         chamfer_m: sum of the two directed mean distances.
         fscore_5mm: harmonic mean of the shares of each surface within 5 mm of the other, 0 to 1.

@@ -1,1 +1,1 @@
-"""Outlines of straight faces."""
+"""Outlines with straight faces."""

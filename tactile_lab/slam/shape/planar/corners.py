@@ -1,8 +1,8 @@
 """Contacts at the corners of an outline.
 
-A fingertip that straddles a corner touches it with a normal anywhere between those of the two faces. Taken for faces of
-their own such contacts cut corners off, taken for errors they are lost; taken for what they are they pin the corner
-down. Concave corners are never touched so: there the fingertip rests on both faces.
+A fingertip that straddles a corner touches it with a normal anywhere between those of the two faces. Treated as
+separate faces, such contacts would cut corners off; treated as errors, they are lost; treated as corner contacts, they
+determine the corner. Concave corners are never touched like this: there the fingertip rests on both faces.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from drivers.core.contacts import Array
 from tactile_lab.slam.shape.planar.segmentation import Faces, PlanarContacts, PRIOR_REACH_m, price_of_face
 
 CORNER_SHARE = 0.1
-"""Share of contacts expected at corners, before any was seen."""
+"""Prior share of contacts at corners."""
 
 _LEAST_ON_FACE = 3
-"""Faces of fewer contacts may be no faces at all, but corners between larger ones."""
+"""Faces with fewer contacts may actually be corners between larger ones."""
 
 _LEAST_TURN_rad = float(np.deg2rad(20.0))
 _CLEARLY = 4.0
-"""Chi-square by which a corner has to explain a contact better than a face."""
+"""Chi-square by which a corner must explain a contact better than a face."""
 
 
 @dataclass(frozen=True)

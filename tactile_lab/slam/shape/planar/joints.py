@@ -1,4 +1,4 @@
-"""Where one straight face of an outline passes into the next: in a corner, or over ground that nothing touched."""
+"""Joints between successive straight faces of an outline: a corner, or a bridge over an untouched part."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _SLACK_SIGMAS = 8.0
 """A corner may lie so many standard deviations of a contact behind the outermost contacts of its faces."""
 
 _MANY = 6
-"""On a face of so many contacts one of them may be beyond the corner."""
+"""On a face with at least this many contacts one may be beyond the corner."""
 
 _LARGEST_CORNER_SIGMA_m = 0.015
-"""A corner that is known worse than this is a guess."""
+"""A corner with a larger standard deviation is a guess."""
 
 _UNSEEN_CONTACTS = 2.5
 _LARGEST_ROUNDING_m = 0.015
@@ -40,7 +40,7 @@ _BRIDGE_STEPS = 8
 
 @dataclass(frozen=True)
 class Joint:
-    """The way from the end of one face to the beginning of the next.
+    """The joint from the end of one face to the beginning of the next.
 
     Attributes:
         points_m: one corner, or a bridge from one end to the other, shape (k, 2).
@@ -78,7 +78,7 @@ class JointMaker:
         return self._bridge(self._ends(face, following, int(before[-1]), int(after[0])))
 
     def _ends(self, face: int, following: int, last: int, first: int) -> Array:
-        """Where two faces were touched last and first."""
+        """The last contact of one face and the first of the next."""
         return np.array([self._foot(face, last), self._foot(following, first)])
 
     def _foot(self, face: int, contact: int) -> Array:
@@ -94,7 +94,7 @@ class JointMaker:
         return np.asarray(np.linalg.solve(normals, self._faces.offsets_m[pair]))
 
     def _is_plausible(self, face: int, following: int, corner: Array, last: int, first: int) -> bool:
-        """The corner lies ahead of the one face and before the other, leaves out no contacts, and is known well."""
+        """Whether the corner lies between both faces, leaves out no contacts, and is known well."""
         ends, tangents = self._ends(face, following, last, first), self._faces.tangents
         slack_m = _SLACK_SIGMAS * float(self._contacts.point_sigma_m[[last, first]].max())
         leaps = np.array([(corner - ends[0]) @ tangents[face], (ends[1] - corner) @ tangents[following]])
@@ -107,11 +107,11 @@ class JointMaker:
         return bool(variance < _LARGEST_CORNER_SIGMA_m**2)
 
     def _rounding_m(self, corner: Array) -> float:
-        """How far the provisional outline passes by a corner."""
+        """Distance of the provisional outline from a corner."""
         return float(distances_to_polygon(corner[None], self._provisional.points_m)[0]) if self._provisional else 0.0
 
     def _bridge(self, ends: Array) -> Joint:
-        """Between two ends: the provisional outline if it runs there, else a straight line.
+        """Between two ends: the provisional outline if it runs there, otherwise a straight line.
 
         Along a straight line sigma grows towards the middle, to a quarter of its length: nothing was touched there.
         """

@@ -20,7 +20,7 @@ from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 LEAST_FACES = 3
 
 BRIDGE = -1
-"""In place of a face, for a part of the outline that no face covers."""
+"""Face number of a part of the outline that no face covers."""
 
 
 class Polygon:
@@ -128,6 +128,6 @@ class Polygon:
 
 
 def _scatter(contacts: PlanarContacts, faces: Faces) -> float:
-    """Root of chi-square per degree of freedom, if above one: the contacts scatter more than they claim to."""
+    """Root of chi-square per degree of freedom, if above one: the contacts scatter more than stated."""
     freedom = 2 * len(contacts) - faces.count - len(np.unique(faces.direction_groups))
     return float(np.sqrt(max(1.0, faces.chi_square / freedom))) if freedom > 0 else 1.0

@@ -1,8 +1,8 @@
-"""Faces of a made object that are parallel or at right angles, where the contacts do not object.
+"""Makes faces parallel or perpendicular if the contacts allow it.
 
 Directions known to some degrees each are known better together. Two faces, or two groups of them, share one direction
 up to quarter turns if that costs less chi-square than one direction more is worth: the narrowing of a prior over a
-quarter turn by the contacts. So it is the evidence that decides, and a face that is clearly askew keeps its direction.
+quarter turn by the contacts. So the evidence decides, and a clearly oblique face keeps its direction.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class _Group:
 
 
 def with_right_angles(contacts: PlanarContacts, faces: Faces) -> Faces:
-    """The same faces, those that may be parallel or at right angles to each other made so."""
+    """The same faces, made parallel or perpendicular where the evidence allows."""
     groups, gained = [_alone(contacts, faces, face) for face in range(faces.count)], 0.0
     while (found := _most_gained(groups)) is not None:
         gain, *pair = found

@@ -1,4 +1,4 @@
-"""How well the straight faces of an outline are known."""
+"""Uncertainty of the straight faces of an outline."""
 
 from __future__ import annotations
 

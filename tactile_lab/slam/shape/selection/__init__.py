@@ -1,1 +1,1 @@
-"""Which model describes an object best, by evidence."""
+"""Choice of the shape model by evidence."""

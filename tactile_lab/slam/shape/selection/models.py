@@ -1,4 +1,4 @@
-"""Shape models by name: the best of ours, each alone, and those of section 2.1 to compare with."""
+"""Shape models by name: the choice by evidence, each single model, and those of section 2.1 for comparison."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Fit: TypeAlias = Callable[[Gpis, Array | None, float | None], FittedShape]
 """Makes a shape from a field's contacts, places known to be outside, and the height of the table."""
 
 _GRADIENT_SIGMA = 0.1
-"""Of normals where the field has none, as with the thesis's off-surface points."""
+"""Standard deviation of normals if the field has none, as with the thesis's off-surface points."""
 
 
 def fit_shape(name: str, gpis: Gpis, free_points_m: Array | None = None, floor_m: float | None = None) -> FittedShape:
@@ -94,7 +94,7 @@ def _normal_sigma(gpis: Gpis) -> Array:
 
 
 SHAPE_MODELS: Registry[Fit] = Registry("shape model")
-"""How each model is made, by its name. See ``docs/extending.md`` for adding one."""
+"""Constructors of the models, by name. See ``docs/extending.md`` for adding one."""
 
 SHAPE_MODELS.register("auto", best_shape)
 SHAPE_MODELS.register("gpis", _gpis)

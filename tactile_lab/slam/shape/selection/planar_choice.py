@@ -1,8 +1,8 @@
-"""Which model describes an object best: the smooth field or sharp faces, by what the contacts say.
+"""Chooses between the smooth field and sharp faces by the evidence of the contacts.
 
-Never by the object's name. The models' evidence is compared (Bayesian information criterion of the faces against the
-marginal likelihood of the field), and a sharp shape is only taken if it contradicts nothing known: its contacts lie on
-it, and places where fingertips were are outside.
+The object's name is not used. The models' evidence is compared (Bayesian information criterion of the faces against the
+marginal likelihood of the field), and a sharp shape is only accepted if it contradicts nothing known: its contacts lie
+on it, and places where fingertips were are outside.
 """
 
 from __future__ import annotations
@@ -148,8 +148,8 @@ def free_evidence(contour: Contour, free_points_m: Array, gpis: Gpis) -> float:
 def _holds_contacts(polygon: Polygon) -> bool:
     """All contacts but a few lie on the outline itself, not only on the lines of its faces, and none far along those.
 
-    A wrong contact may lie anywhere. One that continues a face in place and direction, far beyond its end, tells that
-    the object goes on there: faces that nobody has touched are missing.
+    A wrong contact may lie anywhere. One that continues a face in place and direction, far beyond its end, shows that
+    the object extends there: untouched faces are missing.
     """
     contacts, faces = polygon.contacts, polygon.faces
     away_m = distances_to_polygon(contacts.points_m, polygon.outline_m)

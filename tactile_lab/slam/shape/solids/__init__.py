@@ -1,1 +1,1 @@
-"""Solids of flat faces, and prisms."""
+"""Solids with flat faces, and prisms."""

@@ -1,4 +1,4 @@
-"""Where no plane bounds a solid: how far the field says it goes on."""
+"""Bounds a solid by the field's extent where no plane does."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Trackers to compare with: odometry and registration."""
+"""Baseline trackers: odometry and registration."""

@@ -1,7 +1,7 @@
 """The registration baseline: each grasp's contacts are matched to those placed before, starting at odometry.
 
-Generalised ICP by small-gicp knows points with a local plane. A contact has its plane from its normal, not from
-its neighbours, so it is handed over as a small disc of points; everything else is the library's.
+Generalised ICP by small-gicp knows points with a local plane. A contact has its plane from its normal, not from its
+neighbours, so it is passed as a small disc of points; the library does the rest.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class IcpSettings(StrictModel):
 
     Attributes:
         reach_m: contacts farther from the map than this are not matched.
-        believed: a pose farther from odometry than so many standard deviations is not.
-        iterations: at most so many a grasp.
-        least_matched: share of a grasp's contacts that must find a partner; below it odometry stands.
+        believed: a pose farther from odometry than this many standard deviations is rejected.
+        iterations: largest number per grasp.
+        least_matched: share of a grasp's contacts that must find a partner; otherwise odometry is used.
     """
 
     reach_m: float = Limit(default=0.030, gt=0)
@@ -52,7 +52,7 @@ class IcpTracker(OdometryTracker):
         self._settings = settings
 
     def weigh(self, contacts: ContactSet) -> bool:
-        """Register the contacts; False when too few find a partner, and the predicted pose stands."""
+        """Register the contacts. Returns False if too few find a partner, and the predicted pose is used."""
         found = self._register(contacts) if len(contacts) else None
         self._trusted = found is not None and self._believable(found[0])
         if found is not None and self._trusted:
@@ -64,7 +64,7 @@ class IcpTracker(OdometryTracker):
         return bool(away @ np.linalg.solve(self._now.covariance, away) < len(row) * self._settings.believed**2)
 
     def _register(self, contacts: ContactSet) -> tuple[Array, float] | None:
-        """The pose that lays the contacts onto the map, and their mean squared distance from it, or None."""
+        """The pose that fits the contacts to the map, and their mean squared distance from it, or None."""
         import small_gicp  # here: only this baseline needs it
 
         target, tree = _cloud(self._map.contacts)
@@ -90,9 +90,9 @@ class IcpTracker(OdometryTracker):
         return self._map.space.motion(Pose3(object_T_world).inverse()), squared_m2
 
     def _covariance_at(self, row: Array, squared_m2: float, contacts: ContactSet) -> Array:
-        """What distances along the normals to equally uncertain partners tell, and odometry for the rest.
+        """Information of the distances along the normals to equally uncertain partners, and odometry for the rest.
 
-        Contacts that lie farther from their partners than their noise explains tell as little as that.
+        Contacts farther from their partners than their noise explains are weighted down accordingly.
         """
         space = self._map.space
         points, normals = space.to_object(row, contacts.points_m, contacts.normals)

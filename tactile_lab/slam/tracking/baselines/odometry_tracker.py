@@ -1,7 +1,7 @@
-"""Trackers that take a pose as it comes: from the hand's motion alone, or from outside.
+"""Trackers with a given pose: from the hand's motion alone, or from outside.
 
-They are the two ends that every method is measured between: odometry is what the hand's motion is worth without any
-touch, and known poses show what the shape model makes of perfect tracking.
+They are the bounds for every method: odometry uses only the hand's motion, and known poses show the shape model with
+perfect tracking.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from tactile_lab.slam.tracking.joint.proposals import UNEXPLAINED_COST
 _STEP = 1e-6
 _LOOKS = 3
 _KERNEL_EVERY = 4
-"""Kernel parameters are estimated anew after so many grasps."""
+"""Kernel parameters are estimated again after this many grasps."""
 
 
 class OdometryTracker:
-    """Eq. 3.8 and nothing else: the object moved as the hand did, and the uncertainty adds up."""
+    """Only eq. 3.8: the object moved as the hand did, and the uncertainty adds up."""
 
     effective_count = 1.0
 
@@ -61,31 +61,31 @@ class OdometryTracker:
         return self._now
 
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
-        """Contacts enter the shape where the pose puts them, however uncertain: a baseline judges nothing."""
+        """Contacts are added to the shape at the pose, however uncertain it is: a baseline rejects nothing."""
         placed = PlacedGrasp(contacts, self._now.row, self._now.covariance, self._motion)
         self._map = self._map.with_grasp(placed if self._trusted else placed.put_aside())
 
     def resample(self) -> None:
-        """There is one belief only."""
+        """Nothing to do: there is only one belief."""
 
     def adopt(self, corrected: ContactMap) -> None:
         self._map = corrected
         self._now = PoseEstimate(corrected.placed[-1].row, corrected.placed[-1].covariance)
 
     def finish(self) -> None:
-        """Nothing is estimated, so nothing is left to improve."""
+        """Nothing to do: nothing is estimated."""
 
 
 class KnownPoseTracker(OdometryTracker):
-    """Places every grasp at a pose that is given: the floor that tracking cannot go below."""
+    """Places every grasp at a given pose: the lower bound of tracking errors."""
 
     def __init__(self, first: ContactMap, noise: MotionNoise, poses: Sequence[Pose3 | None]) -> None:
         """
         Args:
             first: map of the first grasp.
-            noise: how the uncertainty grows over grasps whose pose is not known.
+            noise: growth of the uncertainty over grasps with unknown pose.
             poses: true ``world_T_object`` of the first grasp, which is known, and of all that follow; in the truth's
-                own object frame, which the first grasp ties to the map's.
+                own object frame, which the first grasp relates to the map's.
         """
         super().__init__(first, noise)
         space, start = first.space, poses[0]
@@ -102,21 +102,21 @@ class KnownPoseTracker(OdometryTracker):
             self._now = PoseEstimate(self._given, CERTAIN_VARIANCE * np.eye(len(self._given)))
 
     def weigh(self, contacts: ContactSet) -> bool:
-        """Grasps whose pose is not known stay out of the shape."""
+        """Grasps with unknown pose are not used for the shape."""
         self._trusted = self._given is not None and len(contacts) > 0
         return self._trusted
 
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
-        """Contacts that fit nothing are left out: at known poses they are wrong themselves."""
+        """Contacts that fit nothing are left out: at known poses they must be wrong."""
         super().update_shape(contacts, certain)
         self._map, _ = self._judge.clean(self._map, len(self._map.placed) - 1)
         if len(self._map.placed) % _KERNEL_EVERY == 0:
             self._map = self._map.with_best_kernel()
 
     def finish(self) -> None:
-        """Look at all contacts anew, now that the shape is known best; what is left out changes the kernel.
+        """Test all contacts again with the final shape; leaving some out changes the kernel.
 
-        The kernel to begin with is that of the contacts that were trusted: wrong ones would shorten it to explain all.
+        The initial kernel is that of the accepted contacts: wrong ones would shorten it to explain all.
         """
         kernel = self._map.with_best_kernel().settings
         self._map, _ = self._judge.clean(replace(self._map.with_all_contacts(), settings=kernel))

@@ -1,1 +1,1 @@
-"""Contacts, poses and motion as the trackers see them."""
+"""Contacts, poses and motion for the trackers."""

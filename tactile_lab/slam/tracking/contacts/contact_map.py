@@ -16,19 +16,19 @@ from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
 
 _WHATEVER_THE_POSES = ("contacts_world", "grasp_indices", "_free_world")
-"""What a map has gathered from its grasps and keeps when only their poses change."""
+"""What a map has computed from its grasps and keeps when only their poses change."""
 
 WHILE_TRACKING_m = 0.080
-"""Longest kernel while more is to come: contacts on a smooth side would else rule out the edge behind it."""
+"""Longest kernel while more grasps follow: otherwise contacts on a smooth side would rule out the edge behind it."""
 
 
 class Moved(Enum):
-    """How the object came to where it is from where it was at the grasp before."""
+    """How the object moved since the previous grasp."""
 
     AS_MEANT = "as meant"
-    """It was carried and went with the hand but for its slip, or was left where it was and lay nearly still."""
+    """It was carried and moved with the hand except for its slip, or was left in place and hardly moved."""
     PUSHED = "pushed"
-    """It was to be left, and the closing hand pushed or turned it, nearly as far as it slips when it is carried."""
+    """It was left in place, and the closing hand pushed or turned it, nearly as far as it slips when it is carried."""
     FREELY = "freely"
     """It did not follow the hand: it fell, or someone moved it."""
 
@@ -41,9 +41,9 @@ class PlacedGrasp:
         contacts_world: contacts, world frame.
         row: pose ``world_T_object`` as (x_m, y_m, yaw_rad).
         covariance: of the pose, shape (3, 3).
-        motion: the hand's motion since the grasp before, as a row.
-        left_out: indices of the contacts that are kept aside; the others are part of the shape.
-        moved: how the object came there from the grasp before.
+        motion: the hand's motion since the previous grasp, as a pose vector.
+        left_out: indices of the contacts that are not used; the others are part of the shape.
+        moved: how the object moved since the previous grasp.
     """
 
     contacts_world: ContactSet
@@ -65,29 +65,29 @@ class PlacedGrasp:
 
     @property
     def used(self) -> bool:
-        """Some of its contacts are part of the shape."""
+        """Whether some of its contacts are part of the shape."""
         return len(self.left_out) < len(self.contacts_world)
 
     @property
     def free_world_m(self) -> Array:
-        """Places that were free, world frame; not those before a contact that is left out, which may be wrong too."""
+        """Free places, world frame; without those before a contact that is left out, which may be wrong too."""
         world = self.contacts_world
         return world.free_m[~np.isin(world.free_of, sorted(self.left_out))]
 
     def put_aside(self) -> PlacedGrasp:
-        """The same with none of its contacts in the shape."""
+        """The same grasp with none of its contacts in the shape."""
         return replace(self, left_out=frozenset(range(len(self.contacts_world))))
 
 
 @dataclass(frozen=True)
 class ContactMap:
-    """What is known of the object: immutable, a new one is made by every change.
+    """The contacts of all grasps with their poses; immutable, every change makes a new map.
 
     Attributes:
-        placed: the grasps in order, the first one fixes the object frame.
+        placed: the grasps in order; the first one defines the object frame.
         settings: of the shape model, with the current kernel parameters.
-        space: what the rows of poses mean.
-        archive: settled grasps of a long session; the first of the placed ones then sums them up (:mod:`fixed_lag`).
+        space: kind of the pose vectors.
+        archive: settled grasps of a long session, summarized by the first of the placed ones (:mod:`fixed_lag`).
         settled_cost: what the archive's grasps cost beyond their summary.
     """
 
@@ -114,7 +114,7 @@ class ContactMap:
 
     @property
     def moved(self) -> tuple[Moved, ...]:
-        """How the object came to where it is at each grasp."""
+        """How the object moved before each grasp."""
         return tuple(grasp.moved for grasp in self.placed)
 
     @cached_property
@@ -124,7 +124,7 @@ class ContactMap:
 
     @property
     def free_points_m(self) -> Array:
-        """Places that were free at grasps whose contacts are part of the shape, object frame, shape (q, d)."""
+        """Free places of grasps whose contacts are part of the shape, object frame, shape (q, d)."""
         places, grasps = self._free_world
         return self.space.to_object(self.rows[grasps], places, places)[0]
 
@@ -148,7 +148,7 @@ class ContactMap:
 
     @property
     def left_out_count(self) -> int:
-        """Number of contacts that are kept aside."""
+        """Number of contacts that are not used."""
         return sum(len(grasp.left_out) for grasp in self.placed)
 
     @property
@@ -158,12 +158,12 @@ class ContactMap:
 
     @property
     def trailing_unplaced(self) -> int:
-        """How many grasps in a row were left out last."""
+        """Number of grasps at the end that were left out."""
         used = [grasp.used for grasp in reversed(self.placed)]
         return used.index(True)
 
     def with_placed(self, index: int, grasp: PlacedGrasp) -> ContactMap:
-        """The map with one grasp placed otherwise."""
+        """The map with one grasp replaced."""
         return replace(self, placed=(*self.placed[:index], grasp, *self.placed[index + 1 :]))
 
     def without_grasp(self, index: int) -> ContactMap:
@@ -201,9 +201,9 @@ class ContactMap:
         return moved
 
     def reread(self, backward: ContactMap) -> ContactMap:
-        """This map with the poses and doubts of another one, of the same grasps in the opposite order.
+        """This map with the poses and left-out contacts of another one, of the same grasps in the opposite order.
 
-        The other's poses are brought into this map's object frame. Steps in which the object moved freely here stay so.
+        The other's poses are brought into this map's object frame. Steps in which the object moved freely are kept.
         """
         space, theirs = self.space, backward.placed[::-1]
         frame_T_ours = space.compose(space.inverse(theirs[0].row), self.placed[0].row)

@@ -46,8 +46,8 @@ class ContactSet:
     def of_grasp(cls, grasp: Grasp, dimension: int, origin_height_m: float) -> Self:
         """The contacts of a grasp, heights counted from the object origin's.
 
-        In two dimensions points and normals are projected onto the table plane, and contacts on slopes too
-        flat to tell about the contour are left out.
+        In two dimensions points and normals are projected onto the table plane, and contacts on slopes too flat to be
+        informative about the contour are left out.
 
         Raises:
             TrackingError: NaN or infinite entries, normals without length, contacts metres apart.
@@ -89,7 +89,7 @@ class ContactSet:
 
         Args:
             world_T_object: one pose of shape (size,), or one for each contact, shape (n, size).
-            space: what rows of poses mean.
+            space: kind of the pose vectors.
         """
         points, normals = space.to_object(world_T_object, self.points_m, self.normals)
         return ContactSet(points, normals, self.point_sigma_m, self.normal_sigma_rad)
@@ -104,11 +104,10 @@ class ContactSet:
 def _free_places(
     grasp: Grasp, contacts: ContactSet, counted: Sequence[Contact], origin: Array
 ) -> tuple[Array, NDArray[np.intp]]:
-    """Free places and the contact of each, by the approach paths; where those are not known, in the fingertips.
+    """Free places and the contact of each, by the approach paths; if those are unknown, in the fingertips.
 
     Args:
-        grasp, contacts, counted: what was touched, and what of it counts.
-        origin: of the object frame, world frame.
+        grasp, contacts, counted: all contacts, and those that count. origin: of the object frame, world frame.
     """
     if not grasp.approach_paths:
         places = [fingertip_places(contacts.points_m[i], contacts.normals[i]) for i in range(len(contacts))]
@@ -122,7 +121,7 @@ def _free_places(
 
 
 def _comes_down(line: ApproachPath) -> bool:
-    """A way from above tells nothing about the contour: the object may be under it."""
+    """Whether a path is horizontal: one from above says nothing about the contour, as the object may be under it."""
     way = line.end_world_m - line.start_world_m
     return bool(abs(way[2]) > LARGEST_SLOPE * np.linalg.norm(way))
 
@@ -140,7 +139,7 @@ def placement_sigma_m(contacts: ContactSet, row: Array, covariance: Array, space
     Args:
         contacts: world frame.
         row, covariance: of the pose, shapes (size,) and (size, size).
-        space: what rows mean.
+        space: kind of the pose vector.
     """
     points, normals = space.to_object(row, contacts.points_m, contacts.normals)
     rows = space.by_row(row, points, normals, normals, np.zeros_like(normals))

@@ -1,4 +1,4 @@
-"""Where the object frame is born: at the first grasp, by the hand that holds it (section 3.4)."""
+"""Definition of the object frame by the first grasp (section 3.4)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tactile_lab.slam.tracking.contacts.spatial_pose_vectors import SPATIAL
 
 
 def first_row(grasp: Grasp, contacts: ContactSet, *, on_table: bool) -> Array:
-    """The pose of the object frame at its birth: at the contacts' centre, along the palm."""
+    """The initial pose of the object frame: at the contacts' centre, along the palm."""
     if on_table:
         return np.array([*contacts.points_m[:, :2].mean(axis=0), palm_heading(grasp.world_T_palm)])
     return SPATIAL.row(Pose3(grasp.world_T_palm.rotation(), contacts.points_m.mean(axis=0)))

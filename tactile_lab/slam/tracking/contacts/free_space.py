@@ -1,7 +1,7 @@
-"""Where fingers were there is no object: free space as evidence about poses and shape.
+"""Free space as evidence about poses and shape: there is no object where fingers were.
 
 Points before the end of every approach path are outside of the object, and all of the line where a finger met
-nothing. Without approach paths the fingertip itself, outward along the normal, is what is known to be free.
+nothing. Without approach paths only the fingertip itself, outward along the normal, is known to be free.
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ from drivers.core.contacts import ApproachPath, Array
 from tactile_lab.slam.shape.fields.gpis import Gpis
 
 BEFORE_CONTACT_m = np.array([0.004, 0.010, 0.020, 0.035])
-"""Places on a approach path before its contact."""
+"""Places on an approach path before its contact."""
 
 ALONG_NORMAL_m = np.array([0.004, 0.008, 0.012, 0.016])
-"""Places in the fingertip itself, where the approach paths are not known."""
+"""Places in the fingertip itself, if the approach paths are unknown."""
 
 _SPACING_m = 0.010
 """Of places on the line of a finger that met nothing."""
 
 _CLEARANCE_m = 0.004
-"""The end of such a line is where a fingertip's surface was: so far before it, it is free for sure."""
+"""The end of such a line is where a fingertip's surface was: this far before it, space is certainly free."""
 
 _TOLERANCE_m = 0.001
 _WEIGHT = 0.5
-"""Places on one line tell much the same, so each counts half."""
+"""Places on one line are correlated, so each counts half."""
 
 
 def places_on_line(line: ApproachPath) -> Array:
-    """Places on a approach path that are free for sure, world frame, shape (q, 3)."""
+    """Places on an approach path that are certainly free, world frame, shape (q, 3)."""
     back = line.start_world_m - line.end_world_m
     length = float(np.linalg.norm(back))
     if length < _CLEARANCE_m:

@@ -1,6 +1,6 @@
 """Motion of the object on the table while the hand carries it (eq. 3.7 and 3.8).
 
-Inside the tracker a planar pose ``world_T_object`` is a row ``(x_m, y_m, yaw_rad)``, so that thousands of
+Inside the tracker a planar pose ``world_T_object`` is a vector ``(x_m, y_m, yaw_rad)``, so that thousands of
 them are one array of shape (n, 3). At module borders poses are gtsam ``Pose2`` and ``Pose3``.
 """
 
@@ -18,15 +18,15 @@ from drivers.core.poses import planar, spatial, wrap_angle_rad
 
 
 class MotionNoise(StrictModel):
-    """Standard deviations of what the object does beside the hand's motion, per re-orientation.
+    """Standard deviations of the object's slip relative to the hand's motion, per re-orientation.
 
     The defaults are the thesis's 100 % (section 3.4.1): 10 mm per axis and 20 degrees.
 
     Attributes:
         translation_m, rotation_rad: per axis, and about the vertical.
-        unheld: share of these that remains where the hand did not carry the object between two grasps and the
-            closing hand alone may have pushed it. 1 where objects are moved by others than the hand as well.
-        gripped: the hand's grip bounds slips, so that large ones are less likely than a normal distribution has them.
+        unheld: share of these that applies if the hand did not carry the object between two grasps, and only the
+            closing hand may have pushed it. 1 if objects may also be moved by others.
+        gripped: the hand's grip bounds slips, so that large ones are less likely than under a normal distribution.
     """
 
     renamed: ClassVar = {"left_lying": "unheld"}
@@ -42,7 +42,7 @@ class MotionNoise(StrictModel):
         return np.array([self.translation_m, self.translation_m, self.rotation_rad])
 
     def after(self, motions: Array) -> MotionNoise:
-        """The noise of one step after the hand's motions, rows or one row: less where it did not move the object."""
+        """The noise of one step after the hand's motions, shape (..., 3): less if the hand did not move the object."""
         if np.any(motions):
             return self
         factor = self.unheld
@@ -57,30 +57,30 @@ class MotionNoise(StrictModel):
 
 
 def pose_row(world_T_object: Pose2) -> Array:
-    """A planar pose as the row (x_m, y_m, yaw_rad)."""
+    """A planar pose as the vector (x_m, y_m, yaw_rad)."""
     return np.array([world_T_object.x(), world_T_object.y(), world_T_object.theta()])
 
 
 def row_pose(row: Array) -> Pose2:
-    """The planar pose of a row (x_m, y_m, yaw_rad)."""
+    """The planar pose of a vector (x_m, y_m, yaw_rad)."""
     return Pose2(float(row[0]), float(row[1]), float(row[2]))
 
 
 def row_pose_in_space(row: Array, height_m: float) -> Pose3:
-    """The pose of a row in space, its origin at the given height over the table."""
+    """The pose in space of a planar pose vector, its origin at the given height above the table."""
     return spatial(row_pose(row), height_m)
 
 
 def planar_motion(hand_motion_world: Pose3) -> Array:
-    """The hand's motion in the table plane as a row: the object rests on the table, so no tilt is passed on."""
+    """The hand's motion in the table plane as a pose vector: the object rests on the table, so the tilt is ignored."""
     return pose_row(planar(hand_motion_world))
 
 
 def compose(motion: Array, rows: Array) -> Array:
-    """``motion * pose`` for each row: eq. 3.8, the motion being expressed in the world frame.
+    """``motion * pose`` for each pose vector: eq. 3.8, the motion being expressed in the world frame.
 
     Args:
-        motion: one row, or as many as ``rows``.
+        motion: one pose vector, or as many as ``rows``.
         rows: shape (3,) or (n, 3).
     """
     cosine, sine = np.cos(motion[..., 2]), np.sin(motion[..., 2])
@@ -110,7 +110,7 @@ def deviation(rows: Array, reference: Array) -> Array:
 
 
 def sample_motion(rows: Array, motion: Array, noise: MotionNoise, rng: np.random.Generator) -> Array:
-    """Draw the poses after a motion from ``P(x_k | x_{k-1}, u_k)`` (eq. 3.7), one for each row of shape (n, 3)."""
+    """Draw the poses after a motion from ``P(x_k | x_{k-1}, u_k)`` (eq. 3.7), one for each of shape (n, 3)."""
     moved = compose(motion, rows) + rng.normal(size=rows.shape) * noise.sigmas
     moved[:, 2] = wrap_angle_rad(moved[:, 2])
     return moved

@@ -1,7 +1,8 @@
-"""Poses as rows of numbers: how many there are, how they compose, and how contacts move with them.
+"""Pose vectors: their size, how they compose, and how contacts move with them.
 
-Everything that smooths or proposes poses works on arrays of rows and asks one of these for the geometry, so that an
-object on a table (x, y, yaw) and one free in space (x, y, z, rotation vector) go through the same code.
+Everything that smooths or proposes poses works on arrays of pose vectors and uses one of these classes for the
+geometry, so that an object on a table (x, y, yaw) and one free in space (x, y, z, rotation vector) go through the same
+code.
 """
 
 from __future__ import annotations
@@ -24,15 +25,15 @@ from tactile_lab.slam.tracking.contacts.motion import (
 
 
 class PoseVectors(Protocol):
-    """What rows of one kind can do. Arrays of rows have shape (n, size)."""
+    """Operations on one kind of pose vectors. Arrays of them have shape (n, size)."""
 
     @property
     def size(self) -> int:
-        """Numbers in a row: translation first, then rotation."""
+        """Number of components: translation first, then rotation."""
 
     @property
     def translations(self) -> int:
-        """How many of them are translations."""
+        """Number of translational components."""
 
     def sigmas(self, noise: MotionNoise) -> Array:
         """Standard deviations of a re-orientation, shape (size,)."""
@@ -44,13 +45,13 @@ class PoseVectors(Protocol):
         """The inverse of each pose."""
 
     def deviation(self, rows: Array, reference: Array) -> Array:
-        """The noise v of eq. 3.7 that leads from the reference to the rows."""
+        """The noise v of eq. 3.7 that leads from the reference to the pose vectors."""
 
     def move(self, rows: Array, steps: Array) -> Array:
-        """Rows after small steps, in their usual range."""
+        """Pose vectors after small steps, in their usual range."""
 
     def motion(self, hand_motion_world: Pose3) -> Array:
-        """The hand's motion as a row."""
+        """The hand's motion as a pose vector."""
 
     def pose(self, row: Array, height_m: float) -> Pose3:
         """``world_T_object``, the origin of a planar pose at this height."""
@@ -64,7 +65,7 @@ class PoseVectors(Protocol):
         """
 
     def by_row(self, rows: Array, points: Array, normals: Array, by_points: Array, by_normals: Array) -> Array:
-        """Chain rule: derivatives by object-frame points and normals turned into those by the row, shape (..., size).
+        """Chain rule: derivatives by the pose vector, shape (..., size), from those by object-frame points and normals.
 
         Arguments as those and the results of :meth:`to_object`.
         """

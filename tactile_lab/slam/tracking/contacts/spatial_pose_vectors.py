@@ -1,4 +1,4 @@
-"""Poses of an object that is free in space, as rows (x, y, z, rotation vector)."""
+"""Pose vectors of an object that is free in space: (x, y, z, rotation vector)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 class SpatialVectors:
     """(x_m, y_m, z_m, wx, wy, wz), w being the rotation vector in radians; contacts have three coordinates.
 
-    The rotation vector is a chart without a fold below one full turn; it is brought back to half a turn after every
-    step, so that derivatives by it always exist. The noise of eq. 3.7 turns and shifts the object in the world.
+    The rotation vector is a regular chart below one full turn; it is brought back to half a turn after every step, so
+    that derivatives by it always exist. The noise of eq. 3.7 rotates and shifts the object in the world.
     """
 
     size = 6

@@ -1,4 +1,4 @@
-"""Long sessions: only the last grasps stay open, what was before is summed up.
+"""Long sessions: only the last grasps stay open, earlier ones are summarized.
 
 The poses of older grasps are settled. Of their contacts a spread-out selection stays, as one grasp at the last settled
 pose, so that the work of a step does not grow with the length of the session.
@@ -23,8 +23,8 @@ def condense(contact_map: ContactMap, window: int, remembered: int) -> ContactMa
 
     Args:
         contact_map: with more grasps than ``window``.
-        window: so many grasps stay as they are.
-        remembered: so many contacts of all before at most.
+        window: number of grasps that stay open.
+        remembered: largest number of contacts kept of all earlier grasps.
     """
     old, recent = contact_map.placed[:-window], contact_map.placed[-window:]
     archived = old[1:] if contact_map.archive else old
@@ -47,7 +47,7 @@ def unfold(contact_map: ContactMap) -> ContactMap:
 
 
 def _spread_out(contacts: ContactSet, count: int) -> NDArray[np.intp]:
-    """Indices of contacts far from each other in place and normal, one after the other."""
+    """Indices of contacts far from each other in position and normal (farthest point selection)."""
     places = np.hstack([contacts.points_m, _TURN_LENGTH_m * contacts.normals])
     chosen = [0]
     gaps = np.linalg.norm(places - places[0], axis=1)

@@ -18,16 +18,18 @@ _STIFFNESS = 10.0
 
 
 _HARDLY = 1e-3
-"""Certainty of a motion that the object did not follow: not zero, so that a pose nothing touches is still a pose."""
+"""Weight of a motion that the object did not follow: not zero, so that a pose without contacts is still determined."""
 
 
 _CONFIGURED_SLIPS = 6.0
 
 _PUSHED = 0.6
-"""How far a closing hand pushes an object that was to be left, in shares of how far a carried one slips."""
+"""Size of a push of an object left in place, as a share of the slip of a carried one."""
 
 _PUSHED_SHARE = 0.01
-"""Of such grasps. More are pushed than that; but while little is known of an object much fits badly that was not."""
+"""Prior share of such grasps. More are pushed than that, but while an object is little known many grasps fit badly that
+were not pushed.
+"""
 
 
 class MotionCost:
@@ -40,9 +42,9 @@ class MotionCost:
         Args:
             motions: of the hand before each grasp, shape (k, size); the first is not used.
             noise: of a re-orientation.
-            space: what the rows mean.
-            moved: how the object came to where it is at each grasp, k of them; slips of steps in which it moved freely
-                cost next to nothing, and where it was pushed little. None: always as meant.
+            space: kind of the pose vectors.
+            moved: how the object moved before each grasp, k of them; slips of steps in which it moved freely cost
+                almost nothing, and those of pushes little. None: always with the hand.
         """
         self._motions, self._space = motions, space
         self._stiff_beyond = STIFF_BEYOND_SIGMA if noise.gripped else np.inf
@@ -112,7 +114,7 @@ def _costs(slip: Array, excess: Array) -> Array:
 
 
 def pushed_nats(noise: MotionNoise, space: PoseVectors) -> float:
-    """What it costs that an object was pushed that was to be left where it is, before how far is looked at.
+    """The cost of a push of an object left in place, apart from its size.
 
     The share of such grasps, and the norm of the wider normal distribution over that of the narrower one.
     """
@@ -120,12 +122,12 @@ def pushed_nats(noise: MotionNoise, space: PoseVectors) -> float:
 
 
 def _push_scale(noise: MotionNoise) -> float:
-    """How far pushes go, in shares of a carried object's slips; never less far than an object moves that lies still."""
+    """Size of pushes, as a share of a carried object's slips; never less than the motion of an unheld object."""
     return max(_PUSHED, noise.unheld)
 
 
 def estimated_noise(contact_map: ContactMap, configured: MotionNoise) -> MotionNoise:
-    """The noise that the slips of a trajectory speak for, the configured one counting as several of them."""
+    """The motion noise estimated from the slips of a trajectory, with the configured one as prior."""
     cost = MotionCost.of(contact_map, configured)
     bound = [how is not Moved.FREELY for how in contact_map.moved[1:]]
     slips = cost.slips_in_sigma(contact_map.rows)[bound]

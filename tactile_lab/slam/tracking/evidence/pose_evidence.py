@@ -1,6 +1,6 @@
 """The likelihood of all poses together, the shape integrated out.
 
-Contacts placed by wrong poses make a surface that a Gaussian process finds improbable. So the log marginal
+Contacts placed by wrong poses make a surface that is improbable under the Gaussian process. So the log marginal
 likelihood (2.16) of all contacts, values and normals, is a function of all poses: no shape has to be fixed
 while poses are corrected, and its derivative by every contact is known in closed form. With the motion model
 (3.7) between successive poses it is the posterior of the trajectory.
@@ -32,7 +32,7 @@ from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
 
 _JITTER = 1e-9
 _LEAST_INFORMATION = 1e-9
-"""Added to the information relative to its diagonal: nothing is known of a pose that no contact touches."""
+"""Added to the information relative to its diagonal, for poses without contacts."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class PoseEvidence:
     def information(self, rows: Array) -> Array:
         """Approximate second derivative of the negative log posterior by all poses but the first.
 
-        A contact that moves along its normal does to the field what another observed value would do where it was
+        A contact that moves along its normal changes the field like a different observed value at its place
         (Gauss-Newton); the inverse is the poses' joint covariance.
 
         Returns:
@@ -102,7 +102,7 @@ class PoseEvidence:
         return np.asarray(total)
 
     def field_change(self, rows: Array, places_m: Array) -> Array:
-        """How the field follows the poses: derivatives of its mean at places by all poses but the first.
+        """Derivatives of the field's mean at places by all poses but the first.
 
         Args:
             rows: poses, shape (k, size).
@@ -117,7 +117,7 @@ class PoseEvidence:
         return np.asarray(whitened.T @ self._whitened_change(rows, placed))
 
     def _whitened_change(self, rows: Array, placed: _Placed) -> Array:
-        """Change of all that the contacts observe by all poses but the first, in units of what is expected of it."""
+        """Whitened derivatives of the contacts' observations by all poses but the first."""
         size = self._space.size
         count, dimension = placed.points.shape
         seen = np.zeros(((dimension + 1) * count, len(rows), size))
@@ -138,9 +138,9 @@ class PoseEvidence:
         of millimetres and degrees.
 
         Args:
-            rows: where to start, shape (k, size).
+            rows: initial poses, shape (k, size).
             max_iterations: of the optimiser.
-            accuracy: iterations that gain less end it.
+            accuracy: gain below which it stops.
         """
         if len(rows) == 1:
             return rows, self.value(rows)
@@ -166,7 +166,7 @@ class PoseEvidence:
         return moved(found.x), float(found.fun)
 
     def _place_contacts(self, rows: Array) -> _Placed:
-        """The contacts for some poses; the last ones are remembered, as the same are often asked for in turn."""
+        """The contacts for some poses; the last ones are cached, as the same are often requested in turn."""
         if self._last is None or not np.array_equal(self._last[0], rows):
             self._last = rows.copy(), self._compute(rows)
         return self._last[1]

@@ -1,6 +1,6 @@
-"""Where the faces of an outline end: contacts lie between the corners, not only on the lines of their faces.
+"""Extents of the faces of an outline: contacts lie between the corners, not only on the lines of their faces.
 
-A grasp that touches parallel faces only may slide along them, and nothing else would hold it but the motion model.
+A grasp that touches only parallel faces may slide along them, and only the motion model would hold it otherwise.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from drivers.core.contacts import Array
 
 LEAST_TURN = 0.3
-"""Sine of the least angle between two faces that end at each other, 17 degrees; flatter ones may yet be one."""
+"""Sine of the least angle between two faces that end at each other, 17 degrees; flatter ones may be a single face."""
 
 FARTHEST_SIGMAS = 3.0
-"""Where contacts lie farther beyond a corner than that, rather the corner is wrong."""
+"""If contacts lie farther beyond a corner than this, the corner is probably wrong."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
-"""How well flat faces tie the poses of a trajectory together, and how faces follow poses that are off.
+"""Joint uncertainty of poses and flat faces of a trajectory, and derivatives of the faces by the poses.
 
-Right angles and parallels count: what holds one wall holds all walls tied to it.
+Right angles and parallels are included: information about one wall holds for all walls related to it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tactile_lab.slam.tracking.faces.flat_faces import FlatFaces, flat_faces, ta
 from tactile_lab.slam.tracking.faces.regular_faces import made_regular
 
 _TURN_LIKE_m = 0.05
-"""A place belongs to the face that is near and faces its way; a radian counts like so many metres."""
+"""A point belongs to the face that is nearest in position and normal; a radian counts like this many metres."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class FacetCertainty:
         return cls(faces, np.asarray((of_poses + of_poses.T) / 2), np.asarray(by_poses))
 
     def surface_change(self, places_m: Array, normals: Array) -> Array:
-        """How places on the faces, shape (q, d), move along their normals with the poses, shape (q, p)."""
+        """Derivatives of points on the faces, shape (q, d), along their normals by the poses, shape (q, p)."""
         count, dimension = self.faces.normals.shape
         away_m = np.abs(places_m @ self.faces.normals.T - self.faces.offsets_m)
         turned_rad = np.arccos(np.clip(normals @ self.faces.normals.T, -1.0, 1.0))

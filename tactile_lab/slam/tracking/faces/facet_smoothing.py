@@ -1,10 +1,10 @@
-"""Poses and flat faces together: what the trajectory is if the object has faces.
+"""Smooths poses and flat faces together.
 
 The faces take the place of the field in :mod:`pose_evidence`: every contact lies on its face and its normal is the
 face's, up to the sensors' noise, and successive poses follow the motion model. All of it is one least-squares
 problem in the poses and the faces, in the plane and in space alike. A few faces bind contacts all over the object
 together where the field only binds neighbours, so that poses become as certain as the contacts are. Faces that are
-parallel, at right angles, upright or level (:mod:`regular_faces`) stay so: what holds one of them holds the others.
+parallel, at right angles, upright or level (:mod:`regular_faces`) stay so.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ _MOST_PLANES_SHARE = 0.25
 _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e6
 _LARGEST_FOLD = float(np.cos(np.deg2rad(35.0)))
-"""Faces that meet at a larger angle are never one."""
+"""Faces that meet at a larger angle are never merged."""
 
 _REGULAR_rad = 3e-4
-"""Faces miss their regularities by no more: far less than contacts can tell, and loose enough for the steps."""
+"""Standard deviation of regularities: far below the contacts' resolution, and loose enough for the iteration."""
 
 _LEAST_FREEDOM = 1e-6
-"""Keeps the leverage of a contact below one, where it alone holds something."""
+"""Keeps the leverage of a contact below one, if it alone determines something."""
 
 
 @dataclass(frozen=True)
@@ -103,14 +103,14 @@ class FacetSmoother:
         return best
 
     def simplify(self, rows: Array, faces: FlatFaces, price: float, neighbours: Neighbours) -> FacetedTrajectory:
-        """Merge neighbouring faces as long as that costs less than the price of a face, the poses giving way.
+        """Merge neighbouring faces as long as that costs less than the price of a face, while the poses adapt.
 
-        What a merger would cost is foreseen from the joint covariance of all faces and poses, and then verified.
+        The cost of a merger is predicted from the joint covariance of all faces and poses, and then verified.
 
         Args:
             rows, faces: to start from.
-            price: chi-square a face has to save.
-            neighbours: pairs of faces that may be one.
+            price: chi-square that a face must save.
+            neighbours: pairs of faces that may be merged.
         """
         best = self.fit(rows, faces, 15)
         refused: set[tuple[int, int]] = set()
@@ -132,10 +132,10 @@ class FacetSmoother:
         return self._information(at, self._jacobian(at))
 
     def pulls(self, rows: Array, faces: FlatFaces) -> Array:
-        """Chi-square that leaving out each contact would save, poses and faces yielding to the others, shape (n,).
+        """Chi-square saved by leaving out each contact, with poses and faces fitted to the others, shape (n,).
 
-        A contact that a pose or a face hangs on draws it towards itself: its own residual is small, and what it costs
-        is in the others' (the leave-one-out statistics of linear regression, here for all residuals of a contact).
+        A contact that alone determines a pose or a face draws it towards itself: its own residual is small, and its
+        cost is in the others' (the leave-one-out statistics of linear regression, here for all residuals of a contact).
 
         Args:
             rows, faces: as fitted, the faces without regularities.

@@ -1,7 +1,7 @@
-"""Hypotheses in the light of flat faces: other poses, and another opinion on which contacts to leave out.
+"""Scores hypotheses by flat faces, with other poses and other contacts left out than the smooth field.
 
-A smooth field takes the only contact on a small face for an error, and a wrong contact for a bulge. Faces tell these
-apart: a contact that only a face of its own explains has to be worth that face, and one that was left out may be.
+A smooth field treats the only contact on a small face as an error, and a wrong contact as a bulge.
+Faces distinguish these: a contact on its own face must be worth that face.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ _COARSE_m = 0.006
 _SMALL_FACE = 2
 _DOUBTFUL_CHI_SQUARE = 16.0
 _MOST_DOUBTS = 12
-"""Contacts that are looked at once more: on faces of so few, or so far from theirs, and at most so many."""
+"""Contacts that are tested again: on faces of this few, or this far from theirs, and at most this many."""
 
 _HOPELESS_nats = 100.0
-"""Flat faces that are less likely than the field by more than this stay so, whichever contacts are left out."""
+"""Flat faces that are less likely than the field by more than this are rejected, whichever contacts are left out."""
 
 
 _LEAST_PULL_nats = 4.0
 _MOST_PULLS = 4
-"""Contacts that are left out on trial: so many at a time, and none that can hardly pay for it."""
+"""Contacts that are left out on trial: number at a time, and least expected gain."""
 
 _SAME_nats = 1e-6
 _SETTLING_STEPS = 15
@@ -55,7 +55,7 @@ _FIELD_STEPS = 10
 
 
 class FacetedScorer:
-    """Rates hypotheses whose object has flat faces."""
+    """Scores hypotheses whose object has flat faces."""
 
     def __init__(self, judge: HypothesisScorer, noise: MotionNoise, mechanisms: Mechanisms | None = None) -> None:
         """
@@ -78,10 +78,10 @@ class FacetedScorer:
         return _likelier(smooth, settled)
 
     def release(self, best: Hypothesis) -> Hypothesis:
-        """A faceted hypothesis without the contacts that it is better off without once poses and faces yield.
+        """A faceted hypothesis without the contacts that it is more likely without, poses and faces fitted again.
 
-        A wrong contact that a pose hangs on is explained by turning the whole grasp, or by a face bent for it, and then
-        fits: looked at where it is, nothing tells it from the others.
+        A wrong contact that alone determines a pose is explained by turning the whole grasp, or by tilting a face, and
+        then fits: its own residual does not reveal it.
         """
         while found := [each for each in map(self.smooth_with_facets, self._without_pulls(best)) if each is not None]:
             freed = min(found, key=cost)
@@ -99,7 +99,7 @@ class FacetedScorer:
         return _likelier(self._judge.score(cleaned), self._mechanisms.improve("doubts", sharp, self._reconsider)).map
 
     def _without_pulls(self, best: Hypothesis) -> list[ContactMap]:
-        """The map without each of the contacts that pull the most; nothing for an object without flat faces."""
+        """The map without each of the most influential contacts; empty for an object without flat faces."""
         if not self._is_sharp(best):
             return []
         faces, _ = flat_faces(best.map)
@@ -108,7 +108,7 @@ class FacetedScorer:
         return [best.map.without_contact(*best.map.origins[each]) for each in strongest]
 
     def solid(self, best: Hypothesis) -> SurfaceMesh | None:
-        """The surface of a hypothesis in space that is sharp; None for others."""
+        """The surface of a faceted hypothesis in space; None for others."""
         if not self._mechanisms.has("faces"):
             return None
         try:
@@ -119,7 +119,7 @@ class FacetedScorer:
         return None if sharp.cost > best.cost + _SAME_nats else mesh
 
     def settle(self, contact_map: ContactMap) -> Hypothesis | None:
-        """Poses and faces in space smoothed together, contacts staying between the ends of their faces; else None."""
+        """Poses and faces in space smoothed together, with contacts within their faces; otherwise None."""
         try:
             faces, _ = flat_faces(contact_map)
             ends = solid_ends(contact_map, faces)
@@ -129,7 +129,7 @@ class FacetedScorer:
         return self._sharp(contact_map.with_rows(found.rows))
 
     def regular(self, best: Hypothesis) -> Hypothesis:
-        """A faceted hypothesis with faces as regular as contacts and motion allow, poses giving way, if likelier."""
+        """A faceted hypothesis with faces and poses as regular as contacts and motion allow, if more likely."""
         if not self._is_sharp(best):
             return best
         try:
@@ -154,12 +154,12 @@ class FacetedScorer:
         return self._sharp(contact_map.with_rows(faceted.rows)) if faceted else None
 
     def _is_sharp(self, best: Hypothesis) -> bool:
-        """Whether it is flat faces that explain a hypothesis best."""
+        """Whether flat faces explain a hypothesis best."""
         sharp = self._sharp(best.map)
         return sharp is not None and sharp.cost <= best.cost + _SAME_nats
 
     def _sharp(self, contact_map: ContactMap) -> Hypothesis | None:
-        """The map as it is, its contacts explained by a sharp shape; None if there is none."""
+        """The unchanged map, its contacts explained by a sharp shape; None if there is none."""
         if not self._mechanisms.has("faces"):
             return None
         try:
@@ -168,7 +168,7 @@ class FacetedScorer:
             return None
 
     def _score_explained(self, contact_map: ContactMap, explained: float, intrusion: float) -> Hypothesis:
-        """The map as it is, given the log evidence of its sharp shape and the cost of the free places that fills."""
+        """The unchanged map, given the log evidence of its sharp shape and the cost of free places it fills."""
         contacts = contact_map.contacts
         constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
         motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
@@ -176,9 +176,9 @@ class FacetedScorer:
         return Hypothesis(contact_map, misfit, intrusion, self._judge.price(contact_map))
 
     def _sharp_without_one(self, contact_map: ContactMap) -> Hypothesis | None:
-        """The likeliest sharp outline of all contacts but one, of those that the field explains worst.
+        """The most likely sharp outline of all contacts but one of those that the field explains worst.
 
-        One wrong contact can be enough for faces that enclose nothing. In space that is how round bodies are told.
+        A single wrong contact can be enough for faces that enclose nothing. In space this identifies round bodies.
         """
         if contact_map.dimension == 3 or not self._mechanisms.has("without one"):
             return None
@@ -191,7 +191,7 @@ class FacetedScorer:
         return best
 
     def _reconsider(self, sharp: Hypothesis) -> Hypothesis:
-        """Contacts left out that a sharp shape explains by themselves only, and those back that it explains better."""
+        """Leave out contacts that a sharp shape explains only by themselves; restore those it explains better."""
         asked: set[tuple[int, int]] = set()
         while doubts := [each for each in _doubtful(sharp.map) if each not in asked]:
             for each in doubts:
@@ -200,7 +200,7 @@ class FacetedScorer:
         return self._restore(sharp)
 
     def _restore(self, sharp: Hypothesis) -> Hypothesis:
-        """With those contacts back that are better explained than left out: all at once, or one after the other."""
+        """Restore contacts that are better explained than left out: all at once, or one after the other."""
         left_out = [(i, each) for i, grasp in enumerate(sharp.map.placed) if grasp.used for each in grasp.left_out]
         whole = sharp.map
         for index, contact in left_out:

@@ -45,7 +45,7 @@ class FlatFaces:
         return len(self.offsets_m)
 
     def merge(self, kept: int, dropped: int) -> FlatFaces:
-        """The same with two faces made one, in between by the number of their contacts; regularities are forgotten."""
+        """The same with two faces merged, averaged by their numbers of contacts; without regularities."""
         weights = np.bincount(self.labels, minlength=self.count)[[kept, dropped]].astype(float)
         weights /= weights.sum()
         normals, offsets = self.normals.copy(), self.offsets_m.copy()
@@ -57,7 +57,7 @@ class FlatFaces:
         return FlatFaces(labels, normals, offsets, self.leaning, self.bounded)
 
     def irregularity(self) -> Array:
-        """By how much the faces miss their regularities, radians, shape (r,)."""
+        """Deviation of the faces from their regularities, radians, shape (r,)."""
         return np.concatenate([np.empty(0), *(each.state(self.normals).gap for each in self.regularities)])
 
     def irregularity_by_faces(self) -> Array:
@@ -75,7 +75,7 @@ Neighbours = Callable[[FlatFaces], list[tuple[int, int]]]
 
 
 def flat_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
-    """The faces of a map's contacts, and which of them may be one.
+    """The faces of a map's contacts, and which of them may be merged.
 
     Raises:
         ShapeError: contacts in the plane whose faces enclose nothing.
@@ -84,7 +84,7 @@ def flat_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
 
 
 def _outline_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
-    """The faces of an outline; only those that follow each other along it may be one. Raises ShapeError."""
+    """The faces of an outline; only successive ones may be merged. Raises ShapeError."""
     fitted, seen = contact_map.fit(), contact_map.contacts
     polygon, leaning = outline_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
     found, order = polygon.faces, np.flatnonzero(~leaning)[polygon.faces.order]
@@ -104,7 +104,7 @@ def _outline_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
 
 
 def _solid_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
-    """The planes of a solid; any two may be one."""
+    """The planes of a solid; any two may be merged."""
     seen = contact_map.contacts
     planes = segment_planes(seen.points_m, seen.normals, seen.point_sigma_m, seen.normal_sigma_rad)
 

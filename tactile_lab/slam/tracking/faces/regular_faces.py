@@ -1,7 +1,7 @@
-"""Faces made as regular as contacts and motion allow, the poses giving way.
+"""Makes faces as regular as contacts and motion allow, while the poses adapt.
 
-With the poses held, what a pose is off by seems to be a face askew. So what is known of the faces here is what is left
-when all poses may move with them: that decides which faces are parallel, at right angles, upright or level.
+With fixed poses, an error of a pose looks like an oblique face. So the uncertainty of the faces here includes that of
+all poses: it decides which faces are parallel, perpendicular, upright or level.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
-"""Grasps looked at again once the object is known: where else on it could each one lie?
+"""Relocalization: searches other places of grasps on the object once it is known better.
 
 While an object is explored its field is round and vague, and a grasp that closes on a corner the wrong way round, or a
-width further along, fits about as well as the right one. Flat faces tell such places apart, but moving poses and faces
-together from the wrong place does not lead to the right one: it has to be proposed. Each grasp is driven onto the
-object from many samples of the motion model, and the most promising other places are tried, one at a time.
+width further along, fits about as well as the right one. Flat faces distinguish such places, but moving poses and faces
+together from the wrong place does not lead to the right one: it must be proposed. Each grasp is driven onto the object
+from many samples of the motion model, and the most promising other places are tried, one at a time.
 
-A trajectory that took a wrong turn goes on from there: the grasps that follow fit each other, and none of them can go
-back alone. So in space those after a grasp are driven onto the object from its other place too, and tried with it.
+A wrong turn of a trajectory persists: the following grasps fit each other, and none of them can go back alone. So in
+space the grasps after it are also driven onto the object from its other place, and tried with it.
 
-In space grasps are driven onto the solid that the faces make. An outline tells its grasps apart as it grows; only those
-are asked again there that it explains badly or that say little, and they are driven onto the field of all others.
+In space grasps are driven onto the solid that the faces make. In the plane only grasps that the outline explains badly
+or that have few contacts are tested again, and they are driven onto the field of all others.
 """
 
 from __future__ import annotations
@@ -30,24 +30,26 @@ from tactile_lab.slam.tracking.joint.proposals import GraspMatch, Matched, Propo
 
 _OF_A_GRASP = 2
 _SAMPLES = 48
-"""Enough on a solid, which pulls from farther away than a field that is vague between contacts."""
+"""Number of samples, enough for a solid, which has a larger basin of attraction than a field that is vague between
+contacts.
+"""
 
 _SURFACE_SIGMA_m = 0.0005
 _LITTLE = 2
-"""So few contacts fit many places."""
+"""This few contacts fit many places."""
 
 
 @dataclass(frozen=True)
 class _Search:
-    """How far to look.
+    """Settings of the search.
 
     Attributes:
-        rounds: at most so many places are taken, one after the other.
-        tried: so many places in a round, each with the best place of the round before.
-        hopeless_nats: a place that is foreseen to cost so much more is not tried; neighbours and faces that yield bring
-            a few nats, and wrong contacts that turn out to be right some more.
-        least_gain_nats: what a place has to bring. A grasp that has wrong contacts fits elsewhere nearly as well.
-        longest_run: so many successive grasps are placed elsewhere together.
+        rounds: largest number of places accepted, one after the other.
+        tried: number of places per round, each with the best place of the previous round.
+        hopeless_nats: a place with a predicted cost this much higher is not tried; refitting neighbours and faces gains
+            a few nats, and contacts that turn out to be right some more.
+        least_gain_nats: least gain of a place. A grasp with wrong contacts fits elsewhere nearly as well.
+        longest_run: largest number of successive grasps that are moved together.
     """
 
     rounds: int
@@ -68,7 +70,7 @@ class _Place:
     Attributes:
         index: of the first grasp.
         rows: their poses there, shape (k, size).
-        change: foreseen in the cost, the rest staying where it is.
+        change: predicted change of the cost, with the rest unchanged.
     """
 
     index: int
@@ -77,11 +79,11 @@ class _Place:
 
 
 def relocalize(best: Hypothesis, sharp: FacetedScorer, noise: MotionNoise, settings: ProposalSettings) -> Hypothesis:
-    """The hypothesis with grasps at other places of its object, as long as that makes it likelier.
+    """The hypothesis with grasps at other places on its object, as long as that makes it more likely.
 
     Args:
-        best: a hypothesis; one in space without flat faces or upright walls stays as it is.
-        sharp: rates it in the light of flat faces.
+        best: a hypothesis; one in space without flat faces or upright walls is unchanged.
+        sharp: scores it by flat faces.
         noise: of the motion model.
         settings: of the search.
     """
@@ -100,7 +102,7 @@ def _search(contact_map: ContactMap) -> _Search:
 
 
 def _try(contact_map: ContactMap, place: _Place, sharp: FacetedScorer) -> Hypothesis | None:
-    """The map with grasps at another place, smoothed; None where its faces enclose nothing."""
+    """The map with grasps at another place, smoothed; None if its faces enclose nothing."""
     moved = contact_map
     for index, row in enumerate(place.rows, start=place.index):
         whole = replace(moved.placed[index], row=row, left_out=frozenset(), moved=Moved.AS_MEANT)
@@ -109,7 +111,7 @@ def _try(contact_map: ContactMap, place: _Place, sharp: FacetedScorer) -> Hypoth
 
 
 def _places(best: Hypothesis, sharp: FacetedScorer, noise: MotionNoise, settings: ProposalSettings) -> list[_Place]:
-    """The most promising other places of all grasps but the first, the best first."""
+    """The most promising other places of all grasps but the first, best first."""
     search, known = _search(best.map), best.map
     if known.dimension == 3:
         onto, settings = _onto_solid(best, sharp), settings.model_copy(update={"samples": _SAMPLES})
@@ -121,7 +123,7 @@ def _places(best: Hypothesis, sharp: FacetedScorer, noise: MotionNoise, settings
 
 
 def _onto_solid(best: Hypothesis, sharp: FacetedScorer) -> dict[int, Matched]:
-    """What each grasp but the first is driven onto, by its number: the solid of all contacts; nothing without one."""
+    """The surface that each grasp but the first is driven onto, by number: the solid of all contacts, if any."""
     mesh = sharp.solid(best)
     if mesh is None:
         return {}
@@ -130,16 +132,16 @@ def _onto_solid(best: Hypothesis, sharp: FacetedScorer) -> dict[int, Matched]:
 
 
 def _fits_poorly(grasp: PlacedGrasp) -> bool:
-    """Whether a grasp has contacts that do not fit where it is, or hardly any that do."""
+    """Whether a grasp has contacts that do not fit at its place, or few that do."""
     return len(grasp.contacts_world) >= _LITTLE and (bool(grasp.left_out) or len(grasp.kept) <= _LITTLE)
 
 
 class _Outlook:
-    """Other places of a trajectory's grasps, and what they would cost.
+    """Other places of a trajectory's grasps, and their costs.
 
     Args:
         contact_map: the trajectory.
-        onto: what grasps are driven onto, by their number; the others stay where they are.
+        onto: surfaces that grasps are driven onto, by their number; other grasps stay.
         noise: of the motion model.
         settings: of the proposals.
     """
@@ -154,7 +156,7 @@ class _Outlook:
         self._known: dict[int, tuple[Array, Array]] = {}
 
     def places(self, index: int) -> list[_Place]:
-        """Of one grasp, and of those that follow it as far as a wrong turn may reach."""
+        """Other places of one grasp, and of those that follow it as far as a wrong turn may reach."""
         rows, told = self._elsewhere(index, *self._drive_now(index))
         alone = [self._place(index, row[None], each) for row, each in zip(rows, told, strict=True)]
         paid = told + [self._step_changes(index, row[None])[index - 1] for row in rows]
@@ -167,7 +169,7 @@ class _Outlook:
         return sorted(hopeful, key=lambda place: place.change)[:_OF_A_GRASP]
 
     def _runs(self, index: int, row: Array, told: float, paid: float) -> list[_Place]:
-        """A grasp elsewhere, with one and more of those after it where they then belong.
+        """A grasp at another place, with one or more of the following ones at their resulting places.
 
         Args:
             index: of the grasp.
@@ -190,7 +192,7 @@ class _Outlook:
         return found
 
     def _elsewhere(self, index: int, rows: Array, costs: Array) -> tuple[Array, Array]:
-        """Those of the poses of a grasp that are other places, and its contacts' costs there over those where it is."""
+        """The poses of a grasp that are other places, and the change of its contacts' costs there."""
         now, costs_now = self._drive_now(index)
         other, here = self._is_elsewhere(index, rows), ~self._is_elsewhere(index, now)
         return rows[other], costs[other] - np.min(costs_now[here])
@@ -199,13 +201,13 @@ class _Outlook:
         return elsewhere(rows, self._rows[index], self._settings, self._map.space)
 
     def _drive_now(self, index: int) -> tuple[Array, Array]:
-        """As :meth:`_driven`, the grasp before it staying where it is; asked for once."""
+        """As :meth:`_driven` with the previous grasp unchanged; computed once."""
         if index not in self._known:
             self._known[index] = self._drive(index, self._rows[index - 1])
         return self._known[index]
 
     def _drive(self, index: int, before: Array) -> tuple[Array, Array]:
-        """Where a grasp is, and where it is driven onto the object after the one before, with its contacts' costs."""
+        """The place of a grasp and its places driven onto the object, with its contacts' costs."""
         space, grasp, field = self._map.space, self._map.placed[index], self._onto[index]
         predicted = space.compose(grasp.motion, before)
         proposed, _ = propose(predicted, grasp.contacts_world, field, self._wide, self._settings, space)

@@ -1,7 +1,7 @@
-"""Where the faces of a solid end: at those beside them, which contacts lie before (a ridge) or behind (a notch).
+"""Extents of the faces of a solid: where neighbouring faces meet in a ridge or a notch.
 
-In the plane the corners follow from the order of the faces (:mod:`face_ends`); in space they are read off the body
-that the planes enclose.
+In the plane the corners follow from the order of the faces (:mod:`face_ends`); in space they follow from the body that
+the planes enclose.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class SolidFaceExtents:
-    """Contacts that must not go beyond another face than their own, one line each.
+    """Contacts that must not lie beyond a neighbouring face, one entry each.
 
     Attributes:
         contacts: shape (k,).

@@ -1,7 +1,7 @@
 """The calibrated likelihood of very many particles from a tabulated field, in one compiled pass without temporaries.
 
-The same formulas as :class:`tactile_lab.slam.tracking.filter.measurement.CalibratedMeasurement`, which has them in
-readable form for any field; a test keeps both equal. Import it late, see :mod:`tactile_lab.slam.compiled`.
+The same formulas as :class:`tactile_lab.slam.tracking.filter.measurement.CalibratedMeasurement`, which is the readable
+form for any field; a test compares both. Import it late, see :mod:`tactile_lab.slam.compiled`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class LikelihoodConstants:
     Attributes:
         smallest_slope: distances are not divided by less.
         normal_length_m: a map uncertain by sigma predicts normals to ``sigma / normal_length_m``.
-        outlier_density: density of a contact that says nothing, in the same units as the others.
+        outlier_density: density of an uninformative contact, in the same units as the others.
     """
 
     smallest_slope: float

@@ -4,8 +4,8 @@ Two models of ``P(z_k | x_k)``:
 
 - :class:`ThesisMeasurement`: equation 3.9 as printed, behind the gate of section 3.5.1.
 - :class:`CalibratedMeasurement`: the field is close to a signed distance, so ``f / |grad f|`` is a distance in
-  metres with a known variance, and the gradient predicts the normal. The map's own variance widens both: where
-  nothing has been touched yet, contacts neither attract nor forbid.
+  metres with a known variance, and the gradient predicts the normal. The map's own variance widens both: where nothing
+  has been touched yet, contacts neither attract nor exclude.
 
 All results are logarithms, minus infinity standing for a likelihood of zero.
 """
@@ -31,12 +31,12 @@ SMALLEST_SLOPE = 0.3
 
 
 COMPILED_FROM = 2000
-"""Fewer contacts than this, over all particles, are weighed before compiled code is even loaded."""
+"""With fewer contacts than this, over all particles, loading compiled code would take longer than weighting."""
 
 
 @dataclass(frozen=True)
 class Known:
-    """What a new grasp is compared with.
+    """The reference for a new grasp.
 
     Attributes:
         field: the modelled surface, object frame.
@@ -55,13 +55,13 @@ class Measurement(Protocol):
 
 
 class GateSettings(StrictModel):
-    """The gate of section 3.5.1; the thesis gives the number of contacts, the other figures are ours.
+    """The gate of section 3.5.1; the thesis gives the number of contacts, the other values are this program's.
 
     Attributes:
-        least_contacts: so many contacts have to be close to what is known.
+        least_contacts: number of contacts that must be close to the reference.
         close_to: "previous" compares with the contacts of the previous grasp, as the thesis does;
             "surface" with the modelled surface.
-        distance_m: what counts as close.
+        distance_m: largest distance of a close contact.
         normal_angle_rad: largest angle between the normals of close contacts.
         least_eigenvalue: smallest eigenvalue of (3.18) of the close contacts, lengths scaled by 30 mm.
     """
@@ -80,7 +80,7 @@ class ThesisMeasurement:
     Attributes:
         gate: settings of the gate.
         label_distance_m: distance over which the thesis's field grows by one (its labels are +1 and -1 there);
-            our field is in metres and is divided by it.
+            this program's field is in metres and is divided by it.
     """
 
     gate: GateSettings
@@ -93,7 +93,7 @@ class ThesisMeasurement:
         return np.where(self._passes(points, normals, values, known.previous), matching, -np.inf)
 
     def _passes(self, points: Array, normals: Array, values: Array, previous: ContactSet) -> NDArray[np.bool_]:
-        """At least so many close contacts, and these observable."""
+        """Whether there are enough close contacts, and these are observable."""
         if self.gate.close_to == "surface":
             close = np.abs(values) < self.gate.distance_m
         else:
@@ -119,8 +119,8 @@ class CalibratedSettings(StrictModel):
 
     Attributes:
         normal_length_m: a map uncertain by sigma predicts normals to ``sigma / normal_length_m`` radians.
-        outlier_share: share of contacts that say nothing (wrong finger part, torn estimate); keeps one bad
-            contact from deciding.
+        outlier_share: share of uninformative contacts (wrong finger part, wrong estimate); limits the influence of a
+            single bad contact.
         outlier_range_m: such contacts are taken as uniform over this distance and all directions.
     """
 
@@ -172,7 +172,7 @@ class CalibratedMeasurement:
         return np.asarray(np.logaddexp(log_density, self._log_outlier_density(angles)))
 
     def _log_outlier_density(self, angles: int) -> float:
-        """Density of a contact that says nothing, up to the constants left out of the other."""
+        """Density of an uninformative contact, up to the constants left out of the other."""
         uniform = 1 / (self.settings.outlier_range_m * np.pi**angles)
         return float(np.log(self.settings.outlier_share * uniform) + 0.5 * (1 + angles) * np.log(2 * np.pi))
 

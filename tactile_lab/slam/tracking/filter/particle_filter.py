@@ -10,7 +10,7 @@ from drivers.core.contacts import Array
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise, deviation, sample_motion
 
 CERTAIN_VARIANCE = 1e-10
-"""Of a pose that is given, or that defines the object frame: certain up to rounding."""
+"""Variance of a given pose, or of the pose that defines the object frame: certain up to rounding."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Belief:
         return PoseEstimate(mean, (spread * self.weights[:, None]).T @ spread)
 
     def resample(self, rng: np.random.Generator) -> Belief:
-        """Resampling (systematic) when fewer than half the particles are effective, else unchanged."""
+        """Resampling (systematic) if fewer than half the particles are effective, otherwise unchanged."""
         count = len(self.weights)
         if self.effective_count >= count / 2:
             return self

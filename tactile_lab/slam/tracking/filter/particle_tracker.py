@@ -16,7 +16,7 @@ from tactile_lab.slam.tracking.filter.particle_filter import Belief, PoseEstimat
 
 
 class ParticleTracker:
-    """The thesis's filter; the measurement model makes the difference between its form and the calibrated one."""
+    """The thesis's filter; the measurement model distinguishes the printed form from the calibrated one."""
 
     def __init__(
         self,
@@ -34,7 +34,7 @@ class ParticleTracker:
             measurement: the measurement model.
             noise: of the motion model.
             particles: their number.
-            kernel_every: kernel parameters are estimated anew after so many grasps.
+            kernel_every: kernel parameters are estimated again after this many grasps.
             field_of: makes the field that particles are compared with.
             rng: source of all random numbers.
         """
@@ -85,7 +85,7 @@ class ParticleTracker:
         self._map = corrected
 
     def finish(self) -> None:
-        """A filter has nothing to add to what it estimated on the way."""
+        """Nothing to do: a filter does not revise earlier estimates."""
 
     def _last_used(self) -> int:
         return max(index for index, grasp in enumerate(self._map.placed) if grasp.used)

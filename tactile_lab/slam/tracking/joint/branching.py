@@ -1,4 +1,4 @@
-"""How a trajectory goes on: the places that a new grasp's contacts could have on what is known of the object."""
+"""Branches trajectories: the poses at which a new grasp's contacts fit the known object."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from tactile_lab.slam.tracking.joint.settings import JointSettings
 
 @dataclass(frozen=True)
 class Branching:
-    """A grasp that hypotheses are continued by.
+    """A grasp by which hypotheses are continued.
 
     Attributes:
         contacts: of the grasp, world frame.
-        motion: of the hand before it, a row.
+        motion: of the hand before it, a pose vector.
         noise: of the motion model.
-        judge: rates what comes of it.
+        judge: scores the result.
         settings: of the search.
-        space: what rows mean.
-        mechanisms: which are on.
+        space: kind of the pose vectors.
+        mechanisms: those that are on.
     """
 
     contacts: ContactSet
@@ -42,7 +42,7 @@ class Branching:
     mechanisms: Mechanisms
 
     def branches(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """All hypotheses with the grasp aside, and the likeliest with the grasp placed."""
+        """All hypotheses with the grasp left out, and the most likely ones with the grasp placed."""
         placed = self._place(hypotheses)
         if placed and not self.mechanisms.has("aside branch"):
             return placed
@@ -58,9 +58,9 @@ class Branching:
         return replace(hypothesis, map=longer, left_out=self.judge.price(longer))
 
     def _place(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The likeliest continuations of all hypotheses, contacts that do not fit them left out.
+        """The most likely continuations of all hypotheses, without contacts that do not fit them.
 
-        A grasp is only placed if most of its contacts fit: the rest could be anywhere by chance.
+        A grasp is only placed if most of its contacts fit: a few may fit anywhere by chance.
         """
         if len(self.contacts) == 0:
             return []
@@ -75,7 +75,7 @@ class Branching:
         return Hypothesis(cleaned, misfit, branch.intrusion, self.judge.price(cleaned))
 
     def _propose(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """Continuations of a hypothesis, rated contact by contact only."""
+        """Continuations of a hypothesis, scored by single contacts only."""
         unplaced, placed = hypothesis.map.trailing_unplaced, hypothesis.map.placed
         motions = np.array([self.motion, *(grasp.motion for grasp in placed[len(placed) - unplaced :])])
         noise = self.noise.after(motions).accumulate(1 + unplaced)

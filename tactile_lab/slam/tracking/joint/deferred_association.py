@@ -1,12 +1,12 @@
-"""Grasps that could not be placed when they came, or not well: where they belong is looked for with more known.
+"""Deferred association: places grasps later that could not be placed, or fitted badly, at first.
 
-Three ways lead there: the motion model from the neighbouring grasps; if the object was to be left lying, a push of the
+Three ways lead there: the motion model from the neighbouring grasps; if the object was left in place, a push of the
 closing hand; and, if the object was lost, poses anywhere on the known object, which need no motion at all (relocation).
-Nothing is forced: a grasp stays where it is or aside unless the evidence for all contacts gets better.
+A grasp stays at its place, or left out, unless the evidence of all contacts improves.
 
 While the object is explored, and anywhere on it, a grasp needs most of its contacts to be placed. On a known object
-near where the motion leads, two of them with their normals can be enough: fingers with two or three wrong contacts of
-five else stayed aside, a centimetre off.
+near where the motion leads, two of them with their normals can be enough: otherwise grasps with two or three wrong
+contacts of five stayed left out, a centimetre off.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ _SMOOTHED = 2
 _LEAST_CONTACTS = 3
 _LEAST_FITTING = 2
 _DOUBTFUL = 2
-"""So many contacts of a grasp have to be left out for its place to be looked for again."""
+"""Number of left-out contacts from which a grasp's place is searched again."""
 
 
 def relocate_last(hypothesis: Hypothesis, relocate: Relocate, judge: HypothesisScorer) -> list[Hypothesis]:
     """The hypothesis with its last grasp at other places on the object.
 
     Args:
-        hypothesis: whose last grasp is aside, or on ground that nothing else supports.
+        hypothesis: whose last grasp is left out, or on a part that nothing else supports.
         relocate: proposes places.
-        judge: rates them.
+        judge: scores them.
     """
     last = len(hypothesis.map.placed) - 1
     contacts = hypothesis.map.placed[last].contacts_world
@@ -53,13 +53,13 @@ def relocate_last(hypothesis: Hypothesis, relocate: Relocate, judge: HypothesisS
 def propose_pushes(
     hypothesis: Hypothesis, noise: MotionNoise, settings: ProposalSettings, judge: HypothesisScorer
 ) -> list[Hypothesis]:
-    """The hypothesis with its last grasp where a push brought the object, if it was to be left and fits badly so.
+    """The hypothesis with its last grasp at a place after a push, if the object was left in place and fits badly.
 
     Args:
         hypothesis: to improve.
         noise: of the motion model.
         settings: of the search.
-        judge: rates them.
+        judge: scores them.
     """
     last = len(hypothesis.map.placed) - 1
     grasp = hypothesis.map.placed[last]
@@ -78,15 +78,15 @@ def associate_deferred(
     *,
     pushes: bool = True,
 ) -> Hypothesis:
-    """The hypothesis with grasps that are aside or fit badly placed anew, one after the other, where that is likelier.
+    """The hypothesis with left-out or badly fitting grasps placed again where that is more likely.
 
     Args:
         hypothesis: to improve.
         noise: of the motion model.
         settings: of the search near the predicted pose.
-        relocate: proposes places anywhere for grasps that are aside; None for none.
-        judge: rates them.
-        pushes: the closing hand may have pushed an object that was to be left.
+        relocate: proposes places anywhere for left-out grasps; None for none.
+        judge: scores them.
+        pushes: whether the closing hand may have pushed an object left in place.
     """
     for index, grasp in enumerate(hypothesis.map.placed[1:], start=1):
         if not _is_doubtful(grasp):
@@ -108,7 +108,7 @@ def _is_doubtful(grasp: PlacedGrasp) -> bool:
 
 
 def _was_left(grasp: PlacedGrasp, noise: MotionNoise) -> bool:
-    """Whether the hand was to leave the object where it was before a grasp, and it is expected to lie stiller so."""
+    """Whether the hand left the object in place before a grasp, and it is therefore expected to move less."""
     return noise.after(grasp.motion) != noise
 
 
@@ -127,7 +127,7 @@ def _most(contacts: ContactSet) -> int:
 def _place_at(
     hypothesis: Hypothesis, index: int, rows: Array, judge: HypothesisScorer, fitting: int, moved: Moved
 ) -> list[Hypothesis]:
-    """The hypothesis with one grasp at the likeliest poses that enough contacts fit, smoothed."""
+    """The hypothesis with one grasp at the most likely poses that enough contacts fit, smoothed."""
     found = []
     for row in rows:
         grasp = replace(hypothesis.map.placed[index], row=row, left_out=frozenset(), moved=moved)
@@ -139,7 +139,7 @@ def _place_at(
 
 
 def _following(hypothesis: Hypothesis, index: int, judge: HypothesisScorer) -> Hypothesis:
-    """The hypothesis with one grasp as the motion model has it after all, if that is no less likely."""
+    """The hypothesis with one grasp moved as the motion model expects, if that is no less likely."""
     bound = replace(hypothesis.map.placed[index], moved=Moved.AS_MEANT)
     return min(judge.score(hypothesis.map.with_placed(index, bound)), hypothesis, key=cost)
 

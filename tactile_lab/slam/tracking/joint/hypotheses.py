@@ -1,4 +1,4 @@
-"""Hypotheses about the whole trajectory, and what they are judged by.
+"""Hypotheses of the whole trajectory, and their scores.
 
 The cost of a hypothesis is the negative logarithm of its evidence: the likelihood of all contacts for these poses,
 the shape integrated out (:mod:`pose_evidence`), the motion model, free space, and a price for every contact that is
@@ -24,19 +24,20 @@ from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
 
 _EXPECTED_RIGHT = 99.0
-"""Contacts that are right for one that is wrong, before any was seen."""
+"""Prior number of right contacts per wrong one."""
 
 _BREAK_COST = 20.0
-"""Negative log probability that the object moves otherwise than with the hand, wherever it then lies."""
+"""Negative log probability that the object moves independently of the hand."""
 
 _REMEMBERED = 8
-"""Maps whose information is kept: trajectories are compared each with each."""
+"""Number of maps whose information matrix is cached, for pairwise comparison of trajectories."""
 
 _SAME_TRANSLATION_m = 0.001
 _SAME_ROTATION_rad = 0.03
 _SAME_VALLEY = 0.5
-"""Trajectories are one whose squared distance, in what the data say about all poses together, is less than this for
-each number: places that the data do not tell apart differ by two on average."""
+"""Trajectories count as equal if their squared Mahalanobis distance per component is below this: poses that the data do
+not distinguish differ by two on average.
+"""
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Hypothesis:
         map: poses and contacts.
         misfit: negative log posterior of the poses and the contacts that are part of the shape.
         intrusion: negative log probability that free places are free.
-        left_out: what the contacts that are left out cost.
+        left_out: cost of the contacts that are left out.
     """
 
     map: ContactMap
@@ -62,7 +63,7 @@ class Hypothesis:
 
 
 class HypothesisScorer:
-    """Rates, smooths and cleans hypotheses."""
+    """Scores, smooths and cleans hypotheses."""
 
     def __init__(self, noise: MotionNoise, unexplained_cost: float, mechanisms: Mechanisms | None = None) -> None:
         """
@@ -76,11 +77,11 @@ class HypothesisScorer:
         self._informed: dict[int, tuple[ContactMap, Array]] = {}
 
     def score(self, contact_map: ContactMap) -> Hypothesis:
-        """A map as it is."""
+        """The hypothesis of a map as it is."""
         return self._hypothesis(contact_map, self._misfit(contact_map))
 
     def smooth(self, contact_map: ContactMap, iterations: int) -> Hypothesis:
-        """The poses of largest evidence nearby; once more if contacts turn out not to fit them."""
+        """The poses of largest evidence nearby; repeated if contacts turn out not to fit them."""
         rows, _ = PoseEvidence(contact_map, self._noise).maximise(contact_map.rows, iterations)
         cleaned, value = self.clean(contact_map.with_rows(rows))
         if cleaned.left_out_count > contact_map.left_out_count:
@@ -95,7 +96,7 @@ class HypothesisScorer:
         return replace(short, map=replace(short.map, settled_cost=settled))
 
     def clean(self, contact_map: ContactMap, grasp: int | None = None) -> tuple[ContactMap, float]:
-        """Leave out contacts, the worst first, while they cost more than being explained by nothing.
+        """Leave out contacts, the worst first, while they cost more than unexplained contacts.
 
         Args:
             contact_map: with its present poses.
@@ -112,7 +113,7 @@ class HypothesisScorer:
             contact_map = contact_map.without_contact(*contact_map.origins[asked[costs.argmax()]])
 
     def with_covariances(self, contact_map: ContactMap) -> ContactMap:
-        """The map with the covariance that all contacts and motions leave to each pose."""
+        """The map with the covariance of each pose given all contacts and motions."""
         size, count = contact_map.space.size, len(contact_map.placed)
         joint = np.linalg.inv(self._information(contact_map))
         blocks = joint.reshape(count - 1, size, count - 1, size)[np.arange(count - 1), :, np.arange(count - 1)]
@@ -120,18 +121,18 @@ class HypothesisScorer:
         return replace(contact_map, placed=(contact_map.placed[0], *later))
 
     def different(self, hypotheses: list[Hypothesis], *, by_contacts: bool = True) -> list[Hypothesis]:
-        """The likeliest of those that ended at the same trajectory.
+        """The most likely ones of those with equal trajectories.
 
         Args:
             hypotheses: to choose from.
-            by_contacts: those that leave out other contacts are different, even if they are close.
+            by_contacts: those that leave out other contacts count as different, even if they are close.
         """
         return self.unlike(hypotheses, [], by_contacts=by_contacts)
 
     def unlike(
         self, hypotheses: list[Hypothesis], known: list[Hypothesis], *, by_contacts: bool = True
     ) -> list[Hypothesis]:
-        """As :meth:`different`, of those that ended at none of the known trajectories."""
+        """As :meth:`different`, of those that differ from all known trajectories."""
         kept: list[Hypothesis] = []
         for one in sorted(hypotheses, key=cost):
             if not any(self._same(one.map, other.map, by_contacts) for other in (*known, *kept)):
@@ -139,10 +140,10 @@ class HypothesisScorer:
         return kept
 
     def _same(self, one: ContactMap, other: ContactMap, by_contacts: bool) -> bool:
-        """Whether two trajectories are one: near everywhere, or off only where the contacts leave the poses open.
+        """Whether two trajectories are equal: close, or different only where contacts do not determine poses.
 
-        An optimiser that stops where little is to be gained ends at many places of one valley; kept apart, they would
-        take the places of true alternatives.
+        An optimiser that stops when little is gained ends at many places of one valley; kept apart, they would displace
+        true alternatives.
         """
         gaps = one.space.deviation(one.rows, other.rows)
         if _near(gaps, one.space):
@@ -157,7 +158,7 @@ class HypothesisScorer:
         return bool(steps @ self._information(other) @ steps < _SAME_VALLEY * len(steps))
 
     def _information(self, contact_map: ContactMap) -> Array:
-        """Of all poses but the first; the last maps' are remembered."""
+        """Information of all poses but the first; cached for the last maps."""
         if id(contact_map) not in self._informed:
             while len(self._informed) >= _REMEMBERED:
                 del self._informed[next(iter(self._informed))]
@@ -166,7 +167,7 @@ class HypothesisScorer:
         return self._informed[id(contact_map)][1]
 
     def price(self, contact_map: ContactMap) -> float:
-        """What the contacts cost that are left out, and the steps in which the object moved otherwise than meant.
+        """Cost of the contacts that are left out, and of the steps in which the object did not move with the hand.
 
         The more contacts are wrong, the less surprising is one more (Beta-binomial: the share of wrong contacts is
         one in a hundred until the contacts say otherwise).
@@ -192,12 +193,12 @@ class HypothesisScorer:
 
 
 def cost(hypothesis: Hypothesis) -> float:
-    """What hypotheses are sorted by."""
+    """The sort key of hypotheses."""
     return hypothesis.cost
 
 
 def likeliest(hypotheses: list[Hypothesis], count: int, gap: float) -> list[Hypothesis]:
-    """The best ones, but none that is less likely than the best by more than ``gap`` (natural logarithm)."""
+    """The best ones, without those less likely than the best by more than ``gap`` (natural logarithm)."""
     ranked = sorted(hypotheses, key=cost)[:count]
     return [one for one in ranked if one.cost < ranked[0].cost + gap]
 
@@ -210,12 +211,12 @@ def weights(hypotheses: list[Hypothesis]) -> Array:
 
 
 def _left_out_contacts(contact_map: ContactMap, by_contacts: bool) -> list[frozenset[int] | bool]:
-    """What of each grasp is aside; or only whether all of it is."""
+    """The left-out contacts of each grasp; or only whether all are left out."""
     return [grasp.left_out if by_contacts else grasp.used for grasp in contact_map.placed]
 
 
 def _near(gaps: Array, space: PoseVectors) -> bool:
-    """Whether poses differ by less than is worth telling apart."""
+    """Whether poses differ by less than the resolution."""
     limits = np.where(np.arange(space.size) < space.translations, _SAME_TRANSLATION_m, _SAME_ROTATION_rad)
     return bool((np.abs(gaps) <= limits).all())
 

@@ -1,11 +1,10 @@
 """Several hypotheses of the whole trajectory, each smoothed jointly with the shape integrated out.
 
 The filter of algorithm 3.1 commits to one map grasp by grasp and cannot take a wrong pose back. Here a
-hypothesis is a whole trajectory, and the place of a particle's weight is taken by its evidence
-(:mod:`hypotheses`). Each grasp the best hypotheses branch into the poses that the measurement proposes, are
-smoothed, compared, and the best are kept. A contact that fits worse than a contact explained by nothing is left
-out; one more branch always leaves out all contacts of a grasp. It wins where every placement would tear the shape
-or the motion, and is dropped when later grasps tell better.
+hypothesis is a whole trajectory, and its evidence (:mod:`hypotheses`) replaces a particle's weight. At each grasp the
+best hypotheses branch into the poses that the measurement proposes, are smoothed, compared, and the best are kept. A
+contact that fits worse than an unexplained one is left out; one more branch always leaves out all contacts of a grasp.
+It wins if every placement contradicts the shape or the motion, and is dropped when later grasps show a better one.
 """
 
 from __future__ import annotations
@@ -37,23 +36,24 @@ from tactile_lab.slam.tracking.joint.trajectory_splicing import splice_trajector
 
 _LEAST_TO_RELOCATE = 3
 _LEAST_KNOWN = 30
-"""Contacts that a grasp must have, and the object, before the grasp is looked for anywhere on it."""
+"""Contacts that a grasp and the object must have before the grasp is searched anywhere on it."""
 
 _POOR_GAIN = 2.5
-"""Evidence (natural logarithm) that a contact brings on unknown ground, at most; on known ground it is 6 to 10."""
+"""Largest evidence (natural logarithm) of a contact on an unknown part; on a known part it is 6 to 10."""
 
 _LEAST_FOR_FACES = 3
-"""Grasps; fewer have next to no faces in common."""
+"""Number of grasps; fewer have hardly any faces in common."""
 
 _MOST_REGROUPINGS = 3
-"""A trajectory that took several wrong turns is mended at one after the other."""
+"""A trajectory with several wrong turns is repaired at one after the other."""
 
 _PLACED, _HOPEFUL_nats = 3, 30.0
-"""Hypotheses whose grasps are looked at again on their object: so many, less likely than the likeliest by no more."""
+"""Hypotheses whose grasps are relocalized: number, and largest difference of likelihood to the best."""
 
 _BACKWARD_SPREAD = {2: (4, 8), 3: (3, 4)}
-"""Hypotheses kept, and branches smoothed, when a session is read backwards, by the dimension of the contacts: a second
-opinion need not be as thorough as the first, and in space it costs as much."""
+"""Hypotheses kept, and branches smoothed, when a session is read backwards, by the dimension of the contacts: the
+second pass need not be as thorough as the first, and in space it costs as much.
+"""
 
 
 class JointTracker:
@@ -73,7 +73,7 @@ class JointTracker:
             noise: of the motion model.
             settings: see there.
             kernel_every: kernel parameters are estimated anew after so many grasps.
-            relocate: proposes poses anywhere on the object when it was lost; None for none.
+            relocate: proposes poses anywhere on the object if it was lost; None for none.
         """
         self._relocate, self._configured = relocate, noise
         self._noise, self._settings, self._kernel_every = noise, settings, kernel_every
@@ -97,10 +97,10 @@ class JointTracker:
 
     @property
     def refined(self) -> ContactMap:
-        """The likeliest trajectory in the light of flat faces, as the end would have it; hypotheses stay as they are.
+        """The most likely trajectory with flat faces, as at the end of a session; hypotheses are unchanged.
 
         A field binds neighbouring contacts only, so that poses that are right to a millimetre at the end are off by a
-        centimetre on the way.
+        centimetre in between.
         """
         best = self._hypotheses[0].map
         if self._refined is None or self._refined[0] is not best:
@@ -114,19 +114,19 @@ class JointTracker:
 
     @property
     def hypotheses(self) -> tuple[Hypothesis, ...]:
-        """The trajectories that are still followed, the likeliest first."""
+        """The present hypotheses, most likely first."""
         return tuple(self._hypotheses)
 
     @property
     def _has_settled(self) -> bool:
-        """The session is so long that its early grasps are summed up."""
+        """Whether the session is so long that its early grasps are summarized."""
         return len(self.map.placed) > 2 * self._settings.window
 
     def predict(self, motion: Array) -> None:
         self._motion = motion
 
     def weigh(self, contacts: ContactSet) -> bool:
-        """Branch every hypothesis into the poses proposed for this grasp, smooth the likeliest and rank them."""
+        """Branch every hypothesis into the poses proposed for this grasp, smooth the most likely ones and rank them."""
         contacts = contacts if self.mechanisms.has("free space") else contacts.without_free_places()
         given = self._motion, self._noise, self._judge, self._settings, self._space, self.mechanisms
         step = Branching(contacts, *given)
@@ -139,14 +139,14 @@ class JointTracker:
         return self._branches[0].map.placed[-1].used
 
     def _without_free_space(self, first: ContactMap) -> ContactMap:
-        """The map of the first grasp as it is, or without what is known to be free if that is left out."""
+        """The map of the first grasp, without free space if that mechanism is off."""
         if self.mechanisms.has("free space"):
             return first
         grasp = first.placed[0]
         return first.with_placed(0, replace(grasp, contacts_world=grasp.contacts_world.without_free_places()))
 
     def estimate(self) -> PoseEstimate:
-        """The likeliest hypothesis's pose; the covariance holds its own and the spread of the hypotheses."""
+        """The most likely hypothesis's pose; the covariance includes its own and the spread of the hypotheses."""
         best = self._branches[0].map.placed[-1]
         rows = np.array([branch.map.placed[-1].row for branch in self._branches])
         away = self._space.deviation(rows, best.row)
@@ -154,13 +154,13 @@ class JointTracker:
         return PoseEstimate(best.row, best.covariance + spread)
 
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
-        """The branches hold the new contacts already, each hypothesis where it believes them to be."""
+        """Nothing to do: the branches contain the new contacts already."""
         best = self._branches[0]
         last = replace(best.map.placed[-1], covariance=self.estimate().covariance)
         self._branches[0] = replace(best, map=replace(best.map, placed=(*best.map.placed[:-1], last)))
 
     def resample(self) -> None:
-        """Go on with the ranked branches; now and then with new kernel parameters, the same for all."""
+        """Continue with the ranked branches; from time to time with new kernel parameters, the same for all."""
         self._hypotheses = self._branches
         count = len(self._hypotheses[0].map.placed)
         if count % self._kernel_every == 0:
@@ -173,7 +173,7 @@ class JointTracker:
             self._hypotheses = [self._judge.condense(one, lag.window, lag.remembered) for one in self._hypotheses]
 
     def adopt(self, corrected: ContactMap) -> None:
-        """Take over a corrected map; other poses only if grasps were settled on the way.
+        """Accept a corrected map; other poses only if grasps were settled before.
 
         Loops between grasps that were smoothed together are made of contacts that count already; counted
         twice, they made registration worse (decision 26).
@@ -184,9 +184,9 @@ class JointTracker:
             self._hypotheses[0] = replace(self._hypotheses[0], map=corrected)
 
     def finish(self) -> None:
-        """Smooth the remaining hypotheses to the end, those of the session read backwards among them.
+        """Smooth the remaining hypotheses to the end, including those of the session read backwards.
 
-        Where the first grasps left a wrong impression the last ones may not, and the evidence tells which was right.
+        If the first grasps were misleading the last ones may not be, and the evidence decides which is right.
         """
         readable = len(self.map.placed) > 2 and len(self.map.placed[-1].contacts_world) > 0
         if self._settings.backwards and not self._has_settled and readable:
@@ -205,11 +205,11 @@ class JointTracker:
         self._has_ended = True
 
     def _score_with_facets(self) -> list[Hypothesis]:
-        """The hypotheses in the light of flat faces, the likeliest first.
+        """The hypotheses scored by flat faces, most likely first.
 
-        Where the likeliest one can be joined otherwise and then is likelier without faces, that is looked at too. Faces
-        decide anew which contacts are aside, so that trajectories that differ in these alone are looked at once. Grasps
-        are placed on the objects of a few: the way back from a wrong turn may be open from one and not from another.
+        If splicing the most likely one makes it more likely without faces, the result is tested too. Faces decide again
+        which contacts are left out, so that trajectories that differ only in these are tested once. Grasps are
+        relocalized on a few objects: a wrong turn may be repairable in one hypothesis and not in another.
         """
         sharp = FacetedScorer(self._judge, self._noise, self.mechanisms)
         known = self._judge.different(self._hypotheses, by_contacts=False)
@@ -230,12 +230,12 @@ class JointTracker:
         ]
 
     def _spliced_below(self, limit: float, best: Hypothesis, known: list[Hypothesis]) -> list[Hypothesis]:
-        """Other ways to join a hypothesis that are likelier than a limit, and none of the known trajectories."""
+        """Other splices of a hypothesis that are more likely than a limit and differ from all known trajectories."""
         others = self._judge.unlike(self._splice(best), known, by_contacts=False)
         return [one for one in others if one.cost < limit]
 
     def _relocalize(self, hypothesis: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
-        """Without contacts that it is better off without, and with grasps where they belong on its object."""
+        """The hypothesis cleaned of contacts, and with grasps relocalized on its object."""
         freed = self._retry_unplaced(self.mechanisms.improve("released contacts", hypothesis, sharp.release), sharp)
         return self.mechanisms.improve(
             "placing on the object",
@@ -244,12 +244,12 @@ class JointTracker:
         )
 
     def _retry_unplaced(self, best: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
-        """With grasps placed that found no place while a wrong contact spoilt the shape, if that is likelier."""
+        """The hypothesis with grasps placed that did not fit the shape with a wrong contact, if more likely."""
         again = self._associate_deferred(self._judge.score(best.map))
         return best if again.map is best.map else min(best, sharp.better(again.map), key=cost)
 
     def _readmit(self, hypothesis: Hypothesis) -> Hypothesis:
-        """With a second look at all contacts: some were left out when little was known of the object."""
+        """The hypothesis after testing all contacts again: some were left out while the object was little known."""
         looked, _ = self._judge.clean(hypothesis.map.with_all_contacts())
         if looked.left_out_count == hypothesis.map.left_out_count:
             return hypothesis
@@ -268,7 +268,7 @@ class JointTracker:
         return propose_pushes(best, self._noise, self._settings.proposals, self._judge)
 
     def _backwards(self) -> list[Hypothesis]:
-        """The hypotheses that the same grasps give in the opposite order."""
+        """The hypotheses of the same grasps in the opposite order."""
         placed, space = self.map.placed, self._space
         last = replace(placed[-1], left_out=frozenset(), covariance=placed[0].covariance)
         spread = _BACKWARD_SPREAD[self.map.dimension]
@@ -283,7 +283,7 @@ class JointTracker:
         return [self._judge.score(self.map.reread(one.map)) for one in tracker.hypotheses]
 
     def _regroup(self) -> None:
-        """Join the likeliest hypothesis otherwise, and what is likelier then once more."""
+        """Splice the most likely hypothesis, and repeat with a more likely result."""
         for _ in range(_MOST_REGROUPINGS):
             best = min(self._hypotheses, key=cost)
             spliced = self._splice(best) if self.mechanisms.has("splicing") else []
@@ -295,7 +295,7 @@ class JointTracker:
                 break
 
     def _splice(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """The hypothesis joined otherwise at its unlikeliest steps."""
+        """The hypothesis spliced at its least likely steps."""
         others = [
             self._judge.score(one) for one in splice_trajectories(hypothesis.map, self._noise, self._settings.proposals)
         ]
@@ -303,7 +303,7 @@ class JointTracker:
         return [self._judge.smooth(other.map, self._settings.iterations) for other in promising]
 
     def _relocate_grasp(self, best: Hypothesis) -> list[Hypothesis]:
-        """Poses anywhere on the object, where a grasp fits nothing that is known of it near the predicted pose."""
+        """Poses anywhere on the object, if a grasp does not fit the known part of it near the predicted pose."""
         contacts, known = len(best.map.placed[-1].contacts_world), len(best.map.contacts)
         gain = self._hypotheses[0].cost - best.cost
         expected = contacts >= _LEAST_TO_RELOCATE and known >= _LEAST_KNOWN
@@ -314,7 +314,7 @@ class JointTracker:
         return likeliest(hypotheses, count, self._settings.evidence_gap)
 
     def _trust(self, noise: MotionNoise) -> None:
-        """Go on with another noise of the motion model."""
+        """Continue with another noise of the motion model."""
         self._noise, self._judge = (
             noise,
             HypothesisScorer(noise, self._settings.proposals.unexplained_cost, self.mechanisms),

@@ -1,6 +1,6 @@
-"""The mechanisms of method "joint" by name, so that each can be left out to see what it is worth.
+"""The mechanisms of method "joint" by name, so that each can be switched off to measure its benefit.
 
-What each one does and what it is worth is in docs/estimator.md; the figures are made by experiment "ablation".
+docs/estimator.md explains them; experiment "ablation" measures them.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Mechanisms:
     """Which mechanisms are on, and which of those changed anything.
 
     Attributes:
-        changed: names of mechanisms that gave another hypothesis than they were given.
+        changed: names of mechanisms that changed a hypothesis.
     """
 
     def __init__(self, without: frozenset[Mechanism] = frozenset()) -> None:
@@ -51,14 +51,14 @@ class Mechanisms:
         return name not in self._without
 
     def improve(self, name: Mechanism, given: _Value, improved: Callable[[_Value], _Value]) -> _Value:
-        """What a mechanism makes of something; the same where it is left out."""
+        """The result of a mechanism; the unchanged input if it is off."""
         found = improved(given) if self.has(name) else given
         if found is not given:
             self.changed.add(name)
         return found
 
     def add(self, name: Mechanism, further: Callable[[], list[_Value]]) -> list[_Value]:
-        """What a mechanism proposes beside what there is; nothing where it is left out."""
+        """Additional proposals of a mechanism; none if it is off."""
         found = further() if self.has(name) else []
         if found:
             self.changed.add(name)

@@ -1,13 +1,13 @@
-"""What the uncertainty of the poses does to a surface that was made from contacts placed by them.
+"""Propagates pose uncertainty into the surface that was estimated from contacts at these poses.
 
-A shape model states how well it knows the surface if every contact lies where it was placed. The poses of a
-trajectory are uncertain too, and together: a pose that is off moves all contacts of its grasp at once, and the poses
-before and after with it. Where contacts move along their normals the surface follows them; along the surface they
-move nothing. How well poses are known depends on the shape: the field only binds neighbouring contacts to each other,
-an outline times a range of heights those above each other too, and flat faces contacts all over the object.
+A shape model states the uncertainty of the surface for contacts at known poses. The poses of a trajectory are uncertain
+too, and correlated: an error of a pose moves all contacts of its grasp, and the neighbouring poses with it. Where
+contacts move along their normals the surface follows them; along the surface they move nothing. How well poses are
+known depends on the shape: the field only binds neighbouring contacts to each other, an outline times a range of
+heights those above each other too, and flat faces contacts all over the object.
 
-A motion of all contacts as one body changes the place of the shape and not the shape, so that part is taken out: what
-is stated is how far the surface may be off after the best rigid alignment.
+A motion of all contacts as one body changes the place of the shape and not the shape, so that part is removed: the
+result is the uncertainty of the surface after the best rigid alignment.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from tactile_lab.slam.tracking.faces.facet_certainty import FacetCertainty
 def propagate_pose_uncertainty(
     mesh: SurfaceMesh, shape: FittedShape, contact_map: ContactMap, noise: MotionNoise
 ) -> SurfaceMesh:
-    """A surface with what the poses leave open added to its sigma.
+    """A surface with the pose uncertainty added to its sigma.
 
     Args:
         mesh: of the shape.
@@ -52,7 +52,7 @@ def propagate_pose_uncertainty(
 
 
 def _change(contact_map: ContactMap, noise: MotionNoise, places_m: Array, normals: Array, *, faceted: bool) -> Array:
-    """How far a surface moves along its normals by independent standard normal causes, shape (q, m).
+    """Displacement of a surface along its normals by independent standard normal variables, shape (q, m).
 
     Args:
         contact_map: see above, contacts in the plane or in space.
@@ -74,7 +74,7 @@ def _change(contact_map: ContactMap, noise: MotionNoise, places_m: Array, normal
 
 
 def _reshape(change: Array, mesh: SurfaceMesh, *, on_table: bool) -> Array:
-    """What is left of displacements along the normals when the surface is moved as one body to undo them."""
+    """Displacements along the normals after the best rigid motion of the surface is removed."""
     arms, normals = mesh.vertices - mesh.vertices.mean(axis=0), mesh.normals
     turning = np.cross(arms, normals)
     rigid = np.column_stack([normals[:, :2], turning[:, 2]] if on_table else [normals, turning])

@@ -1,8 +1,8 @@
 """Poses proposed by the measurement: motion samples driven onto the modelled surface.
 
-The idea of the manifold particle filter (thesis section 5.2.2): contacts pin the pose down to a thin set of
-poses, which blind samples of the motion model rarely hit. Each sample slides there by a few steps of a robust
-Gauss-Newton iteration, all samples at once; samples that end at the same place are one proposal.
+The idea of the manifold particle filter (thesis section 5.2.2): contacts constrain the pose to a thin set, which blind
+samples of the motion model rarely hit. Each sample slides there by a few steps of a robust Gauss-Newton iteration, all
+samples at once; samples that end at the same place are one proposal.
 """
 
 from __future__ import annotations
@@ -24,18 +24,19 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
 
 UNEXPLAINED_COST = 2.0
-"""A contact in a hundred is wrong, and then anywhere within 10 cm with any normal, which costs 0. The rest keeps
-contacts that are right but alone, on faces touched once."""
+"""A contact in a hundred is wrong, and then anywhere within 10 cm with any normal, which costs 0. The remainder keeps
+right contacts that are alone on faces touched once.
+"""
 
 _ROBUST_SQUARED = 9.0
-"""Residuals beyond three sigma lose their pull (Geman-McClure), which keeps basins wide."""
+"""Residuals beyond three sigma lose their influence (Geman-McClure), which keeps basins wide."""
 
 _LONGEST_STEP_m = 0.012
 _LONGEST_TURN_rad = 0.35
 
 _OTHER_PLACE = 2.0
 _VARIANCE_EVERY = 3
-"""Steps after which the field's variance is asked for again."""
+"""Number of steps after which the field's variance is computed again."""
 
 
 class ProposalSettings(StrictModel):
@@ -44,8 +45,8 @@ class ProposalSettings(StrictModel):
     Attributes:
         samples: quasi-random samples of the motion model, half of them with twice its standard deviation.
         steps: Gauss-Newton steps.
-        kept: at most so many different proposals.
-        distinct_m, distinct_rad: proposals closer than both are the same.
+        kept: largest number of different proposals.
+        distinct_m, distinct_rad: proposals closer than both count as equal.
         unexplained_cost: negative log likelihood of a contact that nothing explains (wrong part of a finger, another
             object); no contact costs more.
         normal_length_m: a map uncertain by sigma predicts normals to ``sigma / normal_length_m`` radians.
@@ -61,7 +62,7 @@ class ProposalSettings(StrictModel):
 
 
 class Matched(Protocol):
-    """A surface that contacts can be driven onto: a field, or a solid."""
+    """A surface onto which contacts can be driven: a field or a solid."""
 
     def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
         """The field at points of shape (q, d)."""
@@ -72,7 +73,7 @@ class Matched(Protocol):
 
 @dataclass(frozen=True)
 class Fit:
-    """How poses fit, linearised.
+    """Fit of poses, linearised.
 
     Attributes:
         cost: negative log of likelihood times motion prior, shape (n,).
@@ -93,18 +94,17 @@ def propose(
     settings: ProposalSettings,
     space: PoseVectors = PLANAR,
 ) -> tuple[Array, Fit]:
-    """Different poses that explain the contacts, the best first.
+    """Different poses that explain the contacts, best first.
 
     Args:
-        predicted: the pose predicted by the hand's motion, a row.
+        predicted: the pose predicted by the hand's motion, a pose vector.
         contacts: of the grasp, world frame.
         field: the modelled surface.
         noise: of the motion model.
         settings: see there.
-        space: what rows mean.
+        space: kind of the pose vectors.
 
-    Returns:
-        Rows of shape (m, size), and how they fit.
+    Returns: Pose vectors of shape (m, size), and their fit.
     """
     spread = quasi_normal(settings.samples, space.size) * space.sigmas(noise)
     spread[settings.samples // 2 :] *= 2.0
@@ -126,7 +126,7 @@ def propose(
 
 
 class GraspMatch:
-    """How one grasp's contacts fit a field at many poses, each contact on its own."""
+    """Fit of one grasp's contacts to a field at many poses, each contact independently."""
 
     def __init__(
         self,
@@ -183,7 +183,7 @@ class GraspMatch:
 
 
 def elsewhere(rows: Array, row: Array, settings: ProposalSettings, space: PoseVectors) -> NDArray[np.bool_]:
-    """Which poses, shape (n, size), are other places than one: farther than twice what tells proposals apart."""
+    """Which poses, shape (n, size), are other places than one: farther than twice the distinct distances."""
     gaps, split = space.deviation(rows, row), space.translations
     far = np.linalg.norm(gaps[:, :split], axis=1) > _OTHER_PLACE * settings.distinct_m
     far |= np.linalg.norm(gaps[:, split:], axis=1) > _OTHER_PLACE * settings.distinct_rad
@@ -191,7 +191,7 @@ def elsewhere(rows: Array, row: Array, settings: ProposalSettings, space: PoseVe
 
 
 def _limits(space: PoseVectors) -> tuple[Array, Array]:
-    """Longest step and damping of each number of a row."""
+    """Longest step and damping of each component of a pose vector."""
     turning = np.arange(space.size) >= space.translations
     return np.where(turning, _LONGEST_TURN_rad, _LONGEST_STEP_m), np.diag(np.where(turning, 1e-3, 10.0))
 

@@ -14,17 +14,17 @@ class JointSettings(StrictModel):
 
     Attributes:
         proposals: how poses are proposed.
-        hypotheses: so many are kept from grasp to grasp.
-        smoothed: so many of the branches, by evidence before smoothing, are smoothed.
-        evidence_gap: hypotheses that much less likely than the best (natural logarithm) are given up.
+        hypotheses: number kept from grasp to grasp.
+        smoothed: number of branches, the best before smoothing, that are smoothed.
+        evidence_gap: hypotheses this much less likely than the best (natural logarithm) are dropped.
         branch_gap: the same for branches before they are smoothed.
         iterations: of the optimiser at each grasp.
         final_iterations: of the optimiser at the end.
         backwards: read the session backwards as well at the end, unless it is too long for that.
-        window: beyond twice so many grasps, all but so many are settled.
+        window: beyond twice this many grasps, all but this many are settled.
         estimate_motion: learn the motion's noise from the session; the configured one counts as much as six grasps.
-        remembered: so many contacts of settled grasps still count.
-        without: mechanisms that are left out, to see what they are worth.
+        remembered: number of contacts of settled grasps that are kept.
+        without: mechanisms that are switched off, to measure their benefit.
     """
 
     proposals: ProposalSettings = ProposalSettings()

@@ -1,8 +1,8 @@
-"""Other ways to join the two halves of a trajectory.
+"""Trajectory splicing: joins the two halves of a trajectory differently.
 
 A hypothesis that once took a wrong turn carries all later grasps with it: each half of the trajectory is right in
-itself, and only the step between them is wrong. Such a step mostly needs an unlikely slip, so that is where to look:
-the contacts of the smaller half, as one rigid set, are matched anew against the surface that the other half makes.
+itself, and only the step between them is wrong. Such a step mostly needs an unlikely slip, so that is where to search:
+the contacts of the smaller half, as one rigid set, are matched again with the surface of the other half.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from tactile_lab.slam.tracking.joint.proposals import ProposalSettings, elsewher
 _UNLIKELY_SIGMA = 2.0
 _MOST_STEPS = 4
 _KEPT = 3
-"""Other ways that are returned for each step."""
+"""Number of alternatives returned for each step."""
 
 _LEAST_CONTACTS = 3
 
 
 def splice_trajectories(contact_map: ContactMap, noise: MotionNoise, settings: ProposalSettings) -> list[ContactMap]:
-    """The trajectory joined in other ways at its most unlikely steps.
+    """The trajectory spliced at its least likely steps.
 
     Args:
         contact_map: poses and contacts of a hypothesis.
@@ -40,7 +40,7 @@ def splice_trajectories(contact_map: ContactMap, noise: MotionNoise, settings: P
 
 
 def _join_anew(contact_map: ContactMap, step: int, noise: MotionNoise, settings: ProposalSettings) -> list[ContactMap]:
-    """The best other ways to join what is before a step with what comes from it on."""
+    """The best alternatives to join the part before a step with the part after it."""
     space, rows, of_grasp = contact_map.space, contact_map.rows, contact_map.grasp_indices
     later = of_grasp >= step
     moves_later = int(later.sum()) <= int((~later).sum())

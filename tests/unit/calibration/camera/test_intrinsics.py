@@ -85,7 +85,7 @@ def test_coverage_tells_regions_tilts_and_distances() -> None:
 
 
 def test_too_few_views_or_two_sizes_are_refused() -> None:
-    with pytest.raises(ConfigurationError, match="4 usable views of the board, 5 are needed"):
+    with pytest.raises(ConfigurationError, match="4 usable views of the board, but at least 5 are needed"):
         calibrate_lens(views(4))
     other = views(6)
     other[2] = BoardView("x", other[2].points_m, other[2].pixels, (1280, 720), 0.2)
@@ -101,7 +101,7 @@ def test_blurred_pictures_and_pictures_without_the_board_are_refused_by_name() -
     assert isinstance(blurred, str)
     assert blurred.startswith(("blurred: edges", "no marker of"))
     empty = view_of("a", np.full((480, 640), 90, np.uint8), BOARD)
-    assert empty == "no marker of DICT_4X4_50 is to be seen"
+    assert empty == "no marker of DICT_4X4_50 is visible"
 
 
 def write_views(folder: Path, count: int) -> None:
@@ -132,7 +132,9 @@ def test_a_wrong_dictionary_is_named_with_the_right_one(lab_data: Path, tmp_path
     for name in ("choriginal.jpg", "img_00.jpg"):
         (tmp_path / name).write_bytes((lab_data / "aruco_photos" / name).read_bytes())
     wrong = CharucoBoard(dictionary="DICT_5X5_250", columns=5, rows=7, square_m=0.04, marker_m=0.02)
-    with pytest.raises(ConfigurationError, match=r"markers of DICT_6X6_1000, the board is described with DICT_5X5_250"):
+    with pytest.raises(
+        ConfigurationError, match=r"markers of DICT_6X6_1000, but the board is described with DICT_5X5_250"
+    ):
         gather_views(CameraSourceSettings(source=str(tmp_path)), wrong, VirtualClock())
 
 
@@ -143,5 +145,5 @@ def test_photographs_of_a_board_are_too_few_and_say_so(lab_data: Path, tmp_path:
     found = gather_views(CameraSourceSettings(source=str(tmp_path)), board, VirtualClock())
     assert 1 <= len(found.views) <= 3
     assert found.refused == {}
-    with pytest.raises(ConfigurationError, match="usable views of the board, 5 are needed"):
+    with pytest.raises(ConfigurationError, match="usable views of the board, but at least 5 are needed"):
         calibrate_lens(found.views)

@@ -83,7 +83,7 @@ def test_steps_are_taken_back_and_what_is_missing_is_told():
     assert len(run.measured.free) == 1
     assert not run.motion().ok
     assert any("presses 0" in words for words in run.motion().missing)
-    with pytest.raises(ConfigurationError, match="1 untouched wrenches, 6 needed"):
+    with pytest.raises(ConfigurationError, match="1 untouched wrenches, but 6 are needed"):
         run.solve()
     assert run.undo() == 1
     assert run.undo() is None

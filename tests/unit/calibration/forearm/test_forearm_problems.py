@@ -89,7 +89,7 @@ def test_quality_has_residuals_held_out_ones_repeats_and_a_verdict(touches):
 
 def test_touches_of_the_top_alone_are_refused_with_the_direction(touches):
     top = tuple(touch for touch in touches if touch.target.name == "table top") * 4
-    with pytest.raises(ConfigurationError, match="no or few touches tell the place along"):
+    with pytest.raises(ConfigurationError, match="too few touches determine the position along"):
         solve_forearm(ForearmData(touches=top))
 
 
@@ -104,14 +104,14 @@ def test_no_touch_at_all_is_told_too():
 
 def test_a_world_marker_that_was_never_seen_is_named(views):
     blind = [replace(view, world_px=None) for view in views]
-    with pytest.raises(ConfigurationError, match="the world marker is in none of the pictures"):
+    with pytest.raises(ConfigurationError, match="the world marker is not visible in any picture"):
         BoardProblem(blind, CAMERA, MARKERS)
 
 
 def test_a_bumped_world_marker_is_named_with_the_picture(views):
     bumped = list(views)
     bumped[4] = replace(bumped[4], world_px=bumped[4].world_px + 5.0)
-    with pytest.raises(ConfigurationError, match=r"was bumped: \d+\.\d px from its place in picture 5"):
+    with pytest.raises(ConfigurationError, match=r"was moved: \d+\.\d px off in picture 5"):
         BoardProblem(bumped, CAMERA, MARKERS)
 
 
@@ -147,7 +147,7 @@ def test_a_block_is_pressed_on_all_faces_but_its_underside():
 
 
 def test_a_top_alone_is_no_geometry():
-    with pytest.raises(ValidationError, match="a top alone tells no place"):
+    with pytest.raises(ValidationError, match="a table top alone does not determine"):
         KnownGeometry()
 
 

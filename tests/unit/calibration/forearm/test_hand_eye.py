@@ -104,10 +104,13 @@ def test_limits_of_pairs_may_be_set():
     ("content", "words"),
     [
         ("[[[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]]]", "at least 2 items|Field required|is missing"),
-        ("[[[[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]],[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]]]", "no rigid motion"),
-        ("{}", "no observations that are known"),
+        (
+            "[[[[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]],[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]]]",
+            "not a rigid motion",
+        ),
+        ("{}", "no known kind of observations"),
         ("not json", "is not JSON"),
-        (json.dumps({"format": "tactile-forearm-data/1", "rig": "x"}), "needs touches, or views"),
+        (json.dumps({"format": "tactile-forearm-data/1", "rig": "x"}), "needs either touches or views"),
     ],
 )
 def test_files_that_hold_no_observations_are_refused(tmp_path, content, words):

@@ -126,7 +126,7 @@ def test_the_wizard_repeats_and_tells_what_is_missing() -> None:
     ("text", "words"),
     [
         ("block: {size_m: [0.1, 0.1, 0.1], world_T_block: {translation_m: [0, 0, 0.05]}}", "block is 120 x 60 x 60 mm"),
-        ("table: {size_m: [1, 1], thickness_m: 0.02}", "names no block"),
+        ("table: {size_m: [1, 1], thickness_m: 0.02}", "does not describe a block"),
     ],
 )
 def test_blocks_that_do_not_fit_are_named(tmp_path: Path, text: str, words: str) -> None:

@@ -76,7 +76,7 @@ def test_contacts_correct_those_joints_alone_that_they_tell():
     found = from_contacts({"WRJ2": sure, "FFJ1": unsure})
     assert list(found) == ["WRJ2"]
     assert found["WRJ2"].shift_deg == pytest.approx(-np.degrees(0.01))
-    with pytest.raises(ConfigurationError, match="no joint's offset can be told"):
+    with pytest.raises(ConfigurationError, match="do not determine the offset of any joint"):
         from_contacts({"FFJ1": unsure})
 
 
@@ -209,8 +209,8 @@ def test_forces_of_the_opposite_sign_are_named():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"free": 3}, "3 untouched wrenches, 6 needed"),
-        ({"presses": 2}, "2 presses, 6 needed"),
+        ({"free": 3}, "3 untouched wrenches, but 6 are needed"),
+        ({"presses": 2}, "2 presses, but 6 are needed"),
     ],
 )
 def test_too_few_wrenches_are_named(change, words):
@@ -240,7 +240,7 @@ def test_electrodes_that_are_dead_open_or_noisy_are_named():
 
 def test_a_touched_biotac_is_refused():
     counts = 2000.0 + np.linspace(0, 400, 200)[:, None] * np.ones(19)
-    with pytest.raises(ConfigurationError, match="touched, or still warms up"):
+    with pytest.raises(ConfigurationError, match="touched, or is still warming up"):
         faulty_electrodes(counts)
 
 
@@ -250,7 +250,7 @@ def test_a_table_of_counts_is_read_and_others_are_refused(tmp_path):
     np.testing.assert_array_equal(load_untouched(path), [[1, 2, 3], [4, 5, 6]])
     for text in ("a b", "1 2\n3\n", "1 nan"):
         path.write_text(text)
-        with pytest.raises(ConfigurationError, match="is no table of counts"):
+        with pytest.raises(ConfigurationError, match="is not a table of counts"):
             load_untouched(path)
     with pytest.raises(ConfigurationError, match="cannot be read"):
         load_untouched(tmp_path / "none.csv")

@@ -46,7 +46,9 @@ def test_the_lever_of_symmetric_touches_is_their_distance_shared_by_three_axes(m
 
 def test_touches_close_together_are_not_enough_and_told_so_in_millimetres() -> None:
     missing = check_touches(touches_around(0.05, (0.0, 0.0, 0.0))).missing
-    assert any(told.startswith("lever of the weakest turn 28.87 mm of 30.00 needed: turns about") for told in missing)
+    assert any(
+        told.startswith("lever of the weakest turn 28.87 mm of 30.00 needed: rotations about") for told in missing
+    )
 
 
 def test_a_turn_that_touches_would_take_for_a_shift_does_not_count() -> None:

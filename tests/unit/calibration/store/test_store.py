@@ -49,6 +49,13 @@ def test_a_record_comes_back_as_it_was_written(stored):
     assert stored.read_text().startswith("# Where the base stands.\n")
 
 
+@pytest.mark.parametrize("notes", ["1e3", "2026-11-21", ".5", "-7", "no", "", "12:30:00", "with: a colon"])
+def test_notes_that_look_like_something_else_stay_text(tmp_path, notes):
+    path = tmp_path / "forearm.yaml"
+    write_record(path, record(notes=notes))
+    assert read_record(path).notes == notes
+
+
 def test_the_device_loader_reads_the_stored_form(stored):
     forearm = load_forearm(stored)
     assert forearm.world_T_mount.pose().equals(POSE, 1e-12)
@@ -101,7 +108,7 @@ def test_a_place_that_can_not_be_written_is_named(tmp_path):
 
 def test_a_covariance_that_is_none_is_refused(stored):
     bad = -np.eye(6)
-    with pytest.raises(ValueError, match="no covariance"):
+    with pytest.raises(ValueError, match="not a covariance"):
         ForearmCalibration.of(POSE, bad)
 
 
@@ -112,10 +119,10 @@ def test_a_good_calibration_is_admitted(stored):
 @pytest.mark.parametrize(
     ("changes", "here", "words"),
     [
-        ({"rig": "sim"}, HERE, "is of rig sim, not of lab"),
-        ({}, Installation("lab", {"hand": "554"}), "is of hand with serial number 378, not 554"),
+        ({"rig": "sim"}, HERE, "belongs to rig sim, not to lab"),
+        ({}, Installation("lab", {"hand": "554"}), "belongs to the hand with serial number 378, not 554"),
         ({"valid_until_utc": "2026-11-01T00:00:00+00:00"}, HERE, "is valid until 2026-11-01"),
-        ({"created_utc": "2027-11-21T09:00:00+00:00"}, HERE, "was made in the future"),
+        ({"created_utc": "2027-11-21T09:00:00+00:00"}, HERE, "was created in the future"),
         ({"verdict": "FAIL"}, HERE, "did not pass its limits"),
         ({"kind": "camera"}, HERE, "is a calibration of camera"),
     ],

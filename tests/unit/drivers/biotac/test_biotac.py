@@ -237,7 +237,7 @@ def test_slots_not_marked_valid_keep_the_last_values(tip: BioTac) -> None:
     stamp = finger.stamp_ns + 300_000_000
     slot = encode_slot(Slot((2040,), {Channel.PDC: 1700}), Channel.PDC)
     tip.update(Reading(stamp, Channel.PDC, 0b100, bytes(32) + slot + bytes(32)))
-    assert tip.health() == ("21 channels not heard for more than 200 ms",)
+    assert tip.health() == ("21 channels not received for more than 200 ms",)
 
 
 def test_an_empty_socket_is_told_apart_and_stops_motion(tip: BioTac) -> None:
@@ -255,7 +255,7 @@ def test_an_empty_socket_is_told_apart_and_stops_motion(tip: BioTac) -> None:
     assert "no sensor fitted" in tip.void()
 
 
-@pytest.mark.parametrize(("channel", "complaint"), [(Channel.PDC, "pressure moves"), (7, "electrode moves")])
+@pytest.mark.parametrize(("channel", "complaint"), [(Channel.PDC, "pressure varies"), (7, "electrode varies")])
 def test_a_tare_is_refused_while_readings_move(tip: BioTac, channel: int, complaint: str) -> None:
     finger = Finger(tip)
     finger.feed(REST, rotations=2)

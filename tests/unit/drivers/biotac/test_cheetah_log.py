@@ -58,7 +58,7 @@ def test_a_line_that_is_no_sample_is_named(line: str) -> None:
 
 
 def test_a_line_of_another_number_of_sensors_is_named() -> None:
-    with pytest.raises(CodecError, match="line 2: 1 sensors, and 3 before"):
+    with pytest.raises(CodecError, match="line 2: 1 sensors, but 3 before"):
         decode_log(f"{LINE}\n0 1 1 17 2602 0\n")
 
 

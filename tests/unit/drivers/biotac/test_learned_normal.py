@@ -107,7 +107,7 @@ def test_a_file_gives_back_what_was_learned(learned: LearnedNormals, tmp_path: P
 
 def test_the_device_uses_what_was_learned_and_refuses_another_model(learned: LearnedNormals) -> None:
     model = {"electrodes": 24, "distal_T_sensor": {"translation_m": (0.0, 0.0, 0.0)}}
-    with pytest.raises(ConfigurationError, match="19 electrodes, on a sensor with 24"):
+    with pytest.raises(ConfigurationError, match="19 electrodes, but the sensor has 24"):
         BioTac("FF", BioTacCalibration.model_validate(model), normals=learned)
 
 
@@ -142,11 +142,11 @@ def test_a_table_is_written_and_read_with_untouched_rows_as_its_tare(tmp_path: P
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "no table of presses"),
-        ("a,b\n1,2\n", "no table of presses"),
+        ("", "not a table of presses"),
+        ("a,b\n1,2\n", "not a table of presses"),
         ("e1,e2,nx,ny,nz\n1,2,0,0,1\n", "2 electrodes"),
-        ("e1,e2,nx,ny,nz\n1,x,0,0,1\n", "line 2: is no sample"),
-        ("e1,e2,nx,ny,nz\n1,2,0,0\n", "line 2: is no sample"),
+        ("e1,e2,nx,ny,nz\n1,x,0,0,1\n", "line 2: is not a sample"),
+        ("e1,e2,nx,ny,nz\n1,2,0,0\n", "line 2: is not a sample"),
         ("e1,e2,nx,ny,nz\n1,2,0,0,3\n", "2 electrodes"),
     ],
 )
@@ -159,7 +159,7 @@ def test_a_table_that_does_not_fit_is_refused(text: str, words: str, tmp_path: P
 def test_normals_that_are_no_unit_vectors_or_too_few_are_refused(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "x.txt", np.ones((19, 6)))
     np.savetxt(tmp_path / "y.txt", 3.0 * np.ones((3, 6)))
-    with pytest.raises(ConfigurationError, match=r"the normal of sample 1 has the length 5\.2, not 1"):
+    with pytest.raises(ConfigurationError, match=r"the normal of sample 1 has length 5\.2, not 1"):
         read_presses(tmp_path / "x.txt", tmp_path / "y.txt")
     np.savetxt(tmp_path / "y.txt", np.ones((3, 5)) / np.sqrt(3.0))
     with pytest.raises(ConfigurationError, match="6 samples of electrodes"):
@@ -167,7 +167,7 @@ def test_normals_that_are_no_unit_vectors_or_too_few_are_refused(tmp_path: Path)
     with pytest.raises(ConfigurationError, match="cannot be read"):
         read_presses(tmp_path / "none.txt", tmp_path / "y.txt")
     np.savetxt(tmp_path / "y.txt", np.ones((3, 6)) / np.sqrt(3.0))
-    with pytest.raises(ConfigurationError, match="6 presses with a known normal, and 100 are needed"):
+    with pytest.raises(ConfigurationError, match="6 presses with a known normal, but 100 are needed"):
         calibrate_normals(read_presses(tmp_path / "x.txt", tmp_path / "y.txt"), in_sensor_frame=True)
 
 

@@ -234,7 +234,7 @@ def test_a_picture_of_another_size_than_the_lens_was_calibrated_with_is_refused(
     assert frame.image is not None
     smaller = Frame(1, np.asarray(cv2.resize(frame.image, (320, 240)), np.uint8))
     problem = refused(ObjectTracker(CAMERA, SETTINGS), smaller)
-    assert problem == "the picture has 320 x 240 pixels, the lens was calibrated with 640 x 480"
+    assert problem == "the picture has 320 x 240 pixels, but the lens was calibrated with 640 x 480"
 
 
 def test_a_blurred_picture_is_refused() -> None:
@@ -262,7 +262,7 @@ def test_corners_of_another_dictionary_are_refused() -> None:
     assert frame.image is not None
     found = Detection("DICT_5X5_50", (640, 480), detection(frame.image, "DICT_4X4_50").markers)
     problem = refused(ObjectTracker(CAMERA, SETTINGS), Frame(1, None, detection=found))
-    assert problem == "markers of DICT_5X5_50 were looked for, not of DICT_4X4_50"
+    assert problem == "markers of DICT_5X5_50 were detected, not of DICT_4X4_50"
 
 
 def test_recorded_corners_give_the_same_pose_as_the_picture() -> None:

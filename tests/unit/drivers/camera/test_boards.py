@@ -140,9 +140,9 @@ def test_a_bar_half_a_per_cent_off_is_refused_with_the_reason(tmp_path: Path, ba
         ("kind: single\nnumber: 50\n", "not 50"),
         ("kind: charuco\nmarker_m: 0.05\n", "marker_m is smaller than square_m"),
         ("kind: checkerboard\n", "checkerboard"),
-        ("kind: single\ndictionary: DICT_3X3\n", "no dictionary of OpenCV"),
-        ("kind: single\ndictionary: nowhere.yml\n", "holds no dictionary"),
-        ("just words\n", "no description of a board"),
+        ("kind: single\ndictionary: DICT_3X3\n", "not an OpenCV dictionary"),
+        ("kind: single\ndictionary: nowhere.yml\n", "contains no dictionary"),
+        ("just words\n", "not a description of a board"),
     ],
 )
 def test_a_board_that_can_not_be_is_refused(tmp_path: Path, text: str, complaint: str) -> None:

@@ -42,7 +42,7 @@ def test_a_trigger_brings_a_picture(kind: str) -> None:
 def test_a_picture_is_waited_for_from_look_to_look_and_polling_does_not_lose_it() -> None:
     transport = ReplayTransport("camera", [[], [], [], [Datagram(encoded(".png"), 5)], [], []])
     camera = Camera(transport, VirtualClock())
-    with pytest.raises(DeviceError, match="no picture was asked for"):
+    with pytest.raises(DeviceError, match="no picture was requested"):
         camera.take_picture()
     camera.ask()
     assert camera.take_picture() is None
@@ -52,7 +52,7 @@ def test_a_picture_is_waited_for_from_look_to_look_and_polling_does_not_lose_it(
     assert frame is not None
     assert frame.stamp_ns == 5
     camera.poll()
-    with pytest.raises(DeviceError, match="no picture was asked for"):
+    with pytest.raises(DeviceError, match="no picture was requested"):
         camera.take_picture()
 
 
@@ -74,11 +74,12 @@ def test_a_silent_camera_is_an_error_after_the_time_out() -> None:
     [
         (b"", "neither JPEG nor PNG"),
         (b"GIF89a", "neither"),
-        (encoded(".jpg")[:-200], "JPEG cut short"),
-        (encoded(".png")[:-5], "PNG cut short"),
+        (encoded(".jpg")[:-200], "JPEG truncated"),
+        (encoded(".png")[:-5], "PNG truncated"),
         (b"\xff\xd8\xff\xd9", "without a size"),
         (encoded(".png")[:16] + b"\x7f\xff\xff\xff" * 2 + encoded(".png")[24:], "2147483647 x 2147483647"),
         (encoded(".png")[:16] + b"\x00" * 8 + encoded(".png")[24:], "0 x 0"),
+        (encoded(".png")[:33] + b"\x40\x00\x00\x00" + encoded(".png")[37:], "parts are longer than it is"),
     ],
 )
 def test_a_damaged_picture_is_a_codec_error(payload: bytes, complaint: str) -> None:

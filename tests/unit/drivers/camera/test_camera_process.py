@@ -54,7 +54,7 @@ def test_the_process_reports_its_frames_and_markers(transport: CameraProcess) ->
 
 
 def test_only_triggers_are_taken(transport: CameraProcess) -> None:
-    with pytest.raises(CodecError, match="no trigger"):
+    with pytest.raises(CodecError, match="not a trigger"):
         transport.send(b"SMILE")
 
 

@@ -67,10 +67,10 @@ def told(width: int, height: int) -> bytes:
         (encode_packet(FRAME) + b"x", "bytes instead of"),
         (encode_packet(FRAME)[:4] + b"\x02" + encode_packet(FRAME)[5:], "version 2"),
         (encode_packet(FRAME)[:5] + b"\xff" + encode_packet(FRAME)[6:], "dictionary 255"),
-        (encode_packet(FRAME, PICTURE[:-9]), "PNG cut short"),
+        (encode_packet(FRAME, PICTURE[:-9]), "PNG truncated"),
         (told(65, 48), "instead of 65 x 48"),
         (told(63, 48), "a picture of 64 x 48 pixels"),
-        (encode_packet(FRAME)[:-4] + b"\x00\x00\xc0\x7f", "no numbers"),
+        (encode_packet(FRAME)[:-4] + b"\x00\x00\xc0\x7f", "not numbers"),
     ],
 )
 def test_a_damaged_packet_is_a_codec_error(payload: bytes, complaint: str) -> None:

@@ -84,7 +84,7 @@ def test_what_the_driver_does_not_take_is_told() -> None:
     driver = Driver(VirtualClock(), [(64, 48)], [1], stubborn=(cv2.CAP_PROP_EXPOSURE, cv2.CAP_PROP_AUTOFOCUS))
     notes = device(driver, exposure_ms=4.0).notes()
     assert any("automatic focus" in note for note in notes)
-    assert any("does not take exposure 40 (it stays -1)" in note for note in notes)
+    assert any("does not accept exposure 40 (it stays -1)" in note for note in notes)
 
 
 def test_frames_are_stamped_numbered_and_lost_ones_counted() -> None:
@@ -111,7 +111,7 @@ def test_a_camera_that_never_takes_the_wanted_resolution_is_an_error() -> None:
 
 
 def test_a_camera_that_falls_silent_is_an_error() -> None:
-    with pytest.raises(DeviceError, match="gives no more pictures"):
+    with pytest.raises(DeviceError, match="delivers no more pictures"):
         device(Driver(VirtualClock(), [(64, 48)], [])).read()
 
 
@@ -147,13 +147,13 @@ def test_pictures_of_two_sizes_in_a_folder_are_an_error_that_names_the_file(tmp_
     write_pictures(tmp_path, [(64, 48), (32, 24)])
     source = open_source(CameraSourceSettings(source=str(tmp_path)), VirtualClock())
     source.read()
-    with pytest.raises(DeviceError, match=r"001\.png: has 32 x 24 pixels, the pictures before it 64 x 48"):
+    with pytest.raises(DeviceError, match=r"001\.png: has 32 x 24 pixels, but the previous pictures 64 x 48"):
         source.read()
 
 
 def test_a_damaged_picture_in_a_folder_is_an_error_that_names_it(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(b"no picture")
-    with pytest.raises(DeviceError, match=r"a\.png: is no picture"):
+    with pytest.raises(DeviceError, match=r"a\.png: is not a readable picture"):
         open_source(CameraSourceSettings(source=str(tmp_path)), VirtualClock()).read()
 
 
@@ -197,5 +197,5 @@ def test_a_word_says_where_pictures_come_from(source: str, kind: str) -> None:
 
 
 def test_a_source_that_is_not_there_is_refused() -> None:
-    with pytest.raises(ConfigurationError, match=r"no-such-thing: no such camera.*Name a camera"):
+    with pytest.raises(ConfigurationError, match=r"no-such-thing: no such camera.*Give a camera"):
         place_of("no-such-thing")

@@ -38,7 +38,7 @@ def test_one_picture_that_shows_it_elsewhere_is_refused_and_leaves_no_trace() ->
     for corners in noisy(5):
         marker.add(corners)
     before = np.array(marker.corners_px)
-    assert "px from where it was" in marker.add(CORNERS + 5.0)
+    assert "px from its first position" in marker.add(CORNERS + 5.0)
     np.testing.assert_array_equal(marker.corners_px, before)
     assert marker.add(CORNERS) == ""
     assert marker.moved == ""
@@ -60,7 +60,7 @@ def test_pictures_that_disagree_with_each_other_are_no_motion() -> None:
     marker = world()
     marker.add(CORNERS)
     for shift in (5.0, -9.0, 20.0, -4.0):
-        assert "px from where it was" in marker.add(CORNERS + shift)
+        assert "px from its first position" in marker.add(CORNERS + shift)
     assert marker.moved == ""
 
 
@@ -72,7 +72,7 @@ def test_creeping_is_seen_though_no_step_is_large() -> None:
             break
     assert moved_at is not None
     assert 20 <= moved_at < 60
-    assert "creeps" in marker.moved
+    assert "drifts" in marker.moved
 
 
 def test_a_marker_that_can_not_move_begins_a_new_mean_when_the_camera_did() -> None:

@@ -59,5 +59,5 @@ def test_a_folder_one_may_not_write_to_is_named_with_what_to_do(old, monkeypatch
 
 
 def test_a_file_in_the_place_of_a_folder_is_told(old):
-    with pytest.raises(WriteError, match=r"inside: cannot be written \(.*record.yaml is no folder\)\. Use --out"):
+    with pytest.raises(WriteError, match=r"inside: cannot be written \(.*record.yaml is not a folder\)\. Use --out"):
         write_whole(old / "inside", "new", "Use --out")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from drivers.core.child_process import ChildProcess
+from drivers.core.child_process import ChildProcess, child_environment
 from drivers.core.errors import DeviceError
 
 CHILD = """
@@ -41,9 +42,7 @@ PATIENCE_s = 60.0
 
 @pytest.fixture
 def child(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ChildProcess]:
-    (tmp_path / "child_under_test.py").write_text(CHILD)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    child = ChildProcess("child_under_test", "echo")
+    child = child_of(CHILD, tmp_path, monkeypatch)
     yield child
     child.kill()
 
@@ -89,7 +88,7 @@ def test_a_busy_child_does_not_hold_up_orders_and_is_killed_when_it_does_not_end
     child.give({"sleep_s": 600.0})
     with pytest.raises(DeviceError, match="echo: its process does not answer"):
         child.answer(0.0)
-    with pytest.raises(DeviceError, match="echo: its process takes no orders"):
+    with pytest.raises(DeviceError, match="echo: its process accepts no commands"):
         child.give({"echo": ["x" * 100_000]})
     assert child.close(0.0) == b""
 
@@ -99,3 +98,91 @@ def test_what_is_not_started_says_so(child: ChildProcess) -> None:
         child.give({})
     with pytest.raises(DeviceError, match="echo: not connected"):
         child.read(0.0)
+
+
+# --- what a child imports -------------------------------------------------------------------------------------------
+
+PACKAGES = Path(__file__).resolve().parents[4]
+OURS = ("drivers", "sessions", "calibration", "tactile_lab")
+THEIRS = ("numpy", "scipy", "gtsam", "cv2", "pydantic", "yaml", "threadpoolctl", "json", "runpy", "selectors", "typing")
+IMPORTING = f"""
+import importlib
+from drivers.core.child_process import errors_said, say
+with errors_said():
+    say({{name: importlib.import_module(name).__name__ for name in {OURS + THEIRS!r}}})
+"""
+
+
+@pytest.mark.parametrize("search_path", ["{elsewhere}", ":{elsewhere}", ".:{elsewhere}:"])
+def test_a_child_imports_nothing_from_the_folder_the_user_stands_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, search_path: str
+) -> None:
+    for name in OURS + THEIRS:
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'a').write(__name__)\n")
+    modules = tmp_path / "elsewhere"
+    modules.mkdir()
+    (modules / "importing_child.py").write_text(IMPORTING)
+    monkeypatch.setenv("PYTHONPATH", search_path.format(elsewhere=modules))
+    monkeypatch.chdir(tmp_path)
+    child = ChildProcess("importing_child", "import")
+    child.start({})
+    assert set(child.answer(PATIENCE_s)) == set(OURS + THEIRS)
+    child.close()
+    assert not (tmp_path / "executed").exists()
+
+
+def test_children_have_the_packages_of_whoever_starts_them(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    monkeypatch.chdir(PACKAGES)
+    assert child_environment()["PYTHONPATH"] == str(PACKAGES), "a checkout, installed nowhere"
+    installed = tmp_path / "lib" / "site-packages"
+    monkeypatch.setattr("drivers.core.child_process._PACKAGES", installed)
+    assert "PYTHONPATH" not in child_environment(), "before the standard library it would hide parts of that"
+
+
+def test_every_process_is_started_by_the_one_command() -> None:
+    naming = {
+        path.relative_to(PACKAGES).as_posix()
+        for name in OURS
+        for path in (PACKAGES / name).rglob("*.py")
+        if re.search(r"\[\s*sys\.executable", path.read_text(encoding="utf-8"))
+    }
+    assert naming == {"drivers/core/child_process.py"}
+
+
+# --- what goes wrong in a child -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("raise KeyError('joint')", r"echo: the program itself failed \(KeyError: 'joint', in .*line 4\)"),
+        ("print('a library says hello')", "echo: its process says what is no answer: 'a library says hello'"),
+        ("print('[1, 2]')", "says what is no answer"),
+    ],
+)
+def test_what_a_child_says_wrongly_is_told_in_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, words: str
+) -> None:
+    source = f"from drivers.core.child_process import errors_said\n\nwith errors_said():\n    {body}\n"
+    child = child_of(source, tmp_path, monkeypatch)
+    child.start({})
+    with pytest.raises(DeviceError, match=words):
+        child.ready(PATIENCE_s)
+
+
+def test_a_child_that_fails_before_it_can_answer_leaves_one_line_and_no_traceback(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    child = child_of("import no_such_library\n", tmp_path, monkeypatch)
+    child.start({})
+    with pytest.raises(DeviceError, match="echo: its process has ended"):
+        child.ready(PATIENCE_s)
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("child_under_test: the program itself failed (ModuleNotFoundError: No module named 'no_such")
+
+
+def child_of(source: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> ChildProcess:
+    (folder / "child_under_test.py").write_text(source)
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+    return ChildProcess("child_under_test", "echo")

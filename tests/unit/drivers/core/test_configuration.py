@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import Field, field_validator, model_validator
 
-from drivers.core.configuration import StrictModel, flatten_keys, load, load_model, validate
+from drivers.core.configuration import StrictModel, flatten_keys, load, load_model, loads, validate
 from drivers.core.errors import ConfigurationError
 
 
@@ -192,6 +192,14 @@ def test_a_model_is_read_from_a_file_and_can_not_be_changed(tmp_path):
     assert settings_read == Settings(cycle_s=0.01, inner=Inner(limit_N=2.0))
     with pytest.raises(ValueError, match="frozen"):
         settings_read.grasps = 3
+
+
+@pytest.mark.parametrize(
+    "content", [b"[" * 100_000, b"[" * 100_000 + b"]" * 100_000, b"- " * 100_000, b"{a: " * 100_000]
+)
+def test_a_document_nested_without_end_is_refused(content: bytes) -> None:
+    with pytest.raises(ConfigurationError, match="nested deeper than 100 levels"):
+        loads(content, "rig.yaml")
 
 
 def test_nested_keys_become_dotted_names_and_an_empty_mapping_is_a_value() -> None:

@@ -68,4 +68,4 @@ def test_lateness_is_summed_up_in_microseconds() -> None:
     assert (summary.cycles, summary.left_out, summary.worst_us) == (101, 59, 60_000.0)
     assert summary.median_us == pytest.approx(50, abs=1)
     assert summary.p99_us == pytest.approx(99, abs=1)
-    assert str(summary).startswith("101 cycles, 59 left out, started late by 50 us")
+    assert str(summary).startswith("101 cycles, 59 skipped, started late by 50 us")

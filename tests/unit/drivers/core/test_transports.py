@@ -50,11 +50,11 @@ def test_a_memory_link_carries_messages_both_ways_in_order():
 @pytest.mark.parametrize("action", [lambda transport: transport.send(b"x"), lambda transport: transport.receive()])
 def test_a_link_that_is_not_open_says_so_by_name(action):
     transport = MemoryTransport("hand", Echo())
-    with pytest.raises(DeviceError, match="hand: link is not open"):
+    with pytest.raises(DeviceError, match="hand: the transport is not open"):
         action(transport)
     opened(transport).close()
     transport.close()
-    with pytest.raises(DeviceError, match="hand: link is not open"):
+    with pytest.raises(DeviceError, match="hand: the transport is not open"):
         action(transport)
 
 

@@ -65,8 +65,8 @@ def test_any_bytes_decode_or_are_refused_in_our_words() -> None:
         (b"", "a frame of 0 bytes"),
         (bytes(60), "EtherType 0x0000"),
         (bytes(12) + b"\x88\xa4\x0e\x40" + bytes(44), "type 4"),
-        (bytes(12) + b"\x88\xa4\xff\x17" + bytes(44), "short of its stated length"),
-        (bytes(12) + b"\x88\xa4\x05\x10" + bytes(44), "cut off"),
+        (bytes(12) + b"\x88\xa4\xff\x17" + bytes(44), "shorter than its stated length"),
+        (bytes(12) + b"\x88\xa4\x05\x10" + bytes(44), "truncated"),
         (bytes(12) + b"\x88\xa4\x0c\x10\x63" + bytes(43), "unknown command 99"),
     ],
 )
@@ -102,7 +102,7 @@ def test_an_answer_is_told_from_anything_else() -> None:
     ("status", "words"),
     [
         (AlStatus(AlState.OP), "OP"),
-        (AlStatus(AlState.SAFEOP, True, 0x1B), "SAFEOP with error 0x001B, watchdog: no process data came in time"),
+        (AlStatus(AlState.SAFEOP, True, 0x1B), "SAFEOP with error 0x001B, watchdog: no process data arrived in time"),
         (AlStatus(AlState.PREOP, True, 0x1E), "PREOP with error 0x001E, input SyncManagers have a wrong address"),
         (AlStatus(AlState.INIT, True, 0x7777), "INIT with error 0x7777, a code without published meaning"),
         (AlStatus(5), "unknown state 5"),

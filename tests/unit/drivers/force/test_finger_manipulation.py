@@ -88,7 +88,7 @@ def test_sensors_1_and_2_touch_their_sector_of_the_40_mm_radius(wrenches: Array,
 def test_sensor_3_is_reported_as_faulty(wrenches: Array) -> None:
     contacts, health, loaded = replay(wrenches[:, 2])
     assert loaded > 200
-    assert any("torque does not fit the force" in problem for problem in health)
+    assert any("torque does not match the force" in problem for problem in health)
     assert len(contacts) < 0.1 * loaded
 
 

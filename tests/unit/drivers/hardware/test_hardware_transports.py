@@ -52,22 +52,37 @@ def udp(device: socket.socket) -> Iterator[UdpTransport]:
     transport.close()
 
 
-def test_datagrams_come_in_order_and_are_stamped_when_they_arrived(udp: UdpTransport, device: socket.socket) -> None:
+def test_datagrams_come_in_order(udp: UdpTransport, device: socket.socket) -> None:
     udp.send(b"hello")
     _, client = device.recvfrom(100)
-    before_ns = CLOCK.now_ns()
     for number in range(5):
         device.sendto(bytes([number]), client)
-    sent_ns = CLOCK.now_ns()
-    time.sleep(0.05)
     arrived = wait_for(udp, 5)
     assert [datagram.payload for datagram in arrived] == [bytes([number]) for number in range(5)]
     stamps = [datagram.stamp_ns for datagram in arrived]
     assert stamps == sorted(stamps)
-    if udp.kernel_stamps:  # the kernel's stamps are those of arrival, however late the program reads
-        assert before_ns - 1_000_000 <= stamps[0]
-        assert stamps[-1] <= sent_ns + 10_000_000
     assert udp.health() == ()
+
+
+def test_datagrams_are_stamped_when_they_arrive_however_late_the_program_reads(
+    udp: UdpTransport, device: socket.socket
+) -> None:
+    udp.send(b"hello")
+    _, client = device.recvfrom(100)
+    if not udp.kernel_stamps:
+        pytest.skip("the kernel of this machine stamps no datagrams")
+
+    def lateness_ns() -> int:
+        before_ns = CLOCK.now_ns()
+        device.sendto(b"reading", client)
+        sent_ns = CLOCK.now_ns()
+        time.sleep(0.05)
+        (arrived,) = wait_for(udp, 1)
+        assert arrived.stamp_ns >= before_ns - 1_000_000
+        return arrived.stamp_ns - sent_ns
+
+    # A busy machine may deliver one of them late; a program that stamps what it reads stamps all of them late.
+    assert any(lateness_ns() < 10_000_000 for _ in range(20))
 
 
 def test_a_stranger_is_counted_and_left_out(udp: UdpTransport, device: socket.socket) -> None:
@@ -78,7 +93,7 @@ def test_a_stranger_is_counted_and_left_out(udp: UdpTransport, device: socket.so
         stranger.sendto(b"forged", client)
     device.sendto(b"real", client)
     assert [datagram.payload for datagram in wait_for(udp)] == [b"real"]
-    assert udp.health() == ("1 datagrams from other addresses than 127.0.0.1 left out",)
+    assert udp.health() == ("1 datagrams from other addresses than 127.0.0.1 ignored",)
 
 
 def test_what_the_kernel_drops_is_known(device: socket.socket) -> None:
@@ -99,9 +114,9 @@ def test_what_the_kernel_drops_is_known(device: socket.socket) -> None:
 
 def test_an_address_that_does_not_exist_is_named() -> None:
     transport = UdpTransport("ft/FF", "no-such-box.invalid", 49152, CLOCK)
-    with pytest.raises(DeviceError, match=r"ft/FF: no UDP socket to no-such-box.invalid:49152"):
+    with pytest.raises(DeviceError, match=r"ft/FF: cannot open a UDP socket to no-such-box.invalid:49152"):
         transport.open()
-    with pytest.raises(DeviceError, match="link is not open"):
+    with pytest.raises(DeviceError, match="the transport is not open"):
         transport.receive()
 
 
@@ -117,7 +132,7 @@ def test_a_serial_port_carries_bytes_both_ways_and_is_ours_alone() -> None:
         SerialTransport("ft/RF", os.ttyname(slave), 115200, CLOCK).open()
     os.close(slave)
     os.close(master)
-    with pytest.raises(DeviceError, match=r"ft/MF: the serial port .* is gone"):
+    with pytest.raises(DeviceError, match=r"ft/MF: the serial port .* was disconnected"):
         wait_for(transport)
     transport.close()
     transport.close()
@@ -140,7 +155,7 @@ def test_a_pseudo_terminal_that_refuses_even_parity_says_so() -> None:
             transport.open()
             transport.close()
 
-    with pytest.raises(DeviceError, match="cannot work at 115200 baud with parity E"):
+    with pytest.raises(DeviceError, match="does not support 115200 baud with parity E"):
         open_twice()
     os.close(master)
     os.close(slave)
@@ -159,7 +174,7 @@ def test_frames_pass_a_can_bus_and_others_are_counted() -> None:
         other.send(can.Message(arbitration_id=0x205, is_extended_id=False, is_error_frame=True))
         other.send(can.Message(arbitration_id=0x205, is_extended_id=False, data=b"FT001"))
         assert [decode_frame(datagram.payload) for datagram in wait_for(transport)] == [CanFrame(0x205, b"FT001")]
-        assert transport.health() == ("1 error frames on the bus", "1 frames of another kind left out")
+        assert transport.health() == ("1 error frames on the bus", "1 frames of another kind ignored")
         transport.close()
         transport.close()
 

@@ -72,7 +72,7 @@ def test_a_device_that_goes_is_told() -> None:
         far.sendall(frame(b"last"))
         far.close()
         assert received(transport, 1) == [b"last"]
-        with pytest.raises(DeviceError, match=r"camera: lost 127.0.0.1:\d+ \(it closed the connection\)"):
+        with pytest.raises(DeviceError, match=r"camera: lost the connection to 127.0.0.1:\d+ \(the device closed"):
             received(transport, 1)
 
 
@@ -86,7 +86,7 @@ def test_another_protocol_at_the_port_is_told() -> None:
 def test_nobody_there() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
-    with pytest.raises(DeviceError, match=f"camera: nobody listens at 127.0.0.1:{port}"):
+    with pytest.raises(DeviceError, match=f"camera: cannot connect to 127.0.0.1:{port}"):
         TcpTransport("camera", "127.0.0.1", port, MonotonicClock()).open()
-    with pytest.raises(DeviceError, match="link is not open"):
+    with pytest.raises(DeviceError, match="the transport is not open"):
         TcpTransport("camera", "127.0.0.1", port, MonotonicClock()).receive()

@@ -174,7 +174,7 @@ def test_a_question_carries_no_targets() -> None:
     assert encode_command(PositionerCommand(0, None)) == bytes(52)
     assert decode_command(bytes(52)).targets is None
     for wrong in (PositionerCommand(0, np.zeros(6)), PositionerCommand(1, None)):
-        with pytest.raises(CodecError, match="a question has sequence number 0"):
+        with pytest.raises(CodecError, match="a request for the position has sequence number 0"):
             encode_command(wrong)
     with pytest.raises(CodecError, match="does not fit"):
         encode_command(PositionerCommand(1, np.zeros(5)))
@@ -194,7 +194,7 @@ def test_connecting_asks_and_moves_nothing(rig: Rig) -> None:
 def test_a_silent_positioner_is_not_connected() -> None:
     rig = Rig()
     rig.base.mute = True
-    with pytest.raises(DeviceError, match="base: no answer to 20 questions"):
+    with pytest.raises(DeviceError, match="base: no answer to 20 requests"):
         rig.device.connect()
     with pytest.raises(DeviceError, match="not connected"):
         rig.device.exchange()
@@ -307,7 +307,7 @@ def test_bytes_that_are_no_status_count_as_lost(rig: Rig, garbage: bytes) -> Non
     rig.base.garbage = garbage
     assert not rig.run(2).fresh
     assert rig.device.counters.malformed == 2
-    assert "2 messages were no status of a positioner" in rig.device.health()
+    assert "2 messages were not a positioner status" in rig.device.health()
 
 
 def test_a_sound_positioner_has_nothing_to_report(rig: Rig) -> None:
@@ -331,7 +331,7 @@ def test_a_status_that_comes_behind_a_newer_one_is_not_taken_for_the_newest() ->
     samples = [device.receive(Datagram(payload, 0)) for payload in told]
     assert [None if sample is None else round(100 * sample.q[0]) for sample in samples] == [7, 9, None, None, 10]
     assert device.counters.late == 1
-    assert "1 statuses came behind newer ones" in device.health()
+    assert "1 statuses arrived after newer ones" in device.health()
 
 
 def test_sequences_go_on_after_their_largest() -> None:

@@ -84,7 +84,7 @@ def test_marker_with_its_border_lies_inside_the_foot(name: str) -> None:
 
 
 def test_unknown_object_is_refused_with_the_catalogue() -> None:
-    with pytest.raises(ConfigurationError, match=r"no object called 'teapot'.*cube-6.*mesh:<path>"):
+    with pytest.raises(ConfigurationError, match=r"there is no object 'teapot'.*cube-6.*mesh:<path>"):
         object_model("teapot")
 
 
@@ -128,7 +128,7 @@ def test_hollow_mesh_is_cut_into_the_same_convex_pieces_every_time(tmp_path: Pat
 @pytest.mark.parametrize(
     ("mesh", "message"),
     [
-        (trimesh.creation.box((60, 40, 30)), "given in millimetres"),
+        (trimesh.creation.box((60, 40, 30)), "in millimetres"),
         (trimesh.creation.box((0.006, 0.004, 0.003)), "scaled from millimetres twice"),
         (trimesh.Trimesh([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], [[0, 1, 2]]), "not a closed surface"),
     ],

@@ -176,5 +176,5 @@ def test_each_trigger_gives_one_picture() -> None:
 
 
 def test_camera_refuses_what_is_no_trigger() -> None:
-    with pytest.raises(CodecError, match="no trigger"):
+    with pytest.raises(CodecError, match="not a trigger"):
         Program().transports["camera"].send(b"SNAP")

@@ -187,7 +187,7 @@ def test_no_way_down_ends_the_session() -> None:
     assert outcome.ending is Ending.OBJECT_LOST
     assert outcome.reason == "could not reach the table: 6 approaches were blocked"
     assert outcome.grasps == ()
-    assert watcher.messages[0] == "the hand came down on the object 4 times: another grasp"
+    assert watcher.messages[0] == "the hand landed on the object 4 times: trying another grasp"
 
 
 def test_object_far_away_ends_the_session() -> None:
@@ -224,7 +224,18 @@ def test_silent_hand_stops_the_rig() -> None:
 
     outcome = run(DiscWorld(disc(), before_cycle=cut))
     assert outcome.ending is Ending.STOPPED
-    assert outcome.reason.startswith("hand: no fresh status for 60 ms")
+    assert outcome.reason.startswith("hand: no new status for 2510 ms")
+
+
+def test_a_hand_that_is_silent_for_a_moment_costs_the_session_that_time_and_no_more() -> None:
+    def cut(world: DiscWorld) -> None:
+        world.silent = 100 < world.cycles <= 200
+
+    whole, interrupted = DiscWorld(disc()), DiscWorld(disc(), before_cycle=cut)
+    outcomes = [run(world, grasps=1) for world in (whole, interrupted)]
+    assert [outcome.ending for outcome in outcomes] == [Ending.COMPLETE] * 2
+    assert len({outcome.grasps[0].touching for outcome in outcomes}) == 1
+    assert 90 <= interrupted.cycles - whole.cycles <= 100
 
 
 def test_failing_device_stops_the_rig_and_is_told_once() -> None:
@@ -516,7 +527,7 @@ def test_nothing_to_take_back_is_told() -> None:
     world = DiscWorld(disc())
     outcome, _, _ = scripted(world, [UndoGrasp("oops")], grasps=1)
     assert outcome.ending is Ending.COMPLETE
-    assert (Level.WARNING, "there is no grasp to take back") in world.log_lines
+    assert (Level.WARNING, "there is no grasp to undo") in world.log_lines
 
 
 def test_vetoed_grasp_does_not_count() -> None:
@@ -533,8 +544,8 @@ def test_hand_is_without_demand_for_as_long_as_the_session_pauses() -> None:
     assert outcome.ending is Ending.COMPLETE
     assert world.hand.stops == 2  # the pause, the end
     assert world.hand.resumes == 1
-    pauses = [text for _, text in world.log_lines if "coffee" in text or text == "goes on"]
-    assert pauses == ["paused: coffee", "goes on"]
+    pauses = [text for _, text in world.log_lines if "coffee" in text or text == "the session continues"]
+    assert pauses == ["paused: coffee", "the session continues"]
 
 
 def test_whoever_decides_ends_the_session() -> None:

@@ -118,7 +118,7 @@ def test_a_planar_log_keeps_the_horizontal_part(tmp_path):
         (["grasps", 0, "contacts", 0, "point_world_m"], [0.01, float("nan"), 0.0], r"contacts\.0\.point_world_m\.1"),
         (["grasps", 0, "contacts", 0, "point_world_m"], [0.01, 0.0], r"contacts\.0\.point_world_m"),
         (["grasps", 0, "contacts", 0, "point_world_m"], [0.01, 0.0, 0.02], "z = 0"),
-        (["grasps", 0, "contacts", 0, "normal_world"], [0.0, 2.0, 0.0], "a normal has length 1, this one 2"),
+        (["grasps", 0, "contacts", 0, "normal_world"], [0.0, 2.0, 0.0], "a normal must have length 1, not 2"),
         (["grasps", 0, "hand_motion_world"], (2 * np.eye(4)).tolist(), "not a rigid motion"),
         (["grasps", 0, "hand_motion_world"], np.diag([1.0, 1.0, -1.0, 1.0]).tolist(), "not a rigid motion"),
         (["grasps", 0, "hand_motion"], IDENTITY, "hand_motion"),

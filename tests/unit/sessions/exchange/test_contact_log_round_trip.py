@@ -198,10 +198,10 @@ def lonely(log: dict) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda log: scaled(log, 1000.0), "m apart, as if .*lengths were in millimetres"),
-        (lonely, "the grasps lie .* m apart, as if .*lengths were in millimetres"),
-        (far, "the hand moved by .* before grasp 2, as if .*lengths were in millimetres"),
-        (wide, "polygon is 100 m wide, as if .*lengths were in millimetres"),
+        (lambda log: scaled(log, 1000.0), "m apart; are .*lengths in millimetres"),
+        (lonely, "the grasps are .* m apart; are .*lengths in millimetres"),
+        (far, "the hand moved by .* before grasp 2; are .*lengths in millimetres"),
+        (wide, "polygon is 100 m wide; are .*lengths in millimetres"),
         (lambda log: log.update(point_sigma_m=1.0), "point_sigma_m: 1 is too large; is it in millimetres"),
         (lambda log: log.update(normal_sigma_rad=5.0), "normal_sigma_rad: 5 is too large; is it in degrees"),
         (lambda log: log["motion_sigma"].update(rotation_rad=20.0), "20 is too large; is it in degrees"),

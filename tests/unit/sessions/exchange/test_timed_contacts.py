@@ -82,25 +82,25 @@ def test_an_imported_log_is_read_back_as_it_was(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("time_s,x_mm,y_mm,nx,ny\n0,50,0,1,0\n", "column 'x_mm' is in another unit.*call it x_m"),
+        ("time_s,x_mm,y_mm,nx,ny\n0,50,0,1,0\n", "column 'x_mm' is in another unit.*name it x_m"),
         ("time_ms,x_m,y_m,nx,ny\n0,0.05,0,1,0\n", "column 'time_ms' is in another unit"),
-        ("time_s,x_m,y_m,nx,ny,tool_yaw_deg\n0,0.05,0,1,0,90\n", "call it tool_yaw_rad"),
+        ("time_s,x_m,y_m,nx,ny,tool_yaw_deg\n0,0.05,0,1,0,90\n", "name it tool_yaw_rad"),
         ("time_s,x_m,y_m,nx,ny,colour\n0,0.05,0,1,0,1\n", "unknown column 'colour'"),
         ("time_s,x_m,nx,ny\n0,0.05,1,0\n", "no column 'y_m'"),
-        ("time_s,x_m,y_m,nx,ny\n1,0,0,1,0\n0,0,0,1,0\n", "contact 2: its time 0 s is before.*Sort"),
-        ("time_s,grasp,x_m,y_m,nx,ny\n0,1,0,0,1,0\n1,0,0,0,1,0\n", "contact 2: its grasp comes before"),
-        ("time_s,x_m,y_m,nx,ny\n0,wide,0,1,0\n", "contact 1: x_m is 'wide', no number"),
-        ("time_s,x_m,y_m,nx,ny\n0,nan,0,1,0\n", "no finite number"),
+        ("time_s,x_m,y_m,nx,ny\n1,0,0,1,0\n0,0,0,1,0\n", "contact 2: its time 0 s is earlier.*Sort"),
+        ("time_s,grasp,x_m,y_m,nx,ny\n0,1,0,0,1,0\n1,0,0,0,1,0\n", "contact 2: its grasp number is lower"),
+        ("time_s,x_m,y_m,nx,ny\n0,wide,0,1,0\n", "contact 1: x_m is 'wide', not a number"),
+        ("time_s,x_m,y_m,nx,ny\n0,nan,0,1,0\n", "not a finite number"),
         ("time_s,x_m,y_m,nx,ny\n0,,0,1,0\n", "contact 1: has no x_m"),
         ("time_s,x_m,y_m,nx,ny\n0,0,0\n", "does not have 5 values"),
-        ("time_s,x_m,y_m,nx,ny\n0,0,0,3,0\n", "a normal has length 1, this one 3"),
+        ("time_s,x_m,y_m,nx,ny\n0,0,0,3,0\n", "a normal must have length 1, not 3"),
         ("time_s,x_m,y_m,fx_N\n0,0,0,0\n", "its force is 0 N"),
         ("time_s,x_m,y_m,fx_N\n0,0,0,2500\n", "the force in newtons"),
-        ("time_s,x_m,y_m,nx,ny,held\n0,0,0,1,0,1\n", "nothing says by what"),
-        ("time_s,x_m,y_m,nx,ny,tool_x_m\n0,0,0,1,0,1\n", "half a pose"),
+        ("time_s,x_m,y_m,nx,ny,held\n0,0,0,1,0,1\n", "the tool's pose is missing"),
+        ("time_s,x_m,y_m,nx,ny,tool_x_m\n0,0,0,1,0,1\n", "incomplete pose"),
         ("time_s,x_m,y_m,nx,ny,tool_x_m,tool_y_m,tool_yaw_rad\n0,0,0,1,0,0,0,90\n", "radians, not degrees"),
-        ("time_s,x_m,y_m,x_m,nx,ny\n0,0,0,0,1,0\n", "two columns have one name"),
-        ("time_s,x_m,y_m,nx,ny\n", "holds no contact"),
+        ("time_s,x_m,y_m,x_m,nx,ny\n0,0,0,0,1,0\n", "two columns have the same name"),
+        ("time_s,x_m,y_m,nx,ny\n", "contains no contact"),
         ("time_s;x_m;y_m;nx;ny\n0;0,05;0;1;0\n", "Separate the columns by commas"),
         ("time_s,x_m,y_m,nx,ny,point_sigma_m\n0,0,0,1,0,-1\n", "contact 1: point_sigma_m is -1"),
         ("time_s,x_m,y_m,nx,ny\n0,50,0,1,0\n9,-50,0,-1,0\n", "millimetres"),
@@ -116,7 +116,7 @@ def test_a_table_that_does_not_fit_is_refused_by_line_or_column(tmp_path, text, 
 def test_nothing_is_left_of_contacts_that_make_no_sense(tmp_path):
     trimesh.creation.box((0.1, 0.06, 0.04)).export(tmp_path / "box.ply")
     source = table(tmp_path, "time_s,x_m,y_m,nx,ny\n0,50,0,1,0\n9,-50,0,-1,0\n")
-    with pytest.raises(ConfigurationError, match="as if lengths were in millimetres"):
+    with pytest.raises(ConfigurationError, match="are lengths in millimetres"):
         import_contacts(source, tmp_path / "log.json", ImportSettings(), tmp_path / "box.ply")
     assert {path.name for path in tmp_path.iterdir()} == {"box.ply", "contacts.csv"}
 

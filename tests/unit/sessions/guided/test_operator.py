@@ -140,7 +140,7 @@ def test_pause_in_the_hold_keeps_the_grasp_as_it_is(tmp_path: Path) -> None:
     world = DiscWorld(disc())
     run = Run(tmp_path, world, SimulatedOperator(script), grasps=1)
     assert run.outcome.ending is Ending.COMPLETE
-    assert any(panel.message == "paused: p goes on" for panel in run.operator.panels)
+    assert any(panel.message == "paused. p: resume" for panel in run.operator.panels)
     assert world.hand.stops == 1
     assert len(run.outcome.grasps[0].contacts) >= 4
 
@@ -189,7 +189,7 @@ def test_unattended_session_is_closed_in_order_after_its_time(tmp_path: Path) ->
 
     run = Run(tmp_path, DiscWorld(disc()), Nobody(attended=True), attention_s=3.0)
     assert run.outcome.ending is Ending.COMPLETE
-    assert "nobody there for 3 s" in run.told
+    assert "no input from the operator for 3 s" in run.told
     assert run.world.clock.now_ns() < 10e9
 
 
@@ -223,7 +223,7 @@ def test_hand_goes_back_where_a_step_meets_something(tmp_path: Path) -> None:
     class Lower(SimulatedOperator):
         def show(self, panel: Panel) -> None:
             self.panels.append(panel)
-            if "met something" in panel.message:
+            if "touched something" in panel.message:
                 self._waiting += [Request(Ask.END), Request(Ask.END)]
             elif panel.stage is Stage.GUIDE:
                 self._waiting.append(Request(Ask.MOVE, z=-1))
@@ -231,7 +231,7 @@ def test_hand_goes_back_where_a_step_meets_something(tmp_path: Path) -> None:
                 self._waiting.append(Request(Ask.NEXT))
 
     run = Run(tmp_path, DiscWorld(Disc(np.zeros(2), radius_m=0.12, height_m=0.04)), Lower())
-    assert any("met something: back by one step" in text for text in run.told)
+    assert any("touched something: moved back by one step" in text for text in run.told)
     assert run.outcome.ending is Ending.COMPLETE
     assert not run.outcome.grasps
 
@@ -281,12 +281,12 @@ def test_hand_fails_and_the_session_goes_on_after_it_is_mended(tmp_path: Path) -
 
     script = [
         Cue(at(Stage.CLOSE, 2), act=cut),
-        Cue(lambda panel: "no fresh status" in panel.paused, act=mend),
+        Cue(lambda panel: "no new status" in panel.paused, act=mend),
     ]
     run = Run(tmp_path, world, SimulatedOperator(script, attended=True))
     assert run.outcome.ending is Ending.COMPLETE
     assert len(run.outcome.grasps) == 2
-    assert any("stopped: hand: no fresh status" in text for text in run.told)
+    assert any("stopped: hand: no new status" in text for text in run.told)
 
 
 def test_failure_ends_a_session_with_nobody_there(tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ def test_empty_table_finds_nothing_and_says_so_of_every_side() -> None:
     assert box.top_m is None
     assert set(box.missing) == set(SIDES)
     assert "top not found" in box.in_words()
-    assert "left not found: nothing met in 1 lanes" in box.in_words()
+    assert "left not found: nothing touched in 1 lanes" in box.in_words()
 
 
 def test_sides_of_an_object_as_high_as_the_palm_are_left_out() -> None:
@@ -187,5 +187,5 @@ def test_a_session_begins_with_the_box_and_the_first_grasp_has_its_contacts() ->
 def test_a_session_without_an_object_ends_after_the_box_with_its_reason() -> None:
     outcome = run(DiscWorld(None))
     assert outcome.ending is Ending.OBJECT_LOST
-    assert outcome.reason.startswith("nothing was felt where the object is expected")
+    assert outcome.reason.startswith("no object was found where it is expected")
     assert outcome.grasps == ()

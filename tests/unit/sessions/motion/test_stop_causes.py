@@ -83,8 +83,8 @@ def rig() -> Iterator[Running]:
 @pytest.mark.parametrize(
     ("device", "words", "cycles"),
     [
-        ("ft/MF", "MF: no reading of the fingertip", 22),
-        ("hand", "hand: no fresh status|without a valid status", 2),
+        ("ft/MF", "MF: no reading from the fingertip", 22),
+        ("hand", "hand: no new status|stopped: no valid status for 2 s", 2),
         ("base", "cycles in a row without a status", 12),
     ],
 )
@@ -127,7 +127,7 @@ def test_the_operator(rig: Running) -> None:
     rig.motion.tick()
     rig.supervisor.stop(KeyboardInterrupt())
     assert rig.cycles_with_demands_after(rig.runtime.snapshot().stamp_ns - 5 * CYCLE_ns) == 0
-    assert rig.sink.reports[0]["cause"] == "stopped at once by the operator"
+    assert rig.sink.reports[0]["cause"] == "stopped immediately by the operator"
 
 
 def test_a_silent_camera_is_an_error_that_stops(rig: Running) -> None:

@@ -113,5 +113,5 @@ def test_marks_of_another_version_stop_the_replay_with_the_file_named(tmp_path):
     writer.write("/link/hand/rx", np.zeros(24).tobytes(), 0)
     writer.write("/marks", b'{"kind":"pirouette","stamp_ns":1}', 1)
     writer.close()
-    with pytest.raises(SessionError, match=r"t\.mcap: not a mark"):
+    with pytest.raises(SessionError, match=r"t\.mcap: not a session event"):
         replay(tmp_path / "t.mcap")

@@ -63,7 +63,7 @@ def test_a_recovery_stands_in_for_the_torn_session_and_not_for_a_later_one(tmp_p
 
 def test_where_nothing_was_recorded_last_names_what_there_is(tmp_path, archive):
     session = import_archive(archive, tmp_path / "runs")
-    with pytest.raises(SessionError, match=rf"only pieces and imports.*name one: {session.folder.name}"):
+    with pytest.raises(SessionError, match=rf"only extracts and imports.*give a name: {session.folder.name}"):
         last(tmp_path / "runs")
 
 

@@ -131,7 +131,7 @@ def test_several_files_are_recovered_as_one_recording(tmp_path):
 def test_a_recording_without_any_message_leaves_nothing_behind(tmp_path, content):
     folder = left_behind(record(tmp_path), 1.0)
     (folder / "traffic.mcap").write_bytes(content)
-    with pytest.raises(SessionError, match=r"holds no message|not an MCAP"):
+    with pytest.raises(SessionError, match=r"contains no readable message|not an MCAP"):
         recover(folder)
     assert [item.name for item in tmp_path.iterdir()] == [folder.name]
 
@@ -155,7 +155,7 @@ def test_a_list_tells_open_closed_recovered_and_damaged(tmp_path):
     assert left_open(tmp_path) == []
     problems = {item.folder: item.problem for item in list_sessions(tmp_path)}
     assert f"tactile-lab session recover {damaged}" in problems[damaged]
-    assert "is cut off" in problems[torn]
+    assert "is truncated" in problems[torn]
 
 
 def test_results_of_the_torn_recording_stay_with_it_and_are_named(tmp_path):

@@ -80,7 +80,7 @@ def test_calibration_files_are_copied_with_their_hashes(tmp_path):
     assert copy.read_text() == "a: 1\n"
     assert again.manifest.calibration["hand/joints"].sha256 == hashlib.sha256(b"a: 1\n").hexdigest()
     copy.write_text("a: 3\n")
-    with pytest.raises(SessionError, match="changed since it was recorded"):
+    with pytest.raises(SessionError, match="changed since the recording"):
         again.calibration_file("hand/joints")
     with pytest.raises(SessionError, match="no calibration called 'camera'"):
         again.calibration_file("camera")
@@ -143,7 +143,7 @@ def test_every_value_survives_the_manifest(tmp_path_factory, content, notes):
 
 
 def test_values_that_yaml_can_not_hold_are_refused(tmp_path):
-    with pytest.raises(SessionError, match="cannot be put into YAML"):
+    with pytest.raises(SessionError, match="cannot be written as YAML"):
         create(tmp_path, rig_description={"clock": object()})
 
 

@@ -20,13 +20,13 @@ def watch(*looks: list[str]) -> tuple[list[tuple[str, str]], list[str]]:
 
 def test_a_fault_is_told_when_it_begins_and_with_its_last_figures_at_the_end() -> None:
     told, heard = watch([], ["base: 1 of 9 cycles lost"], ["base: 3 of 12 cycles lost"])
-    assert told == [("base", "1 of 9 cycles lost"), ("base", "in all: 3 of 12 cycles lost")]
+    assert told == [("base", "1 of 9 cycles lost"), ("base", "total: 3 of 12 cycles lost")]
     assert heard == ["base: 1 of 9 cycles lost"]
 
 
 def test_a_fault_that_has_passed_stands_in_the_summary() -> None:
     told, _ = watch(["FF: 2.5 N beyond"], [])
-    assert told[-1] == ("FF", "in all: 2.5 N beyond")
+    assert told[-1] == ("FF", "total: 2.5 N beyond")
 
 
 def test_motors_are_told_apart_and_what_is_usual_at_rest_is_no_fault() -> None:

@@ -41,7 +41,7 @@ def test_a_surface_needs_every_height_and_the_taps(solved: list[tuple[str, float
 def test_a_policy_may_have_the_hand_lean_where_a_surface_is_wanted(solved: list[tuple[str, float]]) -> None:
     solve(MonotonicClock(), 3, plan={"closings": ["pinch"], "surface_heights_m": [0.018]}, exploration={"policy": "kl"})
     assert solved == [("aside", 0.026), ("aside", 0.034), ("pinch", 0.018), ("radial", 0.022)]
-    with pytest.raises(ConfigurationError, match=r"closings \['flat'\] are not known; choose from aside"):
+    with pytest.raises(ConfigurationError, match=r"unknown closings \['flat'\]; choose from aside"):
         solve(MonotonicClock(), 3, exploration={"side_closings": ["flat"]})
 
 

@@ -118,4 +118,4 @@ def test_the_side_that_nobody_touched_is_named() -> None:
     felt = normals[:, 0] < 0.5
     slam = touched(points_m[felt], normals[felt])
     assert slam.world_T_object is not None
-    assert describe_unknown(planned_with(slam), planar(slam.world_T_object)).endswith("least the far side")
+    assert describe_unknown(planned_with(slam), planar(slam.world_T_object)).endswith("least known is the far side")

@@ -82,7 +82,7 @@ class EstimateSink:
 
 
 class UndoesOnce(PolicyDecisions):
-    """The policy's decisions, but the second grasp is taken back once."""
+    """The policy's decisions, but the second grasp undone once."""
 
     undone_already = False
 
@@ -203,7 +203,7 @@ def test_a_step_that_fails_ends_the_session_in_order_and_the_record_says_where()
     outcome = run.go()
     assert outcome.ending is Ending.STOPPED
     assert isinstance(outcome.error, EstimationError)
-    assert "failed in estimate (ZeroDivisionError: a bug)" in outcome.reason
+    assert "program error in estimate (ZeroDivisionError: a bug)" in outcome.reason
     assert len(outcome.grasps) == 2
     assert any("questions.py" in text and "ZeroDivisionError" in text for _, text in run.world.log_lines)
 
@@ -256,7 +256,7 @@ def test_errors_come_through_as_they_are(process: EstimatorProcess) -> None:
 
 
 def test_a_bug_is_told_with_its_place_and_the_process_goes_on(process: EstimatorProcess) -> None:
-    with pytest.raises(EstimationError, match="failed in stumbled") as caught:
+    with pytest.raises(EstimationError, match="program error in stumbled") as caught:
         ask(process, questions.stumbled)
     assert any("questions.py" in note for note in caught.value.__notes__)
     assert isinstance(ask(process, questions.counted), int)

@@ -113,7 +113,7 @@ def test_a_grasp_is_refused_where_the_rig_asks_for_more_than_it_promises() -> No
         ({"information": {"pose_weigth": 0}}, r"information.pose_weigth: unknown key \(did you mean pose_weight\?\)"),
         ({"information": {"execution": {"palm": 0.1}}}, r"execution.palm: unknown key \(did you mean palm_m\?\)"),
         ({"information": {"pose_weight": -1}}, "pose_weight: must be greater than or equal to 0, not -1"),
-        ({"policy": "best"}, "no policy is called 'best'. Policies are random, .*information"),
+        ({"policy": "best"}, "there is no policy 'best'. Policies are random, .*information"),
         ({"side_heights_m": [0.026, 0.5]}, r"side_heights_m.1: must be less than or equal to 0.12, not 0.5"),
     ],
 )

@@ -132,7 +132,7 @@ def unheard(typed: int) -> Iterator[None]:
 @pytest.mark.usefixtures("heeded")
 def test_ctrl_c_just_before_the_wait_ends_the_question(typed: int) -> None:
     with pytest.raises(KeyboardInterrupt), unheard(typed):
-        wizard.Asker(False, "test").choose("Is its way clear?", {"y": "yes"}, "y")
+        wizard.Asker(False, "test").choose("Is its path clear?", {"y": "yes"}, "y")
 
 
 def proposal(withdrawn: Callable[[], bool] = lambda: False) -> Proposal:

@@ -226,8 +226,8 @@ def test_a_lost_object_without_a_shape_is_said_in_words(tmp_path: Path) -> None:
     data = planar_results(tmp_path, lambda grasp: replace(grasp, contacts=grasp.contacts[:2]))
     found = evaluate(tmp_path, Truth(data.world_T_body, outline_m=data.outline_m), "rectangle")
     assert (found.status, found.failed, found.shape, found.uncertainty) == ("lost", True, None, None)
-    assert found.warnings[0] == "the object is lost: 5 of 5 grasps could not be placed"
-    assert "the contacts enclose no shape" in found.warnings
+    assert found.warnings[0] == "the object is lost: 5 of 5 grasps could not be registered"
+    assert "no closed shape could be estimated from the contacts" in found.warnings
 
 
 def test_a_surface_that_can_not_be_compared_is_said_in_words(tmp_path: Path, recorded: Recorded, results: Path) -> None:

@@ -72,3 +72,12 @@ def test_an_object_that_never_moves_is_not_said_to_lie_as_still_as_a_rock() -> N
     found = Slips.between(*session(carried + [(Pose2(), Pose2())] * 20)).motion
     assert found is not None
     assert found.unheld == 0.02
+
+
+def test_an_object_that_is_left_but_turns_is_not_said_to_lie_still() -> None:
+    rng = np.random.default_rng(8)
+    carried = [(Pose2(0.03, 0.0, 0.5), slip) for slip in drawn(rng, 300, 0.006, 0.15)]
+    turning = [(Pose2(), slip) for slip in drawn(rng, 300, 0.0006, 0.06)]
+    found = Slips.between(*session(carried + turning)).motion
+    assert found is not None
+    assert found.unheld == pytest.approx(0.4, abs=0.05)

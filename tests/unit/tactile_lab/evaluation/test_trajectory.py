@@ -72,7 +72,7 @@ def test_wrong_line_is_named(tmp_path: Path, line: str, message: str) -> None:
 
 
 def test_missing_and_foreign_files_are_session_errors(tmp_path: Path) -> None:
-    with pytest.raises(SessionError, match="Run the session"):
+    with pytest.raises(SessionError, match="Replay the session"):
         read_trajectory(tmp_path / "absent.csv")
     with pytest.raises(SessionError, match="first line"):
         read_trajectory(write(tmp_path / "foreign.csv", "a,b\n1,2\n"))

@@ -155,7 +155,7 @@ def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SessionError, match="results of test"):
         run_cells("other", CELLS[:1], square, file)
     file.write_text("hello\n")
-    with pytest.raises(SessionError, match="not a file of results"):
+    with pytest.raises(SessionError, match="not a results file"):
         run_cells("test", CELLS[:1], square, file)
     (tmp_path / "plain").write_text("")
     with pytest.raises(WriteError, match="cannot be written"):

@@ -45,7 +45,7 @@ def test_a_result_is_what_it_was_after_the_file(tmp_path: Path) -> None:
     assert '"joint", "L", "2"' in file.read_text()  # a row stands on one line
     for damage in ('{"format": 1}', "", file.read_text().replace('"keys"', '"other"'), file.read_text()[:-20]):
         file.write_text(damage)
-        with pytest.raises(SessionError, match="no stored result"):
+        with pytest.raises(SessionError, match="not a stored result"):
             StoredResult.read(file)
 
 

@@ -226,11 +226,11 @@ def test_decisions_and_stops_are_on_the_page(tmp_path: Path) -> None:
     course = record(tmp_path / "course", stop=True, decisions=(decided(4),))
     (course.folder / "traffic.mcap").replace(folder / "traffic.mcap")
     page = Page(report.write(folder).read_text(encoding="utf-8"))
-    assert "Why these grasps" in page.texts
+    assert "Choice of the grasps" in page.texts
     assert "the best <for> grasp 4" in page.texts
     assert "at 2.5 s" in page.texts
     (folder / "traffic.mcap").unlink()
-    assert "Why these grasps" not in Page(report.write(folder).read_text(encoding="utf-8")).texts
+    assert "Choice of the grasps" not in Page(report.write(folder).read_text(encoding="utf-8")).texts
 
 
 def test_torn_recording_still_tells_its_decisions(tmp_path: Path) -> None:
@@ -242,14 +242,14 @@ def test_torn_recording_still_tells_its_decisions(tmp_path: Path) -> None:
 
 
 def test_decision_of_another_form_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SessionError, match="/decision is of another form"):
+    with pytest.raises(SessionError, match="/decision has an unexpected format"):
         read_course(record(tmp_path, decisions=(decided(2, chosen=7),)))
 
 
 def test_report_without_results_is_a_session_error_with_a_hint(tmp_path: Path) -> None:
     session = create_session(tmp_path, rig="sim", rig_description={}, object_name="box")
     session.close()
-    with pytest.raises(SessionError, match="Run the session"):
+    with pytest.raises(SessionError, match="Replay the session"):
         report.write(session.folder)
 
 

@@ -70,7 +70,7 @@ def test_a_network_cable_that_is_pulled_is_told(
 
     monkeypatch.setattr(ports, "wait_for_change", pulled_while_waiting)
     told = CliRunner().invoke(app, ["rig", "list", "--watch", "30"])
-    assert "enp3s0: now no cable, or not set up" in told.output
+    assert "enp3s0: now no cable, or interface down" in told.output
 
 
 def test_the_port_that_is_unplugged_while_the_command_waits_is_named(
@@ -87,7 +87,7 @@ def test_the_port_that_is_unplugged_while_the_command_waits_is_named(
     monkeypatch.setattr(ports.list_ports, "comports", comports)
     told = CliRunner().invoke(app, ["rig", "list", "--ports", "--watch", "30"])
     assert told.exit_code == 0
-    assert "/dev/ttyUSB1 went: RS-485" in told.output
+    assert "/dev/ttyUSB1 removed: RS-485" in told.output
     assert "nothing changed" not in told.output
     answer = CliRunner().invoke(app, ["rig", "list", "--ports", "--watch", "30", "--json"])
     assert [port["name"] for port in json.loads(answer.stdout)["come"]] == ["/dev/ttyUSB1"]

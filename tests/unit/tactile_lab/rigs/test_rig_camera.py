@@ -115,8 +115,14 @@ def test_what_the_lens_and_the_markers_say_need_not_be_said_again(tmp_path: Path
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"source": "simulated", "size_px": [320, 240]}, "takes pictures of 320 x 240 pixels, the lens was calibrated"),
-        ({"source": "simulated", "dictionary": "DICT_5X5_50"}, "looks for DICT_5X5_50, the markers are of DICT_4X4_50"),
+        (
+            {"source": "simulated", "size_px": [320, 240]},
+            "takes pictures of 320 x 240 pixels, but the lens was calibrated",
+        ),
+        (
+            {"source": "simulated", "dictionary": "DICT_5X5_50"},
+            "detects DICT_5X5_50, but the markers are from DICT_4X4_50",
+        ),
         ({"source": "nowhere"}, "no such camera, folder or file"),
     ],
 )

@@ -43,7 +43,7 @@ def test_the_shipped_rig_is_sound() -> None:
     assert sorted(plan.wires) == ["FF", "LF", "MF", "RF", "TH"]
     assert (plan.simulation.object, plan.seed) == ("cube-6", 3)
     assert hand_setup(rig).hand.cycle_s == rig.description.hand.cycle_s < rig.description.cycle_s
-    unstated = rig.description.model_copy(update={"hand": HandSettings(lost_limit=5)})
+    unstated = rig.description.model_copy(update={"hand": HandSettings(blind_after=5)})
     assert hand_setup(replace(rig, description=unstated)).hand.cycle_s == 0.002
     assert set(build_interpreter(rig).perception.fingertips) == {"FF", "MF", "RF", "LF", "TH"}
 
@@ -51,13 +51,13 @@ def test_the_shipped_rig_is_sound() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"wires": None}, "wires belong to kind wired, and kind wired needs them"),
-        ({"kind": "simulated", "wires": None}, "emulated belongs to kind wired"),
+        ({"wires": None}, "a rig of kind wired needs wires"),
+        ({"kind": "simulated", "wires": None}, "emulated is only for kind wired"),
         ({"fingertips": "biotac"}, "others use the palm's"),
         ({"kind": "usb"}, "kind"),
         (
             {"kind": "simulated", "wires": None, "emulated": False, "calibration": CALIBRATION | {"gains": "g.yaml"}},
-            "boards, rates and gains belong to a hand on wires",
+            "boards, rates and gains are only for a hand on wires",
         ),
     ],
 )
@@ -90,7 +90,7 @@ def without_camera(folder: Path) -> dict[str, Any]:
 def test_two_fingers_on_one_box(tmp_path: Path) -> None:
     wires = yaml.safe_load(wire_rig(tmp_path).read_text())["wires"]
     wires["fingertips"]["MF"]["host"] = wires["fingertips"]["FF"]["host"]
-    with pytest.raises(ConfigurationError, match="FF and MF both name the box at"):
+    with pytest.raises(ConfigurationError, match="FF and MF both use the box at"):
         load_rig(changed(tmp_path, wires=wires))
 
 
@@ -98,10 +98,10 @@ def test_wires_without_a_stand_in(tmp_path: Path) -> None:
     wires = yaml.safe_load(wire_rig(tmp_path).read_text())["wires"]
     volts = {"wire": "controller", "port": "/dev/ttyS9", "counts_per_N": 1.0, "counts_per_Nm": 1.0}
     other = wires | {"fingertips": wires["fingertips"] | {"FF": volts}}
-    with pytest.raises(ConfigurationError, match="the simulated plant feeds net-ft wires alone"):
+    with pytest.raises(ConfigurationError, match="the simulated plant feeds only net-ft wires"):
         emulation_plan(load_rig(changed(tmp_path, wires=other)), 0, "cube-6")
     streaming = {"camera": {"stream_hz": 30.0}}
-    with pytest.raises(ConfigurationError, match="the stand-in camera waits for triggers"):
+    with pytest.raises(ConfigurationError, match="the emulated camera waits for triggers"):
         emulation_plan(load_rig(changed(tmp_path, simulation=streaming)), 0, "cube-6")
     del wires["hand"]["far_end"]
     with pytest.raises(ConfigurationError, match="far_end"):
@@ -114,7 +114,7 @@ def test_a_cable_that_may_not_be_made_says_how_it_can_be(monkeypatch: pytest.Mon
     with pytest.raises(DeviceError) as told, virtual_cable("lab0", "lab1"):
         pass
     words = str(told.value)
-    assert "no right to make a virtual network cable (RTNETLINK answers: Operation not permitted)" in words
+    assert "no permission to create a virtual network cable (RTNETLINK answers: Operation not permitted)" in words
     assert "sudo ip link add lab0 type veth peer name lab1" in words
     assert "unshare -Urn sh -c 'ip link set lo up; tactile-lab ...'" in words
 
@@ -147,9 +147,9 @@ def test_the_plants_memory_carries_state_and_demands_both_ways(tmp_path: Path) -
 
 def test_a_file_that_is_no_plants_memory(tmp_path: Path) -> None:
     (tmp_path / "other").write_bytes(b"something")
-    with pytest.raises(DeviceError, match="is no plant's memory"):
+    with pytest.raises(DeviceError, match="is not the memory of a simulated plant"):
         PlantMirror(tmp_path / "other", MonotonicClock())
-    with pytest.raises(DeviceError, match="no plant's memory"):
+    with pytest.raises(DeviceError, match="the memory of the simulated plant"):
         PlantMirror(tmp_path / "none", MonotonicClock())
 
 
@@ -162,4 +162,4 @@ def test_an_emulated_laboratory_that_could_not_keep_up_says_so(tmp_path: Path) -
 
     assert place(0.0).remarks() == ()
     (remark,) = place(1.26).remarks()
-    assert remark == "the emulated laboratory stood still for 1.3 s: this computer is too slow"
+    assert remark == "the emulated laboratory stalled for 1.3 s: this computer is too slow"

@@ -77,7 +77,7 @@ def recorded(grasps: int = 2) -> Scene:
     recorder.surface(5, {**surface, "origin_height_m": 0.02})
     plan = {"index": 2, "closing": "radial", "x_m": 0.0, "y_m": 0.0, "yaw_rad": 0.2, "height_m": 0.022, "reason": "new"}
     recorder.plan(6, plan)
-    recorder.guide(7, {"grasp": 3, "stage": "guide", "prompt": "Guide <the> hand", "paused": "coffee", "view": {}})
+    recorder.guide(7, {"grasp": 3, "stage": "guide", "prompt": "Move <the> hand", "paused": "coffee", "view": {}})
     recorder.log(8, Level.INFO, "guide", "note: hello")
     return sink.scene
 
@@ -118,7 +118,7 @@ def test_topics_that_are_not_shown_change_nothing() -> None:
 def test_panel_tells_prompt_pause_pose_and_grasps_and_shows_no_foreign_markup() -> None:
     scene = recorded()
     text = status_html(scene)
-    assert "Guide &lt;the&gt; hand" in text
+    assert "Move &lt;the&gt; hand" in text
     assert "Paused: coffee" in text
     assert "10, 0 mm, 6°" in text
     assert "TH silent" in text
@@ -212,12 +212,12 @@ def test_loopback_is_told_from_the_rest() -> None:
 
 
 def test_other_addresses_need_a_token() -> None:
-    with pytest.raises(ConfigurationError, match="press the buttons"):
+    with pytest.raises(ConfigurationError, match="control the session"):
         PageAddress("0.0.0.0", 8090, "").check()
     with pytest.raises(ConfigurationError, match="at least 16"):
         PageAddress("0.0.0.0", 8090, "short").check()
     assert PageAddress("0.0.0.0", 8090, "new").check()[2] != ""
-    with pytest.raises(BadParameter, match="belongs to --view"):
+    with pytest.raises(BadParameter, match="needs --view"):
         PageAddress.if_wanted(False, "0.0.0.0", 8090, "")
     with pytest.raises(DeviceError, match="a token is needed"):
         Page("0.0.0.0", 0, "", "test")

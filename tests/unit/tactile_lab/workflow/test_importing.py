@@ -64,7 +64,7 @@ def test_real_touches_of_a_known_cylinder_are_imported_and_give_its_radius(lab_d
     assert finished.evaluation is not None
     document = finished.evaluation.as_json()
     assert document["contacts"] == number
-    assert "every grasp touched one side of the object only: its other sides are not known" in document["warnings"]
+    assert "every grasp touched only one side of the object: its other sides are unknown" in document["warnings"]
     known_m = touched_outline_m(finished.results, np.array([c.point_world_m for g in log.grasps for c in g.contacts]))
     radius_m = np.linalg.norm(known_m, axis=1)  # the cylinder's axis is the world's origin
     assert len(known_m) > 25

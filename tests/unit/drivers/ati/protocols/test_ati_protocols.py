@@ -111,7 +111,7 @@ def test_a_calibration_block_survives_encoding_and_has_its_fields_where_the_manu
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
-        (lambda block: block[:-2], "bytes where"),
+        (lambda block: block[:-2], "bytes instead of"),
         (lambda block: bytes(len(block)), "unit codes 0 and 0"),
         (lambda block: block[:64] + bytes(144) + block[208:], "empty or not finite"),
         (lambda block: block[:234] + bytes(8) + block[242:], "no scale"),

@@ -96,13 +96,13 @@ def test_temperature_terms_are_read_where_the_file_has_them(tmp_path: Path) -> N
     ("text", "complaint"),
     [
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><FTSensor/>", "document type"),
-        ("<other/>", "no ATI calibration"),
+        ("<other/>", "not an ATI calibration"),
         ("<FTSensor", "not valid XML"),
         ("<FTSensor Serial='1'/>", "no element Calibration"),
         (sensor_text().replace('"6"', '"nan"'), "finite"),
         (sensor_text().replace('DistUnits="mm"', 'DistUnits="furlong"'), "furlong"),
         (sensor_text(torque="ounce"), "ounce"),
-        (sensor_text().replace("2.0 0.0", "2.0"), "numbers where 6"),
+        (sensor_text().replace("2.0 0.0", "2.0"), "numbers instead of 6"),
         (sensor_text().replace('Name="Tz"', 'Name="Tw"'), "Tz"),
     ],
 )
@@ -128,5 +128,5 @@ def test_a_calibration_of_another_sensor_than_the_one_plugged_in_is_refused(lab_
     file = next(path for path in sorted((lab_data / "ati_cal").glob("*.cal")) if "FT14048" in path.name)
     wiring = {"wire": "gauge-volts", "calibration": file.name, "local_port": 45000}
     make_wire(VoltsWiring.model_validate(wiring | {"serial": "FT14048"}), file.parent)
-    with pytest.raises(ConfigurationError, match="is the calibration of FT14048, and the sensor is FT99999"):
+    with pytest.raises(ConfigurationError, match="is the calibration of FT14048, but the sensor is FT99999"):
         make_wire(VoltsWiring.model_validate(wiring | {"serial": "FT99999"}), file.parent)

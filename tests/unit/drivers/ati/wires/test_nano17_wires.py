@@ -136,7 +136,7 @@ def test_another_sensor_than_the_rig_names_is_refused(
     unit: Callable[[EmulatedSensor], Unit], wire: Callable[..., ForceWire]
 ) -> None:
     sensor = EmulatedSensor(emulated_calibration("FT11111"))
-    with pytest.raises(DeviceError, match="the sensor is FT11111, the rig file names FT22222"):
+    with pytest.raises(DeviceError, match="the sensor is FT11111, but the rig file names FT22222"):
         Line(unit(sensor), wire(serial="FT22222")).device.connect()
     line = Line(unit(sensor), wire(serial="FT11111"))
     line.device.connect()
@@ -166,7 +166,7 @@ def test_an_empty_calibration_slot_is_told() -> None:
 
 def test_a_sensor_of_a_smaller_range_than_the_settings_is_refused() -> None:
     settings = Nano17Settings(force_range_N=(25.0, 25.0, 35.0), torque_range_Nm=(0.25, 0.25, 0.25))
-    with pytest.raises(DeviceError, match=r"range is 12 12 17 N, 120 120 120 N mm, the settings say 25 25 35 N"):
+    with pytest.raises(DeviceError, match=r"range is 12 12 17 N, 120 120 120 N mm, but the settings say 25 25 35 N"):
         Line(DigitalUnit(), DigitalWire(), settings).device.connect()
 
 

@@ -126,7 +126,7 @@ def test_black_cells_that_touch_have_one_outline_and_holes_another() -> None:
 
 
 def test_what_does_not_fit_is_refused_with_the_room_there_is() -> None:
-    with pytest.raises(ConfigurationError, match=r"285 x 205 mm do not fit on A4: it has room for 190 x 247 mm"):
+    with pytest.raises(ConfigurationError, match=r"285 x 205 mm do not fit on A4, which has room for 190 x 247 mm"):
         sheet_of([CharucoBoard(square_m=0.04, marker_m=0.03)])
     sheet_of([CharucoBoard(square_m=0.045, marker_m=0.03)], "A3")
     with pytest.raises(ConfigurationError, match="no paper called 'A9'"):

@@ -95,7 +95,7 @@ def test_demands_rise_gently_and_are_refused_when_they_are_none() -> None:
 def test_a_duty_cycle_beyond_the_full_one_is_no_setting() -> None:
     gains = GainTable(wrist=JointGains(pwm_per_rad=1.0, max_pwm=2000.0))
     HandSettings(demand="torque", gains=gains)
-    with pytest.raises(ValidationError, match="2000 counts is more than the full one, 1023"):
+    with pytest.raises(ValidationError, match="2000 counts is more than the maximum, 1023"):
         HandSettings(gains=gains)
 
 
@@ -142,8 +142,8 @@ def write(tmp_path: Path, content: object) -> Path:
         ({"a": {"joint": "rh_FFJ0"}}, "pid"),
         (dict(list(published().items())[1:]), "missing or unknown: FFJ0"),
         (published() | {"again": published()["sh_rh_ffj0_position_controller"]}, "named twice"),
-        (published(FFJ3={"p": 100.0, "d": -50.0}), "of FFJ3 do not push the same way"),
-        (published(FFJ3={"p": 0.0}), "do not push the same way"),
+        (published(FFJ3={"p": 100.0, "d": -50.0}), "of FFJ3 have different signs"),
+        (published(FFJ3={"p": 0.0}), "have different signs"),
         (published(FFJ3={"max_force": -1.0}), "max_force"),
     ],
 )

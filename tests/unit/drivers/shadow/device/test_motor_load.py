@@ -70,13 +70,21 @@ def test_a_motor_that_turns_harder_than_told(pwm: int, over: bool) -> None:
 def test_pushing_for_long_stops_and_a_rest_begins_anew() -> None:
     load, words = watch(stall_s=1.0), np.zeros(20, np.int16)
     words[7] = -600
-    assert load.stall(words, 0) is None
-    assert load.stall(np.zeros(20, np.int16), 900_000_000) is None
-    assert load.stall(words, 1_000_000_000) is None
-    assert load.stall(words, 1_900_000_000) is None
-    fault = load.stall(words, 2_100_000_000)
+    still_rad, rest = np.zeros(24), np.zeros(20, np.int16)
+    assert load.stall(words, still_rad, 0) is None
+    assert load.stall(rest, still_rad, 900_000_000) is None
+    assert load.stall(words, still_rad, 1_000_000_000) is None
+    assert load.stall(words, still_rad, 1_900_000_000) is None
+    fault = load.stall(words, still_rad, 2_100_000_000)
     assert fault is not None
-    assert "motor 7): stopped: pushed for 1 s with its largest duty cycle" in str(fault.error())
+    assert "motor 7): stopped: stalled for 1 s at its largest duty cycle" in str(fault.error())
+
+
+def test_a_joint_that_turns_has_not_stalled_however_long_it_is_pushed() -> None:
+    load, words = watch(stall_s=1.0), np.full(20, 600, np.int16)
+    for tenth in range(40):
+        assert load.stall(words, np.full(24, 0.01 * tenth), tenth * 100_000_000) is None
+    assert load.stall(words, np.full(24, 0.4), 5_200_000_000) is not None
 
 
 def test_a_hand_that_pushes_stops_itself_at_the_next_cycle() -> None:
@@ -88,7 +96,7 @@ def test_a_hand_that_pushes_stops_itself_at_the_next_cycle() -> None:
     hand = ShadowHand(transport, world.clock, world.calibration.joints, settings)
     hand.connect()
     hand.set_targets({"WRJ2": 0.4})
-    with pytest.raises(DeviceError, match=r"WRJ2 .*: stopped: pushed for 0.05 s"):
+    with pytest.raises(DeviceError, match=r"WRJ2 .*: stopped: stalled for 0.05 s"):
         _exchange(hand, world, 200)
     assert not np.any(PALMS["0220"].decode_command(sent[-1]).motor_data)
     hand.close()

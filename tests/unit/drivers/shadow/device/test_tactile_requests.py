@@ -64,9 +64,9 @@ def test_what_is_not_valid_or_can_not_be_read_is_left_out() -> None:
     [
         (TactileProtocol.BIOTAC, b"BTSP1", 24, "BTSP1", ""),
         (TactileProtocol.BIOTAC, b"", 24, "BTSP1", ""),
-        (TactileProtocol.BIOTAC, b"BT7", 24, "", "has 19 electrodes by its serial number, 24 by its calibration"),
+        (TactileProtocol.BIOTAC, b"BT7", 24, "", "has 19 electrodes by its serial number, but 24 by its calibration"),
         (TactileProtocol.BIOTAC, b"BTSP1", 24, "BTSP2", "its serial number is BTSP1, not BTSP2"),
-        (TactileProtocol.PST3, b"", 19, "", "is no BioTac: correct the fingertips in the rig file"),
+        (TactileProtocol.PST3, b"", 19, "", "is not a BioTac: correct the fingertips in the rig file"),
     ],
 )
 def test_a_fingertip_that_is_not_the_rigs_is_told(

@@ -121,7 +121,7 @@ def test_bootloaders_tell_their_versions(rig: Rig) -> None:
 
 def test_a_missing_motor_is_named() -> None:
     rig = Rig(missing=frozenset({13}))
-    with pytest.raises(DeviceError, match="motor bus 2: motor 13 does not tell"):
+    with pytest.raises(DeviceError, match="motor bus 2: motor 13 does not report"):
         bootloader_version(rig.bus, 13, tries=2)
     versions = bootloader_versions(rig.bus)
     assert [motor for motor, version in versions.items() if version is None] == [13]
@@ -172,21 +172,21 @@ def test_what_the_buses_do_not_have_is_refused(rig: Rig, bad: Message, words: st
 
 def test_a_failing_wire_is_told_in_the_drivers_words(rig: Rig) -> None:
     rig.hand.ring.faults.drop = 1000
-    with pytest.raises(can.CanOperationError, match="did not take the frame"):
+    with pytest.raises(can.CanOperationError, match="did not accept the frame"):
         rig.bus.send(message(0x604), timeout=0.01)
     rig.hand.ring.faults.drop = 0
     rig.hand.ring.faults.connected = 1
-    with pytest.raises(can.CanOperationError, match="1 EtherCAT slaves answer instead of 2"):
-        rig.bus.recv(0.1)
+    with pytest.raises(can.CanOperationError, match="the frame: 1 EtherCAT slaves answer instead of 2"):
+        rig.bus.send(message(0x604), timeout=0.01)
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
         ({"motor_bus": 3}, "no motor bus 3"),
-        ({"palm": "0320"}, "no palm 0320"),
+        ({"palm": "0320"}, "unknown palm 0320"),
         ({"channel": "nosuch0"}, "nosuch0: no such network interface"),
-        ({"channel": ""}, "no channel. Name the network interface"),
+        ({"channel": ""}, "no channel. Give the network interface"),
     ],
 )
 def test_options_that_do_not_fit_are_named(options: dict[str, object], words: str) -> None:

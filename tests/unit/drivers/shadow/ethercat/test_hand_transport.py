@@ -14,7 +14,7 @@ from drivers.emulators.ethercat.shadow_chain import ChainSettings, EmulatedHand,
 from drivers.ethercat.frames import Command, Telegram, physical
 from drivers.ethercat.master import EtherCatMaster, MasterSettings, Slave
 from drivers.ethercat.ports import RawPort
-from drivers.ethercat.registers import AlCode, AlState, Register, SyncManager
+from drivers.ethercat.registers import AL_ERROR, AlCode, AlState, Register, SyncManager
 from drivers.shadow.device.hand import ShadowHand
 from drivers.shadow.device.hand_settings import HandSettings
 from drivers.shadow.device.hand_setup import HandSetup
@@ -94,7 +94,7 @@ def test_a_product_code_that_can_not_be_driven_is_told_with_what_to_do() -> None
     wire = Wire(ChainSettings(product=0x0A))
     with pytest.raises(DeviceError, match=r"a board this program does not know \(product 0xa\)") as told:
         find_palm(EthercatSettings(interface="memory"), wire.clock, wire.port)
-    assert "0220, 0230 and 0240 can be driven; ask Shadow Robot" in str(told.value)
+    assert "0220, 0230 and 0240 are supported; ask Shadow Robot" in str(told.value)
     with pytest.raises(DeviceError, match="not open"):
         wire.port.send(b"")
 
@@ -216,13 +216,33 @@ def test_a_palm_that_leaves_operation_ends_the_link_in_words() -> None:
     assert wire.transport.counts.openings == 2
 
 
-def test_a_watchdog_that_is_set_reads_back_and_trips() -> None:
+def test_a_watchdog_that_is_set_reads_back_and_trips_and_the_palm_is_brought_back() -> None:
     wire = Wire(watchdog_s=0.05).open()
     assert wire.transport.hand.watchdog_s == pytest.approx(0.05)
     wire.clock.sleep_until_ns(wire.clock.now_ns() + 60 * MS)
-    with pytest.raises(DeviceError, match="watchdog: no process data"):
-        wire.cycles(110)
-    assert wire.hand.palm_slave.counts.watchdog_trips == 1
+    statuses = wire.cycles(110)
+    assert wire.hand.palm_slave.counts.watchdog_trips == wire.transport.counts.restarts == 1
+    assert wire.states == [AlState.OP, AlState.OP]
+    assert statuses[-1] is not None
+    assert "the palm's watchdog tripped 1 times because no commands came" in wire.transport.health()
+
+
+@pytest.mark.parametrize(
+    ("holds", "words"), [(b"\xe8\x03", "reads back 100.0 ms"), (b"\0\0", "reads back as switched off")]
+)
+def test_a_watchdog_that_is_longer_than_asked_is_refused(holds: bytes, words: str) -> None:
+    wire = Wire(watchdog_s=0.05)
+    wire.master().write(Slave(1), Register.WATCHDOG_TIME, holds)
+    wire.hand.palm_slave.fixed.append(Register.WATCHDOG_TIME)
+    with pytest.raises(DeviceError, match=rf"watchdog {words} where 50\.0 ms were asked for"):
+        wire.transport.open()
+
+
+def test_a_watchdog_whose_divider_leaves_it_too_little_time_is_refused() -> None:
+    wire = Wire(watchdog_s=0.1)
+    wire.master().write(Slave(1), Register.WATCHDOG_DIVIDER, b"\0\0")
+    with pytest.raises(DeviceError, match=r"the palm's watchdog can wait 5\.2 ms only, 100\.0 ms were asked for"):
+        wire.transport.open()
 
 
 def test_without_a_watchdog_a_pause_does_not_end_operation() -> None:
@@ -231,11 +251,72 @@ def test_without_a_watchdog_a_pause_does_not_end_operation() -> None:
     assert all(status is not None for status in wire.cycles(3))
 
 
-def test_a_slave_that_vanishes_from_the_ring_is_noticed_at_once() -> None:
+def test_a_slave_that_vanishes_from_the_ring_is_noticed_at_once_and_its_cable_named_when_it_is_back() -> None:
     wire = Wire(poll_every=1000).open()
     wire.hand.ring.faults.connected = 1
-    with pytest.raises(DeviceError, match="1 EtherCAT slaves answer instead of 2"):
-        wire.cycles(3)
+    wire.cycles(3)
+    assert wire.transport.health()[0] == "1 EtherCAT slaves answer instead of 2"
+    wire.hand.ring.faults.connected = None
+    assert all(status is not None for status in wire.cycles(3)[1:])
+    inside = "the cable inside the hand, between bridge and palm: link lost 1 times; the hand needs service"
+    assert wire.transport.health()[0] == inside
+
+
+@pytest.mark.parametrize(
+    ("at", "cable"), [(0, "the cable between computer and hand"), (1, "the cable inside the hand")]
+)
+def test_damaged_frames_name_the_cable_they_were_damaged_on(at: int, cable: str) -> None:
+    wire = Wire(poll_every=1000).open()
+    wire.hand.ring.faults.damage, wire.hand.ring.faults.damaged_at = 3, at
+    wire.cycles(5)
+    first, *others = wire.transport.health()
+    assert first.startswith(cable)
+    assert ": 3 damaged frames; " in first
+    assert not any(other.startswith("the cable") for other in others)
+    wire.transport.close()
+    wire.transport.open()
+    assert wire.transport.health() == ()  # each opening counts from zero
+
+
+def test_a_link_that_is_back_within_two_seconds_goes_on_by_itself_without_a_demand_meanwhile() -> None:
+    wire = Wire(watchdog_s=0.05)
+    hand = ShadowHand(wire.transport, wire.clock, CALIBRATION, HandSettings(cycle_s=0.001, soft_start_s=0.1))
+    hand.connect()
+    hand.set_targets({"FFJ3": 1.4})
+    run(wire, hand, 20)
+    wire.hand.ring.faults.unplugged = True
+    wire.hand.ring.work()  # the palm's processor goes on with the command it has
+    run(wire, hand, 1900)
+    held_rad = wire.hand.plant.joints_rad[2]
+    wire.hand.ring.faults.unplugged = False
+    run(wire, hand, 5)
+    assert wire.hand.plant.joints_rad[2] == pytest.approx(held_rad, abs=0.002)  # demands rise from zero
+    run(wire, hand, 600)
+    assert wire.hand.plant.joints_rad[2] == pytest.approx(1.4, abs=0.05)
+    assert wire.transport.counts.restarts == 1  # its watchdog had tripped
+    told = hand.health() + wire.transport.health()
+    assert any(words.startswith("the cable between computer and hand: link lost 1 times") for words in told)
+    hand.close()
+
+
+def test_a_link_that_stays_away_stops_the_hand_and_says_which_part_of_it() -> None:
+    wire = Wire()
+    hand = ShadowHand(wire.transport, wire.clock, CALIBRATION, HandSettings(cycle_s=0.001))
+    hand.connect()
+    hand.set_targets({"FFJ3": 1.4})
+    wire.hand.ring.faults.connected = 1
+    with pytest.raises(DeviceError, match="stopped: no valid status for 2 s: 1 EtherCAT slaves answer instead of 2"):
+        run(wire, hand, 2100)
+    wire.hand.ring.faults.connected = None
+    with pytest.raises(DeviceError, match="no valid status"):
+        run(wire, hand, 3)
+    assert hand.reconnect() < 1000 * MS
+
+
+def run(wire: Wire, hand: ShadowHand, cycles: int) -> None:
+    for _ in range(cycles):
+        wire.clock.sleep_until_ns(wire.clock.now_ns() + MS)
+        hand.exchange()
 
 
 def test_a_slave_more_on_the_ring_is_noticed_at_the_next_poll() -> None:
@@ -251,7 +332,7 @@ def test_another_hand_on_the_cable_ends_the_link_and_is_not_taken_for_the_first(
     wire.hand.ring.slaves = emulated_hand(wire.clock, CALIBRATION, ChainSettings(serial=12)).ring.slaves
     with pytest.raises(DeviceError, match="the palm has left operation: it is in INIT"):
         wire.cycles(3)
-    with pytest.raises(DeviceError, match=r"hand 12, palm 0220, answers where hand 634 did before.*the cable back"):
+    with pytest.raises(DeviceError, match=r"hand 12, palm 0220, answers instead of hand 634.*the former hand"):
         wire.transport.open()
     with pytest.raises(DeviceError, match="not open"):
         wire.transport.send(bytes(70))
@@ -301,7 +382,7 @@ def test_a_link_failure_takes_the_demands_away_and_stays_until_reconnected() -> 
 @pytest.mark.parametrize(
     ("chain", "settings", "words"),
     [
-        (ChainSettings(vendor=0x2), {}, "first slave is of vendor 0x2, not of Shadow Robot"),
+        (ChainSettings(vendor=0x2), {}, "first slave is from vendor 0x2, not from Shadow Robot"),
         (ChainSettings(product=0x01000002), {}, "second slave is a muscle hand"),
         (ChainSettings(product=77), {}, r"does not know \(product 0x4d\)"),
         (ChainSettings(palm="0240"), {"palm": "0220"}, 'a 0240 palm, not a 0220. Set hand.palm to "0240"'),
@@ -355,7 +436,7 @@ def test_opening_twice_and_closing_twice_do_no_harm() -> None:
 
 
 def test_a_missing_interface_is_named_beside_those_present() -> None:
-    with pytest.raises(DeviceError, match=r"nosuch0: no such network interface. Present are .*lo"):
+    with pytest.raises(DeviceError, match=r"nosuch0: no such network interface. Available interfaces: .*lo"):
         EthercatTransport("hand", EthercatSettings(interface="nosuch0"), MonotonicClock()).open()
 
 
@@ -366,6 +447,26 @@ def test_without_the_right_to_raw_sockets_the_hint_says_how_to_get_it(monkeypatc
     monkeypatch.setattr("drivers.ethercat.ports.socket.socket", refuse)
     with pytest.raises(DeviceError, match=r"no permission for raw sockets.*setcap cap_net_raw"):
         RawPort("lo").open()
+
+
+# --- a slave without a processor, as the bridge probably is ---------------------------------------------------------
+
+
+def test_a_slave_in_device_emulation_shows_an_acknowledge_as_an_error() -> None:
+    wire = Wire()
+    master, bridge = wire.master(), Slave(0)
+    master.write(bridge, Register.AL_CONTROL, struct.pack("<H", AlState.INIT | AL_ERROR))
+    assert str(master.al_status(bridge)) == "INIT with error 0x0000, no reason given"
+    master.write(bridge, Register.AL_CONTROL, struct.pack("<H", AlState.OP))
+    assert str(master.al_status(bridge)) == "OP"
+
+
+def test_what_another_master_left_behind_in_the_bridge_does_not_keep_it_from_starting() -> None:
+    wire = Wire()
+    wire.master().write(Slave(0), Register.AL_CONTROL, struct.pack("<H", AlState.INIT | AL_ERROR))
+    wire.hand.palm_slave.fall_to(AlState.PREOP, AlCode.UNSPECIFIED)  # an error that stands is acknowledged
+    wire.transport.open()
+    assert wire.states == [AlState.OP, AlState.OP]
 
 
 # --- the emulated slave refuses what a real one refuses -----------------------------------------------------------
@@ -399,7 +500,7 @@ def test_a_palm_refuses_safeop_without_its_sync_managers(skip: int, code: int) -
     for number, manager in enumerate(PALMS["0220"].sync_managers()):
         if number != skip:
             master.write(palm, Register.SYNC_MANAGER + 8 * number, manager.encode())
-    with pytest.raises(DeviceError, match=f"slave 1 does not go to SAFEOP: it is in PREOP with error 0x{code:04X}"):
+    with pytest.raises(DeviceError, match=f"slave 1 does not enter SAFEOP: it is in PREOP with error 0x{code:04X}"):
         master.change_state(palm, AlState.SAFEOP)
 
 

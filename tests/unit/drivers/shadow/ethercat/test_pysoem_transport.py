@@ -112,7 +112,7 @@ def test_a_hand_that_was_misread_is_looked_at_again_and_that_is_told(
     soem = Soem(misread, HAND)
     transport = opened(monkeypatch, soem, serial=634)
     assert (transport.hand.serial, transport.counts.misread, soem.looked) == (634, 1, 2)
-    assert transport.health() == ("the hand was not seen in the first 1 of the looks at its ring",)
+    assert transport.health() == ("the hand was not found in the first 1 scans of its EtherCAT ring",)
 
 
 def test_a_hand_that_is_read_rightly_is_looked_at_once_with_the_patience_of_the_settings(
@@ -130,7 +130,7 @@ def test_a_hand_that_is_read_rightly_is_looked_at_once_with_the_patience_of_the_
 @pytest.mark.parametrize(
     ("ring", "words"),
     [
-        (NAMELESS, r"first slave is of vendor 0x0, not of Shadow Robot \(0x530\), at the last of 5 looks at the ring"),
+        (NAMELESS, r"slave is from vendor 0x0, not from Shadow Robot \(0x530\), at the last of 5 scans of the ring"),
         ((board(0), board(77, sizes=SIZES)), r"second slave is .* \(product 0x4d\)"),
         ((board(0), board(6, 3, sizes=SIZES)), "hand 3, not hand 634"),
     ],

@@ -36,9 +36,9 @@ def test_the_map_takes_joint_angles_to_motor_angles() -> None:
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
-        ({"FFJ3": 0}, "not 0 to 19, each once"),
-        ({"FFJ3": 20}, "not 0 to 19, each once"),
-        ({"FFJ1": 1}, "no driven joint called FFJ1"),
+        ({"FFJ3": 0}, "must be 0 to 19, each once"),
+        ({"FFJ3": 20}, "must be 0 to 19, each once"),
+        ({"FFJ1": 1}, "unknown driven joints FFJ1"),
     ],
 )
 def test_a_map_that_is_not_one_to_one_is_refused(change: dict[str, int], problem: str) -> None:
@@ -51,7 +51,7 @@ def test_a_map_without_one_of_the_motors_is_refused(tmp_path: Path) -> None:
     path.write_text("motors: {FFJ0: 0}\n")
     with pytest.raises(ConfigurationError, match=r"motors.yaml: no motor for FFJ3, FFJ4"):
         MotorMap.load(path)
-    with pytest.raises(ConfigurationError, match="called FFJ9"):
+    with pytest.raises(ConfigurationError, match="unknown driven joints FFJ9"):
         MotorMap(MOTORS.numbers, ("FFJ9",))
 
 

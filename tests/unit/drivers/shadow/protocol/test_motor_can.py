@@ -50,7 +50,7 @@ def test_parts_that_do_not_fit_are_refused() -> None:
         (0x604, "bootloader of motor 0: VERSION"),
         (0x614, "motor 0 acknowledges VERSION"),
         (0x60F, "bootloader of motor 0: command 15"),
-        (0x007, "motors are asked for TEMPERATURE"),
+        (0x007, "request for TEMPERATURE from the motors"),
     ],
 )
 def test_frames_are_told_in_words(identifier: int, words: str) -> None:

@@ -76,10 +76,10 @@ def test_a_description_of_an_older_version_is_read_and_written_anew(tmp_path, ch
     [
         ("tactile-session/4", "a newer version of the program"),
         ("tactile-session/99", "or a newer one"),
-        ("tactile-session/0", "a form that this program does not know"),
-        ("tactile-session/x", "a form that this program does not know"),
-        ("another/7", "a form that this program does not know"),
-        (2, "a form that this program does not know"),
+        ("tactile-session/0", "a format that this program does not know"),
+        ("tactile-session/x", "a format that this program does not know"),
+        ("another/7", "a format that this program does not know"),
+        (2, "a format that this program does not know"),
     ],
 )
 def test_a_description_of_an_unknown_version_is_refused(tmp_path, form, words):

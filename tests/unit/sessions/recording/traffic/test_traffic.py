@@ -193,7 +193,7 @@ def foreign(path, profile):
 def test_a_foreign_mcap_is_named(tmp_path, profile):
     foreign(tmp_path / "other.mcap", profile)
     with pytest.raises(
-        SessionError, match=r"other\.mcap: .*(not one of a session|a form that this program does not know)"
+        SessionError, match=r"other\.mcap: .*(not one of a session|a format that this program does not know)"
     ):
         TrafficReader(tmp_path / "other.mcap")
 

@@ -97,7 +97,7 @@ def test_pedal_may_send_any_key(pedal: str, sends: bytes, terminal: tuple[int, i
 
 
 def test_pedal_that_no_key_is_called_is_refused_with_the_names_there_are() -> None:
-    with pytest.raises(ConfigurationError, match="no key is called 'pedal-1'") as refused:
+    with pytest.raises(ConfigurationError, match="unknown key 'pedal-1'") as refused:
         pedal_key("pedal-1")
     assert "f12" in refused.value.hint
 
@@ -126,14 +126,14 @@ def test_lines_come_when_they_are_complete_and_the_end_is_noticed() -> None:
 
 def test_panel_says_prompt_contacts_and_what_is_silent() -> None:
     view = OperatorView({"FF": 0.4, "MF": None}, ("FF",), 0.2, False, 0.31, ("MF",))
-    panel = Panel(0, 2, Stage.HOLD, "Hold still", view, capture="2 more fingers have to touch", paused="coffee")
+    panel = Panel(0, 2, Stage.HOLD, "Hold still", view, capture="2 more fingers must touch", paused="coffee")
     told = dict(facts(panel))
     assert told["contacts"] == "1 fingers touch: FF 0.40 N"
     assert told["silent"] == "MF"
-    assert told["stability"] == "2 more fingers have to touch"
+    assert told["stability"] == "2 more fingers must touch"
     assert told["observability"].startswith("0.31")
     assert as_lines(panel)[0] == "[2 hold] Hold still"
-    assert "  stability: 2 more fingers have to touch" in as_lines(panel)
+    assert "  stability: 2 more fingers must touch" in as_lines(panel)
     beginning = replace(panel, stage=Stage.PLACE, unknown="40 % of the surface is known", suggestion="pinch")
     assert as_lines(beginning)[2:] == ["  object: 40 % of the surface is known", "  suggested: pinch"]
     assert as_panel(panel) is not None

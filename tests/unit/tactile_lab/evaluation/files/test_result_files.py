@@ -148,7 +148,7 @@ def test_damaged_results_are_session_errors_with_a_hint(
 ) -> None:
     write_results(tmp_path, result_of(2, seed=0, motion_noise=0.2), recorded.grasps)
     damage(tmp_path)
-    with pytest.raises(SessionError, match="replay"):
+    with pytest.raises(SessionError, match="Replay"):
         read_results(tmp_path)
 
 

@@ -79,7 +79,7 @@ def test_blurred_frames_frames_without_the_object_and_damaged_ones_are_told_apar
     truth = MarkerTruth(LENS, MARKERS, [*recorded, damaged])
     assert [truth(datagram) is not None for datagram in [*recorded, damaged]] == [True, False, False, False]
     reasons = " | ".join(truth.report.refused)
-    assert "marker 7 is not to be seen" in reasons
+    assert "marker 7 is not visible" in reasons
     assert "blurred" in reasons
     assert "cannot be read" in reasons
 

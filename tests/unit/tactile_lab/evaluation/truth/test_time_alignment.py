@@ -40,7 +40,7 @@ def test_an_object_at_rest_tells_nothing() -> None:
     palm, stamps, _ = motion(0.0)
     found = clock_offset(palm, stamps, np.zeros((len(stamps), 2)), [(0.0, 8.0)])
     assert found.offset_ms is None
-    assert "hardly moved" in found.reason
+    assert "moved too little" in found.reason
 
 
 def test_too_few_pictures_of_the_motion_tell_nothing() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tactile_lab.experiments.cells import Cell
-from tactile_lab.experiments.runs.contour_limit import POLYGONS, limit_of_contour
+from tactile_lab.experiments.runs.contour_limit import limit_of_contour
 
 
 @cache
@@ -26,7 +26,7 @@ def error_mm(
     return float(np.mean([hausdorff_mm(setting, seed) for seed in range(seeds)]))
 
 
-@pytest.mark.parametrize("shape", POLYGONS)
+@pytest.mark.parametrize("shape", ["triangle", "L", "hexagon"])
 def test_four_times_the_contacts_halve_the_error(shape: str) -> None:
     assert error_mm(shape, grasps=64) == pytest.approx(error_mm(shape) / 2, rel=0.45)
 

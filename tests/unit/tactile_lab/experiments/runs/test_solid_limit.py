@@ -10,7 +10,6 @@ import pytest
 
 from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.runs.solid_limit import limit_of_solid
-from tactile_lab.experiments.studies.solids import FACETED_SOLIDS
 
 
 @cache
@@ -33,14 +32,14 @@ def mean_mm(
     return float(np.mean([figures(setting, seed)[figure] for seed in range(6)]))
 
 
-@pytest.mark.parametrize("shape", FACETED_SOLIDS)
+@pytest.mark.parametrize("shape", ["triangular-prism", "l-block"])
 def test_known_poses_are_exact_and_four_times_the_contacts_halve_the_error(shape: str) -> None:
     assert mean_mm("registration_mm", shape, method="known-pose") == pytest.approx(0.0, abs=1e-9)
     few, many = (mean_mm("hausdorff_mm", shape, method="known-pose", grasps=count) for count in (12, 48))
     assert many == pytest.approx(few / 2, rel=0.4)
 
 
-@pytest.mark.parametrize("shape", FACETED_SOLIDS)
+@pytest.mark.parametrize("shape", ["triangular-prism", "l-block"])
 def test_poses_that_have_to_be_estimated_cost_accuracy(shape: str) -> None:
     known = mean_mm("hausdorff_mm", shape, method="known-pose")
     assert 1.1 * known < mean_mm("hausdorff_mm", shape) < 4 * known

@@ -87,7 +87,7 @@ def test_contacts_that_enclose_nothing_leave_the_choice_to_chance(name: str, hal
 
 
 def test_a_policy_that_does_not_exist_is_told_with_those_that_do() -> None:
-    with pytest.raises(ConfigurationError, match=r"no policy is called 'best'.*information"):
+    with pytest.raises(ConfigurationError, match=r"there is no policy 'best'.*information"):
         make_policy("best")
 
 
