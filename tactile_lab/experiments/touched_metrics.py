@@ -93,5 +93,7 @@ def _true_contacts(data: SpatialGrasps) -> _Contacts:
 
 def _divided(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """The same surface in triangles small enough to be judged by their middles."""
-    vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, _LARGEST_EDGE_m, max_iter=12)
+    vertices, faces = trimesh.remesh.subdivide_to_size(  # type: ignore[no-untyped-call]
+        mesh.vertices, mesh.faces, _LARGEST_EDGE_m, max_iter=12
+    )
     return trimesh.Trimesh(vertices, faces, process=False)

@@ -6,7 +6,7 @@ are hollow.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -49,7 +49,7 @@ def blend(one_m: Any, other_m: Any, width_m: float) -> Any:
     return np.minimum(one_m, other_m) - near**2 * width_m / 4
 
 
-def turned(radii_mm: list[float], heights_mm: list[float]) -> trimesh.Trimesh:
+def turned(radii_mm: Sequence[float], heights_mm: Sequence[float]) -> trimesh.Trimesh:
     """A solid of revolution from its profile, which begins and ends on the axis, upward on its outside."""
     profile = np.column_stack([radii_mm, heights_mm]) / 1000
     mesh: trimesh.Trimesh = trimesh.creation.revolve(profile, sections=_SECTIONS)
@@ -87,7 +87,7 @@ def _bowl() -> trimesh.Trimesh:
     outside = [(27, 0), (27, 4), (36, 8), (46, 17), (53, 28), (57, 40), (60, 51)]
     inside = [(58, 52), (55, 51), (52, 40), (48, 29), (41, 19), (32, 12), (20, 8)]
     radii, heights = zip((0, 0), *outside, *inside, (0, 7), strict=True)
-    return turned(list(radii), list(heights))
+    return turned(radii, heights)
 
 
 def _tin() -> trimesh.Trimesh:
@@ -98,7 +98,8 @@ def _tin() -> trimesh.Trimesh:
 def _wedge() -> trimesh.Trimesh:
     """100 x 60 mm at the foot, 60 mm high at one end and 15 at the other: its roof leans by 24 degrees."""
     corners = [(x, y, z) for y in (-30, 30) for x, z in ((-50, 0), (50, 0), (50, 15), (-50, 60))]
-    return trimesh.convex.convex_hull(np.array(corners) / 1000)
+    mesh: trimesh.Trimesh = trimesh.convex.convex_hull(np.array(corners) / 1000)
+    return mesh
 
 
 def _t_block() -> trimesh.Trimesh:

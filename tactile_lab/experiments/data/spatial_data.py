@@ -270,7 +270,7 @@ class _AtAllHeights(_OnTable):
         height = self.solid.height_m
         breadth = min(_HALF_BREADTH_m, height / 2)
         middle = breadth + ((index + 1) * _GOLDEN % 1.0) * (height - 2 * breadth)
-        return middle + self._rng.uniform(-breadth, breadth, 5)
+        return np.asarray(middle + self._rng.uniform(-breadth, breadth, 5))
 
 
 class _InSpace(_Session):

@@ -22,6 +22,8 @@ from tactile_lab.slam.shape.surfaces.surface import Indices, SurfaceMesh
 _WORST_nats = 30.0
 """What a contact held out costs at most: more than an outlier does, or a whole rounded edge would count as outliers."""
 _PARTS = 4
+_SETTLED_nats = 45.0
+"""With so much for or against, further quarters are not asked."""
 
 
 def foretells_better(
@@ -45,6 +47,8 @@ def foretells_better(
         except ShapeError:  # the rest does not enclose anything
             return False
         advantage += _log_density(contacts, held, mesh) - gpis.log_density_given_others(held)
+        if abs(advantage) > _SETTLED_nats:
+            break
     return advantage > 0
 
 
@@ -61,7 +65,8 @@ def _log_density(contacts: WeightedContacts, held: Indices, mesh: SurfaceMesh) -
 
 def _misfit(contacts: WeightedContacts, contact: int, corners: Array, normals: Array) -> float:
     point_m = np.broadcast_to(contacts.points_m[contact], (len(corners), 3))
-    away_m = trimesh.triangles.closest_point(corners, point_m) - point_m
+    nearest_m = trimesh.triangles.closest_point(corners, point_m)  # type: ignore[no-untyped-call]
+    away_m = np.asarray(nearest_m) - point_m
     turned = normals - contacts.normals[contact]
     weight, turn = contacts.point_weights[contact], contacts.normal_weights[contact]
     return float(0.5 * np.min(weight * np.sum(away_m**2, axis=1) + turn * np.sum(turned**2, axis=1)))
