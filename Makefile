@@ -10,7 +10,11 @@ READY  := $(VENV)/ready
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: demo test check bench results experiments coverage lock clean mutants
+.PHONY: help demo test check bench results experiments coverage lock clean mutants
+
+help:  ## This list
+	@echo "make TARGET:"
+	@sed -n 's/^\([a-z]*\):.*  ## /  \1\t/p' $(MAKEFILE_LIST) | expand -t 16
 
 demo: $(READY)  ## A whole autonomous session on the simulated rig, evaluated, with its report
 	$(BIN)/tactile-lab run --rig sim --object box-10x6x4 --grasps 16 --seed 1 --out runs
@@ -48,7 +52,7 @@ lock:  ## Resolve the dependencies again, with hashes
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-config \
 		--no-emit-index-url --no-header --no-annotate --extra dev -o requirements.lock pyproject.toml
 
-clean:
+clean:  ## Remove the environment, what was built, and caches
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 
 # pip of the system installs into the environment, so that a Python without ensurepip will do.

@@ -8,6 +8,7 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 
 LEAST_SAMPLES = 20
 LARGEST_DRIFT = 30.0
@@ -24,7 +25,7 @@ def load_untouched(path: Path) -> Array:
         ConfigurationError: it cannot be read, or is no such table.
     """
     try:
-        text = path.read_text(encoding="utf-8").replace(",", " ")
+        text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8").replace(",", " ")
         counts = np.array([[float(word) for word in line.split()] for line in text.splitlines() if line.strip()])
     except OSError as error:
         raise ConfigurationError(

@@ -25,6 +25,7 @@ from drivers.core.configuration import StrictModel, validate
 from drivers.core.contacts import FINGERS, Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.fingertip import RigidTransform, Vector3
+from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
 from drivers.shadow.model.kinematics import JOINTS
 
 FORMAT = "tactile-forearm-data/1"
@@ -175,7 +176,7 @@ def save_data(path: Path, data: ForearmData) -> None:
 
 def _json(path: Path) -> Any:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(read_bounded(path, LARGEST_JSON_bytes))
     except OSError as error:
         raise ConfigurationError(
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"

@@ -8,6 +8,7 @@ of all. Or two text files of numbers, electrodes and normals, one column a sampl
 from __future__ import annotations
 
 import csv
+import io
 from dataclasses import dataclass
 from pathlib import Path
 from typing import get_args
@@ -18,6 +19,7 @@ from drivers.biotac.electrodes import ElectrodeCount
 from drivers.biotac.learned_normal import Presses
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 
 _NORMAL = ("nx", "ny", "nz")
 _COUNTS: tuple[ElectrodeCount, ...] = get_args(ElectrodeCount)
@@ -68,7 +70,7 @@ def _reason(error: Exception) -> str:
 
 def _matrix(path: Path) -> Array:
     try:
-        values = np.loadtxt(path, ndmin=2)
+        values = np.loadtxt(io.BytesIO(read_bounded(path, LARGEST_TABLE_bytes)), ndmin=2)
     except (OSError, ValueError) as error:
         hint = "Give a text file of numbers, one column per sample"
         raise ConfigurationError(f"cannot be read ({_reason(error)})", where=str(path), hint=hint) from error
@@ -79,8 +81,8 @@ def _matrix(path: Path) -> Array:
 
 def _table(path: Path) -> tuple[Array, Array]:
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.reader(file))
+        text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8")
+        rows = list(csv.reader(io.StringIO(text, newline="")))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         hint = "Give a CSV table"
         raise ConfigurationError(f"cannot be read ({_reason(error)})", where=str(path), hint=hint) from error

@@ -11,6 +11,7 @@ reason is given instead of a pose.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 from gtsam import Pose3, Rot3
@@ -132,6 +133,8 @@ class ObjectTracker:
         largest = self._settings.largest_blur_px
         if blur_px <= largest:
             return ""
+        if not isfinite(blur_px):
+            return f"the edges of marker {number} cannot be measured: it may be partly covered, in glare, or too small"
         return f"blurred: the edges of marker {number} are {blur_px:.1f} px wide, at most {largest:g} px are accepted"
 
     def _check(self, sighting: ObjectSighting | None, stamp_ns: int) -> Observation:

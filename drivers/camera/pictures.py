@@ -10,12 +10,26 @@ from drivers.camera.frames import Image
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """One picture as it arrived: stamp (session clock), number, frames lost so far, grey levels (height, width)."""
+    """One picture as it arrived.
+
+    Attributes:
+        stamp_ns: arrival, session clock.
+        counter: its number.
+        dropped: frames lost so far.
+        image: grey levels, shape (height, width).
+        file: name of the file it was read from; empty for a camera's.
+    """
 
     stamp_ns: int
     counter: int
     dropped: int
     image: Image
+    file: str = ""
+
+    @property
+    def name(self) -> str:
+        """What people know it by: its file, or its number."""
+        return self.file or f"picture {self.counter}"
 
 
 class Source(Protocol):

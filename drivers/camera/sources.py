@@ -161,7 +161,7 @@ class FolderSource:
             shown = [f"{width} x {height}" for height, width in (image.shape, self._size)]
             what = f"has {shown[0]} pixels, but the previous pictures {shown[1]}"
             raise DeviceError(what, where=str(file), hint="Use pictures of one camera at one resolution")
-        return Picture(self._clock.now_ns(), self._counter, 0, np.asarray(image, np.uint8))
+        return Picture(self._clock.now_ns(), self._counter, 0, np.asarray(image, np.uint8), file.name)
 
     def close(self) -> None:
         """Nothing to let go of."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from drivers.core.errors import WriteError
@@ -40,6 +41,16 @@ def write_whole(
     finally:  # after an interruption too; nothing is left of it when all went well
         with suppress(OSError):  # where the folder is none, either
             partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def writing_into(folder: Path) -> Iterator[None]:
+    """Within the block files of a folder are written or copied. Raises WriteError, in words, where one cannot be."""
+    try:
+        yield
+    except OSError as error:
+        advice = "Free some space on it, then try again" if disk_full(error) else "Check the folder and the disk"
+        raise WriteError(write_failure(error), where=str(error.filename or folder), hint=advice) from error
 
 
 def disk_full(error: OSError) -> bool:

@@ -1,8 +1,4 @@
-"""YAML for configuration files: safe, and without YAML 1.1's silent surprises.
-
-Plain ``yaml.safe_load`` keeps the last of two equal keys, reads ``1e-3`` as text and ``no`` as
-false. Here equal keys are an error, ``1e-3`` is a number and only true/false are booleans.
-"""
+"""Configuration files: YAML read into models, errors in plain words (see :mod:`drivers.core.reading.yaml_text`)."""
 
 from __future__ import annotations
 
@@ -13,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -22,11 +18,13 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import LARGEST_YAML_bytes, read_bounded
+from drivers.core.reading.yaml_text import parse, problem_of
 
 Model = TypeVar("Model", bound=BaseModel)
 
 _RETRY = "Correct the file and try again"
-_UNPARSED = ", unable to parse string as a number"
+_UNPARSED = ", unable to parse string as an? (number|integer)$"
 _SHOWN, _LONGEST_VALUE = 5, 40
 
 
@@ -76,52 +74,14 @@ def recorded_keys() -> Iterator[None]:
 _reading: ContextVar[str] = ContextVar("the file being read", default="")
 
 
-class _Loader(yaml.CSafeLoader):
-    """Safe loader with its own implicit resolvers (the parent's table is shared: copy it)."""
-
-
-_Loader.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in resolvers if not tag.endswith((":bool", ":float", ":timestamp"))]
-    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-}
-_Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile(r"^(?:true|false)$"), list("tf"))
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(
-        r"^[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+|[0-9]+(?=[eE]))(?:[eE][-+]?[0-9]+)?$|^[-+]?\.(?:inf|Inf)$|^\.(?:nan|NaN)$"
-    ),
-    list("-+0123456789."),
-)
-
-
-_DEEPEST = 100
-_MERGE = "tag:yaml.org,2002:merge"
-
-
-def _mapping_without_repeats(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
-    keys: list[Any] = []
-    for key_node, _ in node.value:
-        if key_node.tag == _MERGE:
-            continue
-        key = loader.construct_object(key_node, deep=True)
-        if key in keys:
-            raise yaml.MarkedYAMLError(problem=f"key {key!r} appears twice", problem_mark=key_node.start_mark)
-        keys.append(key)
-    loader.flatten_mapping(node)
-    return loader.construct_mapping(node, deep=True)
-
-
-_Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping_without_repeats)
-
-
 def load(path: Path) -> Any:
     """Read one YAML document.
 
     Raises:
-        ConfigurationError: the file is missing, unreadable or not strict YAML.
+        ConfigurationError: the file is missing, unreadable, too large or not strict YAML.
     """
     try:
-        content = path.read_bytes()
+        content = read_bounded(path, LARGEST_YAML_bytes)
     except FileNotFoundError as error:
         raise ConfigurationError("file not found", where=str(path), hint="Check the path") from error
     except OSError as error:
@@ -138,23 +98,11 @@ def loads(content: bytes, where: str) -> Any:
         ConfigurationError: it is not strict YAML in UTF-8.
     """
     try:
-        text = content.decode("utf-8")
-        _check_depth(text)
-        return yaml.load(text, Loader=_Loader)
+        return parse(content.decode("utf-8"))
     except UnicodeDecodeError as error:
         raise ConfigurationError("is not a text file", where=where, hint="Give a YAML file in UTF-8") from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date or number out of its range
-        raise ConfigurationError(f"is not valid YAML: {_yaml_problem(error)}", where=where, hint=_RETRY) from error
-
-
-def _check_depth(text: str) -> None:
-    """Refuse what is nested so deep that composing it would overflow the stack. The parser itself does not recurse."""
-    depth = 0
-    for event in yaml.parse(text, Loader=yaml.CSafeLoader):
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > _DEEPEST:
-            problem = f"nested deeper than {_DEEPEST} levels"
-            raise yaml.MarkedYAMLError(problem=problem, problem_mark=cast(yaml.Mark, event.start_mark))
+        raise ConfigurationError(f"is not valid YAML: {problem_of(error)}", where=where, hint=_RETRY) from error
 
 
 def load_model(path: Path, model: type[Model]) -> Model:
@@ -189,14 +137,6 @@ def flatten_keys(content: Mapping[str, Any], above: str = "") -> Iterator[tuple[
 # --- errors in plain words -----------------------------------------------------------------------------------------
 
 
-def _yaml_problem(error: Exception) -> str:
-    """What a parser found, and where in the file."""
-    if not isinstance(error, yaml.MarkedYAMLError) or error.problem_mark is None:
-        return " ".join(str(error).split()) or type(error).__name__
-    mark = error.problem_mark
-    return f"line {mark.line + 1}, column {mark.column + 1}: {error.problem}"
-
-
 def _explain(error: ValidationError, model: type[BaseModel]) -> str:
     """Up to five problems of a document, each with its key; unknown keys first, as they often explain the others."""
     found = sorted(error.errors(), key=lambda item: item["type"] != "extra_forbidden")
@@ -213,11 +153,17 @@ def _problem(item: ErrorDetails, model: type[BaseModel]) -> str:
         return f"{place}: is missing"
     if item["type"] in {"model_type", "model_attributes_type", "dict_type"}:
         return f"{place}: must be keys with values"
-    words = re.sub(r"^[A-Z]\w+ should", "must", item["msg"].removeprefix("Value error, ")).removesuffix(_UNPARSED)
+    words = plain_words(item["msg"])
     own = item["type"] == "value_error"
     if own and not item["loc"]:
         return words
     return f"{place}: {words}{'' if own and _names(words, item['input']) else _quote_value(item['input'])}"
+
+
+def plain_words(message: str) -> str:
+    """What pydantic says about a value, without its own turns of phrase ("Value error, ...", "Input should ...")."""
+    own = message.removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    return re.sub(_UNPARSED, "", re.sub(r"^[A-Z]\w+ should", "must", own))
 
 
 def _names(words: str, value: Any) -> bool:

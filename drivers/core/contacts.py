@@ -17,6 +17,9 @@ FINGERS = ("FF", "MF", "RF", "LF", "TH")
 LARGEST_GRASP_m = 0.6
 """No hand spans more; contacts farther apart are in wrong units."""
 
+FARTHEST_m = 100.0
+"""Coordinates beyond this lose the digits that tell one contact from another: the world's origin is elsewhere."""
+
 LARGEST_SLOPE = 0.5
 """Smallest horizontal part of a normal that still tells about a horizontal contour (60 degrees of slope)."""
 

@@ -1,7 +1,7 @@
 """Every error a person can meet, in one tree.
 
 TactileLabError                exit 1
- |- ConfigurationError         exit 2   a file the user wrote: rig, calibration, options
+ |- ConfigurationError         exit 2   an option, name or file that was given: rig, calibration, mesh, log
  |- DeviceError                exit 4   a device that does not answer, or answers wrongly
  |   `- CodecError                      bytes that are not what the protocol says
  |- SafetyError                exit 1   a limit of the hand or the workspace was passed: the rig has stopped
@@ -13,11 +13,16 @@ TactileLabError                exit 1
  `- InterruptionError          exit 130 a person ended the work before it was done
 
 Each message says what happened, where (which device or file), and what to do next.
-Exit codes are those of the command line: 0 done, 1 failed, 2 usage, 3 done with data loss or
-outside a limit, 4 hardware not ready, 130 interrupted.
+Exit codes are those of the command line, see :mod:`tactile_lab.cli.main`.
 """
 
 from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 class TactileLabError(Exception):
@@ -41,7 +46,7 @@ class TactileLabError(Exception):
 
 
 class ConfigurationError(TactileLabError):
-    """A rig, calibration or option file that cannot be used as written."""
+    """An option, a name or a file that was given is missing, or cannot be used as it is; nothing was begun."""
 
     exit_code = 2
 
@@ -84,3 +89,12 @@ class InterruptionError(TactileLabError):
     """A person ended the work before it was done; says what is kept."""
 
     exit_code = 130
+
+
+@contextmanager
+def given_by_a_person() -> Iterator[None]:
+    """Within the block a mesh or session that cannot be used is a mistake in what was asked for: ConfigurationError."""
+    try:
+        yield
+    except (ShapeError, SessionError) as error:
+        raise ConfigurationError(error.what, where=error.where, hint=error.hint) from error

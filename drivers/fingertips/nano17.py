@@ -15,10 +15,8 @@ from drivers.core.fingertip import FingertipCalibration, FingertipSensor, TipBod
 from drivers.core.transports import Transport
 from drivers.fingertips.kind import LinkedKind, TipReport
 from drivers.force.force_fingertip import ForceTip
+from drivers.force.plausibility import noise_objection
 from drivers.shadow.protocol.tactile_names import TactileNames
-
-_NOISY = 6.0
-"""How many times the calibrated noise a still force sensor may show."""
 
 
 class Nano17Kind(LinkedKind[FingertipCalibration]):
@@ -70,5 +68,4 @@ class Nano17Kind(LinkedKind[FingertipCalibration]):
             f"{figures['lost']:.0f} lost, noise {noise_mN:.1f} mN (expected {expected_mN:.1f}), "
             f"bias {figures['bias_N']:.2f} N"
         )
-        noisy = "noisier than its calibration says: is it being touched, or is a cable loose?"
-        return TipReport((noisy,) if noise_mN > _NOISY * expected_mN else (), (words,), figures)
+        return TipReport(tuple(filter(None, [noise_objection(tip.noise, tip.calibration)])), (words,), figures)

@@ -60,6 +60,26 @@ def objection(
     return ""
 
 
+_NOISY, _CONSTANT = 6.0, 0.02
+"""How many times its calibrated noise a still sensor may show, and how little it cannot."""
+
+
+def noise_objection(noise: Array, calibration: FingertipCalibration) -> str:
+    """What speaks against the noise of a sensor that nothing touches, in words; empty when nothing does.
+
+    Args:
+        noise: standard deviations of its readings, shape (6,), N and N m.
+        calibration: says what it has been.
+    """
+    expected = np.repeat([calibration.force_sigma_N, calibration.moment_sigma_Nm], 3)
+    if np.any(noise > _NOISY * expected):
+        return "noisier than its calibration says: is it being touched, or is a cable loose?"
+    if np.all(noise < _CONSTANT * expected):
+        usual = f"a still sensor has a noise of {1e3 * calibration.force_sigma_N:.1f} mN"
+        return f"its readings do not change, {usual}: is it connected to its box, and does the box measure?"
+    return ""
+
+
 class WrenchMonitor:
     """Remembers the verdicts on loaded captures and tells when the torque persistently does not fit the force."""
 

@@ -11,7 +11,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from drivers.core.contacts import Array
-from drivers.core.errors import ShapeError
+from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size
 
 MESH_PREFIX = "mesh:"
 LARGEST_m, SMALLEST_m = 0.25, 0.01
@@ -27,7 +28,8 @@ def load_truth_mesh(name: str) -> trimesh.Trimesh:
     down in its most probable resting pose.
 
     Raises:
-        ShapeError: the file cannot be read, holds no closed surface, or its size is not that of a graspable object.
+        ConfigurationError: the file cannot be read, holds no closed surface, or its size is not that of a graspable
+            object.
     """
     path = Path(name.removeprefix(MESH_PREFIX))
     mesh = _read(path)
@@ -80,35 +82,36 @@ def _standing(mesh: trimesh.Trimesh) -> Array:
 
 def _read(path: Path) -> trimesh.Trimesh:
     if not path.is_file():
-        raise ShapeError("file not found", where=str(path), hint="Check the path of the mesh")
+        raise ConfigurationError("file not found", where=str(path), hint="Check the path of the mesh")
+    check_size(path, LARGEST_MESH_bytes)
     try:
         mesh = trimesh.load(path, force="mesh")
     except Exception as error:  # the readers of a dozen formats raise whatever they like
-        raise ShapeError(
+        raise ConfigurationError(
             f"cannot be read as a mesh ({error})", where=str(path), hint="Give a PLY, STL, OBJ or GLB file"
         ) from error
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        raise ShapeError("contains no triangles", where=str(path), hint="Export the object as a triangle mesh")
+        raise ConfigurationError("contains no triangles", where=str(path), hint="Export the object as a triangle mesh")
     return mesh
 
 
 def _check(mesh: trimesh.Trimesh, where: str) -> None:
     if not np.all(np.isfinite(mesh.vertices)):
-        raise ShapeError("has vertices that are not numbers", where=where, hint="Export the mesh again")
+        raise ConfigurationError("has vertices that are not numbers", where=where, hint="Export the mesh again")
     largest = float(mesh.extents.max())
     if largest > LARGEST_m:
-        raise ShapeError(
+        raise ConfigurationError(
             f"is {largest:.3g} m long, but at most {LARGEST_m} m fit the hand's workspace",
             where=where,
             hint="The unit must be the metre: is the mesh in millimetres?",
         )
     if largest < SMALLEST_m:
-        raise ShapeError(
+        raise ConfigurationError(
             f"is only {largest * 1e3:.3g} mm long, but the fingertips need {SMALLEST_m * 1e3:.0f} mm to hold it",
             where=where,
             hint="The unit must be the metre: was the mesh scaled from millimetres twice?",
         )
     if not mesh.is_watertight or mesh.volume <= 0:
-        raise ShapeError(
+        raise ConfigurationError(
             "is not a closed surface with its faces turned outward", where=where, hint="Repair it in a mesh editor"
         )

@@ -107,15 +107,21 @@ def object_model(name: str) -> ObjectModel:
     """The object called ``name``: one of :data:`CATALOGUE`, or ``mesh:<path>`` for a watertight mesh in metres.
 
     Raises:
-        ConfigurationError: no such object.
-        ShapeError: the mesh file cannot be used.
+        ConfigurationError: no such object, or the mesh file cannot be used.
     """
     if name.startswith(MESH_PREFIX):
         return _scan(name)
-    if name not in CATALOGUE:
+    check_object(name)
+    return CATALOGUE[name](name)
+
+
+def check_object(name: str) -> None:
+    """Whether there is an object of this name, and its mesh can be used. Raises ConfigurationError."""
+    if name.startswith(MESH_PREFIX):
+        load_truth_mesh(name)
+    elif name not in CATALOGUE:
         known = ", ".join([*CATALOGUE, f"{MESH_PREFIX}<path>"])
         raise ConfigurationError(f"there is no object {name!r}", where="object", hint=f"Available objects: {known}")
-    return CATALOGUE[name](name)
 
 
 def prism_mesh(outline_m: Array, height_m: float) -> trimesh.Trimesh:

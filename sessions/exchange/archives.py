@@ -15,7 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
-from drivers.core.errors import SessionError
+from drivers.core.atomic_files import writing_into
+from drivers.core.errors import ConfigurationError, SessionError, given_by_a_person
 from sessions.recording.manifest import MANIFEST, read_manifest, write_manifest
 from sessions.recording.session import TRAFFIC, Session
 from sessions.recording.session_ids import check_id
@@ -31,7 +32,7 @@ class ArchiveLimits:
     Attributes:
         files: number of files.
         total_bytes: total unpacked size.
-        ratio: largest ratio of unpacked to packed size of a file above a megabyte.
+        ratio: largest ratio of unpacked to packed size, of a file above a megabyte and of all together.
     """
 
     files: int = 10_000
@@ -43,7 +44,8 @@ def export_archive(session: Session, path: Path) -> int:
     """Write a session's files into a new ZIP file and return their number. Links are skipped.
 
     Raises:
-        SessionError: the file exists or cannot be written.
+        ConfigurationError: the file exists.
+        SessionError: it cannot be written.
     """
     files = [item for item in sorted(session.folder.rglob("*")) if item.is_file() and not item.is_symlink()]
     try:
@@ -52,7 +54,7 @@ def export_archive(session: Session, path: Path) -> int:
                 name = (PurePosixPath(session.folder.name) / item.relative_to(session.folder).as_posix()).as_posix()
                 archive.write(item, name)
     except FileExistsError as error:
-        raise SessionError("exists already", where=str(path), hint="Choose another name") from error
+        raise ConfigurationError("exists already", where=str(path), hint="Choose another name") from error
     except OSError as error:
         with suppress(OSError):
             path.unlink(missing_ok=True)
@@ -67,8 +69,9 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
         name: name of the new session; by default the name of the only folder in the archive.
 
     Raises:
-        SessionError: not a ZIP file, unsafe names, links or sizes, no session in it, or a session of that name exists
-            already; then nothing is left behind.
+        ConfigurationError: not a ZIP file, unsafe names, links or sizes, no session in it, or a session of that name
+            exists already; then nothing is left behind.
+        WriteError: the new folder cannot be written; nothing is left behind either.
     """
     limits = limits or ArchiveLimits()
     try:
@@ -77,9 +80,11 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
             folder = root / check_id(name or _common_folder(entries, path), str(path))
             return _unpack(archive, entries, folder, path, limits)
     except zipfile.BadZipFile as error:
-        raise SessionError(f"not a ZIP archive ({error})", where=str(path), hint=_ADVICE) from error
+        raise ConfigurationError(f"not a ZIP archive ({error})", where=str(path), hint=_ADVICE) from error
     except OSError as error:
-        raise SessionError(f"cannot be read ({error.strerror or error})", where=str(path), hint=_ADVICE) from error
+        raise ConfigurationError(
+            f"cannot be read ({error.strerror or error})", where=str(path), hint=_ADVICE
+        ) from error
 
 
 def _checked_entries(archive: zipfile.ZipFile, path: Path, limits: ArchiveLimits) -> list[zipfile.ZipInfo]:
@@ -90,6 +95,9 @@ def _checked_entries(archive: zipfile.ZipFile, path: Path, limits: ArchiveLimits
         _check_entry(entry, path, limits)
     if (total := sum(entry.file_size for entry in entries)) > limits.total_bytes:
         raise _refusal(path, f"contains {total} bytes, more than {limits.total_bytes}")
+    packed = sum(entry.compress_size for entry in entries)
+    if total > _BLOCK_BYTES and total > limits.ratio * max(1, packed):
+        raise _refusal(path, f"would unpack {packed} bytes to {total}, out of all proportion")
     names = [entry.filename for entry in entries]
     if len(set(names)) < len(names):
         raise _refusal(path, "contains two files of the same name")
@@ -126,15 +134,17 @@ def _unpack(
         folder.mkdir(parents=True)
     except FileExistsError as error:
         hint = f"{_ADVICE}; choose another name with --name"
-        raise SessionError("a session of that name exists already", where=str(folder), hint=hint) from error
+        raise ConfigurationError("a session of that name exists already", where=str(folder), hint=hint) from error
     try:
         left = limits.total_bytes
         for entry in entries:
             target = folder.joinpath(*PurePosixPath(entry.filename).parts[1:])
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with archive.open(entry) as source, target.open("xb") as out:
+            with writing_into(folder):
+                target.parent.mkdir(parents=True, exist_ok=True)
+            with archive.open(entry) as source, writing_into(folder), target.open("xb") as out:
                 left -= _copy(source, out, left, path)  # type: ignore[arg-type]
-        return _as_session(folder, path)
+        with given_by_a_person():
+            return _as_session(folder, path)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)  # only what came out of the archive
         raise
@@ -165,5 +175,5 @@ def _as_session(folder: Path, path: Path) -> Session:
     return Session.open(folder)
 
 
-def _refusal(path: Path, what: str) -> SessionError:
-    return SessionError(what, where=str(path), hint=_ADVICE)
+def _refusal(path: Path, what: str) -> ConfigurationError:
+    return ConfigurationError(what, where=str(path), hint=_ADVICE)

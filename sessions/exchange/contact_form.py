@@ -7,10 +7,10 @@ from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from drivers.core.configuration import StrictModel
-from drivers.core.contacts import Array, LARGEST_GRASP_m
+from drivers.core.contacts import Array, FARTHEST_m, LARGEST_GRASP_m
 
 FORMAT = "tactile-contacts/1"
 
@@ -19,6 +19,9 @@ _LARGEST_OBJECT_m = 2.0
 
 _LARGEST_WORKSPACE_m = 20.0
 """Contacts of one session that are farther apart must be in millimetres."""
+
+_MOST_CORNERS = 2000
+"""Of a true outline."""
 
 
 def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -75,8 +78,15 @@ class ObjectTruth(StrictModel):
     """The true object in its own coordinates: an outline, or the name of a mesh file next to the log."""
 
     name: str = "object"
-    polygon_m: tuple[tuple[float, float], ...] | None = Field(default=None, min_length=3)
+    polygon_m: tuple[tuple[float, float], ...] | None = Field(default=None, min_length=3, max_length=_MOST_CORNERS)
     mesh: str | None = None
+
+    @field_validator("mesh")
+    @classmethod
+    def _beside_the_log(cls, mesh: str | None) -> str | None:
+        if mesh is not None and (mesh in {"", ".", ".."} or any(mark in mesh for mark in "/\\\0")):
+            raise ValueError(f"{mesh!r} is not the name of a file in the log's own folder")
+        return mesh
 
     @model_validator(mode="after")
     def _in_metres(self) -> Self:
@@ -138,6 +148,7 @@ class Document(StrictModel):
         if not any(grasp.contacts for grasp in self.grasps):
             raise ValueError("no grasp has a contact")
         _check_sizes(self.grasps)
+        _check_origin(self.grasps)
         if self.dimension == 2:
             _check_planar(self.grasps)
         return self
@@ -155,6 +166,22 @@ def _check_sizes(grasps: Sequence[GraspEntry]) -> None:
         if (carried := _carried_m(before, grasp)) > _LARGEST_OBJECT_m:
             moved = f"the hand moved by {carried:.4g} m before grasp {index}"
             raise ValueError(f"{moved}; are lengths in millimetres?")
+
+
+def _check_origin(grasps: Sequence[GraspEntry]) -> None:
+    """All of it near the world's origin; a motion about a place within reach may shift the origin by twice as much."""
+    for index, grasp in enumerate(grasps):
+        points = [
+            *grasp.points_m,
+            *(end for line in grasp.closing_lines for end in (line.start_world_m, line.end_world_m)),
+        ]
+        poses = [pose for pose in (grasp.world_T_palm, grasp.world_T_object) if pose is not None]
+        places = [*points, *([row[3] for row in pose[:3]] for pose in poses)]
+        farthest_m = max((float(np.abs(place).max()) for place in places), default=0.0)
+        shift_m = max(abs(row[3]) for row in grasp.hand_motion_world[:3])
+        if (far_m := max(farthest_m, shift_m / 4)) > FARTHEST_m:
+            reach = f"farther than {FARTHEST_m:g} m; move the world's origin near the object"
+            raise ValueError(f"grasp {index} reaches {far_m:.4g} m from the origin, {reach}")
 
 
 def _extent_m(points_m: Array) -> float:

@@ -21,8 +21,9 @@ from drivers.core.clock import NANOSECONDS
 from drivers.core.configuration import validate
 from drivers.core.contact_checks import opposing_pairs
 from drivers.core.contacts import LARGEST_SLOPE, ApproachPath, Array, Contact, Grasp
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import ConfigurationError
 from drivers.core.poses import palm_heading, planar, spatial
+from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
 from sessions.exchange.contact_form import (
     FORMAT,
     ContactEntry,
@@ -65,9 +66,8 @@ def read_contact_log(path: Path) -> ContactLog:
     """Read a log.
 
     Raises:
-        SessionError: the file cannot be read or is not JSON.
-        ConfigurationError: its content does not fit the format, or its normals point into the object; the message names
-            each entry.
+        ConfigurationError: the file cannot be read or is not JSON, its content does not fit the format, or its normals
+            point into the object; the message names each entry.
     """
     content = _load_json(path)
     tag = content.get("format") if isinstance(content, dict) else None
@@ -118,11 +118,13 @@ def write_contact_log(path: Path, log: ContactLog) -> None:
 
 def _load_json(path: Path) -> Any:
     try:
-        return json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_without_repeats)
+        return json.loads(read_bounded(path, LARGEST_JSON_bytes), object_pairs_hook=_without_repeats)
     except OSError as error:
-        raise SessionError(f"cannot be read ({error.strerror})", where=str(path), hint="Check the path") from error
+        raise ConfigurationError(
+            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
+        ) from error
     except (ValueError, RecursionError) as error:
-        raise SessionError(f"is not JSON ({error})", where=str(path)) from error
+        raise ConfigurationError(f"is not JSON ({error})", where=str(path)) from error
 
 
 def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from drivers.core.atomic_files import writing_into
 from drivers.core.clock import NANOSECONDS
 from drivers.core.errors import ConfigurationError, SessionError
 from sessions.recording.manifest import write_manifest
@@ -42,18 +43,21 @@ def extract(session: Session, into: Path, piece: Piece) -> dict[str, int]:
     Returns the number of messages by topic. Session events are kept, so that the extract can be replayed.
 
     Raises:
-        SessionError: the recording cannot be read, the folder exists, or the extract would be empty.
-        ConfigurationError: the recording does not have a transport.
+        SessionError: the recording cannot be read, or the extract would be empty.
+        ConfigurationError: the folder exists, or the recording does not have a transport.
     """
     check_id(into.name, str(into))
     try:
         into.mkdir(parents=True)
     except OSError as error:
-        what = "exists already" if isinstance(error, FileExistsError) else f"cannot be made ({error.strerror})"
+        if isinstance(error, FileExistsError):
+            raise ConfigurationError("exists already", where=str(into), hint="Choose another folder") from error
+        what = f"cannot be made ({error.strerror})"
         raise SessionError(what, where=str(into), hint="Choose another folder") from error
     try:
         counts = _copy_traffic(session.traffic(), into, session.manifest.name, piece)
-        _copy_calibration(session, into)
+        with writing_into(into):
+            _copy_calibration(session, into)
         _write_manifest(session, into, counts)
     except BaseException:
         shutil.rmtree(into, ignore_errors=True)

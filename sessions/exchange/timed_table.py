@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 import re
@@ -15,7 +16,8 @@ from typing import Any, Literal
 import numpy as np
 
 from drivers.core.contacts import Array
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, LARGEST_TABLE_bytes, read_bounded
 
 FORMAT = "tactile-timed-contacts/1"
 
@@ -36,16 +38,19 @@ Row = Mapping[str, Any]
 
 
 def read_csv(path: Path) -> list[dict[str, str]]:
-    """The lines of a CSV table without their empty values. Raises SessionError or ConfigurationError."""
+    """The lines of a CSV table without their empty values. Raises ConfigurationError."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
+        text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8-sig")
+        with io.StringIO(text, newline="") as file:
             lines = csv.DictReader(line for line in file if not line.startswith("#"))
             rows = [{str(name).strip(): value for name, value in row.items()} for row in lines]
             names = [name.strip() for name in lines.fieldnames or ()]
     except OSError as error:
-        raise SessionError(f"cannot be read ({error.strerror})", where=str(path), hint="Check the path") from error
+        raise ConfigurationError(
+            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
+        ) from error
     except (UnicodeDecodeError, csv.Error) as error:
-        raise SessionError(f"is not a CSV table ({error})", where=str(path)) from error
+        raise ConfigurationError(f"is not a CSV table ({error})", where=str(path)) from error
     if len(set(names)) < len(names):
         raise ConfigurationError("two columns have the same name", where=str(path), hint="Name every column once")
     check_columns(set(names), path)
@@ -58,13 +63,15 @@ def read_csv(path: Path) -> list[dict[str, str]]:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """A document of the form :data:`FORMAT`. Raises SessionError or ConfigurationError."""
+    """A document of the form :data:`FORMAT`. Raises ConfigurationError."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(read_bounded(path, LARGEST_JSON_bytes))
     except OSError as error:
-        raise SessionError(f"cannot be read ({error.strerror})", where=str(path), hint="Check the path") from error
+        raise ConfigurationError(
+            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
+        ) from error
     except (ValueError, RecursionError) as error:
-        raise SessionError(f"is not JSON ({error})", where=str(path)) from error
+        raise ConfigurationError(f"is not JSON ({error})", where=str(path)) from error
     form = document.get("format") if isinstance(document, dict) else None
     if form == "tactile-contacts/1":
         hint = f"It needs no import: tactile-lab reconstruct {path}"

@@ -58,6 +58,7 @@ class OperatorConsole:
         self._asks: tuple[Ask, ...] = ()
         self._message = ""
         self._waiting: deque[Request] = deque()
+        self._warned_of_nothing = False
         self._next_panel_ns = 0
         self._heard_ns: int | None = None
         self._markers = self._photos = 0
@@ -77,6 +78,7 @@ class OperatorConsole:
     def enter(self, stage: Stage, prompt: str, *asks: Ask) -> None:
         """Start a new step; earlier requests are discarded."""
         self._stage, self._prompt, self._asks = stage, prompt, asks
+        self._warned_of_nothing = False
         self._waiting.clear()
         self._given_up = self._given_up if stage in BEFORE_CAPTURE else ""
         self._show(self._runtime.clock.now_ns())
@@ -88,8 +90,15 @@ class OperatorConsole:
         return requests
 
     def wants_capture(self) -> bool:
-        """Whether the operator requests the capture, or it is automatic and the grasp is steady."""
+        """Whether the operator requests the capture, or it is automatic and the grasp is steady.
+
+        Without any finger in contact the operator has to ask twice: the grasp would count, and tell nothing.
+        """
         asked = any(request.ask in (Ask.NEXT, Ask.CAPTURE) for request in self.take())
+        if asked and not self.view.touching and not self._warned_of_nothing:
+            self._warned_of_nothing = True
+            self.tell("no finger is in contact. Ask again to capture all the same", Level.WARNING)
+            return False
         return asked or (self.automatic and self.view.is_steady)
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, SessionError
 from sessions.recording.manifest import MANIFEST
 from sessions.recording.session import TRAFFIC, Session
 from sessions.recording.session_ids import recovered_id
@@ -89,7 +89,7 @@ def left_open(root: Path) -> list[SessionSummary]:
     """The sessions under ``root`` that a crash left open, without those that were already recovered."""
     try:
         found = list_sessions(root)
-    except SessionError:
+    except ConfigurationError:
         return []  # whoever wants to write there is told why that is not possible
     names = {item.folder.name for item in found}
     return [item for item in found if item.left_open and recovered_id(item.folder.name) not in names]
@@ -101,7 +101,7 @@ def list_sessions(root: Path) -> list[SessionSummary]:
     Derived sessions follow their recording.
 
     Raises:
-        SessionError: ``root`` is not a readable folder.
+        ConfigurationError: ``root`` is not a readable folder.
     """
     if not root.exists():
         return []
@@ -110,7 +110,8 @@ def list_sessions(root: Path) -> list[SessionSummary]:
             entry for entry in root.iterdir() if (entry / MANIFEST).is_file() or (entry / TRAFFIC).is_file()
         )
     except OSError as error:
-        raise SessionError(f"cannot be read ({error.strerror})", where=str(root)) from error
+        hint = "Name a folder of sessions"
+        raise ConfigurationError(f"cannot be read ({error.strerror})", where=str(root), hint=hint) from error
     return sorted(map(summarize, folders), key=lambda item: (item.started_utc, len(item.derived), item.name))
 
 
@@ -122,18 +123,25 @@ def find_session(root: Path, name: str) -> Session:
     person who made them.
 
     Raises:
-        SessionError: there is none, or its manifest cannot be read.
+        ConfigurationError: there is none.
+        SessionError: its manifest cannot be read.
     """
     return Session.open(session_folder(root, name))
 
 
 def session_folder(root: Path, name: str) -> Path:
-    """The folder of a session, which may be damaged; named as for :func:`find_session`. Raises SessionError."""
+    """The folder of a session, which may be damaged; named as for :func:`find_session`.
+
+    Raises:
+        ConfigurationError: there is none.
+    """
     if name == "last":
         return _last_recorded(root)
     folder = root / name if (root / name).is_dir() else Path(name)
     if not folder.is_dir():
-        raise SessionError("no such session", where=name, hint=f"See: tactile-lab session list --root {root}")
+        raise ConfigurationError("no such session", where=name, hint=f"See: tactile-lab session list --root {root}")
+    if not any((folder / name).is_file() for name in (MANIFEST, TRAFFIC)):
+        raise ConfigurationError(f"not a session folder (no {MANIFEST})", where=str(folder), hint="Check the path")
     return folder
 
 
@@ -146,5 +154,5 @@ def _last_recorded(root: Path) -> Path:
         names = ", ".join(item.folder.name for item in readable[-3:])
         hint = f"'last' ignores extracts and imports; give a name: {names}"
         what = "no session was recorded here, there are only extracts and imports"
-        raise SessionError(what, where=str(root), hint=hint)
-    raise SessionError("no session yet", where=str(root), hint="Record one first: tactile-lab run")
+        raise ConfigurationError(what, where=str(root), hint=hint)
+    raise ConfigurationError("no session yet", where=str(root), hint="Record one first: tactile-lab run")

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.core.atomic_files import write_whole
+from drivers.core.atomic_files import write_whole, writing_into
 from drivers.core.clock import NANOSECONDS
 from drivers.core.errors import SessionError
 from sessions.recording.manifest import MANIFEST, Manifest, manifest_from, read_manifest, write_manifest
@@ -97,7 +97,8 @@ def recover(source: Path, root: Path | None = None) -> Recovery:
 
 
 def _recover_into(folder: Path, source: Path, manifest: Manifest, reader: TrafficReader) -> Recovery:
-    _copy_files(source, folder, reader)
+    with writing_into(folder):
+        _copy_files(source, folder, reader)
     written, topics = _copy_traffic(reader, folder)
     if not written:
         raise SessionError("contains no readable message", where=str(reader.path), hint="Nothing can be recovered")
@@ -130,7 +131,8 @@ def _copy_files(source: Path, folder: Path, reader: TrafficReader) -> None:
         if item.is_symlink() or item.name == MANIFEST or item.suffix in (".mcap", ".part") or _holds_results(item):
             continue
         if item.is_dir():
-            shutil.copytree(item, folder / item.name, symlinks=True, ignore=_results_among)
+            copied = folder / item.name
+            shutil.copytree(item, copied, symlinks=True, ignore=_results_among, copy_function=_copy_file)
         else:
             shutil.copyfile(item, folder / item.name)
     (folder / CALIBRATION).mkdir(exist_ok=True)
@@ -138,6 +140,12 @@ def _copy_files(source: Path, folder: Path, reader: TrafficReader) -> None:
         kept, _, name = attachment.name.rpartition("/")
         if kept == CALIBRATION and not (folder / CALIBRATION / name).exists():
             write_whole(folder / CALIBRATION / name, attachment.data)
+
+
+def _copy_file(source: str, copy: str) -> None:
+    """Ends the copying of a whole folder at the first file that cannot be copied. Raises WriteError."""
+    with writing_into(Path(copy)):
+        shutil.copyfile(source, copy)
 
 
 def _holds_results(item: Path) -> bool:

@@ -22,7 +22,7 @@ from typing import Any, Self
 
 from drivers.core.atomic_files import write_whole
 from drivers.core.clock import utc_text
-from drivers.core.errors import SessionError
+from drivers.core.errors import SessionError, TactileLabError
 from sessions.recording.manifest import (
     MANIFEST,
     CalibrationCopy,
@@ -151,6 +151,7 @@ class RunningSession(Session):
 
         Raises:
             WriteError: the folder cannot be written.
+            SessionError: it is not there any more.
         """
         if self.manifest.status != "open":
             return
@@ -171,6 +172,10 @@ class RunningSession(Session):
                 "problem": problem,
             }
         )
+        if not self._traffic.path.is_file():
+            what = "was removed or renamed while it was recorded"
+            hint = f"If it was renamed, recover it by its new name: tactile-lab session recover {self.folder.name}"
+            raise SessionError(what, where=str(self.folder), hint=hint)
         write_manifest(self.folder, self.manifest)
 
     def __enter__(self) -> Self:
@@ -184,7 +189,18 @@ class RunningSession(Session):
         elif isinstance(error, KeyboardInterrupt):
             self.close("interrupted")
         else:
-            self.close("failed", problem=str(error) or type(error).__name__)
+            self.close("failed", problem=_in_words(error))
+
+
+def _in_words(error: BaseException) -> str:
+    """Why a session failed, for people who read it later: "1" or nothing would tell nobody anything."""
+    if isinstance(error, TactileLabError):
+        return str(error)
+    if isinstance(error, SystemExit):
+        return f"the program was ended with exit code {error.code}"
+    if isinstance(error, MemoryError):
+        return "the memory was exhausted"
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
 
 
 def create_session(

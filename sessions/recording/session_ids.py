@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError
 
 LONGEST_ID = 64
 _ID = re.compile(r"[a-z0-9_-]{1,64}")
@@ -14,10 +14,10 @@ def check_id(name: str, where: str = "") -> str:
     """Check that a name is a session id: 1 to 64 of a-z, 0-9, underscore and hyphen.
 
     Raises:
-        SessionError: it is not.
+        ConfigurationError: it is not.
     """
     if not _ID.fullmatch(name):
-        raise SessionError(
+        raise ConfigurationError(
             f"{name!r} cannot be the name of a session",
             where=where,
             hint=f"Names have 1 to {LONGEST_ID} of the characters a-z, 0-9, _ and -",

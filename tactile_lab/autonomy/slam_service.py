@@ -8,6 +8,7 @@ answers alike in both.
 from __future__ import annotations
 
 import copy
+from collections import deque
 from dataclasses import replace
 from typing import Any
 
@@ -24,6 +25,9 @@ from tactile_lab.autonomy.unknown_part import describe_unknown
 from tactile_lab.autonomy.variance_planner import KnownShape
 from tactile_lab.slam.tactile_slam import TactileSlam
 
+KEPT_STATES = 3
+"""More grasps than this are seldom taken back one after the other."""
+
 
 class SlamService:
     """The estimation and the planner of one session: an :class:`~sessions.conductor.estimator.EstimatorService`.
@@ -37,6 +41,8 @@ class SlamService:
         self.slam, self.planner = slam, planner
         self._memory = SlamMemory(slam)
         self._estimates: list[Estimate] = []
+        """Those that the session may not have yet: surfaces are large."""
+        self._count = 0
 
     # --- what comes next ---------------------------------------------------------------------------------------
 
@@ -81,18 +87,21 @@ class SlamService:
 
     def estimate(self, grasp: Grasp, known: int) -> tuple[Estimate, ...]:
         """See :meth:`sessions.conductor.estimator.Estimator.estimate`; the planner hears of the step too."""
-        self._memory.remember()
+        self._memory.remember(grasp)
         step = self.slam.add_grasp(grasp)
         self.planner.on_estimate(step.index, step.verdict != "untracked")
         shape = self.planner.known_shape()
         step = replace(step, world_T_object=self.slam.world_T_object)
         self._estimates.append(Estimate(step, surface_message(shape), None if shape is None else shape.explored))
-        return tuple(self._estimates[known:])
+        self._count += 1
+        self._estimates = self._estimates[known - self._count :]
+        return tuple(self._estimates)
 
     def undo(self, hand_motion_world: Pose3) -> None:
         """See :meth:`sessions.conductor.estimator.Estimator.undo`."""
         self._memory.undo()
-        self._estimates.pop()
+        self._count -= 1
+        self._estimates = self._estimates[:-1]
         self.planner.on_undo(hand_motion_world)
 
     def state(self) -> dict[str, Any]:
@@ -101,25 +110,42 @@ class SlamService:
 
 
 class SlamMemory:
-    """States of an estimation, one for each grasp it was given through :meth:`remember`.
+    """What an estimation knew before each of its last grasps, so that they can be taken back.
 
     A state holds everything, the source of chance too: after :meth:`undo` the estimation goes on exactly as if the
-    grasp had never been.
+    grasp had never been. States grow with the session, so that only the last few are kept; for what is farther back
+    the grasps are estimated again from the beginning, which comes to the same.
 
     Args:
-        slam: the estimation; its states are put back into this object.
+        slam: the estimation, fresh; its states are put back into this object.
     """
 
     def __init__(self, slam: TactileSlam) -> None:
         self._slam = slam
-        self._states: list[dict[str, Any]] = []
+        self._fresh = self._state()
+        self._grasps: list[Grasp] = []
+        self._states: deque[dict[str, Any]] = deque(maxlen=KEPT_STATES)
 
-    def remember(self) -> None:
-        """Keep the present state; call this before every step."""
-        self._states.append(copy.deepcopy(vars(self._slam)))
+    def remember(self, grasp: Grasp) -> None:
+        """Keep the present state; call this before every step, with the grasp that it is about to take."""
+        self._grasps.append(grasp)
+        self._states.append(self._state())
 
     def undo(self) -> None:
         """Go back to before the last step."""
-        state = self._states.pop()
+        grasps, self._grasps = self._grasps[:-1], self._grasps[:-1]
+        if self._states:
+            self._put_back(self._states.pop())
+            return
+        self._put_back(copy.deepcopy(self._fresh))
+        self._grasps = []
+        for grasp in grasps:
+            self.remember(grasp)
+            self._slam.add_grasp(grasp)
+
+    def _state(self) -> dict[str, Any]:
+        return copy.deepcopy(vars(self._slam))
+
+    def _put_back(self, state: dict[str, Any]) -> None:
         vars(self._slam).clear()
         vars(self._slam).update(state)

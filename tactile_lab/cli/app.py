@@ -17,11 +17,9 @@ from tactile_lab.cli.sessions import evaluate, reconstruct, report, session, vie
 app = typer.Typer(
     cls=Commands,
     help="Tactile SLAM in the laboratory: the shape and pose of an unknown object from a few fingertip contacts.",
-    epilog="Exit codes: 0 success, 1 failure, 2 usage error, 3 finished with data loss or outside a limit, 4 "
-    "hardware not ready, "
-    "130 interrupted.",
+    epilog="Exit codes: 0 done; 1 failed; 2 not begun, by an option or file that cannot be used; 3 done, but data or "
+    "the object were lost, or a limit was passed; 4 a device is not ready; 130 interrupted (docs/command-line.md).",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode="markdown",  # lines of a paragraph flow together
     pretty_exceptions_enable=False,
 )

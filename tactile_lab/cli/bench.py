@@ -51,7 +51,8 @@ def bench(
         ),
     ] = Part.PATHS,
     seconds: Annotated[
-        float, typer.Option(min=1.0, help="Duration of the camera, ethercat, load and recorder benchmarks.")
+        float,
+        typer.Option(min=1.0, max=86_400.0, help="Duration of the camera, ethercat, load and recorder benchmarks."),
     ] = 30.0,
     with_hand: Annotated[bool, typer.Option("--hand/--no-hand", help="With --only load: include the hand.")] = True,
     store: Annotated[
@@ -148,7 +149,7 @@ def _load(seconds: float, with_hand: bool, as_json: bool) -> list[Table]:
     from dataclasses import asdict
 
     from tactile_lab.benchmarks.load import measure_load
-    from tactile_lab.cli.console import emit_json, say, show_table
+    from tactile_lab.cli.console import answer, emit_json, show_table
 
     result = measure_load(seconds, with_hand=with_hand)
     title, head = (
@@ -166,7 +167,7 @@ def _load(seconds: float, with_hand: bool, as_json: bool) -> list[Table]:
     else:
         show_table(title, head, cells, right=(1, 2, 3))
         for name, text in facts:
-            say(f"{name}: {text}")
+            answer(f"{name}: {text}")
     return [(title, head, cells), ("", ["what", "figure"], facts)]
 
 

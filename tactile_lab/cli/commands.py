@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -20,6 +21,16 @@ See ``docs/extending.md`` for adding one.
 class Commands(TyperGroup):
     """Looks up commands in :data:`COMMANDS` lazily: extensions register theirs while options are parsed."""
 
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; a mistake in an option is told in plain words, whichever library found it."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            from drivers.core.configuration import plain_words
+
+            error.message = plain_words(error.message)
+            raise
+
     def list_commands(self, ctx: Any) -> list[str]:
         """All names in order of registration."""
         return list(COMMANDS)
@@ -29,7 +40,8 @@ class Commands(TyperGroup):
         if cmd_name not in COMMANDS:
             return None
         if cmd_name not in self.commands:
-            self.commands[cmd_name] = _command(cmd_name)
+            self.commands[cmd_name] = command = _command(cmd_name)
+            _refuse_infinite_numbers(command)
         return self.commands[cmd_name]
 
 
@@ -42,3 +54,23 @@ def _command(name: str) -> Any:
     holder = typer.Typer(add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False)
     holder.command(name)(registered)
     return typer.main.get_command(holder)
+
+
+def _refuse_infinite_numbers(command: Any) -> None:
+    """No option of a command, or of its commands, takes nan or inf for a number: bounds alone let them through."""
+    for parameter in command.params:
+        parameter.callback = _finite(parameter.callback)
+    for inner in getattr(command, "commands", {}).values():
+        _refuse_infinite_numbers(inner)
+
+
+def _finite(then: Callable[..., Any] | None) -> Callable[..., Any]:
+    """A parameter's callback that refuses numbers which are none, before its own callback. Raises BadParameter."""
+
+    def check(ctx: Any, parameter: Any, value: Any) -> Any:
+        for number in value if isinstance(value, tuple | list) else [value]:
+            if isinstance(number, float) and not math.isfinite(number):
+                raise typer.BadParameter(f"must be a finite number, not {number}", ctx=ctx, param=parameter)
+        return value if then is None else then(ctx, parameter, value)
+
+    return check

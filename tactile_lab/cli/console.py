@@ -1,20 +1,54 @@
-"""Output: text for people to standard error, one JSON document to standard output."""
+"""Where words go: what was asked for to standard output, progress and remarks to standard error.
+
+A command that answers with one JSON document (``--json``) has standard output for that alone; tables and lines that it
+shows beside it go to standard error.
+"""
 
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 from rich.console import Console
 from rich.text import Text
 
+from drivers.core.atomic_files import write_failure
+from drivers.core.errors import WriteError
+from tactile_lab.cli.streams import GONE, LastingStream
 from tactile_lab.cli.table_forms import facts_form, table_form
 
-people = Console(stderr=True, highlight=False)
-"""Text for people: standard error, in colour only on a terminal and without NO_COLOR."""
+_out, _err = LastingStream("stdout"), LastingStream("stderr")
+
+
+def _console(stream: LastingStream) -> Console:
+    """Colours only on a terminal and without NO_COLOR."""
+    return Console(file=cast(Any, stream), highlight=False)
+
+
+people = _console(_err)
+"""Progress, remarks, questions: standard error."""
+_answers = _console(_out)
+_json_only = False
+
+
+def keep_output_for_json(wanted: bool) -> None:
+    """Whether standard output is for one JSON document alone, from here on."""
+    global _json_only
+    _json_only = wanted
+
+
+def answers() -> Console:
+    """Where what was asked for is shown: standard output, unless that is for a JSON document."""
+    return people if _json_only else _answers
+
+
+def check_output() -> None:
+    """Raises WriteError when an answer could not be written, for another reason than that its reader went away."""
+    if _out.failure is not None and _out.failure.errno not in GONE:
+        hint = "Free some space, or send it elsewhere"
+        raise WriteError(write_failure(_out.failure), where="standard output", hint=hint) from _out.failure
 
 
 class Onlooker(Protocol):
@@ -40,8 +74,13 @@ def tell_also(onlooker: Onlooker) -> Iterator[None]:
 
 
 def say(text: str, style: str = "") -> None:
-    """One line for people, printed literally (no markup, no wrapping)."""
-    _tell(Text(text, style=style), style)
+    """A line of progress, or a remark; printed literally (no markup, no wrapping)."""
+    _tell(people, Text(text, style=style), style)
+
+
+def answer(text: str, style: str = "") -> None:
+    """A line of what was asked for."""
+    _tell(answers(), Text(text, style=style), style)
 
 
 def count(number: int, noun: str) -> str:
@@ -51,35 +90,43 @@ def count(number: int, noun: str) -> str:
 
 def complain(text: str) -> None:
     """One error line for people."""
-    _tell(Text.assemble(("error: ", "bold red"), text), "bold red")
+    _tell(people, Text.assemble(("error: ", "bold red"), text), "bold red")
 
 
 def warn(text: str) -> None:
     """One warning line for people."""
-    _tell(Text.assemble(("warning: ", "bold yellow"), text), "bold yellow")
+    _tell(people, Text.assemble(("warning: ", "bold yellow"), text), "bold yellow")
 
 
-def _tell(line: Text, style: str) -> None:
-    people.print(line, soft_wrap=True)
+def _tell(where: Console, line: Text, style: str) -> None:
+    where.print(line, soft_wrap=True)
     for onlooker in _onlookers:
         onlooker.line(line.plain, style)
 
 
 def emit_json(document: Any) -> None:
     """Print the command's single JSON document. NaN is not JSON and is refused."""
-    text = json.dumps(document, indent=2, allow_nan=False)
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
+    _out.write(json.dumps(document, indent=2, allow_nan=False) + "\n")
+    _out.flush()
 
 
-def show_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[int] = ()) -> None:
+def show_table(
+    title: str,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    right: Sequence[int] = (),
+    where: Console | None = None,
+) -> None:
     """A table with a rule below its header; ``right`` lists the columns that hold numbers.
 
-    Cells are printed literally. The last column takes the remaining width and wraps; on a terminal too narrow for the
-    other columns each row becomes a block of lines.
+    It is an answer, unless it is shown on another console such as :data:`people`. Cells are printed literally. The
+    last column takes the remaining width and wraps; on a terminal too narrow for the
+    other columns each row becomes a block
+    of lines.
     """
-    shown = list(rows)
-    people.print(table_form(people, title, columns, shown, right), crop=False)
+    shown, console = list(rows), where or answers()
+    console.print(table_form(console, title, columns, shown, right), crop=False)
     for onlooker in _onlookers:
         onlooker.table(title, columns, shown, right)
 
@@ -87,7 +134,7 @@ def show_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]
 def show_facts(title: str, facts: Iterable[tuple[str, str]]) -> None:
     """Names with values; empty values are left out."""
     shown = [(name, value) for name, value in facts if value]
-    people.print(Text(title, style="bold"), soft_wrap=True)
-    people.print(facts_form(people, shown), crop=False)
+    answers().print(Text(title, style="bold"), soft_wrap=True)
+    answers().print(facts_form(answers(), shown), crop=False)
     for onlooker in _onlookers:
         onlooker.table(title, ("", ""), shown, ())

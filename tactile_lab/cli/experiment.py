@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput
+from tactile_lab.cli.completion import complete_experiment
+from tactile_lab.cli.options import LARGEST_SEED, MOST_GRASPS, MOST_JOBS, Json, NoInput
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -24,13 +25,14 @@ def experiment(
         str,
         typer.Argument(
             help="Name of the experiment. 'list' lists all experiments, 'pages' writes the pages of stored results, "
-            "'commands' prints the commands that made them."
+            "'commands' prints the commands that made them.",
+            autocompletion=complete_experiment,
         ),
     ],
     seeds: Annotated[
         str, typer.Option(help="Random seeds, for example 0-2,7. Seeds from 1000 on are reserved for reported results.")
     ] = ("1000-1029"),
-    jobs: Annotated[int, typer.Option(min=0, help="Number of parallel runs; 0 uses all cores.")] = 0,
+    jobs: Annotated[int, typer.Option(min=0, max=MOST_JOBS, help="Number of parallel runs; 0 uses all cores.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for the results (default: runs/experiments/NAME).")] = None,
     only: Annotated[
         list[str] | None,
@@ -38,7 +40,9 @@ def experiment(
             help="Restrict a setting: method=joint,icp (separate values that contain commas by ;). Can be repeated."
         ),
     ] = None,
-    grasps: Annotated[int | None, typer.Option(min=1, help="Use another number of grasps, for a quick check.")] = None,
+    grasps: Annotated[
+        int | None, typer.Option(min=1, max=MOST_GRASPS, help="Use another number of grasps, for a quick check.")
+    ] = None,
     keep: Annotated[
         bool, typer.Option("--keep", help="Keep finished runs that were made by another version of the program.")
     ] = False,
@@ -59,7 +63,7 @@ def experiment(
         raise typer.BadParameter(
             "a result made by several versions cannot be stored: leave out --keep", param_hint="'--store'"
         )
-    from tactile_lab.cli.console import emit_json, say, show_table, warn
+    from tactile_lab.cli.console import answer, emit_json, show_table, warn
     from tactile_lab.cli.experiment_progress import ExperimentProgress
     from tactile_lab.experiments.catalogue import experiment
     from tactile_lab.experiments.reporting import LINES_FILE, document, part_of, write_report
@@ -84,8 +88,11 @@ def experiment(
     else:
         head, *body = short_table(group_runs(rows, over=study.pooled), study.columns)
         show_table(study.sentence, head, body)
-    say(f"results  {folder}")
+    answer(f"results  {folder}")
     _end(rows)
+
+
+_MOST_SEEDS = 100_000
 
 
 def _command(name: str, seeds: str, only: Sequence[str], grasps: int | None, jobs: int) -> str:
@@ -123,7 +130,7 @@ def _write_pages(docs: Path, as_json: bool = False) -> None:
 
 
 def _show_commands(docs: Path, as_json: bool) -> None:
-    from tactile_lab.cli.console import emit_json
+    from tactile_lab.cli.console import answer, emit_json
     from tactile_lab.experiments.results.publishing import stored_results
 
     made = [command for result in stored_results(docs).values() for part in result.parts for command in part.commands]
@@ -132,7 +139,7 @@ def _show_commands(docs: Path, as_json: bool) -> None:
         emit_json(commands)
         return
     for command in commands:
-        typer.echo(command)
+        answer(command)
 
 
 def _list(docs: Path, as_json: bool) -> None:
@@ -159,6 +166,8 @@ def _end(rows: Sequence[Row]) -> None:
 
         complain(f"every run failed; first error: {rows[0].problem}")
         raise typer.Exit(1)
+    if any(row.figures is None for row in rows):
+        raise typer.Exit(3)
 
 
 def _seeds(text: str) -> list[int]:
@@ -169,7 +178,11 @@ def _seeds(text: str) -> list[int]:
         if not low.isdigit() or (high and not high.isdigit()) or part.strip().endswith("-"):
             problem = f"{text!r} is not a list of seeds such as 0-2,7"
             raise typer.BadParameter(problem, param_hint="'--seeds'")
-        seeds += range(int(low), int(high or low) + 1)
+        first, last = int(low), int(high or low)
+        if last > LARGEST_SEED or last - first >= _MOST_SEEDS:
+            problem = f"seeds go up to {LARGEST_SEED}, and {_MOST_SEEDS} of them at a time"
+            raise typer.BadParameter(problem, param_hint="'--seeds'")
+        seeds += range(first, last + 1)
     if not seeds:
         raise typer.BadParameter(f"{text!r} contains no seed", param_hint="'--seeds'")
     return list(dict.fromkeys(seeds))

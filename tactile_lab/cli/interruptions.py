@@ -25,10 +25,15 @@ _FORGETFUL = {"trimesh", "networkx"}
 
 @contextmanager
 def interruptions_heeded() -> Iterator[None]:
-    """Within the block Ctrl+C and SIGTERM raise KeyboardInterrupt; if Ctrl+C was ignored it stays ignored."""
+    """Within the block Ctrl+C, SIGTERM and the end of the terminal raise KeyboardInterrupt.
+
+    A signal that is ignored stays ignored: Ctrl+C in what a script starts in the background, SIGHUP behind ``nohup``.
+    """
     before = {number: signal.signal(number, _like_ctrl_c) for number in (signal.SIGTERM, signal.SIGALRM)}
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         before[signal.SIGINT] = signal.signal(signal.SIGINT, _on_interrupt)
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
+        before[signal.SIGHUP] = signal.signal(signal.SIGHUP, _on_hangup)
     told, sys.unraisablehook = sys.unraisablehook, _remembering(sys.unraisablehook)
     try:
         yield
@@ -52,6 +57,12 @@ def _like_ctrl_c(number: int, frame: FrameType | None) -> None:
         _on_interrupt(number, frame)
     else:
         signal.raise_signal(signal.SIGINT)
+
+
+def _on_hangup(number: int, frame: FrameType | None) -> None:
+    """The terminal is gone: one request to end in order, though the system and a shell both tell of it."""
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    _like_ctrl_c(number, frame)
 
 
 def _remembering(told: Unraisable) -> Unraisable:

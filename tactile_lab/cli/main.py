@@ -1,7 +1,8 @@
 """``tactile-lab``: the entry point and its exit codes.
 
-0 success, 1 failure, 2 usage error, 3 finished with data loss or outside a calibration limit, 4 hardware not ready, 130
-interrupted.
+0 done. 1 begun and failed. 2 not begun: an option, or a name or file that was given, is missing or cannot be used.
+3 done, but not as it should be: data or the object were lost, a result is outside its limits, some runs failed. 4 a
+device is not ready. 130 interrupted.
 """
 
 from __future__ import annotations
@@ -9,11 +10,12 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from drivers.core.errors import TactileLabError
 from drivers.core.extensions import blamed
 from tactile_lab.cli.interruptions import interruptions_heeded
+from tactile_lab.cli.streams import open_missing_streams
 
 INTERRUPTED = 130
 
@@ -32,11 +34,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         SystemExit: always, with the exit code.
     """
     warnings.showwarning = _show_warning
+    open_missing_streams()
     try:
         with interruptions_heeded():
             from tactile_lab.cli.app import app  # here, so that Ctrl+C while it loads ends without a traceback
 
-            app(arguments, prog_name="tactile-lab")
+            _run(app, arguments)
     except TactileLabError as error:
         from tactile_lab.cli.console import complain
 
@@ -44,6 +47,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
+    except MemoryError:
+        from tactile_lab.cli.console import complain
+
+        complain("the memory is exhausted. Close other programs, or raise the limit (ulimit -v)")
+        sys.exit(1)
     except Exception as error:
         if not (words := blamed(error)):
             raise
@@ -51,6 +59,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
         complain(words)
         sys.exit(1)
+
+
+def _run(app: Callable[..., None], arguments: Sequence[str] | None) -> None:
+    """Run the command. Raises WriteError when its answer could not be written, whatever else it had to say."""
+    from tactile_lab.cli.console import check_output
+
+    try:
+        app(arguments, prog_name="tactile-lab")
+    except SystemExit as ended:
+        check_output()
+        if ended.code:
+            raise
+    check_output()
+    sys.exit(0)
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:

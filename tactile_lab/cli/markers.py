@@ -133,7 +133,7 @@ def _board(kind: str, content: dict[str, Any]) -> AnyBoard:
 
 
 def _store(description: Path, measured_mm: float | None, as_json: bool, no_input: bool) -> None:
-    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.cli.console import answer, emit_json
     from tactile_lab.workflow.printing import check_bar_words, measure
 
     length = measured_mm if measured_mm is not None else _ask(no_input)
@@ -142,7 +142,7 @@ def _store(description: Path, measured_mm: float | None, as_json: bool, no_input
     scale = measure(description, length)
     if as_json:
         emit_json({"description": str(description), "scale": scale})
-    say(f"{description}: {check_bar_words(scale, True)}")
+    answer(f"{description}: {check_bar_words(scale, True)}")
 
 
 def _ask(no_input: bool) -> float | None:
@@ -162,7 +162,7 @@ def _ask(no_input: bool) -> float | None:
 
 def _tell(sheet: PrintedSheet, as_json: bool) -> None:
     from drivers.camera.boards import load_board
-    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.cli.console import answer, emit_json
     from tactile_lab.workflow.printing import check_bar_words
 
     measured, scale = sheet.measured, sheet.scale
@@ -172,11 +172,11 @@ def _tell(sheet: PrintedSheet, as_json: bool) -> None:
     if as_json:
         files = {"pdf": str(sheet.pdf), "svg": str(sheet.svg), "descriptions": [str(d) for d in sheet.descriptions]}
         emit_json({**files, "scale": scale, "measured": measured})
-    say(f"to print    {sheet.pdf} (100 %, actual size)")
-    say(f"            {sheet.svg}")
+    answer(f"to print    {sheet.pdf} (100 %, actual size)")
+    answer(f"            {sheet.svg}")
     for description in sheet.descriptions:
-        say(f"describes   {description}")
-    say(check_bar_words(scale, measured))
+        answer(f"describes   {description}")
+    answer(check_bar_words(scale, measured))
 
 
 def _m(length_mm: float | None) -> float | None:

@@ -8,6 +8,13 @@ from typing import Annotated
 
 import typer
 
+from tactile_lab.cli.completion import complete_rig, complete_session
+
+LARGEST_SEED = 2**32 - 1
+MOST_GRASPS = 1000
+"""More than any session had; each takes about a second of computing and 25 s of the hand's time."""
+MOST_JOBS = 256
+
 
 class Method(StrEnum):
     """Estimation methods, named as in :class:`tactile_lab.slam.tactile_slam.SlamSettings`."""
@@ -34,13 +41,31 @@ SHAPE_HELP = (
     "nagata, occupancy, point-cloud, edge-features, or one of an extension."
 )
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document to standard output.")]
+
+def _keep_output(wanted: bool) -> bool:
+    """Standard output is for the document alone."""
+    from tactile_lab.cli.console import keep_output_for_json
+
+    keep_output_for_json(wanted)
+    return wanted
+
+
+Json = Annotated[
+    bool, typer.Option("--json", help="Print one JSON document to standard output.", callback=_keep_output)
+]
 Root = Annotated[Path, typer.Option(help="Folder that contains the sessions.")]
 LAST = "'last': the newest session under --root, ignoring extracts and imports"
 SessionName = Annotated[
-    str, typer.Argument(metavar="SESSION", help=f"A session's folder, its name under --root, or {LAST}.")
+    str,
+    typer.Argument(
+        metavar="SESSION",
+        help=f"A session's folder, its name under --root, or {LAST}.",
+        autocompletion=complete_session,
+    ),
 ]
-RigName = Annotated[str, typer.Option("--rig", help="Name of a built-in rig, or a rig file.")]
+_RIG = "Name of a built-in rig, or a rig file."
+RigName = Annotated[str, typer.Option("--rig", help=_RIG, autocompletion=complete_rig)]
+RigArgument = Annotated[str, typer.Argument(metavar="RIG", help=_RIG, autocompletion=complete_rig)]
 AllowUncalibrated = Annotated[
     bool,
     typer.Option(

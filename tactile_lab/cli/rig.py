@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput
+from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigArgument
 
 if TYPE_CHECKING:
     from tactile_lab.rigs.description import Rig
@@ -21,7 +21,9 @@ def list_rigs(
     ports: Annotated[
         bool, typer.Option("--ports", help="List serial ports, CAN interfaces and network interfaces instead.")
     ] = False,
-    watch: Annotated[float, typer.Option(min=0.0, help="List ports, then wait this many seconds for changes.")] = 0.0,
+    watch: Annotated[
+        float, typer.Option(min=0.0, max=86_400.0, help="List ports, then wait this many seconds for changes.")
+    ] = 0.0,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -47,7 +49,7 @@ def _list_ports(watch_s: float, as_json: bool) -> None:
     from dataclasses import asdict
 
     from drivers.core.clock import MonotonicClock
-    from tactile_lab.cli.console import emit_json, say, show_table
+    from tactile_lab.cli.console import answer, emit_json, show_table
     from tactile_lab.rigs.ports import list_all_ports, wait_for_change
 
     found = list_all_ports()
@@ -63,24 +65,23 @@ def _list_ports(watch_s: float, as_json: bool) -> None:
     changed = {port.name for port in gone} & {port.name for port in come}
     for port in gone:
         if port.name not in changed:
-            say(f"{port.name} removed: {port.description}")
+            answer(f"{port.name} removed: {port.description}")
     for port in come:
-        say(
-            f"{port.name}: now {port.description}" if port.name in changed else f"{port.name} added: {port.description}"
-        )
+        words = f": now {port.description}" if port.name in changed else f" added: {port.description}"
+        answer(f"{port.name}{words}")
     if watch_s and not (gone or come):
-        say("nothing changed")
+        answer("nothing changed")
 
 
 @app.command("show")
 def show(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="Name of a built-in rig, or a rig file.")],
+    rig: RigArgument,
     every: Annotated[bool, typer.Option("--all", help="Also show settings at their default values.")] = False,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
     """Show a rig's devices, calibration files and settings that differ from the defaults."""
-    from tactile_lab.cli.console import emit_json, say, show_facts, show_table
+    from tactile_lab.cli.console import answer, emit_json, say, show_facts, show_table
     from tactile_lab.rigs.description import load_rig
     from tactile_lab.rigs.effective_settings import effective_settings
 
@@ -92,7 +93,7 @@ def show(
     settings = effective_settings(loaded.description)
     shown = [item for item in settings if every or item.value != item.usual]
     show_facts(f"Rig {loaded.description.name}", _facts(loaded))
-    say("")
+    answer("")
     if shown:
         title = "All settings" if every else f"Settings that differ from the defaults ({len(shown)} of {len(settings)})"
         show_table(title, ["setting", "here", "usual"], [(item.name, item.value, item.usual) for item in shown])
@@ -122,8 +123,8 @@ def _facts(rig: Rig) -> list[tuple[str, str]]:
 
 @app.command("check")
 def check(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="Name of a built-in rig, or a rig file.")],
-    seed: Annotated[int, typer.Option(min=0, help="Random seed of a simulated rig.")] = 0,
+    rig: RigArgument,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Random seed of a simulated rig.")] = 0,
     move: Annotated[
         bool,
         typer.Option(
@@ -133,25 +134,29 @@ def check(
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Read a rig file and its calibration, connect every device and report its state.
+    """Read a rig file and its calibration, connect every device, and report its state and what to do next.
 
     Nothing moves without --move. A rig with force fingertips only, without a hand, can be checked too.
 
     Exit code 0: all ready; 2: a file is invalid; 4: a device is not ready.
     """
-    from tactile_lab.cli.console import emit_json, say, show_table
+    from tactile_lab.cli.console import answer, emit_json, show_table
     from tactile_lab.rigs.checks.check import check_rig
+    from tactile_lab.rigs.checks.next_steps import next_steps
 
     del no_input
     findings = check_rig(rig, seed, move=move)
+    steps = next_steps(rig, findings, moved=move)
     ready = all(finding.ok for finding in findings)
     if as_json:
         devices = [{"device": f.device, "ok": f.ok, "detail": f.detail, "figures": dict(f.figures)} for f in findings]
-        emit_json({"rig": rig, "ready": ready, "devices": devices})
+        emit_json({"rig": rig, "ready": ready, "devices": devices, "next": steps})
     else:
         rows = [[finding.device, "ok" if finding.ok else "NOT READY", finding.detail] for finding in findings]
         show_table(f"Rig {rig}", ["device", "state", "detail"], rows)
-        say("ready" if ready else "not ready", "bold green" if ready else "bold red")
+        answer("ready" if ready else "not ready", "bold green" if ready else "bold red")
+        for number, step in enumerate(steps, 1):
+            answer(f"{number}. {step}")
     if not ready:
         raise typer.Exit(4)
 
@@ -159,7 +164,7 @@ def check(
 @app.command("emulate")
 def emulate(
     rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file of kind fingertips or hand.")],
-    seconds: Annotated[float, typer.Option(min=0.0, help="Duration; 0: until Ctrl+C.")] = 0.0,
+    seconds: Annotated[float, typer.Option(min=0.0, max=1e8, help="Duration; 0: until Ctrl+C.")] = 0.0,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -169,7 +174,7 @@ def emulate(
     """
     import time
 
-    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.cli.console import answer, emit_json, say
     from tactile_lab.rigs.emulate import emulated_rig
 
     del no_input
@@ -177,6 +182,6 @@ def emulate(
         if as_json:
             emit_json({"rig": rig, "devices": places})
         for finger, place in places.items():
-            say(f"{finger}: {place}")
+            answer(f"{finger}: {place}")
         say(f"Run tactile-lab rig check {rig} in another terminal. Ctrl+C: stop")
         time.sleep(seconds or _FOR_EVER_s)

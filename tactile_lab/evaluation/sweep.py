@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import product
 from typing import Any
 
-from drivers.core.errors import TactileLabError
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
 from tactile_lab.evaluation.spread import Spread
 
@@ -22,10 +20,6 @@ class SweepRun:
     object_name: str
     dimension: int
     seed: int
-
-
-RunSession = Callable[[SweepRun], Mapping[str, Any]]
-"""Runs one session and returns the content of its ``evaluation.json``."""
 
 
 @dataclass(frozen=True)
@@ -109,35 +103,6 @@ class SweepSummary:
 def planned_runs(objects: Sequence[str], dimensions: Sequence[int], seeds: Sequence[int]) -> list[SweepRun]:
     """Every combination, seeds fastest."""
     return [SweepRun(*combination) for combination in product(objects, dimensions, seeds)]
-
-
-def sweep(
-    runs: Iterable[SweepRun],
-    run_session: RunSession,
-    finished: Callable[[SweepRow], None] = lambda row: None,
-    each: Callable[[Callable[[SweepRun], SweepRow], Iterable[SweepRun]], Iterable[SweepRow]] = map,
-) -> list[SweepRow]:
-    """Run sessions; an error makes a failed row, and the sweep continues.
-
-    Args:
-        runs: the sessions to run.
-        run_session: runs one session and returns the content of its ``evaluation.json``.
-        finished: called with each row, in the order of the runs.
-        each: applies a function to all runs, in order: the built-in ``map``, or a process pool's.
-    """
-    rows = []
-    for row in each(partial(run_one, run_session=run_session), runs):
-        rows.append(row)
-        finished(row)
-    return rows
-
-
-def run_one(run: SweepRun, run_session: RunSession) -> SweepRow:
-    """One row of a sweep."""
-    try:
-        return SweepRow(run, run_session(run))
-    except TactileLabError as error:
-        return SweepRow(run, None, str(error))
 
 
 def summaries(rows: Sequence[SweepRow]) -> list[SweepSummary]:

@@ -17,8 +17,9 @@ from gtsam import Pose3
 from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, SessionError
 from drivers.core.poses import rotation_angle_rad
+from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 
 COLUMNS = ("stamp_s", *(f"world_T_object_{row}{column}" for row in range(4) for column in range(4)))
 """Columns of ``trajectory.csv``: the stamp, then the 4 x 4 matrix row by row."""
@@ -101,8 +102,8 @@ def read_trajectory(path: Path) -> Trajectory:
         SessionError: the file is missing or not in the format of :func:`trajectory_text`.
     """
     try:
-        rows = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
-    except (OSError, UnicodeDecodeError) as error:
+        rows = list(csv.reader(io.StringIO(read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8"))))
+    except (OSError, ConfigurationError, UnicodeDecodeError) as error:
         raise SessionError(
             "trajectory cannot be read", where=str(path), hint="Replay the session to write its results"
         ) from error

@@ -18,6 +18,8 @@ from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import cache, partial
+from multiprocessing.process import BaseProcess
+from multiprocessing.queues import SimpleQueue
 from pathlib import Path
 from typing import IO
 
@@ -114,30 +116,86 @@ def _in_processes(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]
     """Rows as they are finished; the processes end with this generator, however it ends."""
     os.environ.update(ONE_THREAD, PYTHONSAFEPATH="1")  # inherited: no worker imports from the current folder
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare_worker)
+    watch = _WorkerWatch(context.SimpleQueue(), cells)
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare_worker, initargs=(watch.begun,))
     try:
-        waiting = {pool.submit(execute, cell, work) for cell in cells}
+        waiting = {pool.submit(_execute_in_worker, cell, work) for cell in cells}
         while waiting:
+            watch.look(pool)
             ready, waiting = wait(waiting, _LOOK_s, return_when=FIRST_COMPLETED)
             for future in ready:
                 yield future.result()
     except BrokenProcessPool as error:
-        hint = "Memory may have run out: use fewer --jobs. The same command resumes where it stopped"
-        raise SessionError("a worker process died", where="experiment", hint=hint) from error
+        hint = "Memory may have run out: use fewer --jobs. Finished runs are kept: the same command resumes behind them"
+        raise SessionError(watch.deaths(), where="workers", hint=hint) from error
     finally:
         _end(pool)
 
 
 def _end(pool: ProcessPoolExecutor) -> None:
     """End the workers at once: a run may take a minute, and nobody waits for it any more."""
-    pool.shutdown(wait=False, cancel_futures=True)
     for process in multiprocessing.active_children():
         process.terminate()
-    pool.shutdown(wait=True)
+    pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _prepare_worker() -> None:
+class _WorkerWatch:
+    """Which run each worker is at, so that a death can be told with it.
+
+    Args:
+        begun: where workers say their process id and the key of the run that they begin.
+        cells: all runs.
+    """
+
+    def __init__(self, begun: SimpleQueue[tuple[int, str]], cells: Sequence[Cell]) -> None:
+        self.begun = begun
+        self._cells = {cell.key: cell for cell in cells}
+        self._at: dict[int, str] = {}
+        self._processes: dict[int, BaseProcess] = {}
+
+    def look(self, pool: ProcessPoolExecutor) -> None:
+        """Take note of the workers there are, and of what they have begun."""
+        self._processes.update(pool._processes or {})
+        self._hear()
+
+    def _hear(self) -> None:
+        while not self.begun.empty():
+            process_id, key = self.begun.get()
+            self._at[process_id] = key
+
+    def deaths(self) -> str:
+        """Which worker died of what, and at which run; the pool ends the others by SIGTERM."""
+        self._hear()
+        ended = {number: process.exitcode for number, process in self._processes.items() if process.exitcode}
+        own = {number: code for number, code in ended.items() if code != -signal.SIGTERM} or ended
+        told = [f"{_cause(code)} at {self._words(number)}" for number, code in own.items()]
+        return f"a worker process was {'; '.join(told)}" if told else "a worker process died"
+
+    def _words(self, process_id: int) -> str:
+        key = self._at.get(process_id)
+        return "its start" if key is None else self._cells[key].words()
+
+
+def _cause(code: int) -> str:
+    if code > 0:
+        return f"ended with exit code {code}"
+    return f"killed by {signal.Signals(-code).name}"
+
+
+_begun: SimpleQueue[tuple[int, str]] | None = None
+"""In a worker: where it says what it begins."""
+
+
+def _execute_in_worker(cell: Cell, work: Work) -> Row:
+    if _begun is not None:
+        _begun.put((os.getpid(), cell.key))
+    return execute(cell, work)
+
+
+def _prepare_worker(begun: SimpleQueue[tuple[int, str]]) -> None:
     """Ctrl+C reaches every process of a terminal: only the parent answers. Extensions are known here as well."""
+    global _begun
+    _begun = begun
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     load_named_extensions()
 

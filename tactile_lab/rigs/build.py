@@ -58,8 +58,7 @@ def simulated_world(rig: Rig, seed: int, object_name: str) -> SimulatedWorld:
     """The world of a simulated rig with an object on its table.
 
     Raises:
-        ConfigurationError: no such object; or no calibration of the fingertips for it.
-        ShapeError: the object's mesh cannot be used.
+        ConfigurationError: no such object, a mesh that cannot be used, or no calibration of the fingertips for it.
     """
     settings = simulation_settings(rig, object_name)
     return SimulatedWorld(settings, seed, SimulatedCalibration.with_tips(settings.fingertips, rig.files["fingertips"]))

@@ -102,8 +102,8 @@ def open_laboratory(rig: Rig, seed: int, object_name: str) -> Iterator[Simulated
     A real laboratory takes any name for its object. That of the catalogue, or of a mesh, tells its true shape.
 
     Raises:
-        ConfigurationError: no such object in a simulation, or emulators that this program does not have.
-        ShapeError: the object's mesh cannot be used.
+        ConfigurationError: no such object in a simulation, a mesh that cannot be used, or emulators that this program
+            does not have.
         DeviceError: a emulator cannot be started, or the rig leaves it to the hand's cable which palm there is, and
             none that can be driven is found.
     """

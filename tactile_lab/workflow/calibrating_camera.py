@@ -30,12 +30,14 @@ class Gathering:
         pictures: how many were looked at.
         refused: reasons by picture.
         alike: pictures that show nothing new.
+        newest: name of the picture that was looked at last.
     """
 
     views: list[BoardView] = field(default_factory=list)
     pictures: int = 0
     refused: dict[str, str] = field(default_factory=dict)
     alike: int = 0
+    newest: str = ""
 
     @property
     def coverage(self) -> Coverage:
@@ -85,7 +87,7 @@ def gather_views(
 def _take(found: Gathering, picture: Picture, board: AnyBoard) -> bool:
     """Look at one picture; whether there is news."""
     found.pictures += 1
-    name = f"picture {picture.counter}"
+    name = found.newest = picture.name
     view = view_of(name, picture.image, board)
     if isinstance(view, str):
         found.refused[name] = view

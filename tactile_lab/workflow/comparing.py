@@ -14,7 +14,7 @@ import numpy as np
 from drivers.core.atomic_files import write_whole
 from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import Array
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, SessionError
 from sessions.recording.session import TRAJECTORY, Session
 from sessions.recording.session_events import EventKind, SessionEvent
 from sessions.recording.traffic.schemas import SESSION_EVENTS_TOPIC, TRANSFORMS_TOPIC
@@ -85,7 +85,7 @@ def _check_different(sessions: Sequence[Session]) -> None:
     """A session counted twice would make a confidence interval too narrow. Raises SessionError."""
     for name, count in Counter(session.manifest.name for session in sessions).items():
         if count > 1:
-            raise SessionError(
+            raise ConfigurationError(
                 "is given twice", where=name, hint="Give each session once, and not together with its copy"
             )
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from drivers.core.atomic_files import write_whole
-from drivers.core.errors import ConfigurationError, SessionError, TactileLabError
+from drivers.core.errors import ConfigurationError, TactileLabError, given_by_a_person
 from sessions.exchange.archives import import_archive
 from sessions.exchange.contact_log import ContactLog, read_contact_log, write_contact_log
 from sessions.exchange.timed_contacts import ImportSettings, read_timed_contacts
@@ -16,7 +16,7 @@ from tactile_lab.evaluation.files.mesh_io import read_mesh
 
 
 def import_session(archive: Path, root: Path, name: str | None = None) -> Session:
-    """A session out of a ZIP archive. Raises SessionError."""
+    """A session out of a ZIP archive. Raises as :func:`sessions.exchange.archives.import_archive`."""
     return import_archive(archive, root, name)
 
 
@@ -24,19 +24,19 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
     """Timed contacts as a contact log, with the true mesh, where there is one, copied beside it.
 
     Raises:
-        SessionError: a file cannot be read, or the log exists already.
+        ConfigurationError: a file cannot be read, the contacts do not fit the form or do not make sense, the mesh
+            cannot be used, or the log exists already; nothing is left then.
         WriteError: a file cannot be written.
-        ConfigurationError: the contacts do not fit the form or do not make sense; nothing is left then.
-        ShapeError: the mesh cannot be used.
     """
     if log.exists():
-        raise SessionError("exists already", where=str(log), hint="Choose another name with --out")
+        raise ConfigurationError("exists already", where=str(log), hint="Choose another name with --out")
     if mesh is not None:
+        with given_by_a_person():
+            read_mesh(mesh)
         settings = replace(settings, object_name=mesh.stem, mesh=log.with_suffix(mesh.suffix).name)
     contacts, made = read_timed_contacts(file, settings), [log]
     try:
         if mesh is not None:
-            read_mesh(mesh)
             made += _copy(mesh, log.with_suffix(mesh.suffix))
         write_contact_log(log, contacts)
         read_contact_log(log)  # refuses normals that point inward
@@ -51,13 +51,15 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
 
 
 def _copy(mesh: Path, copy: Path) -> list[Path]:
-    """The file that was made: none where the mesh is in its place already. Raises SessionError, WriteError."""
+    """The file that was made: none where the mesh is in its place already. Raises ConfigurationError, WriteError."""
     if copy.exists() and copy.resolve() != mesh.resolve():
-        raise SessionError("exists already", where=str(copy), hint="Choose another name with --out")
+        raise ConfigurationError("exists already", where=str(copy), hint="Choose another name with --out")
     if copy.exists():
         return []
     try:
         write_whole(copy, mesh.read_bytes())
     except OSError as error:
-        raise SessionError(f"cannot be read ({error.strerror})", where=str(mesh), hint="Check the path") from error
+        raise ConfigurationError(
+            f"cannot be read ({error.strerror})", where=str(mesh), hint="Check the path"
+        ) from error
     return [copy]

@@ -11,7 +11,7 @@ import trimesh
 
 from drivers.core.configuration import load, validate
 from drivers.core.contacts import Array
-from drivers.core.errors import ConfigurationError, TactileLabError
+from drivers.core.errors import ConfigurationError, TactileLabError, given_by_a_person
 from sessions.conductor.progress import NullProgress, Progress
 from sessions.exchange.contact_log import ContactLog, read_contact_log
 from sessions.recording.listing import find_session
@@ -19,6 +19,7 @@ from tactile_lab.evaluation.files.mesh_io import read_mesh
 from tactile_lab.evaluation.files.result_files import write_results
 from tactile_lab.evaluation.judged import Truth
 from tactile_lab.evaluation.prism import open_ring
+from tactile_lab.slam.shape.planar.outlines import is_simple
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.workflow.judging import FinishedSession, estimate_rest, remove_results, write_evaluation
 from tactile_lab.workflow.replaying import check_replaceable, recorded_seed, recorded_slam, replay_session
@@ -82,10 +83,12 @@ def reconstruct(
         progress: is told which grasp is being estimated.
 
     Raises:
-        ConfigurationError: log, settings or folder do not fit, or the method needs a truth that is not there.
-        SessionError, ShapeError: the data, or the true mesh, cannot be read.
+        ConfigurationError: options, log, true mesh, settings or folder do not fit, or the method needs a truth that is
+            not there.
+        SessionError: the recording cannot be read.
     """
     path = Path(source)
+    wishes.apply({})  # a mistake in the options is told before anything is read
     if path.suffix.lower() == ".csv":
         hint = f"To convert timed contacts: tactile-lab session import {source}"
         raise ConfigurationError("is a table, not a contact log", where=source, hint=hint)
@@ -140,12 +143,26 @@ def log_truth(log: ContactLog, folder: Path) -> Truth:
     """The truth in a log, for evaluation. A mesh is a file beside the log.
 
     Raises:
-        ShapeError: the mesh cannot be used, or the polygon has no area.
+        ConfigurationError: the mesh cannot be used or is elsewhere, or the polygon has no area or crosses itself.
     """
     mesh: trimesh.Trimesh | None = None
     outline_m: Array | None = None
     if log.truth is not None and log.truth.mesh is not None:
-        mesh = read_mesh(folder / log.truth.mesh)
+        mesh = _mesh_beside(folder, log.truth.mesh)
     if log.truth is not None and log.truth.polygon_m is not None:
-        outline_m = open_ring(np.array(log.truth.polygon_m))
+        with given_by_a_person():
+            outline_m = open_ring(np.array(log.truth.polygon_m))
+        if not is_simple(outline_m):
+            what, hint = "crosses itself", "List its corners one after the other, around the object"
+            raise ConfigurationError(what, where="object.polygon_m", hint=hint)
     return Truth(log.true_poses, mesh, outline_m)
+
+
+def _mesh_beside(folder: Path, name: str) -> trimesh.Trimesh:
+    """The mesh of this name in a folder. Raises ConfigurationError, also for a link that leads out of it."""
+    path = folder / name
+    if path.resolve().parent != folder.resolve():
+        what = "leads out of the log's own folder"
+        raise ConfigurationError(what, where=str(path), hint="Put a copy of the mesh beside the log")
+    with given_by_a_person():
+        return read_mesh(path)

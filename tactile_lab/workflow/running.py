@@ -11,7 +11,8 @@ from typing import Any
 from calibration.store.admission import UNCALIBRATED, admit
 from drivers.core.configuration import validate
 from drivers.core.errors import ConfigurationError, EstimationError, InterruptionError
-from drivers.simulation.objects import ObjectModel
+from drivers.simulation.mesh_object import MESH_PREFIX
+from drivers.simulation.objects import ObjectModel, check_object
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import Progress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
@@ -75,6 +76,21 @@ def refuse_known_pose(method: str) -> None:
         raise ConfigurationError("a running session does not know the true poses", where="known-pose", hint=hint)
 
 
+def check_request(request: SessionRequest) -> Rig:
+    """The rig, once all that was asked for exists: method, policy, rig and object; nothing was started yet.
+
+    Raises:
+        ConfigurationError: what does not.
+    """
+    refuse_known_pose(request.method)
+    if request.policy is not None:
+        make_policy(request.policy)
+    rig = load_rig(request.rig)
+    if rig.description.kind == "simulated" or rig.description.emulated or request.object_name.startswith(MESH_PREFIX):
+        check_object(request.object_name)
+    return rig
+
+
 def run_session(request: SessionRequest, progress: Progress, attendance: Attendance = ALONE) -> FinishedSession:
     """Run a session on a rig, and judge it.
 
@@ -84,15 +100,12 @@ def run_session(request: SessionRequest, progress: Progress, attendance: Attenda
         attendance: who guides it, or watches.
 
     Raises:
-        ConfigurationError, ShapeError: the request cannot be met; nothing was recorded.
+        ConfigurationError: the request cannot be met; nothing was recorded.
         DeviceError: the rig is not ready; the session folder says so, where there is one yet.
         SessionError: the session could not be recorded.
         InterruptionError: a person ended it at once; the session folder is kept and readable.
     """
-    refuse_known_pose(request.method)
-    if request.policy is not None:
-        make_policy(request.policy)
-    rig = load_rig(request.rig)
+    rig = check_request(request)
     check_calibration(rig)
     overlooked = admit(rig.own_calibrations, rig.installation, allow_uncalibrated=request.allow_uncalibrated)
     slam = TactileSlam(slam_settings(request.method, request.dimension, rig.description.motion), request.seed)

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from drivers.core.errors import SessionError
-from drivers.simulation.objects import CATALOGUE
+from drivers.simulation.objects import CATALOGUE, check_object
 from sessions.conductor.progress import NullProgress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.recording.session import Session
 from tactile_lab.evaluation.sweep import SweepRun
-from tactile_lab.rigs.build import check_calibration, simulated_world
+from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.workflow.judging import differing_files
 from tactile_lab.workflow.replaying import recorded_seed, recorded_slam, replay_session
@@ -23,15 +23,15 @@ def check_sweep(rig: str, objects: Sequence[str] | None, root: Path, method: str
     """The objects of a sweep, the whole catalogue when None; what would fail in every run fails here.
 
     Raises:
-        ConfigurationError: no such rig, object or calibration, or a method that needs the truth.
-        ShapeError: an object's mesh cannot be used.
+        ConfigurationError: no such rig, object or calibration, a mesh that cannot be used, or a method that needs the
+            truth.
         SessionError: the folder of the sessions cannot be made.
     """
     refuse_known_pose(method)
     loaded = load_rig(rig)
     check_calibration(loaded)
     for name in objects or ():
-        simulated_world(loaded, 0, name)
+        check_object(name)
     try:
         root.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -53,6 +53,8 @@ def run_for_sweep(
     """
     request = SessionRequest(rig, run.object_name, root, method, run.dimension, run.seed, grasps)
     finished = run_session(request, NullProgress())
+    if finished.outcome is not None and finished.outcome.ending is Ending.INTERRUPTED:
+        raise KeyboardInterrupt  # of the sweep: it is to run again
     if finished.evaluation is None:
         raise SessionError(finished.problem, where=str(finished.folder))
     if check_replay:

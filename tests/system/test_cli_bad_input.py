@@ -119,7 +119,7 @@ def test_a_finger_without_a_calibrated_tip_is_told(inside, rig_file):
     fingertips.write_text(yaml.safe_dump(content))
     answer = inside("rig", "check", rig_file)
     assert answer.code == 4  # plain figures do not say where they come from
-    assert re.search(r"fingertip MF +ok +none", answer.err)
+    assert re.search(r"fingertip MF +ok +none", answer.out)
 
 
 @pytest.fixture
@@ -147,7 +147,7 @@ def mesh_folder(tmp_path: Path) -> Path:
 )
 def test_a_mesh_that_can_not_be_used(inside, mesh_folder, file, words):
     out = mesh_folder / "runs"
-    one_line(inside("run", "--object", f"mesh:{mesh_folder / file}", "--out", out), 1, file, *words)
+    one_line(inside("run", "--object", f"mesh:{mesh_folder / file}", "--out", out), 2, file, *words)
     assert not out.exists()
 
 
@@ -165,4 +165,4 @@ def test_a_folder_for_sessions_that_is_a_file(inside, tmp_path):
 
 def test_a_list_of_sessions_in_a_file(inside, tmp_path):
     (tmp_path / "file").write_text("")
-    one_line(inside("session", "list", "--root", tmp_path / "file"), 1, "cannot be read")
+    one_line(inside("session", "list", "--root", tmp_path / "file"), 2, "cannot be read")

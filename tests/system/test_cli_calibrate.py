@@ -73,7 +73,7 @@ def test_a_result_outside_its_limits_ends_with_3_and_replaces_nothing(inside, da
     out = tmp_path / "forearm.yaml"
     answer = inside("calibrate", "forearm", "--from", data, "--settings", settings, "--out", out, "--no-input")
     assert answer.code == 3
-    assert "OUTSIDE" in answer.err
+    assert "OUTSIDE" in answer.out
     assert files(tmp_path) == ["forearm.failed.yaml", "strict.yaml"]
 
 

@@ -77,7 +77,7 @@ def test_joints_outside_their_limits_end_with_3_and_replace_nothing(inside, tmp_
     out = tmp_path / "joints.yaml"
     answer = inside("calibrate", "joints", "--from", source, "--out", out, "--no-input")
     assert answer.code == 3
-    assert words in " ".join(answer.err.split())
+    assert words in " ".join(answer.out.split())
     assert files(tmp_path) == ["joints.failed.yaml", "poses.yaml"]
     assert read_record(tmp_path / "joints.failed.yaml").verdict == "FAIL"
 
@@ -121,9 +121,9 @@ def test_sound_electrodes_are_told_with_their_tare(inside, tmp_path):
 def test_dead_and_open_electrodes_are_named_with_exit_code_3(inside, tmp_path):
     answer = inside("calibrate", "electrodes", "--from", counts(tmp_path / "counts.csv", {3: 1800.0, 7: 4095.0}))
     assert answer.code == 3
-    assert "never changes: dead" in answer.err
-    assert "at the end of its range" in answer.err
-    assert "2 faulty" in answer.err
+    assert "never changes: dead" in answer.out
+    assert "at the end of its range" in answer.out
+    assert "2 faulty" in answer.out
 
 
 @pytest.mark.parametrize(

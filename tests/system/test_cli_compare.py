@@ -99,9 +99,9 @@ def test_all_results_of_one_session_are_compared_when_it_is_judged_elsewhere(
 ) -> None:
     answer = inside("evaluate", laboratory / "first", "--out", tmp_path / "out")
     assert answer.code == 0, answer.err
-    assert "2 evaluations" in answer.err
-    assert "joint, 2-D" in answer.err
-    assert "odometry, 2-D" in answer.err
+    assert "2 evaluations" in answer.out
+    assert "joint, 2-D" in answer.out
+    assert "odometry, 2-D" in answer.out
     assert "truth    first: from corners" in answer.err
     assert "clocks   first: camera to hand" in answer.err
 

@@ -11,8 +11,8 @@ from mcap.writer import Writer
 EVERY = ("session show", "session replay", "evaluate", "report")
 
 
-def refused(answer, *words: str) -> None:
-    assert (answer.code, answer.out) == (1, ""), answer
+def refused(answer, *words: str, code: int = 1) -> None:
+    assert (answer.code, answer.out) == (code, ""), answer
     errors = [line for line in answer.err.splitlines() if line.startswith("error: ")]
     assert len(errors) == 1, answer.err
     for word in words:
@@ -30,7 +30,7 @@ def foreign_mcap(path) -> None:
 
 @pytest.mark.parametrize("command", EVERY)
 def test_a_folder_that_is_no_session(inside, tmp_path, command):
-    refused(inside(*command.split(), tmp_path), "not a session folder")
+    refused(inside(*command.split(), tmp_path), "not a session folder", code=2)
 
 
 @pytest.mark.parametrize("share", [0.95, 0.6])
@@ -112,7 +112,7 @@ def test_a_description_that_can_not_be_read(inside, session_copy, change, words)
         refused(inside(*command.split(), session_copy), "session.yaml", words)
     listed = inside("session", "list", "--root", session_copy.parent)
     assert listed.code == 0
-    assert "damaged" in listed.err
+    assert "damaged" in listed.out
     assert words in listed.err
 
 
@@ -171,5 +171,5 @@ def test_evaluating_a_damaged_recording_warns(inside, session_copy):
 def test_a_session_never_closed_is_shown_and_replayed(inside, session_copy):
     manifest = session_copy / "session.yaml"
     manifest.write_text(manifest.read_text().replace("status: closed", "status: open"))
-    assert "killed before it was closed" in inside("session", "show", session_copy).err
+    assert "killed before it was closed" in inside("session", "show", session_copy).out
     assert inside("session", "replay", session_copy, "--method", "odometry").code == 0

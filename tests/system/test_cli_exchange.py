@@ -142,9 +142,9 @@ def test_a_log_that_can_not_be_written_is_named(inside, tmp_path):
 
 def test_a_true_mesh_in_millimetres_or_that_is_missing_is_named(inside, tmp_path):
     (tmp_path / "other.csv").write_text("time_s,x_m,y_m,z_m,nx,ny,nz\n0,0.05,0,0,1,0,0\n1,-0.05,0,0,-1,0,0\n")
-    refused(inside("session", "import", tmp_path / "other.csv", "--mesh", tmp_path / "no.ply"), 1, "no.ply")
+    refused(inside("session", "import", tmp_path / "other.csv", "--mesh", tmp_path / "no.ply"), 2, "no.ply")
     trimesh.creation.box((120.0, 60.0, 60.0)).export(tmp_path / "mm.ply")
-    refused(inside("session", "import", tmp_path / "other.csv", "--mesh", tmp_path / "mm.ply"), 1, "millimetres?")
+    refused(inside("session", "import", tmp_path / "other.csv", "--mesh", tmp_path / "mm.ply"), 2, "millimetres?")
     assert not (tmp_path / "other-log.json").exists()
 
 
@@ -176,7 +176,7 @@ def test_a_session_is_exported_in_every_form_and_opens_in_programs_that_are_not_
     with zipfile.ZipFile(tmp_path / "all.zip") as archive:
         assert archive.testzip() is None
     for form, name in forms.items():
-        refused(inside("session", "export", piece, f"--{form}", tmp_path / name), 1, name, "exists already")
+        refused(inside("session", "export", piece, f"--{form}", tmp_path / name), 2, name, "exists already")
 
 
 @pytest.mark.parametrize("form", ["csv", "hdf5", "rosbag", "archive"])
@@ -208,8 +208,8 @@ def test_a_piece_of_a_session_is_cut_out_and_lists_like_any_other(inside, record
         assert answer.code in (1, 2)
         assert told in answer.err
     assert [path.name for path in into.parent.iterdir()] == ["piece-1"]
-    refused(inside("session", "extract", recorded, "--into", into), 1, "exists already")
-    refused(inside("session", "extract", recorded, "--into", tmp_path / "A Piece"), 1, "cannot be the name")
+    refused(inside("session", "extract", recorded, "--into", into), 2, "exists already")
+    refused(inside("session", "extract", recorded, "--into", tmp_path / "A Piece"), 2, "cannot be the name")
 
 
 # --- archives ------------------------------------------------------------------------------------------------------
@@ -233,9 +233,9 @@ def test_an_archive_becomes_a_session_that_lists_and_shows(inside, packed, tmp_p
     shown = json.loads(inside("session", "show", "from-afar", "--root", tmp_path / "runs", "--json").out)
     assert (shown["name"], shown["counts"]["grasps"]) == ("from-afar", 2)
     refused(
-        inside("session", "import", packed, "--root", tmp_path / "runs", "--name", "from-afar"), 1, "exists already"
+        inside("session", "import", packed, "--root", tmp_path / "runs", "--name", "from-afar"), 2, "exists already"
     )
-    refused(inside("session", "import", packed, "--root", tmp_path / "runs", "--name", "../up"), 1, "cannot be the")
+    refused(inside("session", "import", packed, "--root", tmp_path / "runs", "--name", "../up"), 2, "cannot be the")
 
 
 @pytest.mark.parametrize(
@@ -254,7 +254,7 @@ def test_an_archive_that_can_not_be_trusted_leaves_nothing_behind(inside, packed
     duplicate = pytest.warns(UserWarning, match="Duplicate") if "joints" in name else nullcontext()
     with duplicate, zipfile.ZipFile(bad, "a", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(name, content)
-    refused(inside("session", "import", bad, "--root", tmp_path / "runs"), 1, "bad.zip", words, "Nothing was imported")
+    refused(inside("session", "import", bad, "--root", tmp_path / "runs"), 2, "bad.zip", words, "Nothing was imported")
     assert not (tmp_path / "runs").exists()
     assert not list(tmp_path.rglob("evil*"))
 
@@ -263,8 +263,8 @@ def test_what_is_no_archive_or_a_torn_one_is_told(inside, packed, tmp_path):
     (tmp_path / "torn.zip").write_bytes(packed.read_bytes()[:-200])
     (tmp_path / "empty.zip").write_bytes(b"")
     for name in ("torn.zip", "empty.zip"):
-        refused(inside("session", "import", tmp_path / name, "--root", tmp_path / "runs"), 1, name, "not a ZIP archive")
-    refused(inside("session", "import", tmp_path / "none.zip", "--root", tmp_path / "runs"), 1, "No such file")
+        refused(inside("session", "import", tmp_path / name, "--root", tmp_path / "runs"), 2, name, "not a ZIP archive")
+    refused(inside("session", "import", tmp_path / "none.zip", "--root", tmp_path / "runs"), 2, "No such file")
     assert not (tmp_path / "runs").exists()
 
 
@@ -326,9 +326,9 @@ def test_a_calibration_that_is_not_the_recorded_one_is_refused_wherever_bytes_ar
     for command in ("replay", "export"):
         more = ("--csv", tmp_path / "tables") if command == "export" else ()
         refused(inside("session", command, session_copy, *more), 1, "joints.yaml", "changed since the recording")
-    assert "joints" in inside("session", "show", session_copy).err
+    assert "joints" in inside("session", "show", session_copy).out
     assert inside("session", "export", session_copy, "--archive", tmp_path / "a.zip").code == 0
-    refused(inside("session", "import", tmp_path / "a.zip", "--root", tmp_path / "in"), 1, "changed since")
+    refused(inside("session", "import", tmp_path / "a.zip", "--root", tmp_path / "in"), 2, "changed since")
     assert not (tmp_path / "tables").exists()
 
 

@@ -39,7 +39,7 @@ def test_a_sheet_is_written_as_pdf_and_svg_with_what_describes_it(
     assert files(tmp_path) == sorted([f"{kind}.pdf", f"{kind}.svg", *(f"{name}.yaml" for name in names)])
     assert (told["measured"], told["scale"]) == (False, 1.0)
     assert [load_board(Path(description)).kind for description in told["descriptions"]] == [kind] * len(names)
-    assert "check bar not measured yet" in answer.err
+    assert "check bar not measured yet" in answer.err + answer.out
     width_mm, height_mm = (297, 420) if "A3" in words else (210, 297)
     page = re.search(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", Path(told["pdf"]).read_bytes())
     assert page is not None
@@ -65,7 +65,7 @@ def test_the_measured_bar_of_a_print_is_stored_and_one_that_is_off_is_not(inside
 def test_the_rigs_markers_are_printed_with_the_true_scale(inside: Any, tmp_path: Path) -> None:
     answer = inside("markers", "rig", "--rig", "sim", "--measured-mm", 100.2, "--out", tmp_path, "--no-input")
     assert answer.code == 0, answer.err
-    assert "true scale 1.0020" in answer.err
+    assert "true scale 1.0020" in answer.err + answer.out
     settings = load_parameters(tmp_path / "rig-markers.yaml", MarkerSettings)
     assert settings.print_scale == pytest.approx(1.002)
     printed = (tmp_path / "rig-markers.svg").read_text()
@@ -96,7 +96,7 @@ def test_a_person_is_asked_for_the_bar_and_may_answer_later(
         (("single", "--number", 50), 2, "50"),
         (("single", "--side-mm", -4), 2, "side_m"),
         (("single", "--measured-mm", 99.2), 2, "at most 0.5 % are allowed"),
-        (("grid", "--measured-mm", "nan"), 2, "measured_bar_mm"),
+        (("grid", "--measured-mm", "nan"), 2, "must be a finite number, not nan"),
         (("rig", "--rig", "nowhere"), 2, "nowhere"),
         (("rig", "--measured-mm", 101), 2, "at most 0.5 % are allowed"),
         (("{folder}/nothing.yaml", "--measured-mm", 100), 2, "file not found"),

@@ -61,7 +61,7 @@ def test_a_replay_in_another_process_is_identical(tactile_lab, session_copy):
     answer = tactile_lab("session", "replay", session_copy, "--json")
     assert answer.code == 0
     assert json.loads(answer.out)["identical"] is True
-    assert "identical" in answer.err
+    assert "identical" in answer.err + answer.out
     same_bytes(session_copy / "results", session_copy / "replay")
 
 
@@ -116,7 +116,7 @@ def test_evaluate_and_report_give_the_same_again(inside, session_copy):
 
 def test_the_evaluation_table_fits_eighty_columns(inside, session_copy):
     answer = inside("evaluate", session_copy)
-    table = answer.err[: answer.err.index("session ")]
+    table = answer.out[: answer.out.index("session ")]
     assert all(len(line) <= 80 for line in table.splitlines())
     assert all(words in table for words in ("Hausdorff distance", "best fit", "Position error", "Registration error"))
 
@@ -131,5 +131,5 @@ def test_sessions_are_found_by_folder_by_name_and_as_the_last(inside, recorded_r
     assert shown[0] == shown[1] == shown[2]
     assert shown[0]["notes"] == "for the tests"
     people = inside("session", "show", "last", "--root", recorded_root)
-    assert people.out == ""
-    assert "2 of 2" in people.err
+    assert people.err == f"last  {recorded}\n"
+    assert "2 of 2" in people.out

@@ -17,8 +17,8 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 def test_slips_of_recorded_sessions_are_told_and_too_few_say_so(inside, recorded_root, recorded):
     answer = inside("session", "slips", "--root", recorded_root)
     assert answer.code == 0
-    assert "Slips in 1 session (" in answer.err
-    assert "left in place" in answer.err
+    assert "Slips in 1 session (" in answer.out
+    assert "left in place" in answer.out
     assert "at least 10 are needed" in answer.err
     document = json.loads(inside("session", "slips", recorded.name, "--root", recorded_root, "--json").out)
     assert document["sessions"] == [recorded.name]
@@ -32,7 +32,7 @@ def test_the_motion_is_printed_as_the_rig_file_wants_it(inside, recorded_root, r
     rng = np.random.default_rng(3)
     slips = Slips(rng.normal(size=(40, 3)) * [0.006, 0.006, 0.15], rng.normal(size=(40, 3)) * [0.0006, 0.0006, 0.01])
     monkeypatch.setattr("tactile_lab.workflow.measuring_slips.session_slips", lambda session: slips)
-    said = inside("session", "slips", recorded.name, "--root", recorded_root).err
+    said = inside("session", "slips", recorded.name, "--root", recorded_root).out
     assert "pushed by the closing hand although left in place: 0 of 40" in said
     motion = MotionNoise.model_validate(yaml.safe_load(said.split("for the rig file:")[1])["motion"])
     assert motion.translation_m == pytest.approx(0.006, rel=0.2)

@@ -187,7 +187,7 @@ def test_a_fingertip_outside_its_limits_replaces_nothing(inside: Any, measured: 
     strict.write_text(yaml.safe_dump({"limits": {"force_mN": 0.001}}))
     words = ("--from", measured / "wrenches.yaml", "--settings", strict, "--out", out, "--no-input")
     answer = inside("calibrate", "fingertip", *words)
-    assert (answer.code, "OUTSIDE" in answer.err) == (3, True), answer.err
+    assert (answer.code, "OUTSIDE" in answer.out) == (3, True), answer.err
     assert contents(tmp_path).keys() == {"strict.yaml", "result.failed.yaml"}
 
 

@@ -70,7 +70,8 @@ def test_help_loads_nothing_heavy():
     code = (
         "import sys; from typer.testing import CliRunner; from tactile_lab.cli.app import app;"
         "assert CliRunner().invoke(app, ['run', '--help']).exit_code == 0;"
-        "heavy = {'numpy', 'gtsam', 'mujoco', 'cv2', 'scipy', 'matplotlib', 'numba'} & set(sys.modules);"
+        "heavy = {'numpy', 'gtsam', 'mujoco', 'cv2', 'scipy', 'matplotlib', 'numba', 'yaml', 'viser',"
+        " 'trimesh', 'h5py'} & set(sys.modules);"
         "assert not heavy, heavy"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
@@ -95,13 +96,24 @@ def test_help_loads_nothing_heavy():
         ("sweep --seeds -1", "--seeds"),
         ("sweep --dimensions 2,5", "--dimensions"),
         ("sweep --jobs 0", "--jobs"),
+        ("sweep --jobs 257", "must be less than or equal to 256"),
+        ("run --seed 4294967296", "--seed"),
+        ("run --grasps 1001", "--grasps"),
+        ("run --seed one", "must be a valid integer"),
+        ("run --mode guided --pace nan", "--pace"),
+        ("calibrate forearm --method manual --rpy-deg 0 0 inf", "must be a finite number, not inf"),
+        ("session replay last --speed nan", "--speed"),
+        ("experiment ablation --seeds 0-99999999", "--seeds"),
     ],
 )
 def test_a_usage_error_names_the_option_and_exits_with_2(words, told, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     answer = invoke(words)
     assert answer.exit_code == 2
-    assert told in " ".join(answer.stderr.replace("│", " ").split())
+    words = " ".join(answer.stderr.replace("│", " ").split())
+    assert told in words
+    assert "Value error" not in words
+    assert "Input should" not in words
     assert answer.stdout == ""
     assert not list(tmp_path.iterdir())
 
@@ -118,10 +130,55 @@ def test_the_shape_models_on_offer_are_those_there_are():
 
 def test_the_rigs_are_listed_for_people_and_for_programs(inside):
     spoken, document = inside("rig", "list"), inside("rig", "list", "--json")
-    assert (spoken.code, spoken.out) == (0, "")
-    assert "sim-biotac" in spoken.err
+    assert (spoken.code, spoken.err) == (0, "")
+    assert "sim-biotac" in spoken.out
     assert {rig["name"] for rig in json.loads(document.out)} >= {"sim", "sim-biotac"}
     assert document.err == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("run", "--object", "boxx"), "there is no object 'boxx'"),
+        (("run", "--policy", "guess"), "there is no policy 'guess'"),
+        (("run", "--rig", "nowhere"), "nowhere"),
+        (("run", "--method", "known-pose"), "known-pose"),
+        (("run", "--object", "mesh:none.ply"), "none.ply: file not found"),
+        (("reconstruct", "none.json", "--shape", "guess"), "guess"),
+    ],
+)
+def test_what_does_not_exist_is_told_before_anything_is_begun(inside, words, told, tmp_path, monkeypatch):
+    def begun(*arguments, **named):
+        raise AssertionError("begun")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("tactile_lab.workflow.running.open_laboratory", begun)
+    monkeypatch.setattr("tactile_lab.workflow.running.check_calibration", begun)
+    monkeypatch.setattr("tactile_lab.workflow.reconstructing.read_contact_log", begun)
+    answer = inside(*words)
+    assert (answer.code, answer.out) == (2, "")
+    assert told in answer.err
+    assert "Value error" not in answer.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_export_refuses_what_exists_before_it_reads_anything(inside, tmp_path):
+    (tmp_path / "there.zip").touch()
+    answer = inside("session", "export", "no-such-session", "--archive", tmp_path / "there.zip")
+    assert (answer.code, "there.zip: exists already" in answer.err) == (2, True)
+
+
+def test_the_program_is_a_module_too():
+    words = [sys.executable, "-m", "tactile_lab", "--version"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.startswith("tactile-lab ")
+
+
+def test_make_alone_lists_the_targets():
+    done = subprocess.run(["make"], capture_output=True, text=True, timeout=60, check=True)
+    targets = [line.split()[0] for line in done.stdout.splitlines()[1:]]
+    assert targets[0] == "help"
+    assert {"demo", "test", "check", "bench", "clean"} <= set(targets)
 
 
 def test_a_rig_is_checked_device_by_device(inside):
@@ -133,7 +190,7 @@ def test_a_rig_is_checked_device_by_device(inside):
 
 
 def test_nothing_is_coloured_or_boxed_for_a_program_that_reads_along(tactile_lab):
-    assert "\x1b" not in tactile_lab("rig", "list").err
+    assert "\x1b" not in tactile_lab("rig", "list").out
 
 
 def test_a_folder_without_sessions_is_no_error(inside, tmp_path):
@@ -148,5 +205,5 @@ def test_a_session_that_does_not_exist_is_named(words, tmp_path):
     for name in ("nowhere", "last"):
         answer = invoke(f"{words} {name} --root {tmp_path}")
         assert isinstance(answer.exception, TactileLabError)
-        assert answer.exception.exit_code == 1
+        assert answer.exception.exit_code == 2
         assert "tactile-lab" in str(answer.exception)

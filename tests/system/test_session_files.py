@@ -109,9 +109,9 @@ def test_a_piece_of_a_session_is_a_session(session, tmp_path):
         extract(session, tmp_path / "piece-2", Piece(transports={"elbow"}))
     with pytest.raises(SessionError, match="nothing was recorded in that part"):
         extract(session, tmp_path / "piece-2", Piece(from_s=1e6))
-    with pytest.raises(SessionError, match="exists already"):
+    with pytest.raises(ConfigurationError, match="exists already"):
         extract(session, tmp_path / "piece-1", Piece())
-    with pytest.raises(SessionError, match="cannot be the name"):
+    with pytest.raises(ConfigurationError, match="cannot be the name"):
         extract(session, tmp_path / "Piece", Piece())
     assert not (tmp_path / "piece-2").exists()
 

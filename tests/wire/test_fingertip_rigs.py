@@ -219,4 +219,4 @@ def test_the_command_tells_what_is_wrong_and_ends_with_its_code(rig: Path, capsy
     with pytest.raises(SystemExit) as ended:
         main(["rig", "emulate", str(rig), "--seconds", "0.1"])
     assert ended.value.code == 0
-    assert "FF: the box at 127.0.0.1" in capsys.readouterr().err
+    assert "FF: the box at 127.0.0.1" in capsys.readouterr().out

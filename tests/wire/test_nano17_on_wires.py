@@ -170,7 +170,7 @@ def test_a_forged_record_from_a_foreign_address_never_becomes_a_sample(box: NetB
     ("changes", "complaint"),
     [
         ({"serial": "FT99999"}, "the box uses the calibration of FT00001, but the rig file names FT99999"),
-        ({"counts_per_N": 20480.0}, "counts 1e\\+06 per N .* the rig file says 20480"),
+        ({"counts_per_N": 20480.0}, "1e\\+06 counts per N .* the rig file says 20480"),
     ],
 )
 def test_a_box_set_otherwise_than_the_rig_says_is_refused(

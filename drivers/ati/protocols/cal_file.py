@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.ati.protocols.xml_text import parse_xml
+from drivers.ati.protocols.xml_text import LARGEST, parse_xml
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import read_bounded
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 FORCE_UNITS_N = {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "klbf": 4448.2216152605, "kg": 9.80665, "g": 9.80665e-3}
@@ -117,7 +118,7 @@ def load(path: Path) -> AtiCalibration:
 
 def _parse(path: Path) -> ET.Element:
     try:
-        return parse_xml(path.read_bytes())
+        return parse_xml(read_bounded(path, LARGEST))
     except OSError as error:
         raise ConfigurationError(f"cannot be read ({error.strerror})", where=str(path)) from error
     except ValueError as error:

@@ -63,10 +63,10 @@ def pdf_bytes(sheet: Sheet) -> bytes:
         path.style.intersection_rule = IntersectionRule.EVENODD
         with pdf.drawing_context() as context:
             context.add_item(path)
-    for line in sheet.lines:
-        pdf.set_draw_color(_CUT_GREY if line.grey else 0)
-        pdf.set_line_width(line.width_mm)
-        pdf.line(*line.start, *line.end)
+    for line in sheet.lines:  # as areas: a stroke's caps would make it longer by its width
+        pdf.set_fill_color(_CUT_GREY if line.grey else 0)
+        pdf.rect(*line.area_mm, style="F")
+    pdf.set_text_color(0)
     for words in sheet.words:
         pdf.set_font("Helvetica", size=words.height_mm * _POINTS_PER_mm)
         pdf.text(*words.place, words.text)

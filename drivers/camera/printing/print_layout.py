@@ -33,12 +33,21 @@ class Area:
 
 @dataclass(frozen=True)
 class Line:
-    """A line from one place to another, millimetres; grey lines are to cut along."""
+    """A line along an edge of the paper from one place to another, millimetres; grey lines are to cut along."""
 
     start: tuple[float, float]
     end: tuple[float, float]
     width_mm: float = 0.2
     grey: bool = False
+
+    @property
+    def area_mm(self) -> tuple[float, float, float, float]:
+        """What it covers, as it ends where it ends: left, top, width and height, millimetres."""
+        (left, right), (top, bottom) = (sorted(ends) for ends in zip(self.start, self.end, strict=True))
+        half = self.width_mm / 2
+        if left == right:
+            return left - half, top, self.width_mm, bottom - top
+        return left, top - half, right - left, self.width_mm
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ class LoadLimits(StrictModel):
     torque_counts: float = Field(default=3000.0, gt=0.0)
     exceptions: dict[str, float] = Field(default_factory=_strong_wrist)
     readings: int = Field(default=5, ge=1)
-    stall_s: float = Field(default=5.0, gt=0.0)
+    stall_s: float = Field(default=1.0, gt=0.0)
     stall_rad: float = Field(default=0.05, gt=0.0)
 
 

@@ -26,9 +26,7 @@ from drivers.shadow.protocol.palm_codec import CanFrame, EdcCommand, PalmCommand
 from drivers.shadow.protocol.palm_images import PALMS, USUAL_PALM, PalmName
 
 CYCLE_ns = 1_000_000
-_BUS_NAMES = {"1": 1, "2": 2, "can1": 1, "can2": 2}
-"""How messages name their bus; candump logs that python-can writes put ``can`` before the number."""
-
+_BUSES = (1, 2)
 _SEND_TRIES = 20
 _LARGEST_IDENTIFIER = 0x7FF
 
@@ -40,6 +38,8 @@ class ShadowBridgeBus(can.BusABC):
         channel: network interface the hand is plugged into.
         can_filters: as for any python-can bus.
         motor_bus: bus of sent messages that name no channel, 1 or 2.
+        first_channel: channel by which messages name the first bus: 1, or 0 to play back a file in which another
+            program numbered the buses 1 and 2, since python-can's readers count from 0.
         palm: which palm the hand has; as its product code tells unless given, and the usual one behind a ``transport``
         that
             does not know.
@@ -60,12 +60,14 @@ class ShadowBridgeBus(can.BusABC):
         can_filters: CanFilters | None = None,
         *,
         motor_bus: int | str = 1,
+        first_channel: int | str = 1,
         palm: PalmName | int | str | None = None,
         transport: Transport | None = None,
         clock: Clock | None = None,
         **options: Any,
     ) -> None:
         self._default_bus = _checked_bus(motor_bus)
+        self._first_channel = _checked_channel(first_channel)
         named = None if palm is None else _checked_palm(palm)
         self._image = PALMS[named or USUAL_PALM]
         self._clock = clock or MonotonicClock()
@@ -183,17 +185,35 @@ class ShadowBridgeBus(can.BusABC):
             timestamp=(self._epoch_ns + stamp_ns) / NANOSECONDS,
             arbitration_id=frame.identifier & _LARGEST_IDENTIFIER,
             is_extended_id=False,
-            channel=frame.bus,
+            channel=frame.bus - 1 + self._first_channel,
             data=frame.data[: min(frame.length, 8)],
         )
 
     def _frame(self, msg: can.Message) -> CanFrame:
         if msg.is_extended_id or msg.is_remote_frame or msg.is_error_frame or msg.is_fd:
             raise can.CanOperationError("the motor buses have 11-bit data frames only")
-        bus = self._default_bus if msg.channel is None else _BUS_NAMES.get(str(msg.channel))
-        if bus is None:
-            raise can.CanOperationError(f"there is no motor bus {msg.channel}. Set the message's channel to 1 or 2")
+        bus = self._default_bus if msg.channel is None else self._bus_of(msg.channel)
         return CanFrame(bus, len(msg.data), msg.arbitration_id, bytes(msg.data).ljust(8, b"\0"))
+
+    def _bus_of(self, channel: object) -> int:
+        """The bus that a message names; candump logs that python-can writes put ``can`` before the number."""
+        number = str(channel).removeprefix("can")
+        bus = int(number) - self._first_channel + 1 if number.isdigit() else 0
+        if bus in _BUSES:
+            return bus
+        names = " or ".join(str(bus - 1 + self._first_channel) for bus in _BUSES)
+        hint = f"Set the message's channel to {names}"
+        if number == "0":
+            hint += ", or play a file of another program, which numbers the buses 1 and 2, with first_channel=0"
+        raise can.CanOperationError(f"there is no motor bus {channel}. {hint}")
+
+
+def _checked_channel(first_channel: int | str) -> int:
+    if str(first_channel) not in {"0", "1"}:
+        raise can.CanInitializationError(
+            f"the first bus cannot be channel {first_channel}. Set first_channel to 0 or 1"
+        )
+    return int(first_channel)
 
 
 def _checked_bus(motor_bus: int | str) -> int:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import zlib
+from collections.abc import Mapping
 from pathlib import Path
 
 from drivers.core.atomic_files import disk_full, write_failure
@@ -10,6 +13,21 @@ from drivers.core.errors import SessionError
 PROFILE = "tactile-lab"
 FORMAT = "tactile-traffic/2"
 END_RECORD = "tactile-lab/end"
+SEAL = "crc32"
+
+
+def sealed(info: Mapping[str, str]) -> dict[str, str]:
+    """What a writer notes, with a checksum of it: it stands in the file twice, and one of them may be damaged."""
+    return {**info, SEAL: _checksum(info)}
+
+
+def is_sealed(info: Mapping[str, str]) -> bool:
+    """Whether notes are as they were written."""
+    return info.get(SEAL) == _checksum({key: value for key, value in info.items() if key != SEAL})
+
+
+def _checksum(info: Mapping[str, str]) -> str:
+    return f"{zlib.crc32(json.dumps(info, sort_keys=True).encode()):08x}"
 
 
 def segment_path(path: Path, number: int) -> Path:

@@ -1,8 +1,9 @@
 """MCAP files for a stream of many small messages.
 
-Writes what the library's own writer would write, byte for byte, but appends a message to the current chunk in one step:
-there are hundreds per second, and the library needs ten times as long for each. Rare records are written by the
-library. A chunk can be taken from the writer and compressed and written later, by another thread.
+Writes what the library's own writer would write, but puts a message into the chunk at hand in one go: hundreds come a
+second, and the library spends ten times as long on each. Every chunk describes the channels of its messages again, so
+that it can be read when the others are damaged. The records of which there are few are the library's. A chunk can be
+taken from the writer and compressed and written later, by another thread.
 """
 
 from __future__ import annotations
@@ -68,6 +69,7 @@ class McapWriter:
         self._chunk = PendingChunk()
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
+        self._encoded: dict[int, bytes] = {}
         self._chunk_indices = bytearray()  # as records: thousands come, and objects would take ten times as much
         self._chunk_count, self._span_ns = 0, (0, 0)
         self._metadata_indices: list[MetadataIndex] = []
@@ -110,7 +112,9 @@ class McapWriter:
         number = len(self._channels) + 1
         channel = Channel(id=number, topic=topic, message_encoding=message_encoding, schema_id=schema, metadata={})
         self._channels.append(channel)
-        self._chunk.define(_encode(channel))
+        self._encoded[number] = _encode(channel)
+        self._chunk.define(self._encoded[number])
+        self._chunk.described.add(number)
         return number
 
     def add_message(self, channel: int, log_ns: int, data: bytes, publish_ns: int, sequence: int) -> None:
@@ -118,6 +122,9 @@ class McapWriter:
         chunk = self._chunk
         if not chunk.entries:
             chunk.first_ns = log_ns
+        if channel not in chunk.described:
+            chunk.described.add(channel)
+            chunk.records += self._encoded[channel]
         chunk.last_ns = log_ns
         chunk.entries.setdefault(channel, bytearray()).extend(_INDEX_ENTRY.pack(log_ns, len(chunk.records)))
         chunk.records += _MESSAGE.pack(
@@ -233,6 +240,8 @@ class PendingChunk:
     def __init__(self) -> None:
         self.records = bytearray()
         self.definitions = bytearray()
+        self.described: set[int] = set()
+        """Channels whose description is in it."""
         self.entries: dict[int, bytearray] = {}
         self.first_ns = self.last_ns = 0
 

@@ -2,8 +2,10 @@
 
 A truncated file (killed process, full disk, power cut) has no summary, and its last record may be incomplete. Every
 complete chunk is read, and :attr:`TrafficReader.loss` says what was not. A chunk that was damaged on disk is skipped
-and counted; the chunks after it are read. A recording in several files is read as one. Recordings of older versions are
-converted while they are read (see :mod:`sessions.recording.traffic.formats`).
+and counted; the chunks after it are read, each by itself: it describes what is in it. A recording in several
+files is read as one. Recordings of older versions are
+converted while they are read (see
+:mod:`sessions.recording.traffic.formats`).
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import re
 import struct
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -28,9 +31,13 @@ from mcap.stream_reader import breakup_chunk
 
 from drivers.core.errors import SessionError
 from sessions.recording.traffic import formats, raw_frames, schemas
-from sessions.recording.traffic.files import END_RECORD, PROFILE, segment_path
-from sessions.recording.traffic.mcap_frames import Frames
+from sessions.recording.traffic.files import END_RECORD, PROFILE, SEAL, is_sealed, segment_path
+from sessions.recording.traffic.mcap_frames import DAMAGE, Frames
+from sessions.recording.traffic.mcap_summary import Summary, read_summary
 from sessions.recording.traffic.raw_frames import UNSTAMPED, DeviceStamp
+
+LARGEST_CHUNK_bytes = 16 << 20
+"""A chunk is closed after 64 KiB: more is a picture. A small file may claim to hold gigabytes."""
 
 _UNREADABLE = (McapError, zstandard.ZstdError, struct.error, ValueError, OverflowError, MemoryError)
 """What the mcap package raises on damaged content."""
@@ -55,18 +62,21 @@ class Loss:
         truncated: the file ends too early; up to the last tenth of a second was not written.
         unreadable_bytes: bytes after the last complete record.
         damaged_chunks: chunks skipped.
+        damaged_records: places where no record begins though one should; reading goes on at the next one.
         missing_messages: gaps in the numbering of what was read.
-        by_topic: messages of damaged chunks whose index could be read, by topic; part of ``missing_messages``.
+        by_topic: messages missing by topic: in a whole file by its summary, else those of damaged chunks whose index
+            could be read; part of ``missing_messages``.
     """
 
     truncated: bool = False
     unreadable_bytes: int = 0
     damaged_chunks: int = 0
+    damaged_records: int = 0
     missing_messages: int = 0
     by_topic: dict[str, int] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
-        return self.truncated or self.damaged_chunks > 0 or self.missing_messages > 0
+        return self.truncated or self.damaged_chunks > 0 or self.damaged_records > 0 or self.missing_messages > 0
 
     def describe(self) -> str:
         """The loss in words; empty if nothing was lost."""
@@ -76,6 +86,8 @@ class Loss:
             parts.append(f"the file ends too early{torn}")
         if self.damaged_chunks:
             parts.append(f"{self.damaged_chunks} damaged chunks skipped")
+        if self.damaged_records:
+            parts.append(f"damaged in {self.damaged_records} more places ({self.unreadable_bytes} bytes)")
         if self.missing_messages:
             parts.append(f"{self.missing_messages} messages missing")
         return "; ".join(parts)
@@ -86,6 +98,7 @@ class Loss:
             "truncated": int(self.truncated),
             "unreadable_bytes": self.unreadable_bytes,
             "damaged_chunks": self.damaged_chunks,
+            "damaged_records": self.damaged_records,
             "missing_messages": self.missing_messages,
         }
         return {kind: number for kind, number in kinds.items() if number}
@@ -115,7 +128,7 @@ class TrafficReader:
         """All readable messages, from the beginning."""
         self.loss, self.end, expected = Loss(), {}, 0
         for path in segment_paths(self.path):
-            segment = _SegmentMessages(path, self.loss)
+            segment = _SegmentMessages(path, self.loss, expected)
             for topic, message in segment:
                 self.loss.missing_messages += (message.sequence - expected) & 0xFFFFFFFF
                 expected = message.sequence + 1
@@ -123,6 +136,8 @@ class TrafficReader:
                     self.loss.missing_messages += 1
                     continue
                 yield self._as_now(topic, message)
+            self.loss.missing_messages += segment.lost_at_end
+            expected += segment.lost_at_end
             self.end = segment.end
         self.loss.truncated |= not self.end and self.info.get("format") != formats.TRAFFIC_FORMATS[0]
 
@@ -158,22 +173,32 @@ class TrafficReader:
         return TrafficMessage(topic, payload, stamp_ns, message.sequence, device)
 
     def _read_preamble(self, path: Path) -> Callable[[formats.Message], formats.Message]:
+        """What the header and the writer's own notes say; these stand there twice, in case one is damaged."""
+        notes: list[dict[str, str]] = []
+        profile: str | None = None
         with _open(path) as file:
-            frames = Frames(file)
-            if not frames.is_mcap:
-                raise SessionError("not an MCAP file", where=str(path), hint="Restore it from a copy of the session")
-            try:
-                for opcode, content in frames:
+            frames = Frames(file, read_summary(file).landmarks)
+            begun = False
+            for opcode, content in frames:
+                begun = begun or opcode not in (DAMAGE, Opcode.HEADER)
+                if opcode == Opcode.CHUNK:
+                    break
+                with suppress(*_UNREADABLE):
                     if opcode == Opcode.HEADER:
-                        self._check_profile(Header.read(ReadDataStream(BytesIO(content))).profile)
+                        profile = Header.read(ReadDataStream(BytesIO(content))).profile
                     elif opcode == Opcode.METADATA:
-                        self.info = Metadata.read(ReadDataStream(BytesIO(content))).metadata
-                        return formats.traffic_converter(self.info.get("format"), str(path))
-                    else:
-                        return formats.traffic_converter(None, str(path))
-            except _UNREADABLE as error:
-                raise SessionError(f"its beginning is damaged ({error})", where=str(path)) from error
-        return formats.traffic_converter(formats.TRAFFIC_FORMATS[-1], str(path))  # torn before it says anything
+                        found = Metadata.read(ReadDataStream(BytesIO(content)))
+                        notes += [found.metadata] if found.name == PROFILE else []
+            if frames.damaged_magic and not (notes or profile == PROFILE):
+                raise SessionError("not an MCAP file", where=str(path), hint="Restore it from a copy of the session")
+        if not notes:
+            if profile is not None:
+                self._check_profile(profile)
+            # torn before it says anything; else of the first version
+            return formats.traffic_converter(None if begun else formats.TRAFFIC_FORMATS[-1], str(path))
+        self.info = dict(next((note for note in notes if is_sealed(note)), notes[0]))
+        self.info.pop(SEAL, None)
+        return formats.traffic_converter(self.info.get("format"), str(path))
 
     def _check_profile(self, profile: str) -> None:
         if profile != PROFILE:
@@ -194,38 +219,60 @@ def segment_paths(path: Path) -> list[Path]:
 class _SegmentMessages:
     """The messages of one file with their topics (None if unknown)."""
 
-    def __init__(self, path: Path, loss: Loss) -> None:
+    def __init__(self, path: Path, loss: Loss, expected: int) -> None:
         self.end: dict[str, str] = {}
+        self.lost_at_end = 0
+        """Messages lost behind the last one read, by summary or index: no gap in the numbering shows them."""
         self._path, self._loss = path, loss
         self._topics: dict[int, str] = {}
-        self._lost: Counter[int] = Counter()
-        self._after_damage = False
+        self._read: Counter[int] = Counter()
+        self._indexed: Counter[int] = Counter()
+        self._times: dict[int, list[int]] = {}
+        self._chunk_is_read = False
+        self._gaps, self._expected = 0, expected
 
     def __iter__(self) -> Iterator[tuple[str | None, Message]]:
         with _open(self._path) as file:
-            frames = Frames(file)
+            summary = read_summary(file)
+            self._topics.update(summary.topics)
+            frames = Frames(file, summary.landmarks)
             for opcode, content in frames:
                 for record in self._records(opcode, content):
                     if isinstance(record, Channel):
                         self._topics[record.id] = record.topic
                     elif isinstance(record, Message):
+                        self._note(record)
                         yield self._topics.get(record.channel_id), record
             self._loss.truncated |= not frames.complete
             self._loss.unreadable_bytes += frames.unreadable_bytes
-            for channel, number in self._lost.items():
-                topic = self._topics.get(channel, f"channel {channel}")
-                self._loss.by_topic[topic] = self._loss.by_topic.get(topic, 0) + number
+            self._tell_lost(summary)
+
+    def _note(self, message: Message) -> None:
+        self._read[message.channel_id] += 1
+        self._gaps += (message.sequence - self._expected) & 0xFFFFFFFF
+        self._expected = message.sequence + 1
+
+    def _tell_lost(self, summary: Summary) -> None:
+        """What is lost of each topic: by the summary, else by the indices of chunks that could not be read."""
+        lost = Counter(summary.counts) - self._read if summary.counts else self._indexed
+        for channel, number in lost.items():
+            topic = self._topics.get(channel, f"channel {channel}")
+            self._loss.by_topic[topic] = self._loss.by_topic.get(topic, 0) + number
+        self.lost_at_end = max(0, lost.total() - self._gaps)
 
     def _records(self, opcode: int, content: bytes) -> list[McapRecord]:
         try:
-            if opcode == Opcode.CHUNK:
-                self._after_damage = True  # until it is read
-                records = breakup_chunk(Chunk.read(ReadDataStream(BytesIO(content))), validate_crc=True)
-                self._after_damage = False
-                return records
-            if opcode == Opcode.MESSAGE_INDEX and self._after_damage:
+            if opcode == DAMAGE:
+                self._loss.damaged_records += 1
+                self._chunk_is_read = False  # it may have been a chunk, or an index of the one before
+            elif opcode == Opcode.CHUNK:
+                self._times, self._chunk_is_read = {}, False  # until it is read
+                return self._chunk(content)
+            elif opcode == Opcode.MESSAGE_INDEX:
                 index = MessageIndex.read(ReadDataStream(BytesIO(content)))
-                self._lost[index.channel_id] += len(index.records)
+                times = [stamp_ns for stamp_ns, _ in index.records]
+                if not self._chunk_is_read and times != self._times.get(index.channel_id):
+                    self._indexed[index.channel_id] += len(times)  # of a chunk that could not be read
             elif opcode == Opcode.METADATA:
                 found = Metadata.read(ReadDataStream(BytesIO(content)))
                 self.end = found.metadata if found.name == END_RECORD else self.end
@@ -235,6 +282,24 @@ class _SegmentMessages:
         except _UNREADABLE:
             self._loss.damaged_chunks += opcode == Opcode.CHUNK
         return []
+
+    def _chunk(self, content: bytes) -> list[McapRecord]:
+        chunk = Chunk.read(ReadDataStream(BytesIO(content)))
+        _check_size(chunk)
+        records = breakup_chunk(chunk, validate_crc=True)
+        times: dict[int, list[int]] = {}
+        for record in records:
+            if isinstance(record, Message):
+                times.setdefault(record.channel_id, []).append(record.log_time)
+        self._times, self._chunk_is_read = times, True
+        return records
+
+
+def _check_size(chunk: Chunk) -> None:
+    """No recorder makes a chunk larger than this, and unpacking one takes no more. Raises ValueError."""
+    packed = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else len(chunk.data)
+    if chunk.compression not in ("", "zstd") or max(chunk.uncompressed_size, packed) > LARGEST_CHUNK_bytes:
+        raise ValueError(f"a chunk of {max(chunk.uncompressed_size, packed)} bytes, packed by {chunk.compression!r}")
 
 
 def _open(path: Path) -> BinaryIO:

@@ -23,7 +23,7 @@ from drivers.core.clock import NANOSECONDS
 from drivers.core.errors import SessionError
 from sessions.recording.traffic import foxglove, raw_frames, schemas
 from sessions.recording.traffic.disk import DiskThread, Segment, Syncer
-from sessions.recording.traffic.files import END_RECORD, FORMAT, PROFILE, disk_failure, segment_path
+from sessions.recording.traffic.files import END_RECORD, FORMAT, PROFILE, disk_failure, sealed, segment_path
 from sessions.recording.traffic.mcap_writer import McapWriter, PendingChunk
 from sessions.recording.traffic.raw_frames import UNSTAMPED, DeviceStamp, Stamper
 from sessions.recording.traffic.settings import Attached, TrafficSettings
@@ -237,9 +237,11 @@ class TrafficWriter:
         file = self._settings.open_file(path)
         try:
             writer = McapWriter(file, None, PROFILE, f"tactile-lab {version('tactile-lab')}")
-            writer.add_metadata(PROFILE, {**self._info, "segment": str(number), "format": FORMAT})
+            info = sealed({**self._info, "segment": str(number), "format": FORMAT})
+            writer.add_metadata(PROFILE, info)
             for attached in self._attachments:
                 writer.add_attachment(attached.name, attached.media_type, attached.content)
+            writer.add_metadata(PROFILE, info)
         except OSError as error:
             file.close()
             raise disk_failure(path, error, 0) from error

@@ -62,7 +62,7 @@ def biotac(
     from calibration.fingertip.normals import calibrate_normals, normals_record
     from calibration.store.store import target_file, write_record
     from drivers.biotac.press_recording import read_presses
-    from tactile_lab.cli.console import emit_json, say, show_table
+    from tactile_lab.cli.console import answer, emit_json, show_table
 
     del no_input
     found = calibrate_normals(read_presses(recording, normals), in_sensor_frame=sensor_frame)
@@ -77,8 +77,10 @@ def biotac(
         columns = ["method", "median", "90 %", "sigma", "in 68 %", "in 95 %"]
         cells = [_cells(row) for row in found.methods]
         show_table("Angle to the measured normal on the second half, degrees", columns, cells, right=(1, 2, 3, 4, 5))
-        say(f"median error of the learned normals: {found.share:.2f} of that of equation 2.24 with squeezed electrodes")
-        say("PASS" if found.passed else "FAIL", "bold green" if found.passed else "bold red")
+        answer(
+            f"median error of the learned normals: {found.share:.2f} of that of equation 2.24 with squeezed electrodes"
+        )
+        answer("PASS" if found.passed else "FAIL", "bold green" if found.passed else "bold red")
     if not found.passed:
         raise typer.Exit(OUTSIDE)
 

@@ -35,8 +35,8 @@ def camera(
     size: Annotated[str, typer.Option(help="Image size to request from the camera, such as 1280x720.")] = "1280x720",
     exposure_ms: Annotated[float | None, typer.Option(help="Fix the camera's exposure.")] = None,
     focus: Annotated[float | None, typer.Option(help="Fix the camera's focus, in its driver's units.")] = None,
-    views: Annotated[int, typer.Option(min=5, help="Minimum number of views for a PASS.")] = 12,
-    most: Annotated[int, typer.Option(min=5, help="Stop after this many views.")] = 60,
+    views: Annotated[int, typer.Option(min=5, max=10_000, help="Minimum number of views for a PASS.")] = 12,
+    most: Annotated[int, typer.Option(min=5, max=10_000, help="Stop after this many views.")] = 60,
     third_radial: Annotated[
         bool, typer.Option("--k3", help="Estimate a third radial distortion coefficient, for wide lenses.")
     ] = False,
@@ -107,9 +107,8 @@ def _guide(found: Gathering) -> None:
     """One line per view: how many there are, and what is missing next."""
     from tactile_lab.cli.console import count, say
 
-    name = f"picture {found.pictures}"
-    if name in found.refused:
-        say(f"{name}: rejected, {found.refused[name]}", "dim")
+    if found.newest in found.refused:
+        say(f"{found.newest}: rejected, {found.refused[found.newest]}", "dim")
         return
     missing = found.coverage.missing
     rest = f"; and {len(missing) - 1} more" if len(missing) > 1 else ""

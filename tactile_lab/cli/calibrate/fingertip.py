@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.calibrate.biotac import Finger
-from tactile_lab.cli.options import Json, NoInput, RigName
+from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName
 from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -31,8 +31,8 @@ def fingertip(
         typer.Option(help="File to write the result to.", show_default="calibrations/STATION/fingertips.yaml"),
     ] = None,
     settings: Annotated[Path | None, typer.Option(help="Settings file: limits, speeds, force.")] = None,
-    presses: Annotated[int, typer.Option(min=6, help="Number of presses on the table.")] = 10,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed of a simulated rig.")] = 0,
+    presses: Annotated[int, typer.Option(min=6, max=1000, help="Number of presses on the table.")] = 10,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Random seed of a simulated rig.")] = 0,
     replace: Annotated[bool, typer.Option("--replace", help="Replace an existing result without asking.")] = False,
     notes: Annotated[str, typer.Option(help="Notes to store with the result.")] = "",
     view: View = False,

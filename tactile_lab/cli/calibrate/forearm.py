@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput, RigName
+from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName
 from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -49,22 +49,22 @@ def forearm(
     geometry: Annotated[Path | None, typer.Option(help="Geometry to press, instead of the rig's.")] = None,
     board: Annotated[Path | None, typer.Option(help="Board on the hand, instead of the rig's.")] = None,
     fingers: Annotated[str, typer.Option(help="Fingers that press (not the thumb).")] = "FF,MF",
-    touches: Annotated[int, typer.Option(min=1, help="Number of touches per face.")] = 8,
+    touches: Annotated[int, typer.Option(min=1, max=1000, help="Number of touches per face.")] = 8,
     pictures: Annotated[
-        int | None, typer.Option(min=3, help="Number of pictures of the board.", show_default="20")
+        int | None, typer.Option(min=3, max=1000, help="Number of pictures of the board.", show_default="20")
     ] = None,
     translation_mm: Annotated[Triple, typer.Option(help="manual: position x y z of world_T_mount.")] = (0.0, 0.0, 0.0),
     rpy_deg: Annotated[
         Triple, typer.Option(help="manual: rotation of world_T_mount as roll pitch yaw about fixed axes.")
     ] = (0.0, 0.0, 0.0),
     sigma_mm: Annotated[
-        float | None, typer.Option(min=0.0, help="manual: standard deviation of the position per axis.")
+        float | None, typer.Option(min=0.0, max=1000.0, help="manual: standard deviation of the position per axis.")
     ] = None,
     sigma_deg: Annotated[
-        float | None, typer.Option(min=0.0, help="manual: standard deviation of the rotation per axis.")
+        float | None, typer.Option(min=0.0, max=180.0, help="manual: standard deviation of the rotation per axis.")
     ] = None,
-    valid_days: Annotated[float, typer.Option(min=0.01, help="How long the result stays valid.")] = 90.0,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed of a simulated rig.")] = 0,
+    valid_days: Annotated[float, typer.Option(min=0.01, max=36_500.0, help="How long the result stays valid.")] = 90.0,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Random seed of a simulated rig.")] = 0,
     replace: Annotated[bool, typer.Option("--replace", help="Replace an existing result without asking.")] = False,
     notes: Annotated[str, typer.Option(help="Notes to store with the result.")] = "",
     view: View = False,

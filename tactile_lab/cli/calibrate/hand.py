@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput, RigName
+from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName
 from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -31,10 +31,10 @@ def joints(
     rig: RigName = "sim",
     block: Annotated[Path | None, typer.Option(help="Geometry file with the block, instead of the rig's.")] = None,
     fingers: Annotated[str, typer.Option(help="Fingers that press the block (not the thumb).")] = "FF,MF,RF",
-    rounds: Annotated[int, typer.Option(min=1, help="Number of presses per face and posture.")] = 1,
+    rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of presses per face and posture.")] = 1,
     settings: Annotated[Path | None, typer.Option(help="Settings file: limits, errors, speeds.")] = None,
     record: Annotated[Path | None, typer.Option(help="Also write the measured touches or poses to this file.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed of a simulated rig.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Random seed of a simulated rig.")] = 0,
     out: Annotated[
         Path | None, typer.Option(help="File to write the result to.", show_default="calibrations/STATION/joints.yaml")
     ] = None,
@@ -139,7 +139,7 @@ def _show_joints(found: FoundJoints, faults: Mapping[str, tuple[str, ...]]) -> N
     """The corrections, the joints that the data do not determine, and the touches against their limits."""
     from math import degrees
 
-    from tactile_lab.cli.console import say, show_table
+    from tactile_lab.cli.console import answer, show_table
 
     rows = [_joint_row(joint, correction, faults[joint]) for joint, correction in found.corrections.items()]
     rows += [
@@ -150,9 +150,9 @@ def _show_joints(found: FoundJoints, faults: Mapping[str, tuple[str, ...]]) -> N
     columns = ["joint", "shift, deg", "sigma", "gain", "residual, deg", "poses", ""]
     show_table("Joints", columns, rows, right=(1, 2, 3, 4, 5))
     for judgement in found.judgements:
-        say(f"touches: {judgement}", "dim" if judgement.ok else "bold red")
+        answer(f"touches: {judgement}", "dim" if judgement.ok else "bold red")
     if not found.trusted:
-        say("the contacts are outside their limits", "bold red")
+        answer("the contacts are outside their limits", "bold red")
 
 
 def _joint_row(joint: str, found: JointCorrection, faults: tuple[str, ...]) -> list[str]:
@@ -166,7 +166,7 @@ def electrodes(source: Source, as_json: Json = False, no_input: NoInput = False)
     One line per sample, one column per electrode. Exit code 0: all OK; 2: the table cannot be used; 3: some are faulty.
     """
     from calibration.fingertip.electrodes import faulty_electrodes, load_untouched
-    from tactile_lab.cli.console import emit_json, say, show_table
+    from tactile_lab.cli.console import answer, emit_json, show_table
 
     del no_input
     counts = load_untouched(source)
@@ -179,6 +179,6 @@ def electrodes(source: Source, as_json: Json = False, no_input: NoInput = False)
         emit_json({"tare": counts.mean(axis=0).tolist(), "faults": {str(i + 1): text for i, text in faults.items()}})
     else:
         show_table("Electrodes", ["electrode", "tare", "noise", ""], rows, right=(0, 1, 2))
-        say("all OK" if not faults else f"{len(faults)} faulty", "bold red" if faults else "bold green")
+        answer("all OK" if not faults else f"{len(faults)} faulty", "bold red" if faults else "bold green")
     if faults:
         raise typer.Exit(3)

@@ -77,10 +77,10 @@ def _measure(wizard: Guided[P, T], step: Step[P], measurer: EmulatorHost[P, T], 
 
 
 def _tell_motion(report: MotionReport) -> None:
-    from tactile_lab.cli.console import show_table
+    from tactile_lab.cli.console import people, show_table
 
     columns, rows, right = _motion_table(report)
-    show_table("Motion", columns, rows, right=right)
+    show_table("Motion", columns, rows, right=right, where=people)
 
 
 def _motion_table(report: MotionReport) -> tuple[list[str], list[list[str]], tuple[int, ...]]:
@@ -113,7 +113,7 @@ def store_result(
     from calibration.store.store import target_file, write_record
     from drivers.core.calibration_file import plain
     from tactile_lab.cli.calibrate.tables import tell_verdict
-    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.cli.console import answer, emit_json, say
 
     tell_verdict(record)
     target = target_file(file, record)
@@ -122,7 +122,7 @@ def store_result(
     write_record(target, record, comment)
     if as_json:
         emit_json({"file": str(target), **plain(record)})
-    say(f"stored  {target}")
+    answer(f"stored  {target}")
     if record.verdict == "FAIL":
         raise typer.Exit(OUTSIDE)
     say(f"To use it, name it in the rig file: calibration.{record.kind}: {file}")

@@ -8,7 +8,7 @@ from typing import Any
 from calibration.steps.quality import Judgement
 from calibration.store.store import CalibrationRecord
 from drivers.core.configuration import flatten_keys
-from tactile_lab.cli.console import say, show_facts, show_table
+from tactile_lab.cli.console import answer, show_facts, show_table
 
 _LONGEST = 12
 _LONGEST_TEXT = 200
@@ -35,7 +35,7 @@ def show_record(title: str, record: CalibrationRecord) -> None:
 
 def tell_verdict(record: CalibrationRecord) -> None:
     """PASS or FAIL, coloured."""
-    say(record.verdict, "bold green" if record.verdict == "PASS" else "bold red")
+    answer(record.verdict, "bold green" if record.verdict == "PASS" else "bold red")
 
 
 def show_quality(judgements: Iterable[Judgement]) -> None:

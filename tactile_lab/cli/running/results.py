@@ -9,7 +9,7 @@ import typer
 
 from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.recording.traffic.stream_counts import LATE_ns
-from tactile_lab.cli.console import complain, emit_json, say, warn
+from tactile_lab.cli.console import answer, complain, emit_json, say, warn
 from tactile_lab.cli.sessions.evaluation_table import show_evaluation
 from tactile_lab.cli.sessions.tables import losses_in_words
 from tactile_lab.workflow.judging import FinishedSession
@@ -68,11 +68,11 @@ def _tell_outcome(outcome: SessionOutcome | None) -> None:
 
 
 def _tell_files(finished: FinishedSession) -> None:
-    say(f"{'contact log' if finished.folder.is_file() else 'session':<13}{finished.folder}")
+    answer(f"{'contact log' if finished.folder.is_file() else 'session':<13}{finished.folder}")
     for name, what in FILES:
         path = finished.results / name
         if path.is_file():
-            say(f"{what:<13}{path}")
+            answer(f"{what:<13}{path}")
 
 
 def _tell_losses(finished: FinishedSession) -> None:
@@ -89,6 +89,8 @@ def _exit_code(finished: FinishedSession) -> int:
         return outcome.error.exit_code
     if outcome is not None and outcome.ending is Ending.INTERRUPTED:
         return 130
-    if finished.problem or (outcome is not None and outcome.ending is Ending.OBJECT_LOST):
+    if finished.problem:
         return 1
-    return 3 if finished.data_loss or finished.unread else 0
+    lost = finished.evaluation is not None and finished.evaluation.status == "lost"
+    lost = lost or (outcome is not None and outcome.ending is Ending.OBJECT_LOST)
+    return 3 if lost or finished.data_loss or finished.unread else 0

@@ -10,7 +10,17 @@ from typing import Annotated, Literal
 
 import typer
 
-from tactile_lab.cli.options import METHOD_HELP, AllowUncalibrated, Json, Method, NoInput, RigName
+from tactile_lab.cli.completion import complete_object, complete_policy
+from tactile_lab.cli.options import (
+    LARGEST_SEED,
+    METHOD_HELP,
+    MOST_GRASPS,
+    AllowUncalibrated,
+    Json,
+    Method,
+    NoInput,
+    RigName,
+)
 from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
 
 _GUIDED, _EXPLORATION = "Guided sessions", "Choice of the grasps"
@@ -33,14 +43,20 @@ class LedBy(StrEnum):
 def run(
     rig: RigName = "sim",
     object_name: Annotated[
-        str, typer.Option("--object", help="Simulated rig: an object of its catalogue, or mesh:FILE (metres).")
+        str,
+        typer.Option(
+            "--object",
+            help="Simulated rig: an object of its catalogue, or mesh:FILE (metres).",
+            autocompletion=complete_object,
+        ),
     ] = "box-10x6x4",
     grasps: Annotated[
-        int | None, typer.Option(min=1, help="Number of grasps.", show_default="from the rig, 16 on sim")
+        int | None,
+        typer.Option(min=1, max=MOST_GRASPS, help="Number of grasps.", show_default="from the rig, 16 on sim"),
     ] = None,
     dimension: Annotated[int, typer.Option(min=2, max=3, help="2: estimate a horizontal contour; 3: a surface.")] = 2,
     method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed of the session.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Random seed of the session.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder in which the session's folder is created.")] = Path("runs"),
     notes: Annotated[str, typer.Option(help="Notes to store with the session.")] = "",
     mode: Annotated[
@@ -67,6 +83,7 @@ def run(
         float | None,
         typer.Option(
             min=0.0,
+            max=100.0,
             help="Guided on a simulated rig: simulated seconds per real second; 0: as fast as possible.",
             show_default="1",
             rich_help_panel=_GUIDED,
@@ -82,6 +99,7 @@ def run(
             help="Exploration policy that chooses the grasps, such as information; docs/exploration.md lists all.",
             show_default="from the rig",
             rich_help_panel=_EXPLORATION,
+            autocompletion=complete_policy,
         ),
     ] = None,
     bounding_box: Annotated[
@@ -117,7 +135,7 @@ def run(
     from tactile_lab.cli.running.progress import LiveProgress
     from tactile_lab.cli.running.results import conclude
     from tactile_lab.cli.sessions.tables import tell_left_open
-    from tactile_lab.workflow.running import SessionRequest, run_session
+    from tactile_lab.workflow.running import SessionRequest, check_request, run_session
 
     guided = mode is Mode.GUIDED
     if confirm and (no_input or guided):
@@ -133,10 +151,11 @@ def run(
         )
     page = PageAddress.if_wanted(view, listen, view_port, token)
     way = GuidedWay(_leader(led_by), automatic_capture or None, pedal, 1.0 if pace is None else pace, no_input)
-    tell_left_open(out)
     request = SessionRequest(
         rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy, bounding_box
     )
+    check_request(request)  # before a page is opened, or a terminal taken
+    tell_left_open(out)
     title = f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}"
     with (
         LiveProgress(title, live=not (guided or confirm), reasons=policy is not None) as progress,

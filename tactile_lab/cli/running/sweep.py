@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.options import METHOD_HELP, Json, Method, NoInput, RigName
+from tactile_lab.cli.options import LARGEST_SEED, METHOD_HELP, MOST_GRASPS, MOST_JOBS, Json, Method, NoInput, RigName
 
 
 def sweep(
@@ -16,9 +15,9 @@ def sweep(
     seeds: Annotated[str, typer.Option(help="Comma-separated random seeds.")] = "1,2,3",
     dimensions: Annotated[str, typer.Option(help="Comma-separated dimensions: 2, 3 or 2,3.")] = "2,3",
     method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
-    grasps: Annotated[int, typer.Option(min=1, help="Number of grasps per session.")] = 16,
+    grasps: Annotated[int, typer.Option(min=1, max=MOST_GRASPS, help="Number of grasps per session.")] = 16,
     rig: RigName = "sim",
-    jobs: Annotated[int, typer.Option(min=1, help="Number of parallel sessions.")] = 2,
+    jobs: Annotated[int, typer.Option(min=1, max=MOST_JOBS, help="Number of parallel sessions.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder for the sessions and table.md.")] = Path("runs/sweep"),
     check_replay: Annotated[
         bool,
@@ -27,44 +26,39 @@ def sweep(
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
-    """Run a simulated session for every object, seed and dimension, and tabulate errors and failures."""
-    from concurrent.futures import ProcessPoolExecutor
+    """Run a simulated session for every object, seed and dimension, and tabulate errors and failures.
+
+    A sweep that was interrupted, or whose worker was killed, goes on behind its finished runs when it is started again.
+    """
     from functools import partial
 
     from drivers.core.atomic_files import write_whole
-    from tactile_lab.cli.console import emit_json, say, show_table
-    from tactile_lab.evaluation.sweep import (
-        markdown_table,
-        planned_runs,
-        summaries,
-        summary_cells,
-        summary_titles,
-        sweep,
-    )
-    from tactile_lab.workflow.sweeping import check_sweep, run_for_sweep
+    from tactile_lab.cli.console import answer, emit_json, say, show_table
+    from tactile_lab.cli.running.sweep_cells import LINES_FILE, cell_of, row_of, run_sweep_cell
+    from tactile_lab.evaluation.sweep import markdown_table, planned_runs, summaries, summary_cells, summary_titles
+    from tactile_lab.experiments.runner import RunnerSettings, run_cells
+    from tactile_lab.workflow.sweeping import check_sweep
 
     del no_input
     names = None if objects == "all" else tuple(name.strip() for name in objects.split(","))
     chosen = _numbers(dimensions, "--dimensions", smallest=2, largest=3)
-    drawn = _numbers(seeds, "--seeds")
+    drawn = _numbers(seeds, "--seeds", largest=LARGEST_SEED)
     runs = planned_runs(check_sweep(rig, names, out, method), chosen, drawn)
-    job = partial(run_for_sweep, rig=rig, method=str(method), grasps=grasps, root=out, check_replay=check_replay)
-    with ProcessPoolExecutor(jobs, initializer=_leave_ctrl_c_to_the_parent) as pool:
-        rows = sweep(runs, job, lambda row: say(row.line()), pool.map)
+    cells = [cell_of(run, rig, str(method), grasps, check_replay) for run in runs]
+    work = partial(run_sweep_cell, root=out)
+    done = run_cells(
+        "sweep", cells, work, out / LINES_FILE, RunnerSettings(jobs), lambda row, *_: say(row_of(row).line())
+    )
+    rows = [row_of(row) for row in done]
     found = summaries(rows)
     if as_json:
         emit_json([row.as_json() for row in rows])
     else:
         show_table("Median / 90th percentile / maximum", summary_titles(), map(summary_cells, found))
     write_whole(out / "table.md", markdown_table(found))
-    say(f"table  {out / 'table.md'}")
-    if all(row.evaluation is None for row in rows):
-        raise typer.Exit(1)
-
-
-def _leave_ctrl_c_to_the_parent() -> None:
-    """Ctrl+C reaches every process of the terminal: outside a session only the parent process handles it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    answer(f"table  {out / 'table.md'}")
+    if any(row.evaluation is None for row in rows):
+        raise typer.Exit(1 if all(row.evaluation is None for row in rows) else 3)
 
 
 def _numbers(text: str, option: str, smallest: int = 0, largest: int | None = None) -> tuple[int, ...]:

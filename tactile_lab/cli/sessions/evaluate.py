@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.options import LAST, Json, NoInput, Root
+from tactile_lab.cli.sessions.choosing import choose_session
 
 if TYPE_CHECKING:
     from tactile_lab.workflow.comparing import Comparison
@@ -55,12 +56,11 @@ def evaluate(
     sessions, --results, another calibration, --from or --out, the sessions are not changed: all results are compared by
     method, with confidence intervals.
     """
-    from sessions.recording.listing import find_session
     from tactile_lab.workflow.judging import TruthChoice
 
     del no_input
     choice = TruthChoice(lens, markers, basis.value)
-    found = [find_session(root, session) for session in sessions]
+    found = [choose_session(root, session) for session in sessions]
     if len(found) == 1 and not results and choice.is_recorded and out is None:
         from tactile_lab.cli.running.results import conclude
         from tactile_lab.workflow.judging import evaluate_session
@@ -75,7 +75,7 @@ def evaluate(
 
 
 def _tell(comparison: Comparison, files: list[Path], as_json: bool) -> None:
-    from tactile_lab.cli.console import emit_json, say, show_table, warn
+    from tactile_lab.cli.console import answer, emit_json, say, show_table, warn
     from tactile_lab.evaluation.comparison import short_table
 
     if as_json:
@@ -98,6 +98,6 @@ def _tell(comparison: Comparison, files: list[Path], as_json: bool) -> None:
     for session, lost in comparison.unread.items():
         warn(f"{session}: the recording is damaged: {lost}")
     for file in files:
-        say(f"written  {file}")
+        answer(f"written  {file}")
     if comparison.unread:
         raise typer.Exit(3)

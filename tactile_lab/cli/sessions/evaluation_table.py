@@ -8,7 +8,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from tactile_lab.cli.console import count, people, say
+from tactile_lab.cli.console import answer, answers, count
 from tactile_lab.evaluation.registration import registration_verdict
 from tactile_lab.evaluation.table import further_text
 
@@ -28,15 +28,15 @@ def show_evaluation(content: Mapping[str, Any]) -> None:
     """Print the content of ``evaluation.json``; unknown values show as a dash."""
     made = f"{content['dimension']}-D, method {content['method']}, seed {content['seed']}"
     basis = f"{count(content['grasps'], 'grasp')}, {count(content['contacts'], 'contact')}"
-    people.print()
-    say(
+    answers().print()
+    answer(
         f"Evaluation of {content['object']} ({made}; {basis})",
         "bold",
     )
     for grid in (_shape(content), _pose(content.get("pose") or {}), _rest(content)):
-        people.print()
-        people.print(grid)
-    people.print()
+        answers().print()
+        answers().print(grid)
+    answers().print()
 
 
 def _shape(content: Mapping[str, Any]) -> Table:

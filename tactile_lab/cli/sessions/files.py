@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from tactile_lab.cli.options import Json, NoInput, Root, SessionName
+from tactile_lab.cli.sessions.choosing import choose_session
 
 
 def extract(
@@ -24,15 +25,14 @@ def extract(
 ) -> None:
     """Extract part of a session: a time span, some transports."""
     from sessions.exchange.extracting import Piece, extract
-    from sessions.recording.listing import find_session
-    from tactile_lab.cli.console import emit_json, say
+    from tactile_lab.cli.console import answer, emit_json
 
     del no_input
     wanted = None if links is None else {link.strip() for link in links.split(",")}
-    counts = extract(find_session(root, session), into, Piece(begin, end, wanted, samples, not bare))
+    counts = extract(choose_session(root, session), into, Piece(begin, end, wanted, samples, not bare))
     if as_json:
         emit_json({"session": str(into), "messages": counts})
-    say(f"{sum(counts.values())} messages on {len(counts)} topics: {into}")
+    answer(f"{sum(counts.values())} messages on {len(counts)} topics: {into}")
 
 
 def export(
@@ -55,24 +55,24 @@ def export(
     no_input: NoInput = False,
 ) -> None:
     """Export a session to other formats: its grasps as a contact log, its samples as tables, or the whole session."""
-    from sessions.recording.listing import find_session
-    from tactile_lab.cli.console import count, emit_json, say
+    from tactile_lab.cli.console import answer, count, emit_json
     from tactile_lab.workflow import exporting
 
     del no_input
     if not any((contacts, csv, hdf5, rosbag, archive)):
         raise typer.BadParameter("give at least one of --contacts, --csv, --hdf5, --rosbag, --archive")
-    found, told = find_session(root, session), dict[str, object]()
+    exporting.refuse_existing([place for place in (contacts, csv, hdf5, rosbag, archive) if place is not None])
+    found, told = choose_session(root, session), dict[str, object]()
     if contacts is not None:
         log = exporting.export_contacts(found, contacts, dimension)
         touched = sum(len(grasp.contacts) for grasp in log.grasps)
         told |= {"log": str(contacts), "dimension": log.dimension, "grasps": len(log.grasps), "contacts": touched}
-        say(f"{count(len(log.grasps), 'grasp')} with {count(touched, 'contact')}: {contacts}")
+        answer(f"{count(len(log.grasps), 'grasp')} with {count(touched, 'contact')}: {contacts}")
     for kind, place in (("csv", csv), ("hdf5", hdf5), ("rosbag", rosbag), ("archive", archive)):
         if place is not None:
             written = exporting.EXPORTS[kind](found, place)
             told |= {kind: str(place), f"{kind}_written": written}
-            say(f"{written} {exporting.UNITS[kind]}: {place}")
+            answer(f"{written} {exporting.UNITS[kind]}: {place}")
     if as_json:
         emit_json(told)
 
@@ -89,17 +89,20 @@ def bring_in(
         Path | None, typer.Option(help="Timed contacts: mesh of the true object, closed, in metres.")
     ] = None,
     point_sigma_mm: Annotated[
-        float, typer.Option(min=0.001, help="Timed contacts: standard deviation of points that state none.")
+        float, typer.Option(min=0.001, max=100.0, help="Timed contacts: standard deviation of points that state none.")
     ] = 2.0,
     normal_sigma_deg: Annotated[
         float | None,
         typer.Option(
             min=0.1,
+            max=90.0,
             help="Timed contacts: standard deviation of normals that state none.",
             show_default="6; 20 for forces",
         ),
     ] = None,
-    gap_s: Annotated[float, typer.Option(min=0.0, help="Timed contacts: a longer pause starts a new grasp.")] = 0.5,
+    gap_s: Annotated[
+        float, typer.Option(min=0.0, max=1e6, help="Timed contacts: a longer pause starts a new grasp.")
+    ] = 0.5,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -110,7 +113,7 @@ def bring_in(
     from math import radians
 
     from sessions.exchange.timed_contacts import ImportSettings
-    from tactile_lab.cli.console import count, emit_json, say
+    from tactile_lab.cli.console import answer, count, emit_json, say
     from tactile_lab.workflow.importing import import_contacts, import_session
 
     del no_input
@@ -118,7 +121,7 @@ def bring_in(
         session = import_session(file, root, name)
         if as_json:
             emit_json({"session": str(session.folder), "status": session.manifest.status})
-        say(f"session  {session.folder}")
+        answer(f"session  {session.folder}")
         return
     sigma_rad = None if normal_sigma_deg is None else radians(normal_sigma_deg)
     settings = ImportSettings(point_sigma_mm / 1000, sigma_rad, gap_s)
@@ -127,5 +130,5 @@ def bring_in(
     touched = sum(len(grasp.contacts) for grasp in log.grasps)
     if as_json:
         emit_json({"log": str(target), "dimension": log.dimension, "grasps": len(log.grasps), "contacts": touched})
-    say(f"{count(len(log.grasps), 'grasp')} with {count(touched, 'contact')}: {target}")
+    answer(f"{count(len(log.grasps), 'grasp')} with {count(touched, 'contact')}: {target}")
     say(f"next: tactile-lab reconstruct {target} --out RESULTS")

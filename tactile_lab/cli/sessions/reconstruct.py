@@ -7,24 +7,33 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.options import LAST, METHOD_HELP, SHAPE_HELP, Json, Method, NoInput, Root
+from tactile_lab.cli.completion import complete_session, complete_shape
+from tactile_lab.cli.options import LARGEST_SEED, LAST, METHOD_HELP, SHAPE_HELP, Json, Method, NoInput, Root
+from tactile_lab.cli.sessions.choosing import resolve_name
 
 
 def reconstruct(
     source: Annotated[
         str,
         typer.Argument(
-            metavar="LOG.json|SESSION", help=f"A contact log, a session's folder, its name under --root, or {LAST}."
+            metavar="LOG.json|SESSION",
+            help=f"A contact log, a session's folder, its name under --root, or {LAST}.",
+            autocompletion=complete_session,
         ),
     ],
     method: Annotated[Method | None, typer.Option(help=METHOD_HELP, show_default="joint, or from the session")] = None,
-    shape: Annotated[str | None, typer.Option(metavar="MODEL", help=SHAPE_HELP, show_default="auto")] = None,
+    shape: Annotated[
+        str | None, typer.Option(metavar="MODEL", help=SHAPE_HELP, show_default="auto", autocompletion=complete_shape)
+    ] = None,
     dimension: Annotated[
         int | None,
         typer.Option(min=2, max=3, help="2: estimate a contour; 3: a surface.", show_default="from the data"),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Random seed of the estimation.", show_default="0, or from the session")
+        int | None,
+        typer.Option(
+            min=0, max=LARGEST_SEED, help="Random seed of the estimation.", show_default="0, or from the session"
+        ),
     ] = None,
     settings: Annotated[
         Path | None, typer.Option(help="YAML file with estimation parameters, named as in slam.json.")
@@ -32,7 +41,10 @@ def reconstruct(
     largest_sigma: Annotated[
         float | None,
         typer.Option(
-            metavar="MM", help="Also write the part of the shape with a standard deviation below this: known.ply."
+            min=0.001,
+            max=1e9,
+            metavar="MM",
+            help="Also write the part of the shape with a standard deviation below this: known.ply.",
         ),
     ] = None,
     out: Annotated[
@@ -60,5 +72,5 @@ def reconstruct(
         None if largest_sigma is None else largest_sigma / 1000,
     )
     with LiveProgress(f"reconstruction of {source}") as progress:
-        finished = reconstruct(source, root, wishes, out, progress)
+        finished = reconstruct(resolve_name(root, source), root, wishes, out, progress)
     conclude(finished, as_json)

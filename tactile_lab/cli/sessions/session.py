@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import METHOD_HELP, Json, Method, NoInput, Root, SessionName
+from tactile_lab.cli.options import LARGEST_SEED, METHOD_HELP, Json, Method, NoInput, Root, SessionName
 from tactile_lab.cli.sessions import files as session_files
 from tactile_lab.cli.sessions import slips as session_slips
+from tactile_lab.cli.sessions.choosing import choose_session, resolve_name
 
 if TYPE_CHECKING:
     from sessions.recording.session import Session
@@ -42,12 +43,11 @@ def list_all(root: Root = Path("runs"), as_json: Json = False, no_input: NoInput
 @app.command("show")
 def show(session: SessionName, root: Root = Path("runs"), as_json: Json = False, no_input: NoInput = False) -> None:
     """Show a session's devices and settings, how it ended and what it recorded."""
-    from sessions.recording.listing import find_session
     from tactile_lab.cli.console import emit_json
     from tactile_lab.cli.sessions.tables import show_session
 
     del no_input
-    found = find_session(root, session)
+    found = choose_session(root, session)
     if as_json:
         emit_json(found.manifest.model_dump(mode="json"))
     else:
@@ -66,10 +66,12 @@ def replay(
         int | None, typer.Option(min=2, max=3, help="Dimension: 2 or 3.", show_default="from the session")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Random seed of the estimation.", show_default="from the session")
+        int | None,
+        typer.Option(min=0, max=LARGEST_SEED, help="Random seed of the estimation.", show_default="from the session"),
     ] = None,
     speed: Annotated[
-        float, typer.Option(min=0.0, help="1: original speed; 4: four times as fast; 0: as fast as possible.")
+        float,
+        typer.Option(min=0.0, max=1e6, help="1: original speed; 4: four times as fast; 0: as fast as possible."),
     ] = 0.0,
     as_json: Json = False,
     no_input: NoInput = False,
@@ -78,7 +80,6 @@ def replay(
 
     The first replay of a session that was killed before it had results writes them to its own results folder.
     """
-    from sessions.recording.listing import find_session
     from tactile_lab.cli.console import say
     from tactile_lab.cli.running.progress import LiveProgress
     from tactile_lab.cli.running.results import conclude
@@ -87,7 +88,7 @@ def replay(
     from tactile_lab.workflow.running import slam_settings
 
     del no_input
-    recorded = find_session(root, session)
+    recorded = choose_session(root, session)
     own = recorded_slam(recorded)
     same = method is None and dimension is None and seed is None
     settings = own if same else slam_settings(method or own.method, dimension or own.dimension, own.motion)
@@ -121,7 +122,7 @@ def recover(
     from tactile_lab.cli.sessions.tables import recovery_document, show_recovery
 
     del no_input
-    recovery = recover(session_folder(root, session))
+    recovery = recover(session_folder(root, resolve_name(root, session)))
     if as_json:
         emit_json(recovery_document(recovery))
     show_recovery(recovery)
@@ -132,12 +133,12 @@ def recover(
 def _tell_identity(recorded: Session, out: Path) -> bool:
     """Whether a replay reproduced the session's results; prints the comparison."""
     from sessions.recording.manifest import installed_versions
-    from tactile_lab.cli.console import say, warn
+    from tactile_lab.cli.console import answer, warn
     from tactile_lab.workflow.judging import differing_files
 
     differing = differing_files(recorded.results, out)
     if not differing:
-        say("identical to the recorded results, byte for byte", "green")
+        answer("identical to the recorded results, byte for byte", "green")
         return True
     then, now = recorded.manifest.versions, installed_versions()
     changed = [

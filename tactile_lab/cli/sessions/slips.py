@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tactile_lab.cli.options import Json, NoInput, Root
+from tactile_lab.cli.sessions.choosing import choose_session
 
 if TYPE_CHECKING:
     from drivers.core.contacts import Array
@@ -53,11 +54,11 @@ def slips(
 def _choose_sessions(root: Path, names: list[str] | None) -> list[Session]:
     """The given sessions, or all closed ones; of one rig."""
     from drivers.core.errors import ConfigurationError, SessionError
-    from sessions.recording.listing import find_session, list_sessions
+    from sessions.recording.listing import list_sessions
     from sessions.recording.session import Session
 
     if names:
-        found = [find_session(root, name) for name in names]
+        found = [choose_session(root, name) for name in names]
     else:
         found = [Session.open(each.folder) for each in list_sessions(root) if each.status == "closed"]
     if not found:
@@ -87,7 +88,7 @@ def _measure(sessions: list[Session]) -> dict[str, Slips]:
 
 
 def _show(found: Slips, sessions: list[str]) -> None:
-    from tactile_lab.cli.console import count, say, show_table
+    from tactile_lab.cli.console import answer, count, say, show_table
     from tactile_lab.evaluation.slips import LEAST_STEPS
 
     titles = ["the object was", "steps", "mm, rms", "mm", "°, rms", "°"]
@@ -104,10 +105,10 @@ def _show(found: Slips, sessions: list[str]) -> None:
         )
         return
     if len(found.left) >= LEAST_STEPS:
-        say(f"pushed by the closing hand although left in place: {found.pushed_count(motion)} of {len(found.left)}")
-    say("for the rig file:", "bold")
+        answer(f"pushed by the closing hand although left in place: {found.pushed_count(motion)} of {len(found.left)}")
+    answer("for the rig file:", "bold")
     for line in ("motion:", *(f"  {name}: {value}" for name, value in _settings(motion).items())):
-        say(line)
+        answer(line)
 
 
 def _row(name: str, slips: Array) -> tuple[str, ...]:

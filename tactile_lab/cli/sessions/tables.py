@@ -13,7 +13,7 @@ from sessions.recording.manifest import Manifest
 from sessions.recording.recovery import Recovery
 from sessions.recording.session import TRAFFIC, Session
 from sessions.recording.traffic.reader import segment_paths
-from tactile_lab.cli.console import say, show_facts, show_table, warn
+from tactile_lab.cli.console import answer, say, show_facts, show_table, warn
 
 NEVER_CLOSED = "open: still running, or killed before it was closed"
 _FLAGS = {"truncated": "the file ends too early", "traffic_cut_short": "the recording was cut short"}
@@ -55,7 +55,7 @@ def tell_left_open(root: Path) -> None:
 def show_recovery(recovery: Recovery) -> None:
     """Recovered and lost messages of each topic."""
     if recovery.folder is None:
-        say(f"{recovery.source} is closed and complete: nothing to recover")
+        answer(f"{recovery.source} is closed and complete: nothing to recover")
         return
     rows = [
         (
@@ -69,14 +69,14 @@ def show_recovery(recovery: Recovery) -> None:
     ]
     titles = ["topic", "recovered", "lost", "at most lost at the end", "last stamp, s"]
     show_table(f"Recovered from {recovery.source}", titles, rows, right=(1, 2, 3, 4))
-    say(f"session  {recovery.folder}")
+    answer(f"session  {recovery.folder}")
     if recovery.left_out:
         kept = f"results of the damaged session stay there ({', '.join(recovery.left_out)})"
         say(f"{kept}; make new ones with: tactile-lab session replay {recovery.folder}", "yellow")
     if recovery.lossy:
         warn(f"lost: {recovery.loss.describe()}")
     else:
-        say("nothing was lost", "green")
+        answer("nothing was lost", "green")
 
 
 def recovery_document(recovery: Recovery) -> dict[str, Any]:

@@ -9,13 +9,14 @@ import typer
 
 from tactile_lab.cli.options import Root, SessionName
 from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token
+from tactile_lab.cli.sessions.choosing import choose_session
 
 
 def view(
     session: SessionName,
     root: Root = Path("runs"),
     speed: Annotated[
-        float, typer.Option(min=0.0, help="Playback speed as a multiple of real time; 0: jump to the end.")
+        float, typer.Option(min=0.0, max=1000.0, help="Playback speed as a multiple of real time; 0: jump to the end.")
     ] = 0.0,
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
@@ -26,13 +27,12 @@ def view(
     Viewing does not affect a running session. To control one, use ``tactile-lab run --view``.
     """
     from drivers.core.clock import MonotonicClock
-    from sessions.recording.listing import find_session
     from tactile_lab.cli.console import say
     from tactile_lab.view.page import Page
     from tactile_lab.view.recorded import follow, play
 
     address, port, token = PageAddress(listen, view_port, token).check()
-    found, clock = find_session(root, session), MonotonicClock()
+    found, clock = choose_session(root, session), MonotonicClock()
     with Page(address, port, token, found.folder.name) as page:
         say(f"page: {page.url}   Ctrl+C ends")
         seen = play(found, page.scene, page.draw, clock, speed)

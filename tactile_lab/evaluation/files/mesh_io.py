@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
+from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
 SMALLEST_EXTENT_m, LARGEST_EXTENT_m = 0.005, 1.0
@@ -94,6 +95,7 @@ def _load(path: Path) -> trimesh.Trimesh:
     if not path.is_file():
         raise ShapeError("file not found", where=str(path), hint="Check the path")
     try:
+        check_size(path, LARGEST_MESH_bytes)
         return trimesh.load_mesh(path, process=False)
     except Exception as error:  # each format's reader fails in its own way on foreign bytes
         raise ShapeError(

@@ -14,7 +14,8 @@ import numpy as np
 from gtsam import Pose2, Pose3
 from pydantic import BaseModel
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
 
 
 def plain(value: Any) -> Any:
@@ -65,10 +66,10 @@ def read_json_object(path: Path, *, hint: str) -> dict[str, Any]:
         SessionError: the file is missing, unreadable or not a JSON object; ``hint`` tells the user what to do.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_bounded(path, LARGEST_JSON_bytes))
     except FileNotFoundError as error:
         raise SessionError("file not found", where=str(path), hint=hint) from error
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (OSError, ConfigurationError, ValueError, RecursionError) as error:
         raise SessionError(f"is not readable JSON ({error})", where=str(path), hint=hint) from error
     if not isinstance(content, dict):
         raise SessionError("does not contain a JSON object", where=str(path), hint=hint)

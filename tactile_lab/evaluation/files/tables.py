@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from drivers.core.contacts import Array, Grasp
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 from tactile_lab.evaluation.prism import open_ring
 
 NANOSECOND_s = 1e-9
@@ -116,8 +117,8 @@ def read_contour(path: Path) -> Array:
 
 def _read_csv(path: Path, columns: Sequence[str]) -> list[list[str]]:
     try:
-        rows = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
-    except (OSError, UnicodeDecodeError) as error:
+        rows = list(csv.reader(io.StringIO(read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8"))))
+    except (OSError, ConfigurationError, UnicodeDecodeError) as error:
         raise SessionError("cannot be read", where=str(path), hint=RERUN) from error
     if not rows or rows[0] != list(columns) or any(len(row) != len(columns) for row in rows):
         raise SessionError(f"is not a table of {', '.join(columns)}", where=str(path), hint=RERUN)

@@ -11,13 +11,12 @@ from drivers.core.errors import DeviceError
 from drivers.fingertips.kinds import WIRES
 from drivers.fingertips.wiring import place_of
 from drivers.force.force_fingertip import WrenchSample
+from drivers.force.plausibility import noise_objection
 from tactile_lab.rigs.checks.findings import Finding
 from tactile_lab.rigs.fingertip_rig import FingertipRig
 
 LISTEN_ns = NANOSECONDS
 _POLL_ns = 2_000_000
-_NOISY = 6.0
-"""How many times the calibrated noise a still sensor may show."""
 
 
 def check_fingertips(rig: FingertipRig, clock: Clock) -> list[Finding]:
@@ -44,7 +43,7 @@ def _check(rig: FingertipRig, finger: str, tip: Nano17, clock: Clock) -> Finding
     usable = np.array([sample.wrench for sample in samples if np.isfinite(sample.wrench).all()])
     if len(usable) < 2:
         return Finding(device, False, f"{place}: {'; '.join(problems) or 'no usable sample'}")
-    problems += _noise_problem(tip, usable)
+    problems += filter(None, [noise_objection(usable.std(axis=0), tip.calibration)])
     words = f"{place}: {'; '.join((*problems, _words(tip, samples, usable)))}"
     return Finding(device, not problems, words, _figures(tip, samples, usable))
 
@@ -87,14 +86,6 @@ def _words(tip: Nano17, samples: list[WrenchSample], usable: Array) -> str:
         f"(expected {1e3 * known.force_sigma_N:.1f} and {1e3 * known.moment_sigma_Nm:.3f}), "
         f"untared reading {bias[:3].max():.2f} N and {1e3 * bias[3:].max():.1f} N mm"
     )
-
-
-def _noise_problem(tip: Nano17, usable: Array) -> list[str]:
-    noise, known = usable.std(axis=0), tip.calibration
-    allowed = _NOISY * np.repeat([known.force_sigma_N, known.moment_sigma_Nm], 3)
-    if np.all(noise <= allowed):
-        return []
-    return ["noisier than its calibration says: is it being touched, or is a cable loose?"]
 
 
 def _other_baud(rig: FingertipRig, finger: str, clock: Clock) -> str:

@@ -9,10 +9,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.core.contacts import LARGEST_SLOPE, ApproachPath, Array, Contact, Grasp, LARGEST_GRASP_m
+from drivers.core.contacts import LARGEST_SLOPE, ApproachPath, Array, Contact, FARTHEST_m, Grasp, LARGEST_GRASP_m
 from drivers.core.errors import TrackingError
 from tactile_lab.slam.tracking.contacts.free_space import fingertip_places, places_on_line
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
+
+LEAST_SIGMA_m, LEAST_SIGMA_rad = 1e-6, 1e-5
+"""No contact is known better, whatever its covariance says: one that is known exactly has no finite weight."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,8 @@ class ContactSet:
             normal_sigma, counted = normal_sigma[keep] / flat, [counted[index] for index in np.flatnonzero(keep)]
         along_normal = np.sqrt(np.einsum("ni,nij,nj->n", normals, covariances, normals))
         heights = np.array([0.0, 0.0, origin_height_m])
+        along_normal = np.maximum(along_normal, LEAST_SIGMA_m)
+        normal_sigma = np.maximum(normal_sigma, LEAST_SIGMA_rad)
         seen = cls((points - heights)[:, :dimension], normals[:, :dimension].copy(), along_normal, normal_sigma)
         free, free_of = _free_places(grasp, seen, counted, heights)
         return replace(seen, free_m=free, free_of=free_of)
@@ -163,6 +168,9 @@ def _check(grasp: Grasp, points: Array, normals: Array, covariances: Array, norm
         raise TrackingError("the hand's motion has NaN or infinite entries", where=where)
     if len(points) and np.linalg.norm(normals, axis=1).min() < 1e-6:
         raise TrackingError("a contact normal has no length", where=where)
+    if len(points) and np.abs(points).max() > FARTHEST_m:
+        what = f"a contact lies {np.abs(points).max():.3g} m from the world's origin"
+        raise TrackingError(what, where=where, hint="Move the origin near the object")
     if len(points) and float(np.ptp(points, axis=0).max()) > LARGEST_GRASP_m:
         raise TrackingError(
             f"contacts lie {np.ptp(points, axis=0).max():.3g} m apart",

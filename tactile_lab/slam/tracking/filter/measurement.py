@@ -179,7 +179,7 @@ class CalibratedMeasurement:
 
 def _smallest_eigenvalues(points: Array, normals: Array, close: NDArray[np.bool_]) -> Array:
     """Smallest eigenvalue of (3.18) for planar motions, of the close contacts of each particle."""
-    weights = close[..., None] / close.sum(axis=1)[:, None, None]
+    weights = close[..., None] / np.maximum(close.sum(axis=1), 1)[:, None, None]  # none close: nothing is observable
     arms = (points - (points * weights).sum(axis=1, keepdims=True))[..., :2] / SCALE_m
     turning = arms[..., 0] * normals[..., 1] - arms[..., 1] * normals[..., 0]
     rows = np.stack([turning, normals[..., 0], normals[..., 1]], axis=-1) * close[..., None]

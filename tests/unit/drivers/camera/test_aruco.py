@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -247,6 +248,17 @@ def test_a_blurred_picture_is_refused() -> None:
     problem = refused(tracker, Frame(1, np.asarray(cv2.filter2D(frame.image, -1, streak), np.uint8)))
     assert problem.startswith("blurred: the edges of marker")
     assert tracker.world.frames == 1
+
+
+def test_a_marker_whose_edges_are_not_found_is_not_called_blurred() -> None:
+    frame, _ = scene(0.0, 0.0, 0.3)
+    assert frame.image is not None
+    found = detection(frame.image, "DICT_4X4_50")
+    lost = {7: replace(found.markers[7], blur_px=np.inf)}
+    problem = refused(
+        ObjectTracker(CAMERA, SETTINGS), Frame(1, None, detection=replace(found, markers={**found.markers, **lost}))
+    )
+    assert problem == "the edges of marker 7 cannot be measured: it may be partly covered, in glare, or too small"
 
 
 def test_a_lifted_object_is_refused() -> None:

@@ -141,6 +141,7 @@ def test_a_folder_gives_its_pictures_in_the_order_of_their_names(tmp_path: Path)
     assert [None if picture is None else int(picture.image[0, 0]) for picture in found] == [0, 1, 2, None]
     source.close()
     assert source.notes() == ()
+    assert [picture.name for picture in found if picture is not None] == ["000.png", "001.png", "002.png"]
 
 
 def test_pictures_of_two_sizes_in_a_folder_are_an_error_that_names_the_file(tmp_path: Path) -> None:

@@ -205,3 +205,31 @@ def test_a_document_nested_without_end_is_refused(content: bytes) -> None:
 def test_nested_keys_become_dotted_names_and_an_empty_mapping_is_a_value() -> None:
     content = {"a": 1, "b": {"c": [1, 2], "d": {}, "e": {"f": None}}}
     assert list(flatten_keys(content)) == [("a", 1), ("b.c", [1, 2]), ("b.d", {}), ("b.e.f", None)]
+
+
+ALIASES = "a0: &a0 [1, 2]\n" + "".join(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 12))
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (ALIASES, "more than 500000 entries, aliases expanded"),
+        ("a: &a [*a]", "an alias inside of what it names"),
+        ("? [1, 2]\n: 3", "a key must be one word"),
+    ],
+)
+def test_what_grows_without_end_is_refused_before_anything_is_made_of_it(tmp_path, text, told):
+    (tmp_path / "rig.yaml").write_text(text)
+    with pytest.raises(ConfigurationError, match=told):
+        load(tmp_path / "rig.yaml")
+
+
+def test_aliases_that_stay_small_are_read(tmp_path):
+    (tmp_path / "rig.yaml").write_text("a: &one {x: 1}\nb: *one\nc: {<<: *one, y: 2}\n")
+    assert load(tmp_path / "rig.yaml") == {"a": {"x": 1}, "b": {"x": 1}, "c": {"x": 1, "y": 2}}
+
+
+def test_a_file_of_more_than_a_megabyte_is_not_even_parsed(tmp_path):
+    (tmp_path / "rig.yaml").write_bytes(b"a: 1\n" * 300_000)
+    with pytest.raises(ConfigurationError, match=r"is 1\.5 MB large, more than the 1 MB"):
+        load(tmp_path / "rig.yaml")

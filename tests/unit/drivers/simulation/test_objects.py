@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from drivers.core.errors import ConfigurationError, ShapeError
+from drivers.core.errors import ConfigurationError
 from drivers.simulation.objects import CATALOGUE, QUIET_ZONE, Hull, ObjectModel, Solid, object_model
 
 NAMES = tuple(CATALOGUE)
@@ -134,7 +134,7 @@ def test_hollow_mesh_is_cut_into_the_same_convex_pieces_every_time(tmp_path: Pat
     ],
 )
 def test_unusable_mesh_is_refused_with_a_hint(mesh: trimesh.Trimesh, message: str, tmp_path: Path) -> None:
-    with pytest.raises(ShapeError, match=message) as caught:
+    with pytest.raises(ConfigurationError, match=message) as caught:
         object_model(written(mesh, tmp_path))
     assert "part.ply" in str(caught.value)
 
@@ -142,12 +142,12 @@ def test_unusable_mesh_is_refused_with_a_hint(mesh: trimesh.Trimesh, message: st
 @pytest.mark.parametrize("content", [b"", b"ply\nthis is not one\n", b"\x00\xff" * 40])
 def test_unreadable_mesh_file_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "broken.ply").write_bytes(content)
-    with pytest.raises(ShapeError, match=r"broken\.ply"):
+    with pytest.raises(ConfigurationError, match=r"broken\.ply"):
         object_model(f"mesh:{tmp_path / 'broken.ply'}")
 
 
 def test_missing_mesh_file_is_refused() -> None:
-    with pytest.raises(ShapeError, match="file not found"):
+    with pytest.raises(ConfigurationError, match="file not found"):
         object_model("mesh:nowhere/bottle.ply")
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import stat
 import zipfile
 
 import pytest
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, WriteError
+from sessions.exchange import archives
 from sessions.exchange.archives import ArchiveLimits, export_archive, import_archive
 from sessions.recording.session import create_session
 
@@ -44,11 +47,11 @@ def test_a_session_comes_back_out_of_its_archive(session, tmp_path):
     assert found.folder == tmp_path / "elsewhere" / session.folder.name
     assert sum(item.is_file() for item in found.folder.rglob("*")) == files
     assert next(found.traffic().messages()).data == b"bytes"
-    with pytest.raises(SessionError, match="exists already"):
+    with pytest.raises(ConfigurationError, match="exists already"):
         import_archive(tmp_path / "s.zip", tmp_path / "elsewhere")
     renamed = import_archive(tmp_path / "s.zip", tmp_path / "elsewhere", "mine-2")
     assert renamed.manifest.name == "mine-2"
-    with pytest.raises(SessionError, match="exists already"):
+    with pytest.raises(ConfigurationError, match="exists already"):
         export_archive(session, tmp_path / "s.zip")
 
 
@@ -57,7 +60,7 @@ def test_a_session_comes_back_out_of_its_archive(session, tmp_path):
 )
 def test_unsafe_names_are_refused_and_nothing_is_left(session, tmp_path, name):
     path = repacked(session, tmp_path / "bad.zip", {name: "evil"})
-    with pytest.raises(SessionError, match="unsafe name"):
+    with pytest.raises(ConfigurationError, match="unsafe name"):
         import_archive(path, tmp_path / "in")
     assert not (tmp_path / "in").exists()
     assert not list(tmp_path.rglob("evil*"))
@@ -69,18 +72,18 @@ def test_links_are_refused(session, tmp_path):
     link.external_attr = (stat.S_IFLNK | 0o777) << 16
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr(link, "/etc/passwd")
-    with pytest.raises(SessionError, match="is a link"):
+    with pytest.raises(ConfigurationError, match="is a link"):
         import_archive(path, tmp_path / "in")
 
 
 def test_sizes_are_bounded(session, tmp_path):
     bomb = repacked(session, tmp_path / "bomb.zip", {"s/zeros": bytes(20_000_000)})
-    with pytest.raises(SessionError, match="which is implausible"):
+    with pytest.raises(ConfigurationError, match="which is implausible"):
         import_archive(bomb, tmp_path / "in")
     small = repacked(session, tmp_path / "small.zip", {})
-    with pytest.raises(SessionError, match="more than 100"):
+    with pytest.raises(ConfigurationError, match="more than 100"):
         import_archive(small, tmp_path / "in", limits=ArchiveLimits(total_bytes=100))
-    with pytest.raises(SessionError, match="files, more than 2"):
+    with pytest.raises(ConfigurationError, match="files, more than 2"):
         import_archive(small, tmp_path / "in", limits=ArchiveLimits(files=2))
     assert not (tmp_path / "in").exists()
 
@@ -96,9 +99,16 @@ def test_sizes_are_bounded(session, tmp_path):
 )
 def test_an_archive_that_is_no_whole_session_is_refused_and_nothing_is_left(session, tmp_path, changes, words):
     path = repacked(session, tmp_path / "bad.zip", changes)
-    with pytest.raises(SessionError, match=words):
+    with pytest.raises(ConfigurationError, match=words):
         import_archive(path, tmp_path / "in")
     assert not (tmp_path / "in").exists() or not list((tmp_path / "in").iterdir())
+
+
+def test_many_small_files_are_weighed_together(tmp_path):
+    path = archive_of(tmp_path / "many.zip", {f"s/{number}": bytes(1 << 20) for number in range(40)})
+    with pytest.raises(ConfigurationError, match="to 41943040, out of all proportion"):
+        import_archive(path, tmp_path / "in")
+    assert not (tmp_path / "in").exists()
 
 
 @pytest.mark.parametrize("name", ["Big", "a b", "x" * 65, "", "../up", "ä"])
@@ -107,16 +117,27 @@ def test_names_that_are_no_ids_are_refused(session, tmp_path, name):
     archive = zipfile.ZipFile(tmp_path / "s.zip")
     archive.close()
     if name:
-        with pytest.raises(SessionError, match="cannot be the name of a session"):
+        with pytest.raises(ConfigurationError, match="cannot be the name of a session"):
             import_archive(tmp_path / "s.zip", tmp_path / "in", name)
     assert not (tmp_path / "in").exists()
 
 
 def test_what_is_no_archive_is_told(tmp_path):
     (tmp_path / "a.zip").write_bytes(b"hello")
-    with pytest.raises(SessionError, match="not a ZIP archive"):
+    with pytest.raises(ConfigurationError, match="not a ZIP archive"):
         import_archive(tmp_path / "a.zip", tmp_path)
-    with pytest.raises(SessionError, match="No such file"):
+    with pytest.raises(ConfigurationError, match="No such file"):
         import_archive(tmp_path / "none.zip", tmp_path)
-    with pytest.raises(SessionError, match="contains 0 folders"):
+    with pytest.raises(ConfigurationError, match="contains 0 folders"):
         import_archive(archive_of(tmp_path / "empty.zip", {}), tmp_path)
+
+
+def test_a_full_disk_is_not_the_archive_s_fault_and_nothing_is_left(session, tmp_path, monkeypatch):
+    def fill(*arguments):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    export_archive(session, tmp_path / "s.zip")
+    monkeypatch.setattr(archives, "_copy", fill)
+    with pytest.raises(WriteError, match="the disk is full"):
+        import_archive(tmp_path / "s.zip", tmp_path / "in")
+    assert not list((tmp_path / "in").iterdir())

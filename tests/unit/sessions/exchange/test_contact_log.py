@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.core.contacts import Contact, Grasp
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import ConfigurationError
 from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, read_contact_log, write_contact_log
 
 IDENTITY = np.eye(4).tolist()
@@ -123,6 +123,17 @@ def test_a_planar_log_keeps_the_horizontal_part(tmp_path):
         (["grasps", 0, "hand_motion_world"], np.diag([1.0, 1.0, -1.0, 1.0]).tolist(), "not a rigid motion"),
         (["grasps", 0, "hand_motion"], IDENTITY, "hand_motion"),
         (["object", "polygon_m"], [[0, 0], [1, 1]], "polygon_m"),
+        (["object", "polygon_m"], [[0.0, 0.001 * k] for k in range(2001)], "polygon_m"),
+        (
+            ["object"],
+            {"mesh": "../secret.ply"},
+            "is not the name of a file in the log's own folder",
+        ),
+        (["object"], {"mesh": "/etc/truth.ply"}, "log's own folder"),
+        (["object"], {"mesh": ".."}, "log's own folder"),
+        (["grasps", 0, "contacts", 0, "point_world_m"], [1e6, 0.0, 0.0], "millimetres"),
+        (["grasps", 0, "world_T_object"], [[1, 0, 0, 1e6], *IDENTITY[1:]], "move the world's origin"),
+        (["grasps", 0, "hand_motion_world"], [[1, 0, 0, 1e6], *IDENTITY[1:]], "move the world's origin"),
     ],
 )
 def test_bad_logs_are_explained(tmp_path, path, value, message):
@@ -134,12 +145,12 @@ def test_bad_logs_are_explained(tmp_path, path, value, message):
 @pytest.mark.parametrize("content", ["", "{", "[" * 100_000, '{"format": 1, "format": 2}', "\x00"])
 def test_files_that_are_no_json_are_named(tmp_path, content):
     (tmp_path / "log.json").write_text(content)
-    with pytest.raises(SessionError, match=r"log\.json: is not JSON"):
+    with pytest.raises(ConfigurationError, match=r"log\.json: is not JSON"):
         read_contact_log(tmp_path / "log.json")
 
 
 def test_a_missing_log_and_other_json_are_named(tmp_path):
-    with pytest.raises(SessionError, match="cannot be read"):
+    with pytest.raises(ConfigurationError, match="cannot be read"):
         read_contact_log(tmp_path / "none.json")
     with pytest.raises(ConfigurationError, match="its format is None"):
         read_contact_log(save(tmp_path, [1, 2]))

@@ -236,6 +236,25 @@ def test_hand_goes_back_where_a_step_meets_something(tmp_path: Path) -> None:
     assert not run.outcome.grasps
 
 
+def test_a_capture_with_no_finger_in_contact_is_asked_for_twice(tmp_path: Path) -> None:
+    world, captured = DiscWorld(disc()), list[int]()
+
+    class Hasty(SimulatedOperator):
+        def show(self, panel: Panel) -> None:
+            if panel.stage is Stage.HOLD:
+                captured.append(world.event_counts[EventKind.CAPTURE_BEGIN])
+            if panel.stage in (Stage.CLOSE, Stage.HOLD):
+                self._waiting.append(Request(Ask.CAPTURE if panel.stage is Stage.HOLD else Ask.NEXT))
+            else:
+                super().show(panel)
+
+    run = Run(tmp_path, world, Hasty(), grasps=1)
+    assert "no finger is in contact. Ask again to capture all the same" in run.told
+    assert len(captured) > 1, "asked once, and nothing was captured"
+    assert not any(captured)
+    assert world.event_counts[EventKind.CAPTURE_END] == 1
+
+
 def test_captures_come_by_themselves_when_automatic(tmp_path: Path) -> None:
     class Lazy(SimulatedOperator):
         def show(self, panel: Panel) -> None:

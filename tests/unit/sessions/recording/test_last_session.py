@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import pytest
 
 from drivers.core.clock import utc_text
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError
 from sessions.exchange.archives import export_archive, import_archive
 from sessions.exchange.extracting import Piece, extract
 from sessions.recording.listing import find_session, list_sessions
@@ -63,7 +63,7 @@ def test_a_recovery_stands_in_for_the_torn_session_and_not_for_a_later_one(tmp_p
 
 def test_where_nothing_was_recorded_last_names_what_there_is(tmp_path, archive):
     session = import_archive(archive, tmp_path / "runs")
-    with pytest.raises(SessionError, match=rf"only extracts and imports.*give a name: {session.folder.name}"):
+    with pytest.raises(ConfigurationError, match=rf"only extracts and imports.*give a name: {session.folder.name}"):
         last(tmp_path / "runs")
 
 

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import errno
 import os
 import time
 from datetime import UTC, datetime
 
 import pytest
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import SessionError, WriteError
+from sessions.recording import recovery
 from sessions.recording.listing import left_open, list_sessions, summarize
 from sessions.recording.manifest import read_manifest
 from sessions.recording.recovery import recover
@@ -185,3 +187,17 @@ def test_links_in_a_session_folder_are_not_followed(tmp_path):
     (folder / "note.txt").symlink_to(secret)
     recovery = recover(folder)
     assert not (recovery.folder / "note.txt").exists()
+
+
+@pytest.mark.parametrize("kept_in", ["attachments", "."])
+def test_a_recovery_onto_a_full_disk_is_told_and_leaves_nothing_behind(tmp_path, monkeypatch, kept_in):
+    def fill(source, copy, **named):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    folder = left_behind(record(tmp_path), 0.9)
+    (folder / kept_in).mkdir(exist_ok=True)
+    (folder / kept_in / "photo.jpg").write_text("picture")
+    monkeypatch.setattr(recovery.shutil, "copyfile", fill)
+    with pytest.raises(WriteError, match=r"the disk is full\. Free some space"):
+        recover(folder)
+    assert list(tmp_path.iterdir()) == [folder]

@@ -3,13 +3,14 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import shutil
 from datetime import UTC, datetime
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, SessionError
 from sessions.recording.listing import find_session, list_sessions, summarize
 from sessions.recording.manifest import Manifest, read_manifest, write_manifest
 from sessions.recording.session import Session, create_session
@@ -183,13 +184,13 @@ def test_a_calibration_copy_can_not_point_outside_the_session(tmp_path):
 
 def test_sessions_are_found_by_path_name_and_last(tmp_path):
     assert list_sessions(tmp_path / "none") == []
-    with pytest.raises(SessionError, match="no session yet"):
+    with pytest.raises(ConfigurationError, match="no session yet"):
         find_session(tmp_path, "last")
     with create(tmp_path) as session:
         pass
     assert find_session(tmp_path, session.folder.name).folder == session.folder
     assert find_session(tmp_path / "elsewhere", str(session.folder)).folder == session.folder
-    with pytest.raises(SessionError, match="no such session"):
+    with pytest.raises(ConfigurationError, match="no such session"):
         find_session(tmp_path, "nothing")
 
 
@@ -234,3 +235,38 @@ def test_a_recording_that_was_broken_off_is_told_as_data_loss(tmp_path, monkeypa
     }
     assert summary.data_loss
     assert next(Session.open(summary.folder).traffic().messages()).data == b"kept"
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (SystemExit(1), "the program was ended with exit code 1"),
+        (MemoryError(), "the memory was exhausted"),
+        (KeyError("FF"), "KeyError: 'FF'"),
+        (ValueError(), "ValueError"),
+    ],
+)
+def test_the_reason_of_a_failure_is_told_in_words(tmp_path, error, told):
+    def run():
+        with create(tmp_path):
+            raise error
+
+    with pytest.raises(type(error)):
+        run()
+    assert list_sessions(tmp_path)[0].problem == told
+
+
+@pytest.mark.parametrize("removed", [True, False])
+def test_a_folder_that_goes_while_it_is_recorded_is_told_and_not_made_again(tmp_path, removed):
+    session = create(tmp_path)
+    session.recorder.on_received("hand", b"bytes", 1)
+    session.settle()
+    if removed:
+        shutil.rmtree(session.folder)
+    else:
+        session.folder.rename(tmp_path / "elsewhere")
+    with pytest.raises(SessionError, match="was removed or renamed while it was recorded"):
+        session.close()
+    assert not session.folder.exists()
+    if not removed:
+        assert next(Session.open(tmp_path / "elsewhere").traffic().messages()).data == b"bytes"

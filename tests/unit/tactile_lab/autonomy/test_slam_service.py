@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from tactile_lab.autonomy.slam_service import SlamService
+import numpy as np
+from gtsam import Pose3
+
+from tactile_lab.autonomy.slam_service import KEPT_STATES, SlamMemory, SlamService
 from tactile_lab.experiments.data.planar_data import simulate
 from tactile_lab.slam.tactile_slam import TactileSlam
 
@@ -15,6 +18,9 @@ class Nothing:
 
     def known_shape(self) -> None:
         """Nothing is known."""
+
+    def on_undo(self, hand_motion_world: Pose3) -> None:
+        """Nothing is noted."""
 
 
 def test_the_object_is_told_where_its_surface_is() -> None:
@@ -29,3 +35,35 @@ def test_the_object_is_told_where_its_surface_is() -> None:
         followed = slam._tracker.map.placed[-1].row if slam._tracker else None
         moved.append(followed is not None and abs(told.x() - followed[0]) > 1e-6)
     assert any(moved)  # the surface's contacts are smoothed with faces, beside the trajectory that is followed
+
+
+def test_grasps_are_taken_back_farther_than_states_are_kept() -> None:
+    grasps = simulate("rectangle", 50, count=KEPT_STATES + 3).grasps
+    slam, fresh = TactileSlam(seed=4), TactileSlam(seed=4)
+    memory = SlamMemory(slam)
+    for grasp in grasps:
+        memory.remember(grasp)
+        slam.add_grasp(grasp)
+    assert len(memory._states) == KEPT_STATES
+    for _ in grasps[1:]:
+        memory.undo()
+    fresh.add_grasp(grasps[0])
+    for grasp in grasps[1:3]:  # it goes on as if the others had never been
+        memory.remember(grasp)
+        slam.add_grasp(grasp)
+        fresh.add_grasp(grasp)
+    for one, other in zip(slam.trajectory, fresh.trajectory, strict=True):
+        assert one is not None
+        assert other is not None
+        np.testing.assert_array_equal(one.matrix(), other.matrix())
+
+
+def test_the_service_keeps_no_surface_that_the_session_has() -> None:
+    service = SlamService(TactileSlam(seed=0), Nothing())  # type: ignore[arg-type]
+    grasps = simulate("rectangle", 50, count=4).grasps
+    assert len(service.estimate(grasps[0], 0)) == 1
+    assert len(service.estimate(grasps[1], 0)) == 2  # the first has not reached it
+    assert [told.step.index for told in service.estimate(grasps[2], 1)] == [1, 2]
+    service.undo(Pose3())
+    assert [told.step.index for told in service.estimate(grasps[3], 2)] == [3]
+    assert len(service._estimates) == 1

@@ -18,6 +18,7 @@ from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import GraspFrame
 from tactile_lab.cli.calibrate import wizard
 from tactile_lab.cli.interruptions import interruptions_heeded
+from tactile_lab.cli.main import main
 from tactile_lab.cli.running import approval
 from tactile_lab.cli.running.approval import TerminalApproval
 from tactile_lab.cli.running.progress import INTERRUPTED, LiveProgress
@@ -167,3 +168,31 @@ def test_an_unfinished_line_counts_when_the_input_ends() -> None:
     os.close(writing)
     assert [*lines.lines(), *lines.lines(), *lines.lines()] == ["y", "no"]
     os.close(reading)
+
+
+def test_a_terminal_that_goes_ends_the_program_in_order_and_only_once() -> None:
+    with interruptions_heeded():
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGHUP)
+        signal.raise_signal(signal.SIGHUP)  # the shell's, behind the system's
+    assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL
+
+
+def test_a_hangup_that_is_ignored_stays_ignored() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with interruptions_heeded():
+            signal.raise_signal(signal.SIGHUP)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_exhausted_memory_is_told_in_words(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def exhausted(*arguments: object, **named: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("tactile_lab.cli.app.app", exhausted)
+    with pytest.raises(SystemExit) as ended:
+        main(["rig", "list"])
+    assert ended.value.code == 1
+    assert "the memory is exhausted" in capsys.readouterr().err

@@ -31,7 +31,8 @@ def shown(monkeypatch):
 
 def shown_by(patch, width, columns, rows, terminal, title, right):
     people = Console(file=io.StringIO(), width=width, force_terminal=terminal, color_system=None, highlight=False)
-    patch(console, "people", people)
+    patch(console, "_answers", people)
+    patch(console, "_json_only", False)
     console.show_table(title, columns, rows, right=right)
     return [line.rstrip() for line in people.file.getvalue().splitlines()]
 
@@ -84,7 +85,8 @@ def test_a_long_path_in_the_last_column_is_broken_and_not_cut(shown):
 
 def test_a_long_path_among_facts_is_broken_and_not_cut(monkeypatch):
     people = Console(file=io.StringIO(), width=40, force_terminal=True, color_system=None)
-    monkeypatch.setattr(console, "people", people)
+    monkeypatch.setattr(console, "_answers", people)
+    monkeypatch.setattr(console, "_json_only", False)
     path = "/runs/" + "0123456789" * 12
     console.show_facts("session", [("folder", path), ("notes", "")])
     assert path in "".join(people.file.getvalue().split())
@@ -115,7 +117,8 @@ def test_no_character_is_lost(width, terminal, title, table):
 @pytest.mark.parametrize("terminal", [True, False])
 def test_long_facts_are_broken_on_a_terminal_alone(monkeypatch, terminal):
     people = Console(file=io.StringIO(), width=40, force_terminal=terminal, color_system=None, highlight=False)
-    monkeypatch.setattr(console, "people", people)
+    monkeypatch.setattr(console, "_answers", people)
+    monkeypatch.setattr(console, "_json_only", False)
     console.show_facts("Session", [("ending", "failed: ../sessions/x: the disk is full"), ("note", "two\nlines")])
     text = people.file.getvalue()
     assert ("failed: ../sessions/x: the disk is full" in text) is not terminal

@@ -6,9 +6,8 @@ from typing import Any
 
 import pytest
 
-from drivers.core.errors import DeviceError
 from tactile_lab.evaluation.spread import Spread
-from tactile_lab.evaluation.sweep import SweepRow, SweepRun, markdown_table, planned_runs, summaries, sweep
+from tactile_lab.evaluation.sweep import SweepRow, SweepRun, markdown_table, planned_runs, summaries
 
 
 def evaluation(hausdorff_mm: float, *, status: str = "ok", failed: bool | None = False) -> dict[str, Any]:
@@ -26,26 +25,6 @@ def evaluation(hausdorff_mm: float, *, status: str = "ok", failed: bool | None =
 def test_runs_are_all_combinations_with_seeds_fastest() -> None:
     runs = planned_runs(["box", "cube"], [2], [1, 2])
     assert runs == [SweepRun("box", 2, 1), SweepRun("box", 2, 2), SweepRun("cube", 2, 1), SweepRun("cube", 2, 2)]
-
-
-def test_a_session_that_ends_in_an_error_is_a_failed_row_and_the_sweep_goes_on() -> None:
-    def run_session(run: SweepRun) -> dict[str, Any]:
-        if run.seed == 2:
-            raise DeviceError("object left the table", where="sim")
-        return evaluation(4.0)
-
-    told: list[SweepRow] = []
-    rows = sweep(planned_runs(["box"], [2], [1, 2, 3]), run_session, told.append)
-    assert told == rows
-    assert [row.failure for row in rows] == ["", "sim: object left the table", ""]
-
-
-def test_other_errors_are_not_hidden() -> None:
-    def broken(run: SweepRun) -> dict[str, Any]:
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        sweep([SweepRun("box", 2, 1)], broken)
 
 
 def test_spread_is_median_p90_and_maximum_of_what_is_known() -> None:

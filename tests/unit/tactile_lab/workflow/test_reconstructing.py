@@ -10,7 +10,7 @@ import pytest
 from gtsam import Pose3
 
 from drivers.core.contacts import FINGERS, Contact, Grasp
-from drivers.core.errors import ConfigurationError, SessionError, ShapeError
+from drivers.core.errors import ConfigurationError
 from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
 from tactile_lab.experiments.data.planar_data import PlanarGrasps, simulate
 from tactile_lab.slam.result import SlamResult
@@ -57,10 +57,25 @@ def test_the_outline_runs_counter_clockwise_whichever_way_the_log_has_it(tmp_pat
     assert found is not None
     x, y = found.T
     assert np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0
-    with pytest.raises(ShapeError, match="fewer than three different points"):
+    with pytest.raises(ConfigurationError, match="fewer than three different points"):
         log_truth(log(truth=replace_polygon(np.zeros((4, 2)))), tmp_path)
-    with pytest.raises(ShapeError, match=r"none\.ply: file not found"):
+    with pytest.raises(ConfigurationError, match=r"none\.ply: file not found"):
         log_truth(log(truth=ObjectTruth(mesh="none.ply")), tmp_path)
+
+
+def test_an_outline_that_crosses_itself_is_no_truth(tmp_path: Path) -> None:
+    bow = np.array([[0, 0], [0.1, 0.1], [0.1, 0], [0, 0.1]])
+    with pytest.raises(ConfigurationError, match=r"object\.polygon_m: crosses itself"):
+        log_truth(log(truth=replace_polygon(bow)), tmp_path)
+
+
+def test_a_link_does_not_lead_out_of_the_folder_either(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "truth.ply").write_text("secret")
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs" / "truth.ply").symlink_to(tmp_path / "elsewhere" / "truth.ply")
+    with pytest.raises(ConfigurationError, match="leads out of the log's own folder"):
+        log_truth(log(truth=ObjectTruth(mesh="truth.ply")), tmp_path / "logs")
 
 
 def replace_polygon(points_m: np.ndarray) -> ObjectTruth:
@@ -81,7 +96,7 @@ def test_results_of_an_earlier_estimation_are_replaced_whole(tmp_path: Path) -> 
 
 
 def test_a_name_is_looked_for_among_the_sessions(tmp_path: Path) -> None:
-    with pytest.raises(SessionError, match="no such session"):
+    with pytest.raises(ConfigurationError, match="no such session"):
         reconstruct("yesterday", tmp_path, Wishes())
 
 

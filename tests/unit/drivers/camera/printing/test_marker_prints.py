@@ -103,6 +103,17 @@ def test_the_check_bar_is_a_hundred_millimetres_between_the_outer_edges_of_its_t
     assert right - left == pytest.approx(100.0)
 
 
+def test_the_printed_bar_is_no_longer_by_the_ends_of_its_strokes() -> None:
+    content = pdf_bytes(sheet_of([SingleMarker(number=7, side_m=0.035)]))
+    numbers = re.findall(rb"(?m)^([\d.]+) ([\d.]+) ([\d.]+) (-?[\d.]+) re", content)
+    areas_mm = [25.4 / 72 * np.array(area, float) for area in numbers]
+    bar = [area for area in areas_mm if abs(area[3]) == pytest.approx(0.3, abs=0.01)]
+    ticks = [area for area in areas_mm if area[2] == pytest.approx(0.2, abs=0.01)]
+    outer_mm = max(tick[0] + tick[2] for tick in ticks) - min(tick[0] for tick in ticks)
+    assert (bar[0][2], outer_mm) == pytest.approx((100.0, 100.0), abs=0.01)
+    assert not re.search(rb"(?m) l\s+S$", content), "a stroke's caps would add to its length"
+
+
 def test_a_sheet_names_what_is_on_it_and_the_page_is_not_to_be_scaled() -> None:
     sheet = sheet_of([SingleMarker(number=7, side_m=0.035)])
     words = " ".join(words.text for words in sheet.words)

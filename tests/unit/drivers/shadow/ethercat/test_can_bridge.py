@@ -148,6 +148,30 @@ def test_traffic_is_recorded_read_and_played_by_python_can_itself(rig: Rig, tmp_
         assert [frame.bus for frame in rig.motors.heard] == [1, 2, 1]
 
 
+ANOTHER_PROGRAMS = """date Mon Nov 23 12:00:00.000 2026
+base hex timestamps absolute
+internal events logged
+   0.000100 1  4A3             Rx   d 2 61 62
+   0.000200 2  322             Rx   d 2 00 01
+"""
+
+
+def test_a_log_of_another_program_is_played_to_the_buses_that_it_names(rig: Rig, tmp_path: Path) -> None:
+    log = tmp_path / "motors.asc"
+    log.write_text(ANOTHER_PROGRAMS)
+    with can.LogReader(log) as reader:
+        read = list(reader)
+    with pytest.raises(can.CanOperationError, match=r"no motor bus 0.*play a file of another program.*first_channel=0"):
+        rig.bus.send(read[0])
+    rig.bus._first_channel = 0
+    for each in read:
+        rig.bus.send(each)
+    rig.bus.recv(0.01)
+    assert [(frame.bus, frame.identifier) for frame in rig.motors.heard] == [(1, 0x4A3), (2, 0x322)]
+    with pytest.raises(can.CanOperationError, match=r"no motor bus 2\. Set the message's channel to 0 or 1"):
+        rig.bus.send(message(1, bus=2))
+
+
 def test_a_notifier_hands_messages_to_listeners(rig: Rig) -> None:
     rig.motors.announce(CanFrame(1, 2, 0x4A3, b"ab".ljust(8, b"\0")))
     buffer = can.BufferedReader()
@@ -184,6 +208,7 @@ def test_a_failing_wire_is_told_in_the_drivers_words(rig: Rig) -> None:
     ("options", "words"),
     [
         ({"motor_bus": 3}, "no motor bus 3"),
+        ({"first_channel": 2}, "the first bus cannot be channel 2"),
         ({"palm": "0320"}, "unknown palm 0320"),
         ({"channel": "nosuch0"}, "nosuch0: no such network interface"),
         ({"channel": ""}, "no channel. Give the network interface"),

@@ -6,9 +6,11 @@ import os
 import struct
 
 import pytest
+import zstandard
 from gtsam import Pose3
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
@@ -275,3 +277,29 @@ def test_an_interrupt_inside_a_write_leaves_a_readable_file(tmp_path, monkeypatc
     assert (199 - found[-1]) * STEP_ns // 3 <= traffic.FLUSH_PERIOD_ns
     assert reader.loss.truncated
     assert reader.loss.damaged_chunks == 0
+
+
+def test_a_chunk_that_would_unpack_to_gigabytes_is_left_out(tmp_path):
+    """A file of some kilobytes whose one chunk says so of itself, or does not: it is not unpacked."""
+    record(tmp_path / "t.mcap", count=20)
+    content = (tmp_path / "t.mcap").read_bytes()
+    frame = zstandard.ZstdCompressor().compress(bytes(64 << 20))
+    for claimed in (64 << 20, 1000):
+        chunk = struct.pack("<QQQII", 0, 1, claimed, 0, 4) + b"zstd" + struct.pack("<Q", len(frame)) + frame
+        bomb = struct.pack("<BQ", Opcode.CHUNK, len(chunk)) + chunk
+        first = chunk_starts(content)[0]
+        (tmp_path / "bomb.mcap").write_bytes(content[:first] + bomb + content[first:])
+        reader = TrafficReader(tmp_path / "bomb.mcap")
+        assert numbers(reader) == list(range(20))
+        assert reader.loss.damaged_chunks == 1
+
+
+def chunk_starts(content):
+    """Offset of each chunk."""
+    starts, position = [], 8
+    while position < len(content) - 8:
+        opcode, length = struct.unpack_from("<BQ", content, position)
+        if opcode == 6:
+            starts.append(position)
+        position += 9 + length
+    return starts

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gtsam import Pose3
@@ -58,9 +60,16 @@ def test_the_object_frame_turns_points_and_normals_but_not_heights() -> None:
         (grasp(contact([0, 0, 0], [np.inf, 0, 0])), "NaN or infinite"),
         (grasp(contact([0, 0, 0], [0, 0, 0])), "no length"),
         (grasp(contact([0, 0, 0], [1, 0, 0]), contact([60.0, 0, 0], [-1, 0, 0], "TH")), "millimetres"),
+        (grasp(contact([1e6, 0, 0], [1, 0, 0])), "1e\\+06 m from the world's origin"),
     ],
 )
 def test_unusable_contacts_are_refused_and_the_grasp_is_named(bad: Grasp, words: str) -> None:
     with pytest.raises(TrackingError, match=words) as caught:
         ContactSet.of_grasp(bad, 2, 0.0)
     assert "grasp 3" in str(caught.value)
+
+
+def test_no_contact_counts_as_known_exactly() -> None:
+    exact = replace(contact([0, 0, 0], [1, 0, 0]), point_covariance_m2=np.zeros((3, 3)))
+    seen = ContactSet.of_grasp(grasp(exact), 2, 0.0)
+    assert 0 < seen.point_sigma_m[0] <= 1e-6

@@ -68,6 +68,14 @@ def test_the_gate_needs_four_contacts_near_the_previous_ones() -> None:
     assert found[1] == -np.inf
 
 
+def test_a_gate_that_asks_for_no_contact_may_find_none() -> None:
+    far = np.array([[0.5, 0.0, 0.0]])
+    for least_eigenvalue, passes in ((0.0, True), (0.15, False)):
+        gate = GateSettings(least_contacts=0, least_eigenvalue=least_eigenvalue)
+        found = ThesisMeasurement(gate, 0.005).log_likelihood(far, CORNERS, Known(Disc(), CORNERS))
+        assert np.isfinite(found[0]) == passes
+
+
 def test_the_gate_compares_normals_too() -> None:
     model = ThesisMeasurement(GateSettings(), label_distance_m=0.005)
     inward = ContactSet(CORNERS.points_m, -CORNERS.normals, CORNERS.point_sigma_m, CORNERS.normal_sigma_rad)

@@ -1,0 +1,58 @@
+"""Files from elsewhere are read up to a limit: none can fill the memory or keep the program for ever."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from drivers.core.errors import ConfigurationError
+
+MB = 1_000_000
+LARGEST_YAML_bytes = 1 * MB
+"""Rig files, calibrations, settings and session descriptions are a hundredth of it; more takes minutes to parse."""
+LARGEST_TABLE_bytes = 16 * MB
+"""A CSV table: 100 000 timed contacts, or an hour of presses."""
+LARGEST_JSON_bytes = 32 * MB
+"""A contact log of 16 000 grasps."""
+LARGEST_MESH_bytes = 64 * MB
+"""A binary mesh of more than a million triangles."""
+
+
+def read_bounded(path: Path, most_bytes: int) -> bytes:
+    """The content of a plain file.
+
+    Args:
+        path: of the file.
+        most_bytes: a larger one is refused.
+
+    Raises:
+        OSError: it is missing, or cannot be read.
+        ConfigurationError: it is larger, or a pipe or device, which might never end.
+    """
+    with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:  # a pipe is not waited for
+        check_plain(path, os.fstat(file.fileno()), most_bytes)
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:  # it has grown
+        raise _too_large(path, len(content), most_bytes)
+    return content
+
+
+def check_size(path: Path, most_bytes: int) -> None:
+    """As :func:`read_bounded` for a file that a library reads. Raises OSError, ConfigurationError."""
+    check_plain(path, path.stat(), most_bytes)
+
+
+def check_plain(path: Path, found: os.stat_result, most_bytes: int) -> None:
+    """Whether it is a plain file that is not too large. Raises IsADirectoryError, ConfigurationError."""
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(21, "Is a directory", str(path))
+    if not stat.S_ISREG(found.st_mode):
+        raise ConfigurationError("is a pipe or device", where=str(path), hint="Name a plain file")
+    if found.st_size > most_bytes:
+        raise _too_large(path, found.st_size, most_bytes)
+
+
+def _too_large(path: Path, size: int, most_bytes: int) -> ConfigurationError:
+    what = f"is {size / MB:.1f} MB large, more than the {most_bytes / MB:g} MB that are read of such a file"
+    return ConfigurationError(what, where=str(path), hint="Check that it is the right file")

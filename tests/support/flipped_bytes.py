@@ -1,0 +1,146 @@
+"""One wrong byte anywhere in a recording: what is lost, and whether it is told truly.
+
+    python -m tests.support.flipped_bytes --places 2000
+
+Prints a line of figures. The recording has several chunks, topics, an attachment, and comes whole or torn.
+"""
+
+from __future__ import annotations
+
+import argparse
+import struct
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Chunk, Message
+from mcap.stream_reader import breakup_chunk
+
+from sessions.recording.traffic.reader import TrafficReader
+from sessions.recording.traffic.settings import Attached, TrafficSettings
+from sessions.recording.traffic.writer import TrafficWriter
+
+TOPICS = ("/link/hand/rx", "/link/hand/tx", "/link/ft/FF/rx")
+_STEP_ns = 3_000_000
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording, and the truth about it.
+
+    Attributes:
+        content: its bytes.
+        topics: of each message, by its number.
+        chunks: the chunk of each message.
+        spans: where each chunk stands, with its indices.
+    """
+
+    content: bytes
+    topics: list[str]
+    chunks: list[int]
+    spans: list[tuple[int, int]]
+
+    def chunk_at(self, place: int) -> int | None:
+        """The chunk that a byte belongs to."""
+        return next((number for number, (start, end) in enumerate(self.spans) if start <= place < end), None)
+
+
+def make_recording(folder: Path, count: int = 400, *, whole: bool = True) -> Recording:
+    """Numbered messages on three topics, in chunks of 80 ms; torn in the last of them unless ``whole``."""
+    path, random = folder / "made.mcap", np.random.default_rng(1)
+    attached = (Attached("calibration/joints.yaml", "application/yaml", b"a: 1\n" * 20),)
+    writer = TrafficWriter(path, {"session": "s"}, attachments=attached, settings=TrafficSettings(tell_streams=False))
+    topics = [TOPICS[number % len(TOPICS)] for number in range(count)]
+    for number, topic in enumerate(topics):
+        writer.write(topic, number.to_bytes(4, "little") + random.bytes(20), number * _STEP_ns)
+    writer.close()
+    content = path.read_bytes()
+    path.unlink()
+    chunks: list[int] = []
+    spans: list[tuple[int, int]] = []
+    for opcode, start, end in _records(content):
+        if opcode == Opcode.CHUNK:
+            records = breakup_chunk(Chunk.read(ReadDataStream(BytesIO(content[start + 9 : end]))))
+            chunks += [len(spans)] * sum(isinstance(record, Message) for record in records)
+            spans.append((start, end))
+        elif opcode == Opcode.MESSAGE_INDEX:
+            spans[-1] = (spans[-1][0], end)
+    assert len(chunks) == count
+    return Recording(content if whole else content[: spans[-1][1]], topics, chunks, spans)
+
+
+def _records(content: bytes) -> Iterator[tuple[int, int, int]]:
+    position = 8
+    while position + 9 <= len(content) - 8:
+        opcode, length = struct.unpack_from("<BQ", content, position)
+        yield opcode, position, position + 9 + length
+        position += 9 + length
+
+
+def read_flipped(made: Recording, place: int, by: int, path: Path) -> tuple[set[int], str]:
+    """Flip a byte, read, and compare.
+
+    Args:
+        place: of the byte.
+        by: its bits that change.
+        path: of a file to use.
+
+    Returns:
+        the numbers of the messages lost, and what was told wrongly; "" when all was true.
+    """
+    changed = bytearray(made.content)
+    changed[place] ^= by
+    path.write_bytes(changed)
+    reader = TrafficReader(path)
+    found = [int.from_bytes(message.data[:4], "little") for message in reader.messages()]
+    lost = set(range(len(made.topics))) - set(found)
+    wrong = []
+    if found != sorted(set(found)) or not set(found) <= set(range(len(made.topics))):
+        wrong.append("messages that are none, twice, or out of order")
+    if lost and len({made.chunks[number] for number in lost}) > 1:
+        wrong.append("more than one chunk")
+    if reader.loss.missing_messages != len(lost):
+        wrong.append(f"{reader.loss.missing_messages} said to be missing, {len(lost)} are")
+    if lost and reader.loss.by_topic != dict(Counter(made.topics[number] for number in lost)):
+        wrong.append(f"by topic {reader.loss.by_topic}")
+    if lost and not reader.loss:
+        wrong.append("nothing said")
+    return lost, "; ".join(wrong)
+
+
+def main() -> None:
+    """Flip bytes at random places of a whole and of a torn recording."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--places", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    random = np.random.default_rng(asked.seed)
+    for whole in (True, False):
+        with tempfile.TemporaryDirectory() as folder:
+            made = make_recording(Path(folder), whole=whole)
+            bad: Counter[str] = Counter()
+            most = 0
+            for _ in range(asked.places):
+                place, by = int(random.integers(len(made.content))), int(random.integers(1, 256))
+                try:
+                    lost, wrong = read_flipped(made, place, by, Path(folder) / "flipped.mcap")
+                except Exception as error:
+                    lost, wrong = set(), f"{type(error).__name__}: {error}"
+                most = max(most, len(lost))
+                if wrong:
+                    bad[f"{wrong} (at {place} of {len(made.content)}, chunk {made.chunk_at(place)}, by {by})"] += 1
+        kind = "whole" if whole else "torn"
+        figures = f"at most {most} messages lost, {bad.total()} told wrongly"
+        print(f"{kind}: {asked.places} flips in {len(made.spans)} chunks, {figures}")
+        for words, number in bad.most_common(20):
+            print(f"  {number} x {words}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,34 @@
+"""Files that would fill the memory or never end are refused, by their size and kind alone."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import check_size, read_bounded
+
+
+def test_a_file_is_read_up_to_its_limit(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"12345")
+    assert read_bounded(tmp_path / "file", 5) == b"12345"
+    for check in (read_bounded, check_size):
+        with pytest.raises(ConfigurationError, match=r"file: is .* MB large, more than the 4e-06 MB"):
+            check(tmp_path / "file", 4)
+
+
+def test_pipes_and_devices_are_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for place in (tmp_path / "pipe", Path("/dev/zero")):
+        for check in (read_bounded, check_size):
+            with pytest.raises(ConfigurationError, match="is a pipe or device"):
+                check(place, 1000)
+
+
+def test_what_is_missing_or_a_folder_is_the_system_s_to_tell(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        read_bounded(tmp_path / "none", 10)
+    with pytest.raises(IsADirectoryError):
+        read_bounded(tmp_path, 10)
