@@ -1,1 +1,1 @@
-"""Calibration: what ties the sensors to the world, in files a rig names."""
+"""Calibration: relations between sensors and the world, in files named by a rig."""

@@ -1,1 +1,1 @@
-"""The lens."""
+"""Lens calibration."""

@@ -23,12 +23,12 @@ _OUTLIER, _OUTLIER_FLOOR_px = 3.0, 0.5
 
 
 class LensLimits(StrictModel):
-    """What a lens calibration must keep to, to pass.
+    """Limits of a lens calibration.
 
     Attributes:
-        views: at least so many.
+        views: least number of views.
         reprojection_px: root mean square error of all corners.
-        held_out_px: the same of views that the lens was not made from (their poses are).
+        held_out_px: the same for views not used for the lens (only for their poses).
         focal_percent: standard deviation of the focal lengths over themselves.
         centre_px: standard deviation of the principal point, for a picture 1000 pixels wide.
     """
@@ -42,17 +42,17 @@ class LensLimits(StrictModel):
 
 @dataclass(frozen=True, eq=False)
 class LensResult:
-    """What came of a lens calibration.
+    """The result of a lens calibration.
 
     Attributes:
         lens: the camera's calibration.
         sigmas: standard deviation of each of :data:`PARAMETERS` that was free, by name.
         per_view_px: error of each used view, by name.
         reprojection_px: root mean square error of all corners.
-        held_out_px: the same of the views that a second calibration was not made from.
+        held_out_px: the same for views held out of a second calibration.
         left_out: views that disagree with the others, with their errors.
         coverage: what the views showed.
-        problems: why the result fails, in words; empty when it passes.
+        problems: why the result fails; empty if it passes.
     """
 
     lens: CameraCalibration
@@ -66,7 +66,7 @@ class LensResult:
 
     @property
     def passed(self) -> bool:
-        """Whether it may be used."""
+        """Whether it passes."""
         return not self.problems
 
 
@@ -129,7 +129,7 @@ def _solve(views: Sequence[BoardView], third_radial: bool) -> _Solution:
 
 
 def _without_outliers(views: Sequence[BoardView], solution: _Solution) -> tuple[list[BoardView], dict[str, float]]:
-    """Views that fit like the others, and the errors of those that do not."""
+    """Consistent views, and the errors of the others."""
     limit = max(_OUTLIER * float(np.median(solution.per_view_px)), _OUTLIER_FLOOR_px)
     good = solution.per_view_px <= limit
     if good.sum() < _FEWEST_VIEWS:
@@ -139,7 +139,7 @@ def _without_outliers(views: Sequence[BoardView], solution: _Solution) -> tuple[
 
 
 def _held_out_error(views: Sequence[BoardView], third_radial: bool) -> float:
-    """Error of every fourth view with a lens made from the others; NaN where too few are left."""
+    """Error of every fourth view with a lens made from the others; NaN if too few are left."""
     kept = [view for number, view in enumerate(views) if number % _HELD_OUT_EVERY]
     if len(kept) < _FEWEST_VIEWS:
         return float("nan")

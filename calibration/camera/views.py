@@ -1,7 +1,7 @@
-"""Views of a board for a lens calibration: what each shows, whether it adds anything, and what is still missing.
+"""Views of a board for a lens calibration: their content, whether they add anything, and what is still missing.
 
-A lens is known where corners were seen: in every region of the picture, with the board tilted every way (focal length
-and distance are told apart by perspective only) and at different distances.
+A lens is known where corners were seen: in every region of the picture, with the board tilted in every direction (only
+perspective separates focal length from distance) and at different distances.
 """
 
 from __future__ import annotations
@@ -66,13 +66,13 @@ class BoardView:
 
 
 def rough_lens(size_px: tuple[int, int]) -> CameraCalibration:
-    """A lens as most have it, for first guesses."""
+    """A typical lens as initial guess."""
     focal, (width, height) = _FIRST_FOCAL * size_px[0], size_px
     return CameraCalibration(focal_px=(focal, focal), centre_px=(width / 2, height / 2), size_px=size_px)
 
 
 def view_of(name: str, image: Image, board: AnyBoard) -> BoardView | str:
-    """The view a picture gives, or why it gives none, in words."""
+    """The view of a picture, or why it has none."""
     blurs = [marker.blur_px for marker in seen_markers(image, board.dictionary).values()]
     if not blurs:
         return f"no marker of {board.dictionary} is visible"
@@ -86,13 +86,13 @@ def view_of(name: str, image: Image, board: AnyBoard) -> BoardView | str:
 
 
 def adds_something(view: BoardView, views: Sequence[BoardView]) -> bool:
-    """Whether the board stands otherwise than in all views so far."""
+    """Whether the board's pose differs from all views so far."""
     return all(np.linalg.norm(view.features - other.features) > _NEWS for other in views)
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """What the views have shown.
+    """Coverage of the views.
 
     Attributes:
         regions: corners in each ninth of the picture, by name.
@@ -108,7 +108,7 @@ class Coverage:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """What a person should show next, in words; empty when nothing is missing."""
+        """What a person should show next; empty if nothing is missing."""
         wanted = [
             f"the board in the {name} of the picture" for name, count in self.regions.items() if count < LEAST_CORNERS
         ]
@@ -120,7 +120,7 @@ class Coverage:
 
 
 def coverage(views: Sequence[BoardView]) -> Coverage:
-    """What the views have shown so far."""
+    """The coverage of the views so far."""
     names = [f"{row} {column}" for row in _ROWS for column in _COLUMNS]
     counts = np.zeros(9, int)
     for view in views:

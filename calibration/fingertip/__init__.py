@@ -1,1 +1,1 @@
-"""What fingertips are like: mounting, weight and shape of force sensors, electrodes and normals of BioTacs."""
+"""Calibration of fingertips: mounting, weight and shape of force sensors, electrodes and normals of BioTacs."""

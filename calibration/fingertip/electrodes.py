@@ -1,4 +1,4 @@
-"""Health of a BioTac's electrodes, from counts that it gives while nothing touches it."""
+"""Health of a BioTac's electrodes, from counts without contact."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 
 LEAST_SAMPLES = 20
 LARGEST_DRIFT = 30.0
-"""Counts between the means of both halves, median of the electrodes: beyond it the sensor was not left alone."""
+"""Counts between the means of both halves, median of the electrodes: above it the sensor was touched."""
 
 _RANGE = (50.0, 4045.0)
 _NOISY = 10.0
@@ -42,7 +42,7 @@ def load_untouched(path: Path) -> Array:
 
 
 def faulty_electrodes(untouched: Array) -> dict[int, str]:
-    """What is wrong with a BioTac's electrodes, by index, from untouched counts of shape (samples, electrodes).
+    """Faults of a BioTac's electrodes, by index, from untouched counts of shape (samples, electrodes).
 
     Raises:
         ConfigurationError: too few samples, or the sensor was touched meanwhile.

@@ -1,9 +1,9 @@
-"""What a force fingertip is like: its sensor's mounting, its weight, its shape, from wrenches in known orientations.
+"""Estimates a force fingertip's mounting, weight and shape from wrenches in known orientations.
 
-* Untouched, the hand turned: what the weight does gives mass and centre of mass, and the bias.
+* Untouched, with the hand turned: the weight gives mass, centre of mass and bias.
 * Pressed on a level plate: the force points about up, which gives the sign of the readings and, roughly, the sensor's
   mounting angle; roughly, because of friction.
-* Pressed and rolled on a plate: the torque tells where the force acts, which gives mounting and ellipsoid.
+* Pressed and rolled on a plate: the torque gives the point of the force, and so mounting and ellipsoid.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from drivers.core.fingertip import FingertipCalibration, RigidTransform
 
 LEAST_ORIENTATIONS, LEAST_PRESSES = 6, 6
 LEAST_SPREAD = 0.05
-"""Smallest mean squared share of directions along any axis: below it a direction was never turned to."""
+"""Smallest mean squared share of directions along any axis: below it orientations in some direction are missing."""
 
 PRESS_N = 0.3
 LARGEST_TILT_rad = float(np.radians(40.0))
-"""Of the forces from the plate's normal: friction allows some, and a finger gives way along itself."""
+"""Largest angle of the forces from the plate's normal: friction and the yielding finger allow some."""
 
 
 @dataclass(frozen=True, eq=False)
 class FingertipFit:
-    """What was found.
+    """The result.
 
     Attributes:
         calibration: the new one.
         turned_rad: by how much the mounting differs from the one before.
         covariance: of what was found, shape (13, 13), in the order of :data:`calibration.fingertip.model.PARTS`.
         variance_factor: squared residuals over what the stated noise allows.
-        rms_force_N: what is left of the untouched forces, per axis.
-        rms_lever_m: what is left of the presses' torques, per newton and axis.
+        rms_force_N: residual of the untouched forces, per axis.
+        rms_lever_m: residual of the presses' torques, per newton and axis.
         tilt_rad: root mean square angle between the presses' forces and the plate's normal.
     """
 
@@ -60,7 +60,7 @@ class FingertipFit:
         return float(np.sqrt(np.trace(self.covariance[rows, rows])))
 
     def errors(self, truth: FingertipCalibration) -> Array:
-        """How far the truth is from what was found, in the order of the covariance, shape (13,)."""
+        """Error of the result relative to the truth, in the order of the covariance, shape (13,)."""
         found = self.calibration
         turn = found.distal_T_sensor.pose().rotation().between(truth.distal_T_sensor.pose().rotation())
         back = found.distal_T_sensor.pose().rotation().matrix() @ Rot3.Logmap(turn)
@@ -73,7 +73,7 @@ class FingertipFit:
         return np.concatenate([-back, *(np.subtract(true, mine) for true, mine in pairs)])
 
     def holds(self, truth: FingertipCalibration, part: Part | None = None) -> bool:
-        """Whether the 95 % region of a part, or of everything together, holds the truth."""
+        """Whether the 95 % region of a part, or of everything together, contains the truth."""
         rows = slice(None) if part is None else PARTS[part]
         off, spread = self.errors(truth)[rows], self.covariance[rows, rows]
         return bool(off @ np.linalg.solve(spread, off) <= chi2.ppf(CONFIDENCE, len(off)))
@@ -112,7 +112,7 @@ def fit_fingertip(
 
 
 def wrench_motion(data: FingertipData) -> MotionReport:
-    """Whether the orientations in some data are enough, and what is missing."""
+    """Whether the orientations of the data are sufficient, and what is missing."""
     turn = "turn the hand so that the fingertip points down, level, sideways and up"
     return MotionReport(
         (

@@ -1,10 +1,10 @@
-"""What a fingertip's wrenches should be, given its mounting, weight and shape, and how sure those are of each other.
+"""Model of a fingertip's wrenches given its mounting, weight and shape, and its joint estimation.
 
 One joint least-squares problem over all readings: bias, weight, mounting, ellipsoid, and the force of every press.
 Forces and torques have the sensor's own noise and drift; the drift of readings near in time is nearly the same, so
-they do not count as independent. A press's force may point anywhere: friction, and a finger that gives way, do no
-harm, as only the point tells where it acts. Errors of the joint angles turn all readings alike and cannot be told
-from the mounting; they are an unknown with what was stated of them, and so widen the answer.
+they do not count as independent. A press's force may point anywhere: friction and a yielding finger do no harm, as only
+the point of action is used. Errors of the joint angles rotate all readings alike and cannot be separated from the
+mounting; they are an unknown with the stated prior, and so widen the result.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ _READINGS, _STEP_rad, _ROUNDS, _ENOUGH = 10, 1e-4, 2, 1e-6
 
 
 class FingertipNoise(StrictModel):
-    """Errors beyond the sensor's own, which the fingertip's file states; one standard deviation each.
+    """Errors besides the sensor's own, which are in the fingertip's file; one standard deviation each.
 
     Attributes:
-        joint_deg: offset of each joint of the finger, for good.
+        joint_deg: constant offset of each joint of the finger.
         level_deg: of the plate, the mount and the wrist together, per axis.
-        drift_s: time after which the sensor's drift has forgotten where it was.
+        drift_s: correlation time of the sensor's drift.
         contact_mm: of a contact point, per axis: shape of the tip beyond its ellipsoid.
-        shape_mm: of the ellipsoid known before, each coordinate and semi-axis.
+        shape_mm: prior of the ellipsoid, each coordinate and semi-axis.
     """
 
     joint_deg: float = Field(default=0.6, ge=0.0)
@@ -65,7 +65,7 @@ class FingertipNoise(StrictModel):
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """The refined answer.
+    """The refined result.
 
     Attributes:
         sensor_R_distal: the mounting, shape (3, 3).
@@ -101,7 +101,7 @@ def wrenches(poses: Sequence[WrenchPose]) -> Array:
 
 
 def refine(data: FingertipData, before: FingertipCalibration, start: Array, noise: FingertipNoise) -> Refined:
-    """The answer that explains all readings best, from a rough rotation of the distal frame into the sensor's."""
+    """The best fit to all readings, from a rough rotation of the distal frame into the sensor's."""
     problem = _Problem(data, before, noise)
     unknowns, rotation = problem.first(start), start
     for _ in range(_ROUNDS):  # again from where it ended, so that the turn is small and its covariance the rotation's
@@ -144,7 +144,7 @@ class _Problem:
         return np.asarray(np.concatenate(values) / self._scale)
 
     def misfit(self, unknowns: Array, rotation: Array) -> Array:
-        """Whitened residuals of all readings, and of what was known before."""
+        """Whitened residuals of all readings, and of the prior."""
         values = unknowns * self._scale
         off = self._predict(values, rotation) - self._measured
         parts = (
@@ -167,7 +167,7 @@ class _Problem:
         return np.hstack([forces @ turned.T, torques @ turned.T]) + values[_BIAS]
 
     def answer(self, unknowns: Array, rotation: Array, jacobian: Array) -> Refined:
-        """What was found, with its covariance and what is left of the readings."""
+        """The result, with its covariance and the residuals of the readings."""
         values = unknowns * self._scale
         rest = self._measured - self._predict(values, rotation)
         forces = values[_FIXED:].reshape(-1, 3)
@@ -207,7 +207,7 @@ def orientation_covariance(finger: str, noise: FingertipNoise) -> Array:
 
 
 def _alike(poses: Sequence[WrenchPose], drift_s: float) -> Array:
-    """Correlation of the drift between readings, shape (n, n); those without a time stand alone."""
+    """Correlation of the drift between readings, shape (n, n); those without a time are uncorrelated."""
     times = np.array([np.nan if pose.time_s is None else pose.time_s for pose in poses])
     alike = np.nan_to_num(np.exp(-np.abs(times[:, None] - times) / drift_s))
     np.fill_diagonal(alike, 1.0)
@@ -215,7 +215,7 @@ def _alike(poses: Sequence[WrenchPose], drift_s: float) -> Array:
 
 
 def _report_derivative(mass_kg: float, moment_kgm: Array) -> Array:
-    """Derivative of what is reported by the unknowns, shape (13, 22)."""
+    """Derivative of the reported values by the unknowns, shape (13, 22)."""
     picked = np.zeros((13, _FIXED))
     picked[PARTS["mounting"], _TURN] = np.eye(3)
     picked[PARTS["mass"], _MASS] = 1.0

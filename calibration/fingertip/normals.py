@@ -13,19 +13,19 @@ from drivers.core.configuration import validate
 from drivers.core.errors import ConfigurationError
 
 LARGEST_SHARE = 0.75
-"""Of equation 2.24's median error that learned normals may keep; otherwise they are not worth their while."""
+"""Largest share of equation 2.24's median error for learned normals to be worthwhile."""
 
 FEWEST_WITHIN_68, MOST_WITHIN_68 = 0.5, 0.86
-"""Share of errors inside the stated 68 per cent for which the statement passes as true."""
+"""Range of the share of errors inside the stated 68 per cent for which the statement passes."""
 
 
 @dataclass(frozen=True)
 class NormalsCalibration:
-    """What a calibration found.
+    """The result of a calibration.
 
     Attributes:
         learned: from the whole recording.
-        methods: errors of every method, trained on the recording's first half and judged on its second.
+        methods: errors of every method, trained on the recording's first half and tested on its second.
     """
 
     learned: LearnedNormals
@@ -38,7 +38,7 @@ class NormalsCalibration:
 
     @property
     def passed(self) -> bool:
-        """Whether the learned normals are better, and say truly how good they are."""
+        """Whether the learned normals are better, with a correct stated error."""
         return self.share <= LARGEST_SHARE and FEWEST_WITHIN_68 <= self._of("learned").within_68 <= MOST_WITHIN_68
 
     def _of(self, method: str) -> MethodErrors:
@@ -69,7 +69,7 @@ def normals_record(
     """The record to store; other fingers of an earlier file of the same rig are kept.
 
     Raises:
-        ConfigurationError: the earlier file is no calibration of normals, or of another rig.
+        ConfigurationError: the earlier file is not a calibration of normals, or of another rig.
     """
     before = read_record(earlier) if earlier is not None and earlier.exists() else None
     fingers: dict[str, StoredNormals] = {}

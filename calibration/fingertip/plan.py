@@ -1,7 +1,7 @@
 """A plan for a force fingertip: free in several orientations of the hand, then pressed and rolled about on the table.
 
-Free, the hand is turned high above the table, so that the tip's weight pulls in all directions. Pressed, the finger
-leans to the palm's side and to both others, where a fingertip has its shell.
+For free wrenches the hand is turned high above the table, so that the tip's weight acts in all directions. For presses
+the finger leans to the palm's side and to both others, where a fingertip has its shell.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class PlannedFree:
 
     @property
     def instruction(self) -> str:
-        """What to do, in words."""
+        """The instruction as text."""
         pitch, roll = np.degrees([self.pitch_rad, self.roll_rad])
         return f"{self.finger} free, hand pitched {pitch:.0f} deg, rolled {roll:.0f} deg"
 

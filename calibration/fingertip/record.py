@@ -24,14 +24,14 @@ COVARIANCE_ROWS = (
 
 
 class FingertipLimits(StrictModel):
-    """What a fingertip's calibration must keep to, to pass.
+    """Limits of a fingertip's calibration.
 
     Attributes:
-        force_mN: what is left of the untouched forces, root mean square per axis.
-        lever_mm: what is left of the presses' torques, as a lever.
+        force_mN: residual of the untouched forces, root mean square per axis.
+        lever_mm: residual of the presses' torques, as a lever.
         tilt_deg: between the presses' forces and the plate's normal, root mean square.
-        noise: of the residuals, of what was stated.
-        mass_g, com_mm, mounting_deg, centre_mm: standard deviations of what was found.
+        noise: of the residuals, relative to the stated noise.
+        mass_g, com_mm, mounting_deg, centre_mm: standard deviations of the result.
     """
 
     force_mN: float = Field(default=30.0, gt=0.0)
@@ -45,7 +45,7 @@ class FingertipLimits(StrictModel):
 
 
 def judge_fingertip(fit: FingertipFit, limits: FingertipLimits | None = None) -> tuple[Judgement, ...]:
-    """The figures of a fit against their limits."""
+    """The checks of a fit against their limits."""
     limits = limits or FingertipLimits()
     return (
         Judgement("left of the untouched forces", 1e3 * fit.rms_force_N, limits.force_mN, "mN"),

@@ -40,9 +40,9 @@ class FingertipWizard(GuidedSteps[PlannedWrench, tuple[WrenchPose, ...]]):
         return self.data.model_copy(update={"free": free, "presses": presses})
 
     def motion(self) -> MotionReport:
-        """What of the orientations is enough by now, and what is missing."""
+        """Whether the orientations are sufficient, and what is missing."""
         return wrench_motion(self.measured)
 
     def solve(self) -> FingertipFit:
-        """Mounting, weight and shape. Raises ConfigurationError when the wrenches do not tell them."""
+        """Mounting, weight and shape. Raises ConfigurationError if the wrenches do not determine them."""
         return fit_fingertip(self.measured, self.before, self.noise)

@@ -1,1 +1,1 @@
-"""Where the forearm's mount stands in the world."""
+"""Pose of the forearm's mount in the world."""

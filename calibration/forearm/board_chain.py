@@ -1,4 +1,4 @@
-"""A board on the hand in the world and in the camera, as a function of everything that is unknown about it."""
+"""A board on the hand in the world and in the camera, as a function of all unknowns."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from drivers.core.rotations import skew
 class BoardChain:
     """A board's corners in the world as a function of all unknowns, linear in the joint offsets.
 
-    The last of the offsets is by which share the board is larger than it should be.
+    The last of the offsets is the relative scale error of the board.
     """
 
     def __init__(self, motion: LinkMotion, about_rad: Array | None, board_m: Array) -> None:

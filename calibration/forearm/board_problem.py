@@ -1,8 +1,7 @@
 """Forearm to world from pictures of a board on the hand, while the hand moves.
 
-The world marker in the same pictures says where the camera stands; the board's place on the hand is unknown and found
-with it. Refined over all corners: the pixel of corner c is that of ``camera_T_world world_T_mount mount_T_link
-link_T_board c``.
+The world marker in the same pictures gives the camera's pose; the board's pose on the hand is estimated too. Refined
+over all corners: the pixel of corner c is that of ``camera_T_world world_T_mount mount_T_link link_T_board c``.
 """
 
 from __future__ import annotations
@@ -52,9 +51,8 @@ class BoardNoise(HandNoise):
 
     Attributes:
         corner_px: of a detected corner, per axis.
-        corner_bias_px: what moves all corners of a standing marker alike in every picture, per axis: sides that bow in
-            the lens.
-        corner_own_px: what stays of each of its corners alone.
+        corner_bias_px: common bias of all corners of a static marker, per axis: sides curved by the lens.
+        corner_own_px: remaining bias of each single corner.
         print_share: how well the size of each print is known: a bar of 100 mm measured to 0.03 mm.
     """
 
@@ -102,7 +100,7 @@ class BoardProblem:
     # --- solving -----------------------------------------------------------------------------------------------
 
     def solve(self, keep: Sequence[int] | None = None, near: Solution | None = None) -> Solution:
-        """The refined answer from all pictures, or from those in ``keep``."""
+        """The refined solution from all pictures, or from those in ``keep``."""
         chosen = list(range(self.count) if keep is None else keep)
         values = near.values if near else self._start
         for _ in range(_ROUNDS if near is None else 1):
@@ -216,7 +214,7 @@ class BoardProblem:
     # --- residuals ---------------------------------------------------------------------------------------------
 
     def residuals(self, solution: Solution) -> tuple[PoseResidual, ...]:
-        """What is left of each picture: the board as seen alone against the board as the answer has it."""
+        """Residual of each picture: the board's measured pose relative to the solution."""
         return tuple(self._residual(index, view, solution) for index, view in enumerate(self.views))
 
     def _residual(self, index: int, view: View, solution: Solution) -> PoseResidual:

@@ -6,7 +6,7 @@ camera in the mount's frame: ``A_i X = Z B_i``. From two poses on, relative moti
 group" (IEEE Trans. Robotics and Automation 1994). Both at once: Shah, "Solving the robot-world/hand-eye calibration
 problem using the Kronecker product" (J. Mechanisms and Robotics 2013).
 
-Neither notices motion that cannot give an answer; :mod:`calibration.steps.motion_check` looks at it before.
+Neither detects insufficient motion; :mod:`calibration.steps.motion_check` checks it before.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Hand-eye calibration from pairs of poses, as other programs record them: no corners, noise not known beforehand."""
+"""Hand-eye calibration from pairs of poses, as other programs record them: without corners, with unknown noise."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class PairProblem:
         return len(self.pairs)
 
     def solve(self, keep: Sequence[int] | None = None, near: Solution | None = None) -> Solution:
-        """The refined answer from all pairs, or from those in ``keep``."""
+        """The refined solution from all pairs, or from those in ``keep``."""
         chosen = range(self.count) if keep is None else keep
         measured = [_measurement(self.pairs[index], self._noise) for index in chosen]
         values = minimise(measured, near.values if near else self._start)
@@ -67,7 +67,7 @@ class PairProblem:
         )
 
     def residuals(self, solution: Solution) -> tuple[PoseResidual, ...]:
-        """What is left of each pair."""
+        """Residual of each pair."""
         offs = [_off(pair, solution.values) for pair in self.pairs]
         return tuple(
             PoseResidual(f"pair {index + 1}", float(np.linalg.norm(off.translation())), rotation_angle_rad(off))

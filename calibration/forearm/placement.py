@@ -1,4 +1,4 @@
-"""The forearm-to-world calibration file: where the positioner stands, and how well that is known."""
+"""The forearm-to-world calibration file: the positioner's pose, and its uncertainty."""
 
 from __future__ import annotations
 

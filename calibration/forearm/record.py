@@ -1,4 +1,4 @@
-"""The record of a forearm-to-world calibration: what the store keeps of a result, or of what a person states."""
+"""The record of a forearm-to-world calibration: from a result, or from a stated pose."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """Recorded observations of a forearm-to-world calibration in a file, so that it can be solved again.
 
-Ours (``tactile-forearm-data/1``) is one JSON document with touches or views and all that solving them needs. Pose pairs
-as other programs write them, ``[[mount_T_hand, camera_T_target], ...]`` with 4 x 4 matrices, are read too.
+This program's format (``tactile-forearm-data/1``) is one JSON document with touches or views and all data needed to
+solve them. Pose pairs as other programs write them, ``[[mount_T_hand, camera_T_target], ...]`` with 4 x 4 matrices, are
+read too.
 """
 
 from __future__ import annotations
@@ -111,8 +112,8 @@ class ForearmData:
     """Recorded observations: touches, views or pairs, and what solving them needs.
 
     Attributes:
-        rig, devices: what they were recorded on; empty where the file does not say.
-        guess: roughly where the mount stands.
+        rig, devices: what they were recorded on; empty if unknown.
+        guess: approximate pose of the mount.
         touches, views, pairs: one of them.
         link: what carries the board in the views.
         camera, markers: lens and world marker of the views.
@@ -133,7 +134,8 @@ def load_data(path: Path) -> ForearmData:
     """Read recorded observations.
 
     Raises:
-        ConfigurationError: the file cannot be read, is of no known form, or holds what is no rigid motion.
+        ConfigurationError: the file cannot be read, has an unknown format, or contains a matrix that is not a rigid
+            motion.
     """
     content = _json(path)
     if isinstance(content, list):

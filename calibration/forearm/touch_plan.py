@@ -1,7 +1,7 @@
 """A plan of touches: which finger presses what, from where, with the hand turned how.
 
-The hand points down with one finger stretched, the others bent away. So an error of a joint moves the tip sideways
-in the hand, and turning the hand about the finger tells it from an error of the mount.
+The hand points down with one finger stretched, the others bent away. So an error of a joint moves the tip sideways in
+the hand, and turning the hand about the finger separates it from an error of the mount.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ TURNS_rad = tuple(np.radians([-105.0, -35.0, 35.0, 105.0]))
 """Turns of the hand about the stretched finger."""
 
 LEANS_rad = tuple(np.radians([12.0, 22.0]))
-"""How far the finger leans against a face, or from the upright on the top."""
+"""Lean of the finger against a face, or from the vertical on the top."""
 
 Flexion: TypeAlias = tuple[float, float, float]
 
@@ -65,7 +65,7 @@ class PlannedTouch:
         return f"{self.finger} presses {self.patch.target.name} at ({x:.0f}, {y:.0f}, {z:.0f}) mm"
 
     def world_T_distal(self, tip: TipEllipsoid, off_m: float = 0.0) -> Pose3:
-        """The distal frame when the tip touches, or stands ``off_m`` before the face."""
+        """The distal frame when the tip touches, or is ``off_m`` in front of the face."""
         outward, axes = self.patch.normal_world, np.array(tip.semi_axes_m)
         reach = float(np.linalg.norm(axes * (self.world_R_distal.T @ outward)))
         centre = self.place_world_m + (reach + off_m) * outward

@@ -1,8 +1,8 @@
-"""Forearm to world from touches: fingertips on faces and points of known place.
+"""Forearm to world from touches: fingertips on faces and points with known poses.
 
-A touch on a face says that the contact point lies in the face, one number; on a known point it says three. The contact
-point comes from the fingertip's sensor through the kinematics, with the joints' offsets among the unknowns; so is how
-far each face is from where it should be, which all touches of it share.
+A touch on a face gives one equation (the contact point lies in the face); on a known point it gives three. The contact
+point comes from the fingertip's sensor through the kinematics, with the joints' offsets among the unknowns; so is the
+error of each face's position, shared by all touches of it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from drivers.core.contacts import Array
 from drivers.core.rotations import skew
 
 _STRAY = 1e-3
-"""How little the closed form's start is pulled to the guess, as a share: it only settles what no touch tells."""
+"""Weight of the guess in the closed form: it only determines what no touch determines."""
 
 _ROUNDS = 2
 _EXACT_m = 1e-6
@@ -59,7 +59,7 @@ class TouchProblem:
     Args:
         touches: at least as many as the closed form needs (see :mod:`calibration.steps.motion_check`).
         noise: their errors.
-        guess: roughly where the mount stands.
+        guess: approximate pose of the mount.
     """
 
     def __init__(self, touches: Sequence[Touch], noise: TouchNoise | None = None, guess: Pose3 | None = None) -> None:
@@ -74,7 +74,7 @@ class TouchProblem:
         return len(self.touches)
 
     def solve(self, keep: Sequence[int] | None = None, near: Solution | None = None) -> Solution:
-        """The refined answer from all touches, or from those in ``keep``."""
+        """The refined solution from all touches, or from those in ``keep``."""
         chosen = range(self.count) if keep is None else keep
         values = near.values if near else self._first_values()
         for _ in range(_ROUNDS if near is None else 1):
@@ -83,7 +83,7 @@ class TouchProblem:
         return self._solution(measured, values)
 
     def residuals(self, solution: Solution) -> tuple[PoseResidual, ...]:
-        """What is left of each touch: distance from its target, and the angle between the two normals."""
+        """Residual of each touch: distance from its target, and the angle between the two normals."""
         unknowns = solution.values.atVector(OFFSETS)
         return tuple(self._residual(touch, solution.world_T_mount, unknowns) for touch in self.touches)
 
@@ -100,7 +100,7 @@ class TouchProblem:
 
     @property
     def _joint_sigmas(self) -> Array:
-        """Of the joints' offsets, as known before."""
+        """Prior of the joints' offsets."""
         return np.full(len(self.joints), self.noise.joint_offset_rad)
 
     @property
@@ -134,7 +134,7 @@ class TouchProblem:
         return Measurement((MOUNT, OFFSETS), covariance, evaluate)
 
     def _along(self, touch: Touch) -> Array:
-        """How the tips' yield and the faces' shifts change a touch's residual, shape (1 or 3, 1 + faces)."""
+        """Derivatives of a touch's residual by the tips' yield and the faces' shifts, shape (1 or 3, 1 + faces)."""
         directions = touch.target.directions()
         shifts = np.zeros((len(directions), len(self._faces)))
         if isinstance(touch.target, Plane):
@@ -181,7 +181,7 @@ def _outward(touch: Touch) -> Array:
 
 
 def _tilt(touch: Touch, normal_world: Array) -> float | None:
-    """Angle between the sensed and the known normal; None where none is known."""
+    """Angle between the measured and the known normal; None if unknown."""
     if len(touch.target.directions()) != 1:
         return None
     cosine = float(touch.target.directions()[0] @ normal_world)
@@ -191,7 +191,7 @@ def _tilt(touch: Touch, normal_world: Array) -> float | None:
 def closed_form(touches: Sequence[Touch], guess: Pose3) -> Pose3:
     """The pose that fits best without joint offsets, by linear least squares in the twelve entries of its matrix.
 
-    What the touches do not tell (heights, when all of them lie in one plane) is taken from the guess; the matrix is
+    What the touches do not determine (heights, if all lie in one plane) is taken from the guess; the matrix is
     then brought to the nearest rotation, and the translation solved for again.
     """
     points = np.array([_point_mount_m(touch) for touch in touches])

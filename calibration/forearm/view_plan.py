@@ -23,10 +23,10 @@ _THUMB_AWAY = {"THJ5": np.radians(-30.0), "THJ4": 0.1}
 
 
 class ViewSettings(StrictModel):
-    """Where the board is shown.
+    """Poses at which the board is shown.
 
     Attributes:
-        pictures: how many.
+        pictures: their number.
         centre_m: middle of the board's places, world; above the camera.
         spread_m: largest distance from it, per axis.
         tilt_rad: largest tilt of the palm.

@@ -1,4 +1,4 @@
-"""The steps of the forearm-to-world wizard: plan, measure, check the motion, solve, judge.
+"""The steps of the forearm-to-world wizard: plan, measure, check the motion, solve, assess.
 
 Nothing here prints or asks: the command line shows these steps in a terminal, a page may show the same.
 """
@@ -32,11 +32,11 @@ Observation: TypeAlias = Touch | View
 
 
 class WizardSettings(StrictModel):
-    """What may be configured of the wizard.
+    """Settings of the wizard.
 
     Attributes:
         needs: the least motion.
-        limits: what a result must keep to.
+        limits: of a result.
         touch, board: errors of the observations.
         valid_days: how long a result may be used.
     """
@@ -59,11 +59,11 @@ class ForearmResult:
     """A solved calibration.
 
     Attributes:
-        method: how.
-        solution: the answer.
-        quality: how good it is, against the limits.
+        method: how it was found.
+        solution: the result.
+        quality: its checks against the limits.
         limits: those limits.
-        motion: what was solved from.
+        motion: the motion it was solved from.
     """
 
     method: Method
@@ -99,11 +99,11 @@ class ForearmWizard(GuidedSteps[Planned, Observation]):
         return replace(self.data, touches=touches, views=views)
 
     def motion(self) -> MotionReport:
-        """What of the motion is enough by now, and what is missing."""
+        """Whether the motion is sufficient, and what is missing."""
         return motion_of(self.measured, self.method, self.settings.needs)
 
     def solve(self, each: Callable[[], object] = lambda: None) -> ForearmResult:
-        """Check the motion, solve, and judge. Raises ConfigurationError when the motion is not enough."""
+        """Check the motion, solve, and assess. Raises ConfigurationError if the motion is insufficient."""
         return solve_forearm(self.measured, self.settings, each)
 
 
@@ -147,7 +147,7 @@ def solve_forearm(
 
 
 def problem_of(data: ForearmData, settings: WizardSettings) -> Problem:
-    """The problem that some data pose. Raises ConfigurationError when they lack something."""
+    """The problem for some data. Raises ConfigurationError if something is missing."""
     if data.touches:
         return TouchProblem(data.touches, settings.touch, data.guess)
     if data.pairs:

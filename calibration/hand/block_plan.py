@@ -1,7 +1,7 @@
 """A plan of touches of one rigid block with several fingers, stretched and bent, for the joints' offsets.
 
-A stretched finger tells the sum of its joints alone: J3, J2 and J1 turn its tip about the same point as good as. Bent
-once at the knuckle and once beyond it, it has levers of its own for each; the block ties the fingers to each other.
+A stretched finger only determines the sum of its joints: J3, J2 and J1 turn its tip about nearly the same point. Bent
+once at the knuckle and once beyond it, each joint has its own lever; the block relates the fingers to each other.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def _high(share: float) -> float:
 
 
 def _faces(block: Block) -> list[Patch]:
-    """The faces in the order they are pressed, the top after each side: only heights tell a bent finger's joints."""
+    """The faces in pressing order, the top after each side: only heights determine a bent finger's joints."""
     found = [patch for patch in patches(KnownGeometry(block=block)) if patch.target.name.startswith("block")]
     tops = [patch for patch in found if patch.normal_world[2] > 0.5]
     return [face for side in found if side not in tops for face in (side, *tops)]

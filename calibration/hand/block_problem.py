@@ -1,4 +1,4 @@
-"""Joint offsets from several fingers on one rigid block at a known place, the forearm's place being calibrated.
+"""Joint offsets from several fingers on one rigid block at a known pose, with a calibrated forearm.
 
 The forearm's calibration was taken with the wrist held, and has taken its offsets in; it is an unknown here only as far
 as it is unsure. Without it an offset that all fingers share would look like a turn of the palm.
@@ -30,17 +30,17 @@ from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 
 _WRIST_rad = float(np.radians(0.05))
-"""What the wrist may have moved since the forearm's calibration."""
+"""Possible motion of the wrist since the forearm's calibration."""
 
 _LEAST_SIGMAS = np.repeat([np.radians(0.02), 1e-4], 3)
-"""What even an exact calibration of the forearm is off by, radians and metres."""
+"""Least error of the forearm's calibration, radians and metres."""
 
 
 class BlockLimits(StrictModel):
-    """What touches of a block must keep to, so that the joints' offsets found from them are trusted.
+    """Limits of touches of a block, for trusting the joints' offsets found from them.
 
     Attributes:
-        residual_mm: what is left of the touches, root mean square.
+        residual_mm: residual of the touches, root mean square.
         noise: of the residuals, of what was stated.
         outliers: share of touches that the robust loss distrusts.
     """
@@ -51,7 +51,7 @@ class BlockLimits(StrictModel):
 
 
 class BlockSettings(StrictModel):
-    """What may be configured of the joints' calibration by a block.
+    """Settings of the joints' calibration by a block.
 
     Attributes:
         noise: errors of the touches.
@@ -103,7 +103,7 @@ class BlockWizard(GuidedSteps[Planned, Observation]):
         return tuple(found for _, found in self.observations() if isinstance(found, Touch))
 
     def motion(self) -> MotionReport:
-        """What of the touches is enough by now, and what is missing."""
+        """Whether the touches are sufficient, and what is missing."""
         return block_motion(self.touches, self.settings)
 
 
@@ -126,7 +126,7 @@ def block_motion(touches: Sequence[Touch], settings: BlockSettings) -> MotionRep
 
 
 def solve_block(touches: Sequence[Touch], forearm: ForearmCalibration, settings: BlockSettings) -> BlockResult:
-    """Joint offsets, how sure they are, and whether the touches fit.
+    """Joint offsets, their covariance, and whether the touches fit.
 
     Raises:
         ConfigurationError: too few touches, fingers or faces.

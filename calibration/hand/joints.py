@@ -1,4 +1,4 @@
-"""Joint offsets and gains: from poses whose angles are known, or from several fingers on one rigid known body.
+"""Joint offsets and gains: from poses with known angles, or from several fingers on a known rigid body.
 
 A correction ``true = gain * measured + shift`` goes into the tables of the hand's own calibration file: the angle of
 each point is replaced, so that reading them gives the corrected angle exactly.
@@ -23,19 +23,19 @@ from drivers.core.errors import ConfigurationError
 from drivers.shadow.model.kinematics import JOINT_INDEX
 
 GAIN_SPREAD_deg = 20.0
-"""Known angles of a joint have to lie this far apart for a gain; nearer ones give an offset alone."""
+"""Least range of a joint's known angles for a gain; smaller ranges give only an offset."""
 
 LARGEST_deg, LARGEST_GAIN = 15.0, 0.2
-"""A correction beyond these is no calibration: a wrong joint, a wrong pose or a wrong table."""
+"""Largest plausible correction: beyond, the joint, the pose or the table is wrong."""
 
 
 class JointLimits(StrictModel):
-    """What the corrections must keep to, to pass.
+    """Limits of the corrections.
 
     Attributes:
-        left_deg: what is left of a joint's poses, root mean square.
+        left_deg: residual of a joint's poses, root mean square.
         sigma_deg: standard deviation of a joint's shift.
-        poses: the least of each joint: what a single pose says nothing checks.
+        poses: least number per joint: a single pose cannot be checked.
     """
 
     left_deg: float = Field(default=1.0, gt=0.0)
@@ -74,8 +74,8 @@ class JointCorrection:
     Attributes:
         gain, shift_deg: ``true = gain * measured + shift``.
         sigma_deg: standard deviation of the shift at the middle of the poses.
-        rms_deg: what is left of the poses.
-        poses: how many there were; 0 for one from contacts.
+        rms_deg: residual of the poses.
+        poses: their number; 0 for a correction from contacts.
     """
 
     gain: float
@@ -107,10 +107,10 @@ def from_poses(poses: Sequence[JointPose]) -> dict[str, JointCorrection]:
 
 
 def from_contacts(offsets: Mapping[str, JointOffset]) -> dict[str, JointCorrection]:
-    """Corrections of those joints whose offset the contacts of a touch problem told.
+    """Corrections of those joints whose offset the contacts of a touch problem determine.
 
     Raises:
-        ConfigurationError: they told none.
+        ConfigurationError: they determine none.
     """
     found = {
         joint: JointCorrection(1.0, -float(np.degrees(o.offset_rad)), float(np.degrees(o.sigma_rad)), 0.0, 0)
@@ -161,7 +161,7 @@ def corrected_tables(path: Path, corrections: Mapping[str, JointCorrection]) -> 
 def judge_joints(
     corrections: Mapping[str, JointCorrection], limits: JointLimits | None = None
 ) -> dict[str, tuple[str, ...]]:
-    """What is outside its limit, in words, by joint; empty where all is well."""
+    """What is outside its limit, by joint; empty if all pass."""
     limits = limits or JointLimits()
     return {joint: tuple(_faults(found, limits)) for joint, found in corrections.items()}
 
@@ -228,7 +228,7 @@ def joints_record(
 
 
 def _untold(offsets: Mapping[str, JointOffset]) -> dict[str, Any]:
-    """What is kept of joints whose offset the contacts do not tell: their tables stay as they are."""
+    """The record of joints whose offset the contacts do not determine: their tables are unchanged."""
     return {
         joint: {"told": False, "sigma_deg": float(np.degrees(found.sigma_rad))}
         for joint, found in offsets.items()

@@ -17,7 +17,7 @@ from drivers.core.atomic_files import write_whole
 
 @dataclass(frozen=True)
 class PlannedPose:
-    """A pose whose angles are known, to be read."""
+    """A pose with known angles, to be read."""
 
     pose: JointPose
 
@@ -47,7 +47,7 @@ class PoseSteps(GuidedSteps[PlannedPose, JointPose]):
         return tuple(found for _, found in self.observations())
 
     def motion(self) -> MotionReport:
-        """Whether every joint has poses enough by now."""
+        """Whether every joint has enough poses."""
         counts = Counter(joint for pose in self.poses for joint in pose.known_deg)
         joints = {joint for planned in self.plan for joint in planned.pose.known_deg}
         least = min((counts[joint] for joint in joints), default=0)

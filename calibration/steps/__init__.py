@@ -1,1 +1,1 @@
-"""What all calibrations share: guided steps, motion checks, refinement, verdicts."""
+"""Shared parts of all calibrations: guided steps, motion checks, refinement, verdicts."""

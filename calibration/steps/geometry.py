@@ -1,4 +1,4 @@
-"""Geometry of known place that fingertips press: the table, its edges, a calibration block, marked points."""
+"""Known geometry that fingertips press: the table, its edges, a calibration block, marked points."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ class Block(StrictModel):
 
 
 class KnownGeometry(StrictModel):
-    """What can be pressed.
+    """Known targets.
 
     Attributes:
-        table: top and edges; only the top, without edges, when None.
+        table: top and edges; None: only the top.
         block: None without one.
         points_world_m: marked points by name.
         point_sigma_m: how well a fingertip hits a marked point, and the point is known, per axis.

@@ -1,4 +1,4 @@
-"""Guided measuring, step by step: what every wizard that moves a rig has in common. Nothing here prints or asks."""
+"""Guided measuring, step by step: shared by all wizards that move a rig. Nothing here prints or asks."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.core.errors import DeviceError
 
 
 class Instructed(Protocol):
-    """Something planned that can be told in words."""
+    """A planned observation with a textual instruction."""
 
     @property
     def instruction(self) -> str: ...
@@ -23,10 +23,10 @@ _AnsweredT = TypeVar("_AnsweredT", covariant=True)
 
 
 class EmulatorHost(Protocol[_AskedT, _AnsweredT]):
-    """Where observations are made: a rig, or a person with one."""
+    """Makes observations: a rig, or a person with one."""
 
     def measure(self, planned: _AskedT) -> _AnsweredT:
-        """Make one planned observation. Raises TactileLabError when it did not come off."""
+        """Make one planned observation. Raises TactileLabError if it failed."""
 
 
 @dataclass(frozen=True)
@@ -61,17 +61,17 @@ class GuidedSteps(Generic[PlannedT, ObservedT]):
         return tuple(Step(n + 1, count, planned.instruction, planned) for n, planned in enumerate(self.plan))
 
     def measure(self, step: Step[PlannedT], measurer: EmulatorHost[PlannedT, ObservedT]) -> ObservedT:
-        """Do one step; a step that is done again replaces its observation. Raises TactileLabError."""
+        """Do one step; repeating a step replaces its observation. Raises TactileLabError."""
         observation = measurer.measure(step.planned)
         self._taken = [(number, old) for number, old in self._taken if number != step.number]
         self._taken.append((step.number, observation))
         return observation
 
     def measure_all(self, measurer: EmulatorHost[PlannedT, ObservedT]) -> int:
-        """Do every step without asking, as ``--no-input`` does; gives how many did not come off and were left out.
+        """Do every step without asking, as ``--no-input`` does; returns how many failed and were skipped.
 
         Raises:
-            SafetyError: a limit was passed.
+            SafetyError: a limit was exceeded.
         """
         left_out = 0
         for step in self.steps():
@@ -82,7 +82,7 @@ class GuidedSteps(Generic[PlannedT, ObservedT]):
         return left_out
 
     def undo(self) -> int | None:
-        """Take the last observation back; gives its step's number, None when there is none."""
+        """Undo the last observation. Returns its step's number, None if there is none."""
         return self._taken.pop()[0] if self._taken else None
 
     def observations(self) -> list[tuple[PlannedT, ObservedT]]:

@@ -1,4 +1,4 @@
-"""Points of the hand in the mount's frame, and how they move with errors of the joint angles."""
+"""Points of the hand in the mount's frame, and their derivatives by errors of the joint angles."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _STEP_rad = 1e-5
 
 
 class HandNoise(StrictModel):
-    """Errors of where hand and positioner say they stand, one standard deviation.
+    """Errors of the measured joints of hand and positioner, one standard deviation.
 
     Attributes:
-        joint_offset_rad: offset of every joint, for good.
+        joint_offset_rad: constant offset of every joint.
         joint_noise_rad: of a joint's angle in one touch or picture, after averaging.
         base_sigma_m: of the positioner's place in one touch or picture, per axis.
     """

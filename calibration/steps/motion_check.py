@@ -1,7 +1,7 @@
-"""Is there enough motion to solve from? Asked before solving, and answered with what is missing.
+"""Checks before solving whether there is enough motion, and what is missing.
 
-Closed forms do not notice motion that cannot give an answer: from rotations that are too small, or all about one axis,
-they return something all the same, the identity for instance.
+Closed forms do not detect insufficient motion: from rotations that are too small, or all about one axis, they still
+return a result, the identity for instance.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class MotionNeeds(StrictModel):
         touches: touches.
         direction: smallest share of the touches that tells a direction of space (the mean squared cosine).
         lever_m: root mean square lever of the touches about each axis through their middle.
-        turn_rad: rotation of the hand between touches, root mean square: it tells joint offsets from the mount.
+        turn_rad: rotation of the hand between touches, root mean square: it separates joint offsets from the mount.
     """
 
     poses: int = Field(default=8, ge=3)
@@ -45,13 +45,13 @@ class MotionNeeds(StrictModel):
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that must be enough.
+    """One criterion.
 
     Attributes:
-        name: of what.
+        name: its name.
         value, needed: in the unit.
-        unit: "" for a number of things.
-        advice: what to do when it is not enough.
+        unit: "" for a count.
+        advice: what to do if it is not met.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Check:
 
     @property
     def ok(self) -> bool:
-        """Whether it is enough."""
+        """Whether it is met."""
         return self.value >= self.needed
 
     def __str__(self) -> str:
@@ -78,16 +78,16 @@ class MotionReport:
 
     @property
     def ok(self) -> bool:
-        """Whether one may solve."""
+        """Whether all are met."""
         return all(check.ok for check in self.checks)
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """What is not enough, and what to do about it."""
+        """The criteria that are not met, and what to do."""
         return tuple(f"{check}: {check.advice}" for check in self.checks if not check.ok)
 
     def refuse(self, where: str) -> None:
-        """Raise ConfigurationError when something is missing."""
+        """Raise ConfigurationError if something is missing."""
         if not self.ok:
             hint = "Record more poses; nothing was solved or stored"
             raise ConfigurationError(f"the motion is not enough: {'; '.join(self.missing)}", where=where, hint=hint)
@@ -132,7 +132,7 @@ def check_rotations(poses: Sequence[Pose3], what: str, needs: MotionNeeds) -> Mo
 
 
 def check_touches(touches: Sequence[Touch], needs: MotionNeeds | None = None) -> MotionReport:
-    """Number of touches, the directions they tell, their levers, and turns of the hand between them."""
+    """Number of touches, the directions they determine, their levers, and rotations of the hand between them."""
     needs = needs or MotionNeeds()
     directions = np.concatenate([touch.target.directions() for touch in touches] or [np.zeros((1, 3))])
     hands = [Pose3(mount_T_link(touch.pose, "palm")) for touch in touches]
@@ -186,9 +186,9 @@ def _weakest(directions: Array) -> tuple[float, Array]:
 
 
 def _weakest_lever(touches: Sequence[Touch]) -> tuple[float, Array]:
-    """Lever about the axis through the touches' middle about which they tell least, and that axis.
+    """Lever about the least determined axis through the touches' middle, and that axis.
 
-    What a turn shares with a shift does not count: a turn that all touches would take for a shift is not told.
+    A rotation that all touches would measure as a shift does not count.
     """
     places, rows = [], []
     for touch in touches:

@@ -1,4 +1,4 @@
-"""What a forearm-to-world calibration is computed from: touches of known geometry, views of a marker on the hand."""
+"""Observations for a forearm-to-world calibration: touches of known geometry, views of a marker on the hand."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drivers.core.contacts import Array
 
 @dataclass(frozen=True, eq=False)
 class HandPose:
-    """Where positioner and hand stood, as they measured it.
+    """Measured joints of positioner and hand.
 
     Attributes:
         base_q: axes of the positioner, shape (6,), metres and radians.
@@ -41,20 +41,20 @@ class Plane:
     sigma_m: float = 0.0
 
     def directions(self) -> Array:
-        """Directions in which a touch tells something, shape (1, 3)."""
+        """Directions that a touch determines, shape (1, 3)."""
         return np.asarray(self.normal_world)[None]
 
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """A point of known place, small enough that a touch there tells all three coordinates."""
+    """A known point, small enough that a touch determines all three coordinates."""
 
     name: str
     point_world_m: Array
     sigma_m: float = 0.0
 
     def directions(self) -> Array:
-        """Directions in which a touch tells something, shape (3, 3)."""
+        """Directions that a touch determines, shape (3, 3)."""
         return np.eye(3)
 
 

@@ -1,4 +1,4 @@
-"""What is left over of one pose of a calibration."""
+"""Residuals of the poses of a calibration."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class PoseResidual:
 
     Attributes:
         label: what it was.
-        distance_m: how far the observation lies from where it should.
+        distance_m: distance of the observation from its prediction.
         angle_rad: the same for its direction; None where the observation has none.
         pixels: root mean square of a picture's corners; None without a picture.
     """

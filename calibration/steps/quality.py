@@ -1,4 +1,4 @@
-"""How good is a calibration? Residuals, what it says of poses it was not made from, how it repeats, and a verdict."""
+"""Quality of a calibration: residuals, errors of held-out poses, repeatability, and a verdict."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CONFIDENCE = 0.95
 
 
 class Problem(Protocol):
-    """What can be solved from all of its observations, or from some."""
+    """A problem that can be solved from all of its observations, or from some."""
 
     @property
     def count(self) -> int: ...
@@ -31,11 +31,11 @@ class Problem(Protocol):
 
 
 class QualityLimits(StrictModel):
-    """What a result must keep to, to pass.
+    """Limits of a result.
 
     Attributes:
         residual_mm, residual_deg: root mean square over the poses.
-        held_out_mm, held_out_deg: the same of poses that the solution was not made from.
+        held_out_mm, held_out_deg: the same for poses held out of the solution.
         repeat_mm, repeat_deg: largest change of the result when one pose is left out.
         region_mm, region_deg: largest half-axis of the 95 % region.
     """
@@ -51,12 +51,14 @@ class QualityLimits(StrictModel):
 
 
 VIEW_LIMITS = {"residual_mm": 5.0, "residual_deg": 2.5, "held_out_mm": 5.5, "held_out_deg": 2.5}
-"""Limits of pictures and pose pairs where they differ: a board seen once from far is placed less well than a touch."""
+"""Limits of pictures and pose pairs where they differ: a board seen once from far away is less
+accurate than a touch.
+"""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """One figure against its limit."""
+    """One value against its limit."""
 
     name: str
     value: float
@@ -65,7 +67,7 @@ class Judgement:
 
     @property
     def ok(self) -> bool:
-        """Whether it keeps to the limit (what is no number does not)."""
+        """Whether it is within the limit (NaN is not)."""
         return self.value <= self.limit
 
     def __str__(self) -> str:
@@ -74,7 +76,7 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Quality:
-    """All figures of one result.
+    """All quality values of one result.
 
     Attributes:
         residuals: of each pose.
@@ -83,7 +85,7 @@ class Quality:
         repeat_m, repeat_rad: largest change of the result when one pose is left out.
         region_m, region_rad: half-axes of the 95 % region of the place and of the rotation, each (3,), largest last.
         outliers: labels of poses that the robust loss distrusts.
-        judgements: the figures against their limits.
+        judgements: the values against their limits.
     """
 
     residuals: tuple[PoseResidual, ...]
@@ -100,7 +102,7 @@ class Quality:
 
     @property
     def passed(self) -> bool:
-        """Whether every figure keeps to its limit."""
+        """Whether every value is within its limit."""
         return all(judgement.ok for judgement in self.judgements)
 
 
@@ -110,11 +112,11 @@ def judge(
     limits: QualityLimits | None = None,
     each: Callable[[], object] = lambda: None,
 ) -> Quality:
-    """Work out every figure of a result: one solution for each pose and each part left out.
+    """Compute the quality of a result: one solution for each pose and each part left out.
 
     Args:
-        problem, solution: what was solved, and the answer from all of it.
-        limits: what to keep to.
+        problem, solution: the problem, and its solution from all observations.
+        limits: of the result.
         each: called after every solution, for a progress bar; there are :func:`judging_steps` of them.
     """
     residuals = problem.residuals(solution)
@@ -142,13 +144,13 @@ def judging_steps(problem: Problem) -> int:
 
 
 def region_holds(solution: Solution, truth: Pose3) -> bool:
-    """Whether the 95 % region of all six numbers holds a pose."""
+    """Whether the 95 % region of all six numbers contains a pose."""
     off = Pose3.Logmap(solution.world_T_mount.inverse() * truth)
     return bool(off @ np.linalg.solve(solution.covariance, off) <= chi2.ppf(CONFIDENCE, 6))
 
 
 def _held_out_residuals(problem: Problem, solution: Solution, each: Callable[[], object]) -> list[PoseResidual]:
-    """Residuals of every pose by a solution that was not made from it."""
+    """Residuals of every pose by a solution without it."""
     found = []
     for part in range(min(FOLDS, problem.count)):
         out = range(part, problem.count, FOLDS)
@@ -160,7 +162,7 @@ def _held_out_residuals(problem: Problem, solution: Solution, each: Callable[[],
 
 
 def _leave_one_out(problem: Problem, solution: Solution, each: Callable[[], object]) -> list[Pose3]:
-    """The answers with each pose left out in turn."""
+    """The solutions with each pose left out in turn."""
     found = []
     for left in range(problem.count):
         keep = [index for index in range(problem.count) if index != left]

@@ -1,8 +1,8 @@
-"""Joint robust refinement in gtsam: what the three forearm problems share.
+"""Joint robust refinement in gtsam, shared by the three forearm problems.
 
 Every observation is one factor with its own noise and a Huber loss whose threshold only outliers pass; the unknown
 pose, the joints' offsets and whatever else is unknown are solved for together, and the covariance comes from the
-marginals. It is scaled by what the residuals say about the noise, so that noise worse than stated shows in the region.
+marginals. It is scaled by the noise estimated from the residuals, so that noise above the stated one widens the region.
 """
 
 from __future__ import annotations
@@ -79,13 +79,13 @@ class JointOffset:
 
     @property
     def observable(self) -> bool:
-        """Whether the data say more about it than was known before."""
+        """Whether the data add information to the prior."""
         return self.sigma_rad < 0.5 * self.prior_rad
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A refined answer.
+    """A refined solution.
 
     Attributes:
         world_T_mount: the pose.
@@ -109,7 +109,7 @@ class Solution:
 
 
 def prior_of_offsets(sigmas: Array) -> Measurement:
-    """What is known of offsets beforehand: nothing but their size, one standard deviation each, shape (n,)."""
+    """Prior of the offsets: one standard deviation each, shape (n,)."""
 
     def evaluate(values: gtsam.Values) -> tuple[Array, list[Array]]:
         return values.atVector(OFFSETS), [np.eye(len(sigmas))]

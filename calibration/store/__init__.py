@@ -1,1 +1,1 @@
-"""Results of calibrations as sealed files, and whether a session may use them."""
+"""Calibration results as sealed files, and their admission to sessions."""

@@ -1,4 +1,4 @@
-"""May a session begin with these calibrations? Each one must be there, unchanged, passed, of this rig and of now."""
+"""Decides whether a session may start with its calibrations: present, unchanged, passed, valid, and of this rig."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from drivers.core.configuration import load
 from drivers.core.errors import ConfigurationError
 
 DEVICE_TABLES = frozenset({"joints", "motors", "markers", "boards", "rates", "gains", "geometry", "block", "board"})
-"""Roles that may be plain files: the maker's tables of a device, and descriptions of what a rig is built of."""
+"""Roles that may be plain files: the manufacturer's tables of a device, and descriptions of a rig's parts."""
 
 UNCALIBRATED = "uncalibrated"
-"""Key of a session's settings under which it records what was overlooked."""
+"""Key of a session's settings that records overridden objections."""
 
 _CLOCK_SLACK_s = 86400.0
 
 
 @dataclass(frozen=True)
 class Installation:
-    """What a calibration has to belong to.
+    """The installation that a calibration must belong to.
 
     Attributes:
-        rig: name of the installation (a rig file's ``station``).
-        devices: serial numbers by device name, as far as they are known.
+        rig: name of the installation (in the rig file).
+        devices: known serial numbers by device name.
     """
 
     rig: str
@@ -36,7 +36,7 @@ class Installation:
 
 @dataclass(frozen=True)
 class Objection:
-    """Why one file may not be used.
+    """The objection to one file.
 
     Attributes:
         role: of the file in the rig.
@@ -55,7 +55,7 @@ class Objection:
 
 
 def objections(files: Mapping[str, Path], here: Installation, now: datetime | None = None) -> tuple[Objection, ...]:
-    """Everything that speaks against beginning a session with these files.
+    """All objections to starting a session with these files.
 
     Args:
         files: role to file.
@@ -70,10 +70,10 @@ def objections(files: Mapping[str, Path], here: Installation, now: datetime | No
 def admit(
     files: Mapping[str, Path], here: Installation, *, allow_uncalibrated: bool = False, now: datetime | None = None
 ) -> tuple[str, ...]:
-    """Refuse files that may not be used, or tell what was overlooked because the caller allows it.
+    """Refuse invalid files, or return the objections if the caller allows them.
 
     Returns:
-        The objections in words, for the session's record; empty when all is well.
+        The objections as text, for the session's record; empty if there are none.
 
     Raises:
         ConfigurationError: there are objections, and they are not allowed.
@@ -86,7 +86,7 @@ def admit(
 
 
 def check_record(record: CalibrationRecord, here: Installation, now: datetime) -> tuple[str, str] | None:
-    """Why a record may not be used here and now, and what to do; None when it may."""
+    """The objection to a record here and now, and what to do; None if it is valid."""
     if (foreign := _foreign(record, here)) is not None:
         return foreign
     if record.is_expired(now):
@@ -101,7 +101,7 @@ def check_record(record: CalibrationRecord, here: Installation, now: datetime) -
 def refuse_foreign(path: Path, here: Installation) -> None:
     """Refuse a stored calibration of another rig or device; plain files do not say whose they are.
 
-    For judging old recordings, where it does not matter whether the calibration may still be used today.
+    For evaluating old recordings, where it does not matter whether the calibration is still valid today.
 
     Raises:
         ConfigurationError: it is foreign, was changed by hand, or cannot be read.
@@ -112,7 +112,7 @@ def refuse_foreign(path: Path, here: Installation) -> None:
 
 
 def _foreign(record: CalibrationRecord, here: Installation) -> tuple[str, str] | None:
-    """How a record belongs to another rig or device, and what to do; None when it does not."""
+    """The objection if a record belongs to another rig or device, and what to do; otherwise None."""
     if record.rig != here.rig:
         return f"belongs to rig {record.rig}, not to {here.rig}", f"Use a calibration of {here.rig}"
     for device, serial in record.devices.items():

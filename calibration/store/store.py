@@ -1,7 +1,7 @@
-"""The calibration store: one YAML file for each result, with everything one asks later.
+"""The calibration store: one YAML file per result with its complete provenance.
 
-What was found and how well, from what and by which method, when, on which devices of which rig, and until when it may
-be used. Written whole or not at all; sealed with a hash of its content (:mod:`drivers.core.calibration_file`).
+Result and accuracy, data and method, date, devices and rig, and expiry. Written atomically; sealed with a hash of its
+content (:mod:`drivers.core.calibration_file`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Kind = Literal["forearm", "joints", "fingertips", "biotacs", "normals", "camera"
 Verdict = Literal["PASS", "FAIL"]
 
 VALID_DAYS = 90.0
-"""How long a result may be used unless its calibration says otherwise."""
+"""Default validity of a result."""
 
 _DISTRIBUTIONS = {
     "tactile-lab": "tactile-lab",
@@ -39,7 +39,7 @@ _DISTRIBUTIONS = {
 
 
 class Covariance(StrictModel):
-    """Covariance of what was found.
+    """Covariance of a result.
 
     Attributes:
         of: names of its rows, with units.
@@ -77,15 +77,15 @@ class CalibrationRecord(StrictModel):
 
     Attributes:
         kind: what was calibrated; the role of its file in a rig.
-        rig: the installation it belongs to (a rig file's ``station``).
-        devices: serial numbers of the devices it belongs to, by device name; empty where none is known.
+        rig: the installation it belongs to (in the rig file).
+        devices: serial numbers of the devices it belongs to, by device name; empty if unknown.
         method: how it was found.
-        created_utc, valid_until_utc: ISO 8601; no end when None.
-        software: versions of what computed it.
-        parameters: what the device's loader reads.
-        covariance: of the parameters or of what they were computed from; None where there is none.
-        residuals: what was left over, per pose and in all; figures for people, by name.
-        limits: what the verdict was judged by.
+        created_utc, valid_until_utc: ISO 8601; None: no expiry.
+        software: versions of the software.
+        parameters: read by the device's loader.
+        covariance: of the parameters or of what they were computed from; None if there is none.
+        residuals: per pose and in total; values for people, by name.
+        limits: of the verdict.
         verdict: whether the result is inside its limits.
         details: further findings (joint offsets, the marker's place on the hand, ...).
         notes: the operator's.
@@ -120,7 +120,7 @@ class CalibrationRecord(StrictModel):
         return datetime.fromisoformat(self.created_utc)
 
     def is_expired(self, now: datetime) -> bool:
-        """Whether its time is over."""
+        """Whether it has expired."""
         return self.valid_until_utc is not None and datetime.fromisoformat(self.valid_until_utc) < now
 
 
@@ -140,7 +140,7 @@ def new_record(
     valid_days: float | None = VALID_DAYS,
     now: datetime | None = None,
 ) -> CalibrationRecord:
-    """A record of now, by this version of the program; valid for ever when ``valid_days`` is None."""
+    """A record created now by this version of the program; without expiry if ``valid_days`` is None."""
     created = (now or datetime.now(UTC)).astimezone(UTC)
     until = None if valid_days is None else utc_text(created + timedelta(days=valid_days))
     return CalibrationRecord(
@@ -162,12 +162,12 @@ def new_record(
 
 
 def target_file(out: Path, record: CalibrationRecord) -> Path:
-    """Where a record goes: its file, or beside it when it failed, so that it replaces nothing that passed."""
+    """Path of a record: its file, or NAME.failed.yaml if it failed, so that it replaces no valid one."""
     return out if record.verdict == "PASS" else out.with_name(f"{out.stem}.failed{out.suffix}")
 
 
 def write_record(path: Path, record: CalibrationRecord, comment: str = "") -> None:
-    """Write a record, sealed, whole or not at all.
+    """Write a sealed record atomically.
 
     Raises:
         WriteError: the file cannot be written.
@@ -187,7 +187,7 @@ def read_record(path: Path) -> CalibrationRecord:
     """Read a stored calibration.
 
     Raises:
-        ConfigurationError: it is missing, is no stored calibration, was changed by hand, or does not fit.
+        ConfigurationError: it is missing, is not a stored calibration, was changed by hand, or is invalid.
     """
     content = load(path)
     if not is_stored(content):
@@ -199,7 +199,7 @@ def read_record(path: Path) -> CalibrationRecord:
 
 
 def software_versions() -> dict[str, str]:
-    """Versions of what computes a calibration."""
+    """Versions of the software that computes a calibration."""
     versions = {"python": platform.python_version()}
     for name, distribution in _DISTRIBUTIONS.items():
         with suppress(PackageNotFoundError):

@@ -1,1 +1,1 @@
-"""What every package speaks in: errors, time, poses, contacts, configuration, transports, child processes."""
+"""Shared types of all packages: errors, time, poses, contacts, configuration, transports, child processes."""

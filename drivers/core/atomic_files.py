@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all: after a power cut, too, either the old or the new one is there."""
+"""Atomic files: even after a power cut either the old or the new file is complete."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 def write_whole(
     path: Path, content: str | bytes, hint: str = "Choose another folder, or check its permissions"
 ) -> None:
-    """Write a file, and its folder where there is none, whole or not at all.
+    """Write a file atomically, and create its folder if needed.
 
     Args:
-        content: text goes out as UTF-8 with the line ends it has.
-        hint: what to do when this place cannot be written; a full disk has an advice of its own.
+        content: text is written as UTF-8 with its line ends unchanged.
+        hint: what to do if the path cannot be written; a full disk has its own hint.
 
     Raises:
-        WriteError: the disk is full, or the place cannot be written; an older file is as it was.
+        WriteError: the disk is full, or the path cannot be written; an older file is unchanged.
     """
     partial = path.with_name(f".{path.name}.part")
     try:
@@ -59,5 +59,5 @@ def disk_full(error: OSError) -> bool:
 
 
 def write_failure(error: OSError) -> str:
-    """Why something could not be written, in words."""
+    """Why something could not be written, as text."""
     return "the disk is full" if disk_full(error) else f"cannot be written ({error.strerror or error})"

@@ -1,8 +1,8 @@
-"""The outer form of a stored calibration: what is inside belongs to the device, the seal is the same for all.
+"""The envelope of a stored calibration: its content belongs to the device, the seal is the same for all.
 
-A stored calibration is a YAML document with the key ``format`` and a hash of everything else in it, so that a figure
-that was changed by hand is noticed. Comments and layout may be changed. A plain file, a device's own table for
-instance, has no such seal and is taken as it is; whether it may be used is decided where a session begins.
+A stored calibration is a YAML document with the key ``format`` and a hash of everything else in it, so that a value
+changed by hand is detected. Comments and layout may be changed. A plain file, a device's own table for instance, has no
+seal and is read as it is; whether it may be used is decided when a session starts.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def is_stored(content: Any) -> bool:
 
 
 def check_seal(content: Mapping[str, Any], where: str) -> None:
-    """Refuse a stored calibration of another version, or one that is not as it was written.
+    """Refuse a stored calibration of another version, or a changed one.
 
     Raises:
         ConfigurationError: says which.
@@ -49,7 +49,7 @@ def check_seal(content: Mapping[str, Any], where: str) -> None:
 
 
 def load_parameters(path: Path, model: type[Model]) -> Model:
-    """What a device needs from a calibration file, stored or plain.
+    """The parameters of a device from a calibration file, stored or plain.
 
     Raises:
         ConfigurationError: the file cannot be read, was changed by hand, or does not fit the model.

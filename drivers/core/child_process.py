@@ -1,9 +1,9 @@
-"""A module of this package in a process of its own: start it, give it orders, hear its answers, end it.
+"""Runs a module in a child process: start it, send commands, read its answers, end it.
 
-Two pipes lead to the child: orders go in as lines of JSON (see :mod:`drivers.core.orders`), the first of them says what
-it is to be. It answers with what it likes; :meth:`ChildProcess.answer` hears lines of JSON, :func:`say` is the child's
-side of that. The pipe of the orders ends with the program that started the child, however that ends, and the child
-then ends by itself: whoever writes one looks at that pipe between two pieces of work.
+Two pipes lead to the child: commands are lines of JSON (see :mod:`drivers.core.orders`), the first of them configures
+it. Its output can have any form; :meth:`ChildProcess.answer` reads lines of JSON, :func:`say` is the child's side of
+that. The command pipe closes when the parent ends, however that happens, and the child must then end: it checks that
+pipe regularly.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _READ_BYTES = 1_048_576
 _ENDING_s = 1.0
 _PACKAGES = Path(__file__).resolve().parents[2]
 _INSTALLED = ("site-packages", "dist-packages")
-"""Folders that Python looks into by itself, behind its own library."""
+"""Folders that Python searches by default, besides its standard library."""
 
 _SHOWN = 80
 
@@ -55,11 +55,11 @@ def child_environment() -> dict[str, str]:
 
 
 class ChildProcess:
-    """A child and its two pipes; nothing runs before :meth:`start`. Not to be shared between threads.
+    """A child and its two pipes; nothing runs before :meth:`start`. Not thread-safe.
 
     Args:
-        module: of this package, run as a program.
-        name: of the device or work it is for, for messages.
+        module: run as a program.
+        name: of the device or work, for messages.
     """
 
     def __init__(self, module: str, name: str) -> None:
@@ -69,12 +69,12 @@ class ChildProcess:
         self._rest = b""
 
     def start(self, first: Order) -> None:
-        """Start it with its first order, without waiting until it works.
+        """Start it with its first command, without waiting until it is ready.
 
-        It gets a process group of its own: Ctrl+C is for the program that started it, which ends it in order.
+        It has a separate process group: Ctrl+C goes to the parent, which ends it properly.
 
         Raises:
-            DeviceError: it ended at once.
+            DeviceError: it ended immediately.
         """
         assert self._process is None, f"{self.name} has been started already"
         self._process = subprocess.Popen(
@@ -99,29 +99,29 @@ class ChildProcess:
 
     @property
     def running(self) -> bool:
-        """Whether its process lives."""
+        """Whether its process is running."""
         return self._process is not None and self._process.poll() is None
 
     @property
     def process_id(self) -> int:
-        """Of the started process. Raises DeviceError when there is none."""
+        """Process id of the started process. Raises DeviceError if there is none."""
         return self._start().pid
 
     def give(self, order: Order) -> None:
-        """Give an order; never waits.
+        """Send a command, without waiting.
 
         Raises:
-            DeviceError: it is not started, has ended, or has not taken orders for long.
+            DeviceError: it is not started, has ended, or has not read commands for long.
         """
         self._start()
         assert self._orders is not None
         self._orders.give(order)
 
     def read(self, patience_s: float) -> bytes | None:
-        """Bytes that arrive in this time; None when none do.
+        """Bytes that arrive in this time; None if there are none.
 
         Raises:
-            DeviceError: it is not started, or has ended and all it said has been read.
+            DeviceError: it is not started, or has ended and all output was read.
         """
         process = self._start()
         assert process.stdout is not None
@@ -134,7 +134,7 @@ class ChildProcess:
         return data
 
     def ready(self, patience_s: float) -> dict[str, Any]:
-        """Its first answer; without a good one it is closed.
+        """Its first answer; without a valid one it is closed.
 
         Raises:
             DeviceError: as :meth:`answer`.
@@ -146,20 +146,20 @@ class ChildProcess:
             raise
 
     def answer(self, patience_s: float) -> dict[str, Any]:
-        """The next line of JSON it says, waited for.
+        """Wait for its next line of JSON.
 
         Raises:
-            DeviceError: none comes in this time; and as :meth:`hear`.
+            DeviceError: none arrives in this time; and as :meth:`hear`.
         """
         if (content := self.hear(patience_s)) is None:
             raise DeviceError("its process does not answer", where=self.name, hint="Start it again")
         return content
 
     def hear(self, patience_s: float = 0.0) -> dict[str, Any] | None:
-        """The next line of JSON it says; None when none comes in this time.
+        """Its next line of JSON; None if none arrives in this time.
 
         Raises:
-            DeviceError: it has ended, the line is an error of :func:`errors_said`, in its own words, or no answer.
+            DeviceError: it has ended, the line is an error of :func:`errors_said`, or not an answer.
         """
         clock = MonotonicClock()
         until_ns = clock.now_ns() + round(patience_s * NANOSECONDS)
@@ -174,16 +174,16 @@ class ChildProcess:
         return content
 
     def kill(self) -> None:
-        """End it at once, as a power cut would; idempotent."""
+        """Kill it immediately; idempotent."""
         if self._process is not None:
             self._process.kill()
         self.close(0.0)
 
     def close(self, patience_s: float = 5.0) -> bytes:
-        """End its orders and wait until it has ended, or kill it when it takes longer; idempotent.
+        """Close its command pipe and wait until it has ended, or kill it after a timeout; idempotent.
 
         Returns:
-            what it has said that was not read.
+            output that was not read.
         """
         if self._process is None:
             return b""
@@ -202,7 +202,7 @@ class ChildProcess:
 
 
 def read_answer(line: bytes, where: str) -> dict[str, Any]:
-    """What a child says in a line of JSON.
+    """Parse a child's line of JSON.
 
     Raises:
         DeviceError: it is something else; a library of the child's may have printed it.
@@ -211,21 +211,21 @@ def read_answer(line: bytes, where: str) -> dict[str, Any]:
         if isinstance(content := json.loads(line), dict):
             return content
     shown = line[:_SHOWN].decode(errors="replace")
-    raise DeviceError(f"its process says what is no answer: {shown!r}", where=where, hint="Start it again")
+    raise DeviceError(f"unexpected output of its process: {shown!r}", where=where, hint="Start it again")
 
 
 # --- the child's side ----------------------------------------------------------------------------------------------
 
 
 def say(content: dict[str, Any]) -> None:
-    """Say a line, for :meth:`ChildProcess.answer`."""
+    """Write a line, for :meth:`ChildProcess.answer`."""
     sys.stdout.write(json.dumps(content) + "\n")
     sys.stdout.flush()
 
 
 @contextmanager
 def errors_said() -> Iterator[None]:
-    """Errors are said as an answer, and end the process: those of this package with their exit code."""
+    """Errors are written as an answer and end the process: those of this program with their exit code."""
     try:
         yield
     except TactileLabError as error:
@@ -237,7 +237,7 @@ def errors_said() -> Iterator[None]:
 
 
 def failure(error: Exception) -> str:
-    """An error that nobody foresaw, in one line: what it was, and where it happened."""
+    """An unexpected error in one line: what it was, and where it happened."""
     frames = traceback.extract_tb(error.__traceback__)
     place = f", in {frames[-1].filename}, line {frames[-1].lineno}" if frames else ""
     words = " ".join(str(error).split())
@@ -245,7 +245,7 @@ def failure(error: Exception) -> str:
 
 
 def main() -> None:
-    """How every child begins: run the module that the first word names, with the other words; errors are one line."""
+    """The entry point of every child: run the module in the first argument; errors are one line."""
     module, sys.argv[1:] = sys.argv[1], sys.argv[2:]
     try:
         runpy.run_module(module, run_name="__main__", alter_sys=True)

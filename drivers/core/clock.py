@@ -1,4 +1,4 @@
-"""Time as a parameter: nothing in the program asks the operating system for the time itself."""
+"""Time as a parameter: nothing in the program reads the operating system's time directly."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ NANOSECONDS = 1_000_000_000
 
 
 def utc_text(time: datetime) -> str:
-    """A moment as all files write it: ISO 8601 in UTC, to the second."""
+    """A time as written in all files: ISO 8601 in UTC, to the second."""
     return time.astimezone(UTC).isoformat(timespec="seconds")
 
 
@@ -36,7 +36,7 @@ class MonotonicClock:
 
 
 class VirtualClock:
-    """A clock that jumps: waiting costs nothing. Subclasses move a simulated world along."""
+    """A virtual clock: waiting takes no time. Subclasses advance a simulated world."""
 
     def __init__(self, start_ns: int = 0) -> None:
         self._now_ns = start_ns

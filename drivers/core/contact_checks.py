@@ -1,4 +1,4 @@
-"""What a whole set of grasps says about its own conventions, before anything is estimated from it."""
+"""Checks the conventions of a set of grasps before anything is estimated from it."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class OpposingPairs:
     """Pairs of contacts of one grasp that face away from each other, over all grasps.
 
     Attributes:
-        pairs: how many there are.
-        inward: how many of them have normals that point at each other: into an object held between fingers.
+        pairs: their number.
+        inward: number with normals that point at each other: into an object held between fingers.
     """
 
     pairs: int
@@ -32,12 +32,12 @@ class OpposingPairs:
 
     @property
     def point_in(self) -> bool:
-        """Most of them do, which outward normals never do on an object that is held from outside."""
+        """Whether most of them do; outward normals of an object held from outside never do."""
         return self.pairs >= _LEAST_PAIRS and 2 * self.inward > self.pairs
 
 
 def opposing_pairs(grasps: Sequence[Grasp]) -> OpposingPairs:
-    """Look at all pairs of contacts with opposing normals, grasp by grasp."""
+    """Count all pairs of contacts with opposing normals, grasp by grasp."""
     found = [_pairs(grasp.points_world_m, grasp.normals_world) for grasp in grasps]
     return OpposingPairs(sum(pairs for pairs, _ in found), sum(inward for _, inward in found))
 
@@ -52,7 +52,7 @@ def _pairs(points_m: Array, normals: Array) -> tuple[int, int]:
 
 
 def touched_one_side(normals: Sequence[Array]) -> bool:
-    """Whether every grasp touched the object from one side only: the other sides are not known at all.
+    """Whether every grasp touched the object from one side only: the other sides are unknown.
 
     Args:
         normals: of each grasp, shape (n, 3), any frame.

@@ -15,13 +15,13 @@ FINGERS = ("FF", "MF", "RF", "LF", "TH")
 """Fingers of the Shadow hand in the palm's own order: first, middle, ring, little finger, thumb."""
 
 LARGEST_GRASP_m = 0.6
-"""No hand spans more; contacts farther apart are in wrong units."""
+"""Largest span of a hand; contacts farther apart must be in wrong units."""
 
 FARTHEST_m = 100.0
 """Coordinates beyond this lose the digits that tell one contact from another: the world's origin is elsewhere."""
 
 LARGEST_SLOPE = 0.5
-"""Smallest horizontal part of a normal that still tells about a horizontal contour (60 degrees of slope)."""
+"""Smallest horizontal part of a normal that is informative about a horizontal contour (60 degrees of slope)."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class Contact:
         normal_sigma_rad: standard deviation of the normal's direction, per axis, radians; by default the thesis's 5
             degrees.
         force_N: magnitude of the contact force.
-        probed: touched on its own before the hand closed (a tap on the top, a probe from the side), the object at
-            rest where the grasp then found it.
+        probed: touched before the hand closed (a tap on the top, a probe from the side), with the object not moved
+            until the grasp.
     """
 
     finger: str
@@ -52,13 +52,13 @@ class Contact:
 
 @dataclass(frozen=True)
 class ApproachPath:
-    """The straight way of one fingertip's contact point while it closed: free space, as far as it got.
+    """The straight path of one fingertip's contact point while it closed, which is free space.
 
     Attributes:
         finger: one of :data:`FINGERS`.
-        start_world_m: where it began, shape (3,), world frame, metres.
+        start_world_m: its start, shape (3,), world frame, metres.
         end_world_m: where it touched, or where it stopped without a touch, shape (3,).
-        touched: it ended at a contact.
+        touched: whether it ended at a contact.
     """
 
     finger: str
@@ -74,12 +74,12 @@ class Grasp:
     Attributes:
         index: number of the grasp in the session, from 0.
         stamp_ns: time in the middle of the capture, session clock.
-        contacts: at most one contact a finger from the closing; behind them those that were probed before it.
-        world_T_palm: the palm's pose at capture; the object frame is born along its axes.
+        contacts: at most one contact per finger from the closing, followed by those probed before it.
+        world_T_palm: the palm's pose at capture; the first one defines the axes of the object frame.
         hand_motion_world: how the hand moved while it held the object since the previous grasp, so that
             predicted ``world_T_object = hand_motion_world * previous world_T_object`` (eq. 3.8); identity
             in the first grasp.
-        closing_lines: the fingers' ways to their contacts, and of those that met nothing; empty if not known.
+        closing_lines: the fingers' approach paths, including those of fingers that met nothing; empty if unknown.
     """
 
     index: int
@@ -91,7 +91,7 @@ class Grasp:
 
     @property
     def touching(self) -> frozenset[str]:
-        """Fingers that touch the object in this grasp, those that only probed it left out."""
+        """Fingers that touch the object in this grasp, without those that only probed it."""
         return frozenset(contact.finger for contact in self.contacts if not contact.probed)
 
     @property

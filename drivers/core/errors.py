@@ -1,16 +1,16 @@
-"""Every error a person can meet, in one tree.
+"""All errors that users can see, in one tree.
 
 TactileLabError                exit 1
  |- ConfigurationError         exit 2   an option, name or file that was given: rig, calibration, mesh, log
  |- DeviceError                exit 4   a device that does not answer, or answers wrongly
- |   `- CodecError                      bytes that are not what the protocol says
- |- SafetyError                exit 1   a limit of the hand or the workspace was passed: the rig has stopped
+ |   `- CodecError                      bytes that do not follow the protocol
+ |- SafetyError                exit 1   a limit of the hand or the workspace was exceeded: the rig has stopped
  |- SessionError               exit 1   a session folder or its traffic file
- |   `- EstimationError                 the program itself failed while it estimated or planned
+ |   `- EstimationError                 a program error during estimation or planning
  |- WriteError                 exit 1   a file that cannot be written: a full disk, a folder one may not write to
  |- ShapeError                 exit 1   a mesh, contour or model that cannot be used
  |- TrackingError              exit 1   the object cannot be followed any further
- `- InterruptionError          exit 130 a person ended the work before it was done
+ `- InterruptionError          exit 130 a person interrupted the work
 
 Each message says what happened, where (which device or file), and what to do next.
 Exit codes are those of the command line, see :mod:`tactile_lab.cli.main`.
@@ -62,7 +62,7 @@ class CodecError(DeviceError):
 
 
 class SafetyError(TactileLabError):
-    """A limit of the hand or the workspace was passed; the rig has to stop."""
+    """A limit of the hand or the workspace was exceeded; the rig must stop."""
 
 
 class SessionError(TactileLabError):
@@ -70,7 +70,7 @@ class SessionError(TactileLabError):
 
 
 class EstimationError(SessionError):
-    """The estimation or the planning of a running session failed for a reason nobody foresaw; its notes say where."""
+    """A program error in the estimation or planning of a running session; its notes say where."""
 
 
 class WriteError(TactileLabError):
@@ -86,7 +86,7 @@ class TrackingError(TactileLabError):
 
 
 class InterruptionError(TactileLabError):
-    """A person ended the work before it was done; says what is kept."""
+    """A person interrupted the work; says what is kept."""
 
     exit_code = 130
 

@@ -1,11 +1,11 @@
 """Extensions: Python files of a laboratory that register their own policies, models, devices, figures and commands.
 
 A rig file names them (``extensions: [my_policy.py]``), or the command line does (``--extension my_policy.py``). They
-are imported once, in the order given, before anything looks a name up. Processes that the program starts find them in
+are imported once, in the order given, before any name is looked up. Processes that the program starts find them in
 the environment variable :data:`VARIABLE`, which may also be set by hand.
 
-An extension is code that runs with all rights of whoever starts the program. Hence a recorded session names its
-extensions, and keeps copies of them, but is never a reason to run them: whoever opens it decides that.
+An extension is code that runs with all rights of the user. Hence a recorded session names its extensions and keeps
+copies of them, but opening it never runs them: the user decides that.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ VARIABLE = "TACTILE_LAB_EXTENSIONS"
 
 
 def load_extension(path: Path) -> None:
-    """Import an extension, so that what it registers can be used; a second time does nothing.
+    """Import an extension, so that its entries can be used; a second time does nothing.
 
     Raises:
-        ConfigurationError: there is no such file, it raises, or it registers a name that is taken. Nothing that it
-            had registered until then stays.
+        ConfigurationError: there is no such file, it raises, or it registers a name that is in use. Its earlier entries
+            are then removed.
     """
     path = path.resolve()
     name = _module_name(path)
@@ -50,7 +50,7 @@ def load_named_extensions() -> None:
 
 
 def unload_extension(path: Path) -> None:
-    """As if the file had never been loaded: its names are free again."""
+    """Unload an extension: its names are free again."""
     path = path.resolve()
     Registry.withdraw(str(path))
     sys.modules.pop(_module_name(path), None)
@@ -61,7 +61,7 @@ def unload_extension(path: Path) -> None:
 
 
 def blamed(error: BaseException) -> str:
-    """The extension that an unforeseen error comes out of, with what it says; empty where none is to blame."""
+    """The extension that raised an unexpected error, with its message; empty if none did."""
     files = {frame.filename for frame in traceback.extract_tb(error.__traceback__)}
     return next((f"{file}: this extension failed: {explain(error, file)}" for file in _named() if file in files), "")
 

@@ -1,4 +1,4 @@
-"""What every kind of fingertip gives the rest of the program: a load and a contact.
+"""The interface of fingertips: a load and a contact.
 
 The *distal frame* of a finger is the child frame of its last joint J1: origin on the joint's axis, z along the
 fingertip, -y to the palm side. The fingertip's surface is an ellipsoid whose axes are parallel to that frame's.
@@ -27,7 +27,7 @@ PositiveFloat = Annotated[float, Field(gt=0.0)]
 
 @dataclass(frozen=True)
 class TipBody:
-    """One fingertip beyond its sensor.
+    """Geometry and mass of one fingertip.
 
     Attributes:
         distal_T_sensor: the sensor's measuring frame in the distal frame.
@@ -54,7 +54,7 @@ class TipContact:
         point_covariance_m2: covariance of the point, shape (3, 3).
         normal_sigma_rad: standard deviation of the normal's direction, per axis.
         force_N: magnitude of the contact force.
-        torsion_Nm: moment about ``normal_distal`` that the object applies to the tip (0 where it is not measured).
+        torsion_Nm: moment about ``normal_distal`` that the object applies to the tip (0 if it is not measured).
     """
 
     point_distal_m: Array
@@ -66,31 +66,31 @@ class TipContact:
 
 
 class FingertipSensor(Protocol):
-    """A fingertip, whatever it measures with. Each kind has its own ``update`` for its decoded samples.
+    """A fingertip of any kind. Each kind has its own ``update`` for its decoded samples.
 
-    ``world_R_distal`` is the distal frame's orientation in the world (z up), shape (3, 3): it tells which way the
-    tip's own weight pulls.
+    ``world_R_distal`` is the distal frame's orientation in the world (z up), shape (3, 3), for the direction of the
+    tip's weight.
     """
 
     finger: str
 
     def tare(self, world_R_distal: Array, *, reason: str = "") -> None:
-        """Take the newest samples as "nothing touches". Raises DeviceError when they do not allow it."""
+        """Tare with the newest samples. Raises DeviceError if they are unsuitable."""
 
     def load_N(self, world_R_distal: Array) -> float:
-        """Contact force from the newest sample, for the stop threshold; infinite where it tells none."""
+        """Contact force from the newest sample, for the stop threshold; infinite if it is invalid."""
 
     def void(self) -> str:
-        """Why the newest sample tells no force, in words; "" while it does."""
+        """Why the newest sample is invalid; "" if it is valid."""
 
     def begin_capture(self) -> None:
-        """From here on samples are gathered for :meth:`contact`."""
+        """From now on samples are collected for :meth:`contact`."""
 
     def contact(self, world_R_distal: Array) -> TipContact | None:
-        """The contact from the samples since :meth:`begin_capture`; None when nothing is touched for sure."""
+        """The contact from the samples since :meth:`begin_capture`; None without a certain contact."""
 
     def health(self) -> tuple[str, ...]:
-        """What is wrong with the sensor, in words; empty when all is well."""
+        """Problems of the sensor as text; empty if there are none."""
 
 
 class RigidTransform(StrictModel):
@@ -116,8 +116,8 @@ class FingertipCalibration(StrictModel):
         shell_min_distal_m, shell_max_distal_m: the box in the distal frame outside which the tip has no shell, so that
             no contact there is valid; the shell on the Shadow hand covers the palm side only, y up to 5.1 mm.
         force_sigma_N, moment_sigma_Nm: noise of one sample, per axis.
-        force_drift_N, moment_drift_Nm: what may have crept in since the tare, per axis, one standard deviation.
-        point_floor_m, normal_floor_rad: error of shape and mounting that no averaging removes, per axis.
+        force_drift_N, moment_drift_Nm: drift since the tare, per axis, one standard deviation.
+        point_floor_m, normal_floor_rad: error of shape and mounting that averaging does not reduce, per axis.
     """
 
     semi_axes_m: tuple[PositiveFloat, PositiveFloat, PositiveFloat]

@@ -1,11 +1,10 @@
-"""Does a set of contacts pin down a relative pose? (thesis section 3.3.2)
+"""Observability of a relative pose by a set of contacts (thesis section 3.3.2).
 
 Point-to-plane matching is linearised (3.10-3.15): each contact contributes a row
-``H_i = [-(p_i x n_i)^T, -n_i^T]`` (3.17), and the eigenvalues of ``A = sum H_i^T H_i`` (3.18) tell which
-motions the contacts resist. As printed the rotation part carries metres squared and the others none, so
-the eigenvalues depend on the unit and on the origin. Here points are taken about their centre and divided
-by a length: the eigenvalues are then pure numbers, comparable among each other, and one contact adds at
-most one for each direction it resists.
+``H_i = [-(p_i x n_i)^T, -n_i^T]`` (3.17), and the eigenvalues of ``A = sum H_i^T H_i`` (3.18) show which motions the
+contacts resist. As printed the rotation part carries metres squared and the others none, so the eigenvalues depend on
+the unit and on the origin. Here points are taken about their centre and divided by a length: the eigenvalues are then
+pure numbers, comparable among each other, and one contact adds at most one for each direction it resists.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ SCALE_m = 0.030
 
 @dataclass(frozen=True)
 class Observability:
-    """What contacts tell about small motions.
+    """Observability of small motions by contacts.
 
     Attributes:
         eigenvalues: of (3.18), ascending, without unit.

@@ -28,5 +28,5 @@ def on_one_thread(work: Callable[Arguments, Result]) -> Callable[Arguments, Resu
 
 @cache
 def _controller() -> ThreadpoolController:
-    """Looking for the libraries takes milliseconds, so it is done once."""
+    """Searching for the libraries takes milliseconds, so it is done once."""
     return ThreadpoolController()

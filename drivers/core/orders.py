@@ -1,4 +1,4 @@
-"""Orders to a process of its own: lines of JSON through a pipe, none of whose ends ever waits for the other."""
+"""Commands to a child process: lines of JSON through a pipe, without either end waiting for the other."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drivers.core.errors import DeviceError
 
 Order = dict[str, Any]
 END: Order = {"end": True}
-"""What the reader makes of a pipe that has ended: whoever gave the orders is gone."""
+"""Returned by the reader when the pipe has closed: the parent has ended."""
 
 _AT_ONCE = 65_536
 
@@ -27,7 +27,7 @@ class OrderReader:
         self._descriptor, self._rest = descriptor, b""
 
     def waiting(self, patience_s: float = 0.0) -> list[Order]:
-        """The orders that have come, oldest first; :data:`END` when no more can come."""
+        """Received commands, oldest first; :data:`END` if no more can arrive."""
         if not select.select([self._descriptor], [], [], patience_s)[0]:
             return []
         data = os.read(self._descriptor, _AT_ONCE)
@@ -35,7 +35,7 @@ class OrderReader:
         return [json.loads(line) for line in lines] if data else [END]
 
     def first(self) -> Order:
-        """The first order, waited for; :data:`END` when none comes."""
+        """Wait for the first command; :data:`END` if there is none."""
         while not (orders := self.waiting(1.0)):
             pass
         return orders[0]
@@ -54,10 +54,10 @@ class OrderWriter:
         os.set_blocking(descriptor, False)
 
     def give(self, order: Order) -> None:
-        """Give an order.
+        """Send a command.
 
         Raises:
-            DeviceError: the process is gone, or has not taken orders for long.
+            DeviceError: the process has ended, or has not read commands for long.
         """
         line = json.dumps(order).encode() + b"\n"
         try:

@@ -1,4 +1,4 @@
-"""A child process that says records, traffic among them, in place of lines of JSON."""
+"""A child process that writes records, including traffic, instead of lines of JSON."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class RecordProcess(ChildProcess):
         super().start(first)
 
     def read_records(self, patience_s: float = 0.0) -> list[Record] | None:
-        """Records that are complete after what arrives in this time, oldest first; None when nothing arrives.
+        """Records completed by what arrives in this time, oldest first; None if nothing arrives.
 
         Raises:
             DeviceError: as :meth:`ChildProcess.read`.
@@ -41,7 +41,9 @@ class RecordProcess(ChildProcess):
         return None if data is None else self._records.feed(data)
 
     def await_record(self, kind: RecordKind, patience_s: float, aside: Callable[[Record], None]) -> dict[str, Any]:
-        """The content, of JSON, of the next record of a kind. Others go ``aside``, which may raise what they tell.
+        """The JSON content of the next record of a kind.
+
+        Others are passed to ``aside``, which may raise their errors.
 
         Raises:
             DeviceError: none comes in this time; and as :meth:`read_records`.

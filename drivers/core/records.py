@@ -1,7 +1,7 @@
-"""Records that a device's own process hands to the session: traffic with its stamps, errors, reports.
+"""Records from a device's own process to the session: traffic with its stamps, errors, reports.
 
 Each is a head of kind, length and stamp, and a payload; whole blocks of them go through a pipe. The writer never waits:
-what a full pipe does not take is kept up to a limit, further blocks are dropped and counted.
+what a full pipe does not accept is kept up to a limit, further blocks are dropped and counted.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from drivers.core.errors import CodecError
 _HEAD = struct.Struct("<BIq")
 _BACKLOG_BYTES, _PIPE_BYTES = 4_000_000, 1_048_576
 LONGEST = 65_536
-"""Payloads of more bytes are damage, where nothing else is said."""
+"""Default limit of a payload; longer ones count as damage."""
 
 
 class RecordKind(IntEnum):
@@ -105,7 +105,7 @@ class RecordPipe:
         self._block += encode_record(kind, stamp_ns, payload)
 
     def flush(self) -> None:
-        """Hand the present block over, as far as the pipe takes it now."""
+        """Write the present block, as far as the pipe accepts it now."""
         if len(self._backlog) + len(self._block) > _BACKLOG_BYTES:
             self.dropped_blocks += 1
         else:
@@ -119,7 +119,7 @@ class RecordPipe:
             self._backlog.clear()  # nobody reads any more; the orders' end tells the worker
 
     def close(self) -> None:
-        """Hand over what is left; waits for the reader, as nothing cycles any more."""
+        """Write the remainder; waits for the reader, as no cycles run any more."""
         os.set_blocking(self._descriptor, True)
         self.flush()
         while self._backlog:

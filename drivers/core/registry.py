@@ -1,4 +1,4 @@
-"""Registries: named lists of what the program can choose from, open to a laboratory's own code.
+"""Registries: named choices of the program, open to extensions.
 
 A registry maps names to entries of one kind (policies, shape models, fingertip kinds ...). The program fills it with
 its own, and an extension (:mod:`drivers.core.extensions`) adds to it with the same call, so that nothing distinguishes
@@ -46,12 +46,12 @@ class Registry(Generic[Item]):
         """Add an entry.
 
         Args:
-            name: as rig files and the command line call it.
-            item: what the registry's own page in ``docs/extending.md`` asks for.
+            name: its name in rig files and on the command line.
+            item: as described in ``docs/extending.md``.
 
         Raises:
-            ConfigurationError: the name is no word for a command line and file names, or it is taken; then both files
-                are named.
+            ConfigurationError: the name is not valid on the command line and in file names, or it is in use; then both
+                files are named.
         """
         file = sys._getframe(1).f_code.co_filename
         if not _NAME.fullmatch(name):
@@ -63,7 +63,7 @@ class Registry(Generic[Item]):
         self._entries[name] = _Entry(item, file)
 
     def __getitem__(self, name: str) -> Item:
-        """The entry of this name. Raises ConfigurationError, which lists the names there are."""
+        """The entry of this name. Raises ConfigurationError, which lists the existing names."""
         if name not in self._entries:
             raise ConfigurationError(self.unknown(name), where=self.kind, hint=f"{self.listed()}{_EXTENSIONS}")
         return self._entries[name].item
@@ -78,7 +78,7 @@ class Registry(Generic[Item]):
         return len(self._entries)
 
     def file(self, name: str) -> str:
-        """The file that registered an entry; of a name that is not registered, the empty string."""
+        """The file that registered an entry; the empty string for an unknown name."""
         entry = self._entries.get(name)
         return "" if entry is None else entry.file
 
@@ -87,28 +87,28 @@ class Registry(Generic[Item]):
         return explain(error, self.file(name))
 
     def known(self, name: str) -> str:
-        """The name, checked; for pydantic fields that hold one. Raises ValueError, which lists the names there are."""
+        """The checked name; for pydantic fields. Raises ValueError, which lists the existing names."""
         if name not in self._entries:
             raise ValueError(f"{self.unknown(name)}. {self.listed()}")
         return name
 
     def unknown(self, name: str) -> str:
-        """That there is no entry of this name, in words."""
+        """The message that there is no entry of this name."""
         return f"there is no {self.kind} {name!r}"
 
     def listed(self) -> str:
-        """The names, in words."""
+        """The names as text."""
         return f"{self.plural[:1].upper()}{self.plural[1:]} are {', '.join(self._entries)}"
 
     @classmethod
     def withdraw(cls, file: str) -> None:
-        """Take what a file registered out of every registry."""
+        """Remove a file's entries from every registry."""
         for registry in cls._all:
             registry._entries = {name: entry for name, entry in registry._entries.items() if entry.file != file}
 
 
 def explain(error: BaseException, file: str) -> str:
-    """An unforeseen error in one line: what it says, and the line of ``file`` that it comes from where it does."""
+    """An unexpected error in one line: its message, and the line of ``file`` that raised it, if any."""
     words = " ".join(str(error).split())
     told = f"{type(error).__name__}: {words}" if words else type(error).__name__
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]

@@ -1,4 +1,4 @@
-"""The seam between the program and the world: a transport moves byte strings and stamps their arrival.
+"""Transports, the interface to devices: they move byte strings and stamp their arrival.
 
 A device never knows whether its transport is hardware, a simulated world or a recorded log.
 """
@@ -28,13 +28,13 @@ class Transport(Protocol):
     name: str
 
     def open(self) -> None:
-        """Connect; repeatable, all or nothing. Raises DeviceError."""
+        """Connect completely or not at all; can be repeated. Raises DeviceError."""
 
     def close(self) -> None:
         """Disconnect; idempotent."""
 
     def send(self, payload: bytes) -> None:
-        """Send one message. Raises DeviceError when the device is gone."""
+        """Send one message. Raises DeviceError if the device is disconnected."""
 
     def receive(self) -> list[Datagram]:
         """Everything that has arrived since the last call, oldest first; never blocks for long."""
@@ -42,25 +42,25 @@ class Transport(Protocol):
 
 @runtime_checkable
 class WatchedTransport(Protocol):
-    """A transport that knows what went wrong below the messages: strangers, drops, damaged frames."""
+    """A transport that reports problems below the messages: unknown senders, drops, damaged frames."""
 
     def health(self) -> tuple[str, ...]:
-        """What went wrong, in words; empty when nothing did."""
+        """Problems as text; empty if there are none."""
 
 
 def link_health(transport: Transport) -> tuple[str, ...]:
-    """What a transport, of any kind, knows to be wrong."""
+    """Problems that a transport of any kind reports."""
     return transport.health() if isinstance(transport, WatchedTransport) else ()
 
 
 class Peer(Protocol):
-    """The far end of an in-memory transport: something that takes and gives device bytes."""
+    """The far end of an in-memory transport: a source and sink of device bytes."""
 
     def write(self, payload: bytes) -> None:
         """Take one message from the program."""
 
     def read(self) -> list[Datagram]:
-        """Give all messages that wait for the program, with their arrival stamps."""
+        """All messages waiting for the program, with their arrival stamps."""
 
 
 class MemoryTransport:
@@ -89,7 +89,7 @@ class MemoryTransport:
 
 
 class ReplayTransport:
-    """A transport that gives back recorded messages: one recorded batch for each ``receive``.
+    """A transport that returns recorded messages: one recorded batch per ``receive``.
 
     ``sent`` keeps what the program wrote, so that a test can compare it with the recording.
     """
@@ -147,5 +147,5 @@ class TappedTransport:
         return datagrams
 
     def health(self) -> tuple[str, ...]:
-        """What the tapped transport knows to be wrong."""
+        """Problems of the tapped transport."""
         return link_health(self._transport)

@@ -1,1 +1,1 @@
-"""Force fingertips of any make: bias, weight, load, and the contact that a wrench tells."""
+"""Vendor-independent force fingertips: bias, weight, load, and contact from a wrench."""

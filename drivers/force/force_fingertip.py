@@ -1,6 +1,6 @@
 """A fingertip on a six-axis force sensor: from wrench samples to load and contact.
 
-Driven by decoded samples only, so that a replayed session gives what the live one gave.
+Driven by decoded samples only, so that a replay gives the same as the live session.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ __all__ = ["AXES", "CAPTURE_LIMIT", "ForceTip", "ForceTipSettings", "Tare", "Wre
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 CAPTURE_LIMIT = 1000
-"""Samples a capture keeps, the newest: a capture that nobody ends must not grow without bound."""
+"""Largest number of samples of a capture, so that an open capture cannot grow without bound."""
 
 _STUCK = "the sensor has stopped measuring: its readings do not change"
 
@@ -64,7 +64,7 @@ class ForceTip:
         self._weight_from_down = self._weight_matrix()
 
     def update(self, samples: Sequence[WrenchSample]) -> None:
-        """Take decoded samples, oldest first; those older than one already seen are counted and left out."""
+        """Take decoded samples, oldest first; those older than one already seen are counted and ignored."""
         if not samples:
             return
         in_range = (np.abs(np.array([sample.wrench for sample in samples])) <= self._range).all(axis=1).tolist()
@@ -80,10 +80,10 @@ class ForceTip:
                 self._recent.clear()  # a tare must not reach back across a failure
 
     def tare(self, world_R_distal: Array, *, reason: str = "") -> None:
-        """Take the newest samples as "only the tip's own weight acts"; the hand must be still and touch nothing.
+        """Tare with the newest samples; the hand must be still and touch nothing.
 
         Raises:
-            DeviceError: too few usable samples, or they lie too far apart; the bias stays as it was.
+            DeviceError: too few usable samples, or they vary too much; the bias is unchanged.
         """
         if self.newest is None or len(self._recent) < self._settings.tare_samples:
             raise self._refusal(
@@ -103,13 +103,13 @@ class ForceTip:
         self.tare_record = Tare(self.newest.stamp_ns, reason, len(window), self._bias, moved, since_s)
 
     def load(self, wrench: Array, world_R_distal: Array) -> Array:
-        """What the object does to the tip: the measured wrench without bias and weight, shape (6,), sensor frame."""
+        """The wrench of the object on the tip: measured, without bias and weight, shape (6,), sensor frame."""
         return np.asarray(wrench - self._bias - self._weight(world_R_distal))
 
     def load_N(self, world_R_distal: Array) -> float:
         """Contact force of the newest sample; 0 before the first.
 
-        Infinite, so that motion stops, when the sample is void or the sensor is near the end of its range.
+        Infinite, so that motion stops, if the sample is invalid or the sensor near the end of its range.
         """
         if self.newest is None:
             return 0.0
@@ -119,7 +119,7 @@ class ForceTip:
         return math.sqrt(force_N @ force_N)
 
     def void(self) -> str:
-        """Why the newest sample tells no force: what is wrong with it, or how near its range's end it is."""
+        """Why the newest sample is invalid: its fault, or the share of the sensor's range."""
         if self.newest is None:
             return ""
         if self._newest_usable:
@@ -129,7 +129,7 @@ class ForceTip:
 
     @property
     def overload(self) -> str:
-        """Which axis of the newest sample is beyond its limit, in words; empty when none is."""
+        """Which axis of the newest sample exceeds its limit, as text; empty if none."""
         if self.newest is None:
             return ""
         share = np.abs(self.newest.wrench) / self._range
@@ -144,14 +144,14 @@ class ForceTip:
         return np.std(self._recent, axis=0) if len(self._recent) > 1 else np.zeros(6)
 
     def begin_capture(self) -> None:
-        """From here on samples are gathered for :meth:`contact`."""
+        """From now on samples are collected for :meth:`contact`."""
         self._capture.clear()
 
     def contact(self, world_R_distal: Array) -> TipContact | None:
         """The contact of the mean wrench since :meth:`begin_capture`.
 
-        None when there are too few samples, too little force, no contact that could give this wrench, or a torque
-        that has not fitted the force for several captures (see :meth:`health`).
+        None if there are too few samples, too little force, no contact with this wrench, or a torque that has not
+        matched the force for several captures (see :meth:`health`).
         """
         if len(self._capture) < self._settings.minimum_samples:
             return None
@@ -181,7 +181,7 @@ class ForceTip:
         return (*problems, *self._sequence_problems(), *filter(None, [self._drift(), self._judge.fault]))
 
     def _drift(self) -> str:
-        """How the bias has moved between the last two tares, when it is too far."""
+        """Change of the bias between the last two tares, if it is too large."""
         tare, limits = self.tare_record, self._settings
         if tare is None or tare.moved is None:
             return ""
@@ -206,14 +206,14 @@ class ForceTip:
 
     @staticmethod
     def _reports(sample: WrenchSample) -> list[str]:
-        """What the sensor's electronics and its wire say of a sample."""
+        """Faults and remarks of the sensor's electronics and its wire."""
         return [*sample.faults, *sample.remarks]
 
     def _sound(self, sample: WrenchSample) -> bool:
         return not sample.faults and not self.sequences.stuck
 
     def _weight(self, world_R_distal: Array) -> Array:
-        """The tip's own weight as the sensor feels it, shape (6,), sensor frame."""
+        """The tip's own weight as measured by the sensor, shape (6,), sensor frame."""
         return np.asarray(self._weight_from_down @ -world_R_distal[2])
 
     def _weight_matrix(self) -> Array:

@@ -1,4 +1,4 @@
-"""Readings of a force sensor, the bias taken from them, and how a force fingertip judges them."""
+"""Samples of a force sensor, tares, and their limits."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class WrenchSample:
             shape (6,), sensor frame.
         sent, measured: the device's counters of sent and of measured records.
         status: the device's own status word as it came, 0 when healthy.
-        faults: what is wrong with the reading, in words; the reading is void when there is anything.
-        remarks: what the device says besides that leaves the reading usable.
+        faults: faults of the reading as text; any fault makes it invalid.
+        remarks: other messages of the device that leave the reading usable.
     """
 
     stamp_ns: int
@@ -41,8 +41,8 @@ class Tare:
     Attributes:
         stamp_ns, reason, samples: of the newest sample, for people, and how many were averaged.
         bias: shape (6,), N and N m, sensor frame, without the tip's weight.
-        moved: how far the bias is from the one before, shape (6,); None for the first.
-        since_s: seconds since the one before.
+        moved: change of the bias since the previous tare, shape (6,); None for the first.
+        since_s: seconds since the previous tare.
     """
 
     stamp_ns: int
@@ -54,20 +54,20 @@ class Tare:
 
 
 class ForceTipSettings(StrictModel):
-    """How a force fingertip judges its samples.
+    """Limits of a force fingertip's samples.
 
     Attributes:
-        force_range_N, torque_range_Nm: the calibration's range per axis, that of an SI-12-0.12 unless given
-            (protocols: Nano17 ratings); a reading beyond it is void.
+        force_range_N, torque_range_Nm: the calibration's range per axis, that of an SI-12-0.12 unless given (protocols:
+            Nano17 ratings); a reading beyond it is invalid.
         contact_force_N: below this force no contact is computed (several times the drift).
         minimum_samples: samples a capture needs.
         tare_samples: the newest samples that a tare averages.
-        tare_spread_N, tare_spread_Nm: how far they may lie apart, largest minus smallest on any axis.
+        tare_spread_N, tare_spread_Nm: their largest spread, maximum minus minimum on any axis.
         lost_share: share of lost records that is reported as a problem.
         limit_share: a reading beyond this share of the range, on any axis, counts as an infinite load, so that motion
-            stops: what a Nano17 survives beyond its range is not published.
-        drift_limit_N, drift_limit_Nm: a bias that has moved farther since the tare before is reported.
-        plausibility: limits of what one contact can do.
+            stops: a Nano17's overload limits are not published.
+        drift_limit_N, drift_limit_Nm: a larger change of the bias since the previous tare is reported.
+        plausibility: limits of a single contact.
     """
 
     force_range_N: tuple[float, float, float] = (12.0, 12.0, 17.0)

@@ -1,13 +1,13 @@
-"""Where on an ellipsoid does a wrench touch? Intrinsic contact sensing in closed form.
+"""Intrinsic contact sensing in closed form: the contact of a wrench on an ellipsoid.
 
 Bicchi, Salisbury and Brock, "Contact sensing from force measurements" (IJRR 1993), soft finger (protocols: Contact
 from a wrench). The surface is c' A^2 c = 1 with A = diag(1 / semi-axes). The force f acts in c, and the contact may
 also twist about the normal, so that the moment about the centre is m = c x f + K A^2 c. Of the two solutions the one
-that presses on the surface is taken. A very long semi-axis stands for a cylinder.
+that presses on the surface is used. A very long semi-axis approximates a cylinder.
 
 Every wrench that has a force has such a solution, also one whose axis misses the ellipsoid: it then needs a force
-along the surface and a strong twist. ``axis_distance`` and ``force_angle_rad`` tell these apart; whether to believe
-them is the caller's decision. All functions take arrays with any leading shape.
+along the surface and a strong twist. ``axis_distance`` and ``force_angle_rad`` identify these; the caller decides
+whether to accept them. All functions take arrays with any leading shape.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def _axis_distance(f: Array, m: Array, a: Array, along: Array) -> Array:
 
 
 def contact_jacobian(contact: EllipsoidContact, force_N: Array, semi_axes_m: Array) -> Array:
-    """How the contact points move with the wrench: shape (..., 3, 6), force then moment about the centre.
+    """Derivatives of the contact points by the wrench: shape (..., 3, 6), force then moment about the centre.
 
     By implicit differentiation of m = c x f + K A^2 c and c' A^2 c = 1 with respect to c and K. Near a grazing
     force the derivative grows without bound; the pseudo-inverse keeps it finite.

@@ -1,4 +1,4 @@
-"""Can this wrench come from one contact on the fingertip? If it persistently cannot, the torque is not to be trusted.
+"""Checks whether a wrench can come from a single contact on the fingertip; persistent failures mean a wrong torque.
 
 A gauge that drifts, a loose cable or a wrong calibration file gives wrenches that look like forces and torques but
 belong to no contact: their axis misses the tip, or they need a pull, an impossible friction or an impossible twist.
@@ -18,15 +18,15 @@ from drivers.force.intrinsic_contact import EllipsoidContact
 
 
 class PlausibilitySettings(StrictModel):
-    """Limits of what one frictional contact can do.
+    """Limits of a single frictional contact.
 
     Attributes:
-        axis_distance: how far the wrench's axis may pass outside the surface (1: it just touches).
+        axis_distance: largest distance of the wrench's axis outside the surface (1: it just touches).
         force_angle_rad: largest angle between force and inward normal; the atan of a generous friction coefficient.
         torsion_m: largest twist per newton of force; about the radius of the contact patch.
-        judged_force_N: below this load drift and noise decide, and nothing is judged.
-        window: captures remembered; the sensor is faulty when at least ``faulty_count`` and more than half of the
-            loaded ones are impossible.
+        judged_force_N: below this load drift and noise dominate, and nothing is checked.
+        window: number of captures considered; the sensor is faulty when at least ``faulty_count`` and more than half of
+            the loaded ones are impossible.
     """
 
     axis_distance: float = Field(default=1.1, gt=0.0)
@@ -40,7 +40,7 @@ class PlausibilitySettings(StrictModel):
 def objection(
     contact: EllipsoidContact, force_N: Array, calibration: FingertipCalibration, settings: PlausibilitySettings
 ) -> str:
-    """Why this one contact cannot be, in words; empty when it can.
+    """Why this contact is impossible; empty if it is possible.
 
     Args:
         contact: one contact (no leading shape), axes parallel to the distal frame, origin in the ellipsoid's centre.
@@ -81,20 +81,20 @@ def noise_objection(noise: Array, calibration: FingertipCalibration) -> str:
 
 
 class WrenchMonitor:
-    """Remembers the verdicts on loaded captures and tells when the torque persistently does not fit the force."""
+    """Collects the verdicts on loaded captures, and reports if the torque persistently does not match the force."""
 
     def __init__(self, settings: PlausibilitySettings) -> None:
         self._settings = settings
         self._verdicts: deque[str] = deque(maxlen=settings.window)
 
     def note(self, verdict: str, force_N: Array) -> None:
-        """Take the verdict on one capture; weak ones do not count."""
+        """Add the verdict on one capture; weak ones are ignored."""
         if np.linalg.norm(force_N) >= self._settings.judged_force_N:
             self._verdicts.append(verdict)
 
     @property
     def fault(self) -> str:
-        """The complaint in words; empty while the sensor can be trusted."""
+        """The problem as text; empty while the sensor is plausible."""
         objections = [verdict for verdict in self._verdicts if verdict]
         if len(objections) < self._settings.faulty_count or 2 * len(objections) <= len(self._verdicts):
             return ""

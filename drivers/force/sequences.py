@@ -1,4 +1,4 @@
-"""What the counters of a force sensor tell: losses, disorder, a stuck sensor loop, a restarted stream."""
+"""Evaluates the counters of a force sensor: losses, disorder, a stuck sensor loop, a restarted stream."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ class SequenceMonitor:
 
     Args:
         stuck_after: records with the same measured in a row after which the sensor counts as stuck.
-        step: how far measured moves from record to record (7000 / rate); 0 when that is not known.
+        step: how far measured moves from record to record (7000 / rate); 0 if unknown.
 
     Attributes:
-        seen: records taken.
+        seen: records received.
         lost: records that the box sent and that never arrived.
-        skipped: records that the box should have sent by its own measuring rate and did not.
-        disordered: records that came after a newer one, or twice.
-        restarts: times the box began a new stream.
+        skipped: records that the box should have sent by its measuring rate and did not.
+        disordered: records that arrived after a newer one, or twice.
+        restarts: number of new streams of the box.
     """
 
     def __init__(self, stuck_after: int = STUCK_AFTER, step: int = 0) -> None:
@@ -54,7 +54,7 @@ class SequenceMonitor:
 
     @property
     def stuck(self) -> bool:
-        """The box sends records, but the sensor behind it has stopped measuring."""
+        """Whether the box sends records, but its sensor has stopped measuring."""
         return self._repeats >= self._stuck_after
 
     def _follows(self, sent: int, measured: int, previous: int) -> bool:
@@ -69,7 +69,7 @@ class SequenceMonitor:
         return False
 
     def _note_skipped(self, records: int, measured: int) -> None:
-        """Compare what was measured between two records with what should have been."""
+        """Compare the measurements between two records with the expected number."""
         if self._expected:
             surplus = measured - records * self._expected
             self.skipped += max(0, surplus + self._expected // 2) // self._expected

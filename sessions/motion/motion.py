@@ -98,7 +98,7 @@ class Motion:
         while self.supervisor.hand_is_silent:
             self._watched_cycle()
         waited_s = (self.runtime.clock.now_ns() - began_ns) / NANOSECONDS
-        self._log(f"the hand is heard again after {waited_s:.1f} s: the session goes on")
+        self._log(f"the hand answers again after {waited_s:.1f} s: the session continues")
 
     def _log(self, words: str) -> None:
         self.runtime.log(Level.WARNING, "hand", words)

@@ -1,1 +1,1 @@
-"""Who decides on the hand: planners, candidates, regrasping, and the estimator's service and process."""
+"""Decisions for the hand: planners, candidates, regrasping, and the estimator's service and process."""

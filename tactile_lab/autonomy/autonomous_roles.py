@@ -41,12 +41,12 @@ def autonomous_roles(
 
     Args:
         runtime, slam, settings: of the session.
-        seed: of what is left to chance.
+        seed: of all random numbers.
         dimension: of the estimation.
-        approve: asked before every grasp; refuses what a person does not want.
+        approve: asked before every grasp; may veto it.
 
     Raises:
-        ConfigurationError: there is no policy of the name in the settings.
+        ConfigurationError: the policy in the settings does not exist.
     """
     supervisor = SafetySupervisor(runtime, settings.safety, runtime.cycle_ns)
     tip, window = tip_shape(runtime), settings.plan.yaw_window_rad
@@ -64,10 +64,10 @@ def autonomous_roles(
 
 
 def planner_for(slam: TactileSlam, settings: SessionSettings, tip: TipEllipsoid, seed: int, dimension: int) -> Planner:
-    """What chooses the grasps of a session, with the policy of its settings.
+    """The planner of a session, with the policy of its settings.
 
     Raises:
-        ConfigurationError: there is no policy of that name.
+        ConfigurationError: there is no such policy.
     """
     rule = HeuristicPlanner(settings.plan, np.random.default_rng(seed), dimension)
     chooser = None
@@ -78,7 +78,7 @@ def planner_for(slam: TactileSlam, settings: SessionSettings, tip: TipEllipsoid,
 
 
 def tip_shape(runtime: RigRuntime) -> TipEllipsoid:
-    """The fingertip's shape by calibration; the default one where a rig has none."""
+    """The fingertip's shape by calibration; the default one if a rig has none."""
     for calibration in runtime.fingertip_calibrations.values():
         return TipEllipsoid(calibration.semi_axes_m, calibration.centre_distal_m)
     return TipEllipsoid()
@@ -92,7 +92,7 @@ def chooser_for(
     noise: MotionNoise,
     seed: int,
 ) -> PolicyChooser:
-    """The policy called ``policy`` over what the hand can do. Raises ConfigurationError if there is none."""
+    """The policy named ``policy`` with the hand's candidates. Raises ConfigurationError if there is none."""
     plan, exploration, cycle, safety = settings
     limits = HandLimits(plan, exploration, cycle, safety, tip, dimension)
     return PolicyChooser(make_policy(policy, exploration.information), limits, noise, np.random.default_rng([seed, 1]))

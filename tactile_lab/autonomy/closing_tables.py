@@ -12,9 +12,9 @@ from tactile_lab.autonomy.settings import SessionSettings
 
 
 def solve_closings(clock: Clock, settings: SessionSettings, tip: TipEllipsoid, dimension: int) -> None:
-    """Have every table that the session may need in memory; simulated time can wait for each until it is needed.
+    """Compute every table that the session may need; with simulated time they are computed on demand.
 
-    A table takes up to a second, in which no cycle would run: the process that plans has its own.
+    A table takes up to a second, in which no cycle would run: the planning process has its own tables.
     """
     if isinstance(clock, VirtualClock):
         return

@@ -1,8 +1,8 @@
-"""Which grasps close without a link above the fingertips meeting the object: such a link would push it along, unfelt.
+"""Checks that no link above the fingertips meets the object while closing: it would push the object, unnoticed.
 
-The hand has to come down over what is tall, and its fingers reach down beside what is long, so that knuckles and middle
-links may be nearer to the object than the fingertips are. On the simulated rig every grasp that moved an object left
-lying by more than 2 mm was such a one (decision 32).
+The hand must come down over tall objects, and its fingers reach down beside long ones, so that knuckles and middle
+links may be nearer to the object than the fingertips are. On the simulated rig every grasp that moved an unheld object
+by more than 2 mm was of this kind (decision 32).
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from tactile_lab.slam.tracking.contacts.contact_set import planar_rotation
 
 _POSTURES = slice(None, None, 2)
 _MARGIN_m = 0.001
-"""Distances are those to the surface's vertices, which are up to 6 mm apart: so much too long beside a link."""
+"""Distances are those to the surface's vertices, which are up to 6 mm apart: correction for this."""
 
 
 @dataclass(frozen=True)
 class StandingObject:
-    """An estimated object where it stands on the table.
+    """An estimated object at its pose on the table.
 
     Attributes:
         surface: object frame.
         world_T_object: planar pose.
         origin_height_m: height of the object frame's origin over the table.
-        top_m: height over the table at which an object ends of which only the contour is known.
+        top_m: assumed height of an object of which only the contour is known.
     """
 
     surface: Surface
@@ -71,14 +71,14 @@ class StandingObject:
 
 
 def standing(known: KnownShape, world_T_object: Pose2, contour_top_m: float) -> StandingObject | None:
-    """The object as it is known; None where the contacts enclose nothing yet."""
+    """The object as estimated; None if the contacts enclose nothing yet."""
     if known.surface is None:
         return None
     return StandingObject(known.surface, world_T_object, known.origin_height_m, contour_top_m)
 
 
 def links_are_clear(plans: Sequence[GraspPlan], tip: TipEllipsoid, target: StandingObject) -> Verdicts:
-    """Whether every finger comes down and closes with no link in the object until its tip touches, by plan."""
+    """For each plan, whether every finger descends and closes with no link in the object until its tip touches."""
     verdicts = np.empty(len(plans), dtype=bool)
     for kind in {(plan.closing, plan.height_m) for plan in plans}:
         alike = [index for index, plan in enumerate(plans) if (plan.closing, plan.height_m) == kind]
@@ -87,7 +87,7 @@ def links_are_clear(plans: Sequence[GraspPlan], tip: TipEllipsoid, target: Stand
 
 
 def _are_clear(plans: Sequence[GraspPlan], tip: TipEllipsoid, target: StandingObject) -> Verdicts:
-    """The same for plans that differ in the grasp frame alone."""
+    """The same for plans that differ only in the grasp frame."""
     name, height_m = plans[0].closing, plans[0].height_m
     balls, paths = link_balls(name, height_m, tip), closing(name, height_m, tip).paths
     tips_m = np.array([[paths[finger].centre_m(u) for finger in FINGERS] for u in PROGRESS[_POSTURES]])

@@ -1,9 +1,9 @@
-"""The estimator service in a process of its own, seen from the session: ask it, and run cycles until it answers.
+"""Client of the estimator service in a separate process: asks it, and runs cycles until it answers.
 
-So that no estimation and no planning can delay a cycle. One question is on its way at a time, and nothing queues up:
-where a failing device interrupted the session while it waited, the next question waits for that answer too, and what
-was estimated comes with the next estimate. The estimation comes home when the session has ended: its
-:class:`~tactile_lab.slam.tactile_slam.TactileSlam` then is as if it had been here all the time.
+So estimation and planning cannot delay a cycle. Only one question is open at a time: if a failing device interrupted
+the session while it waited, the next question also waits for that answer, and the missed estimate comes with the next
+one. When the session has ended the estimation is transferred back: its
+:class:`~tactile_lab.slam.tactile_slam.TactileSlam` is then as if it had always been in this process.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from tactile_lab.autonomy.slam_service import SlamService
 NAME = "estimation"
 _START_s = 120.0
 _HOME_s = 60.0
-"""The estimation's last step may still be on its way when the session ends; it is thrown away after this."""
+"""Longest wait for the estimation's last step when the session ends; then it is discarded."""
 
 
 class EstimatorProcess:
-    """An estimator service in another process, which runs while this is open.
+    """An estimator service in another process, which runs while this context is open.
 
     Args:
-        service: of the session, not used yet; a copy of it answers.
+        service: of the session, unused; a copy of it answers.
         idle: runs one cycle of the devices.
     """
 
@@ -37,15 +37,15 @@ class EstimatorProcess:
         self._slam, self._start, self._idle = service.slam, pack(service), idle
         self._child = ChildProcess("tactile_lab.autonomy.estimator_worker", NAME)
         self._open = False
-        """A question has no answer yet."""
+        """Whether a question is unanswered."""
 
     @property
     def process_id(self) -> int:
-        """Of the other process. Raises DeviceError when it does not run."""
+        """Process id of the other process. Raises DeviceError if it does not run."""
         return self._child.process_id
 
     def __enter__(self) -> Self:
-        """Start the process and wait until it can answer: starting is the one thing of it that disturbs cycles.
+        """Start the process and wait until it can answer: only starting disturbs cycles.
 
         Raises:
             SessionError: it does not start.
@@ -60,7 +60,7 @@ class EstimatorProcess:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Bring the estimation home, or leave this one fresh where it cannot be had, and end the process."""
+        """Transfer the estimation back if possible, and end the process."""
         try:
             if kind is None and self._child.running:
                 self._come_home()
@@ -117,12 +117,12 @@ class EstimatorProcess:
 
 
 def _unpack_answer(answer: dict[str, str]) -> Any:
-    """What an answer holds. Raises the error that it holds."""
+    """The content of an answer. Raises the error that it contains."""
     if "raised" in answer:
         raise unpack(answer["raised"])
     return unpack(answer["answer"])
 
 
 def client_for(clock: Clock, service: SlamService, idle: Callable[[], None]) -> LocalClient | EstimatorProcess:
-    """Where a session on this clock asks."""
+    """The estimator client for a session with this clock."""
     return LocalClient(service) if isinstance(clock, VirtualClock) else EstimatorProcess(service, idle)

@@ -1,8 +1,8 @@
-"""The estimator service in a process of its own, started by :mod:`tactile_lab.autonomy.estimator_process`.
+"""The estimator service in a separate process, started by :mod:`tactile_lab.autonomy.estimator_process`.
 
 Only the session that started it writes to its pipe. Questions are computed one after the other with one thread of
-the linear algebra library. A second thread does nothing but read the pipe: when that ends, so does the process, at
-once and whatever it is busy with, as nothing it holds is of use to anyone then.
+the linear algebra library. A second thread only reads the pipe: when that ends, the process ends immediately, whatever
+it is doing.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from sessions.conductor.estimator_client import answer
 from tactile_lab.autonomy.slam_service import SlamService
 
 _QUESTIONS = 1
-"""So many may wait, as the session asks one at a time."""
+"""Size of the queue; the session asks one question at a time."""
 
 
 def pack(content: Any) -> str:
-    """Objects as text, for a pipe between two processes of one session and nothing else."""
+    """Objects as text, only for a pipe between two processes of one session."""
     return base64.b64encode(pickle.dumps(content, protocol=pickle.HIGHEST_PROTOCOL)).decode()
 
 

@@ -45,9 +45,9 @@ def guided_roles(
         slam: the estimation.
         settings: of the session.
         operator: the person.
-        session_folder: where notes and pictures go.
+        session_folder: folder for notes and pictures.
         seed: of the suggestions.
-        dimension: the estimation's, 2 or 3.
+        dimension: of the estimation, 2 or 3.
         pace: see :class:`OperatorConsole`.
     """
     supervisor, guard = SafetySupervisor(runtime, settings.safety, runtime.cycle_ns), InterruptGuard()

@@ -1,10 +1,10 @@
-"""What the hand can do next around an object as it is estimated now: the real candidates, and why others are none.
+"""Feasible grasps of the hand around the estimated object, and why others are infeasible.
 
 A candidate is a grasp frame (every yaw of the arm's window, shifts across it), a closing, a height of the fingertips
 and, where a surface is wanted, perhaps a tap on the top before it, or a hand that leans to one side. Its expected
-contacts follow from the kinematics: round fingertips on the closing's lines against the estimated surface. What the arm
-cannot reach, where the open fingers would come down on the object or the palm rest on it, and what the hand has just
-landed on, is no candidate. What would push the object by a link that feels nothing is marked.
+contacts follow from the kinematics: round fingertips on the closing's lines against the estimated surface. A grasp is
+infeasible if the arm cannot reach it, if the open fingers would land on the object or the palm rest on it, or if the
+hand has just landed there. A grasp that would push the object with a link without sensors is marked.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from tactile_lab.slam.exploration.candidates import Candidate, ClosingRays
 from tactile_lab.slam.tracking.contacts.contact_set import planar_rotation
 
 HasRoom: TypeAlias = Callable[[GraspPlan], bool]
-"""Whether nothing that only the session knows of stands against a plan."""
+"""Whether a plan is free of obstacles that only the session knows."""
 
 _TAP_FROM_m = 0.025
-"""Height over the object's top that the rays of a tap begin at."""
+"""Height above the object's top at which the rays of a tap start."""
 
 _PALM_THICKNESS_m = 0.030
-"""Of the palm below its own origin, where the object's top must not be."""
+"""Extent of the palm below its origin, which the object's top must not reach."""
 
 _DESCENT_STEP_m = 0.010
 _OWN_TIME_s = 1.6  # opening, closing and waiting for motors, beside what the settings tell
@@ -54,7 +54,7 @@ LANDED = "the hand has just landed there, or the bounding box is in the way"
 
 @dataclass(frozen=True)
 class HandCandidate:
-    """A grasp for the hand, and the same as policies see it."""
+    """A grasp for the hand, and its form for policies."""
 
     plan: GraspPlan
     candidate: Candidate
@@ -62,20 +62,20 @@ class HandCandidate:
 
 @dataclass(frozen=True)
 class Offer:
-    """Everything the hand can do, and how many plans each obstacle ruled out."""
+    """All feasible grasps, and the number of plans excluded by each obstacle."""
 
     usable: tuple[HandCandidate, ...]
     ruled_out: Mapping[str, int]
 
     @property
     def obstacles(self) -> str:
-        """Why the others are none, in words."""
+        """Why the others are infeasible."""
         return ", ".join(f"{count}: {reason}" for reason, count in self.ruled_out.items())
 
 
 @dataclass(frozen=True)
 class HandLimits:
-    """What the candidates of a session have in common."""
+    """Limits of the candidates of a session."""
 
     plan: PlanSettings
     exploration: ExplorationSettings
@@ -91,12 +91,12 @@ class HandLimits:
 
     @property
     def side_closings(self) -> tuple[str, ...]:
-        """Closings with the hand leaning; none for a contour, which is one height's."""
+        """Closings with the hand leaning; none for a contour, which has a single height."""
         return () if self.dimension == 2 else self.exploration.side_closings
 
 
 def anywhere(plan: GraspPlan) -> bool:
-    """There is room for every plan."""
+    """No obstacle for any plan."""
     return True
 
 
@@ -112,9 +112,9 @@ def offer(
     Args:
         limits: of the hand.
         known: the object's shape as estimated.
-        world_T_object: where it is expected, in the table plane.
-        here: where the hand is now, for the time to travel; None where that is not known.
-        has_room: what else stands against a plan (where the hand has just landed on the object).
+        world_T_object: its expected pose in the table plane.
+        here: present pose of the hand, for the travel time; None if unknown.
+        has_room: further obstacles of a plan (such as a place where the hand has just landed).
     """
     plans = list(_plans(limits, np.asarray(world_T_object.transformFrom(known.centre_m))))
     ruled_out: Counter[str] = Counter()
@@ -138,7 +138,7 @@ def offer(
 
 
 def _plans(limits: HandLimits, centre_world_m: Array) -> Iterator[GraspPlan]:
-    """Every combination; a tap only where the hand stands in the middle and at one height, as the rest changes none."""
+    """Every combination; a tap only with the hand in the middle and at one height, as the others would be equal."""
     shifts, heights = limits.exploration.shifts_m, limits.heights_m
     for yaw in np.linspace(*limits.plan.yaw_window_rad, limits.exploration.yaws):
         for shift in shifts:
@@ -195,7 +195,7 @@ def _tips_are_clear(plans: Sequence[GraspPlan], limits: HandLimits, known: Known
 
 
 def _are_clear(places_m: Array, settings: ExplorationSettings, known: KnownShape) -> Verdicts:
-    """Which places keep clear of the surface; its uncertainty is asked where it decides, as it is dear."""
+    """Which points are clear of the surface; its expensive uncertainty is computed only where it matters."""
     spare_m = known.field.predict(places_m).mean_m - settings.clearance_m
     clear = spare_m > settings.caution * settings.clearance_m
     decisive = (spare_m > 0.0) & ~clear
@@ -236,7 +236,7 @@ def _rays(limits: HandLimits, tap_from_m: float, name: str, height_m: float, tap
 
 
 def _with_tap(rays: ClosingRays, taps: bool, from_m: float, tip: TipEllipsoid) -> ClosingRays:
-    """The rays with those of a tap behind them; without a tap these have no length, so that all plans have as many."""
+    """The rays followed by those of a tap; without a tap these have length zero, for equal numbers."""
     table = closing(TAP.closing, TAP_HEIGHT_m, tip)
     above_m = np.array([table.path(finger).centre_m(TAP.progress[finger]) for finger in FINGERS])
     above_m[:, 2] = from_m
@@ -250,7 +250,7 @@ def _with_tap(rays: ClosingRays, taps: bool, from_m: float, tip: TipEllipsoid) -
 
 
 def grasp_time_s(plan: GraspPlan, cycle: CycleSettings, here: GraspFrame | None) -> float:
-    """How long a grasp takes from where the hand is, until the object is let go again."""
+    """Duration of a grasp from the hand's present pose until the object is released."""
     travel_s = 0.0
     if here is not None:
         way_m = float(np.hypot(plan.frame.x_m - here.x_m, plan.frame.y_m - here.y_m))
@@ -263,7 +263,7 @@ def grasp_time_s(plan: GraspPlan, cycle: CycleSettings, here: GraspFrame | None)
 
 
 def tap_time_s(cycle: CycleSettings) -> float:
-    """How long a tap on the top takes beside the grasp that follows it."""
+    """Additional duration of a tap on the top before a grasp."""
     touch = cycle.touch
     moving_s = cycle.lift_m / touch.tap_m_s + cycle.lift_m / cycle.travel_m_s
     return moving_s + cycle.rest_s + touch.press_s + touch.capture_s + _OWN_TIME_s / 2

@@ -1,9 +1,8 @@
-"""Where to grasp next, as far as the hand's own contacts tell it.
+"""Plans grasps from the hand's own contacts, without an estimate.
 
 The first grasps of a session, and all grasps after the estimation has lost the object, follow a fixed rule: the grasp
-frame goes where the last contacts say that the object is, the yaw alternates between both sides of the arm's window,
-the closings alternate too. :mod:`tactile_lab.autonomy.variance_planner` chooses better once there is an estimate to
-choose by.
+frame is placed where the last contacts indicate the object, the yaw alternates between both sides of the arm's window,
+the closings alternate too. :mod:`tactile_lab.autonomy.variance_planner` chooses better once there is an estimate.
 """
 
 from __future__ import annotations
@@ -22,20 +21,20 @@ from sessions.motion.motion import GraspFrame
 
 
 class PlanSettings(StrictModel):
-    """What may be grasped, and how.
+    """Settings of the planner.
 
     Attributes:
-        closings: closings to alternate between; radial first, as its contacts tell the pose of the object frame
-            that is born then, while a pinch leaves the place along the fingers open.
+        closings: closings to alternate between; radial first, as its contacts determine the object frame, while a pinch
+            does not determine the position along the fingers.
         contour_heights_m: heights of the fingertip centres above the table, in turn, when a contour is wanted.
-        surface_heights_m: the same when the whole surface is wanted; what does not fit the object's height is left out
-            as soon as its top was felt.
-        contour_top_m: height that objects are taken to have where a contour is wanted: nothing feels their top then.
+        surface_heights_m: the same when the whole surface is wanted; unsuitable heights are skipped once the object's
+            top was touched.
+        contour_top_m: assumed height of objects if a contour is wanted, since their top is not touched then.
         yaw_window_rad: lowest and highest yaw of the grasp frame that the arm can reach.
-        start_m: where the object is expected before the first grasp, world x, y.
+        start_m: expected position of the object before the first grasp, world x, y.
         turn_rad: smallest and largest re-orientation.
         return_m: largest step back toward ``start_m`` while the object is carried.
-        tap_every: every so many grasps begins with a tap on the top when the whole surface is wanted; 0 never.
+        tap_every: interval of grasps that start with a tap on the top if the whole surface is wanted; 0: never.
     """
 
     closings: tuple[str, ...] = Field(default=("radial", "pinch"), min_length=1)
@@ -66,10 +65,10 @@ _MISSED_SIDE_m = {"FF": -0.012, "MF": -0.004, "RF": 0.004, "LF": 0.012}  # a fin
 
 
 def contact_centre(grasp: Grasp, plan: GraspPlan) -> Array:
-    """Where the middle of the object is, world x, y, from one grasp's contacts alone.
+    """Centre of the object, world x, y, from one grasp's contacts alone.
 
-    Across the hand it is midway between thumb and fingers; along it, midway between first and little finger where
-    they close from the sides, else away from the fingers that met nothing.
+    Across the hand it is midway between thumb and fingers; along it, midway between first and little finger if they
+    close from the sides, otherwise away from the fingers that met nothing.
     """
     frame = plan.frame.pose
     closed = [contact for contact in grasp.contacts if not contact.probed]
@@ -104,8 +103,8 @@ class HeuristicPlanner:
     """Plans grasps and re-orientations without an estimate of the shape.
 
     Args:
-        settings: what may be grasped.
-        rng: the session's own source of chance.
+        settings: see there.
+        rng: the session's random numbers.
         dimension: 2 when a contour is wanted, 3 for a surface.
     """
 
@@ -114,13 +113,13 @@ class HeuristicPlanner:
         self._wants_top = dimension == 3
         self._heights_m = settings.contour_heights_m if dimension == 2 else settings.surface_heights_m
         self.centre_m: Array = np.array(settings.start_m)
-        """Where the object is thought to be, world x, y."""
+        """Estimated position of the object, world x, y."""
 
         self.top_m: float | None = None
-        """Height of its top over the table, where that was felt."""
+        """Height of its top above the table, if it was touched."""
 
     def plan(self, index: int, has_room: Callable[[GraspPlan], bool] = lambda plan: True) -> GraspPlan:
-        """The grasp number ``index``, from 0: on the side whose turn it is, or wherever else there is room."""
+        """The grasp number ``index``, from 0: on the next side in turn, or anywhere else with room."""
         side = 0.53 if index % 2 else -0.53
         plan = self._at(index, side + self._rng.uniform(-0.19, 0.19), "alternating yaw")
         for _ in range(_OTHER_YAWS):
@@ -137,15 +136,15 @@ class HeuristicPlanner:
         return GraspPlan(frame, self.closing(index), self.height_m(index), reason)
 
     def closing(self, index: int) -> str:
-        """The closing whose turn it is: each twice, so that it meets both sides of the window."""
+        """The next closing in turn: each twice, so that it is used on both sides of the window."""
         return self.settings.closings[(index // 2) % len(self.settings.closings)]
 
     def taps(self, index: int) -> bool:
-        """Whether the grasp begins with a tap on the top."""
+        """Whether the grasp starts with a tap on the top."""
         return self._wants_top and self.settings.tap_every > 0 and index % self.settings.tap_every == 0
 
     def height_m(self, index: int) -> float:
-        """The contact height whose turn it is, among those at which the hand has room over the object."""
+        """The next contact height in turn, among those at which the hand has room above the object."""
         heights_m, top_m = self._heights_m, self.top_m
         if top_m is not None:
             fitting_m = [height_m for height_m in heights_m if height_m + _BELOW_TOP_m < top_m < height_m + _ROOM_m]
@@ -165,7 +164,7 @@ class HeuristicPlanner:
         return room_up if room_up >= room_down else -room_down
 
     def step_back(self, centre_m: Array) -> Array:
-        """Shift (2,) in the world that brings an object at ``centre_m`` nearer to where it started."""
+        """Shift (2,) in the world that brings an object at ``centre_m`` closer to its start."""
         step_m = np.array(self.settings.start_m) - centre_m
         size_m = float(np.linalg.norm(step_m))
         return np.asarray(step_m * min(1.0, self.settings.return_m / size_m)) if size_m > 0 else step_m

@@ -1,4 +1,4 @@
-"""The planner: chooses every grasp of a session, by the estimate where there is one, else by the fixed rule."""
+"""The planner: chooses every grasp of a session, by the estimate if there is one, otherwise by the fixed rule."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ _UPWARD = 0.7
 """Least vertical part of the normal of a contact on the object's top."""
 
 _LEAST_BY_POLICY = 2
-"""A policy may be after few contacts; with fewer than that the object is not where it was expected."""
+"""With fewer contacts than this the object is not where it was expected."""
 
 
 class Planner:
-    """Where to grasp, and how to carry the object then.
+    """Chooses grasps, and how to carry the object afterwards.
 
     Args:
         slam: the estimation.
         rule: plans where there is no estimate.
         exploration: the candidates of the estimate.
-        fixed_grasps: so many grasps follow the rule in any case.
+        fixed_grasps: this many first grasps follow the rule.
         tip: shape of the fingertips.
         dimension: the estimation's, 2 or 3.
-        chooser: the policy that chooses where there is an estimate; None for the reward of equation 4.20 alone.
-        grasps: how many the session may make, for the policy.
+        chooser: the policy that chooses if there is an estimate; None for the reward of equation 4.20 alone.
+        grasps: number of grasps of the session, for the policy.
     """
 
     def __init__(
@@ -69,11 +69,11 @@ class Planner:
         self._carried = False
         self._box: BoundingBox | None = None
         self.choice: Choice | None = None
-        """The policy's decision about the grasp that comes next; None where the policy was not asked."""
+        """The policy's decision about the next grasp; None if the policy was not asked."""
 
     @property
     def centre_m(self) -> Array:
-        """Where the middle of the object is thought to be, world x, y."""
+        """Estimated centre of the object, world x, y."""
         return self._rule.centre_m
 
     @property
@@ -84,10 +84,10 @@ class Planner:
     # --- the next grasp ----------------------------------------------------------------------------------------
 
     def plan(self, index: int) -> GraspPlan:
-        """The grasp number ``index``, from 0, clear of all places where the hand has landed on the object.
+        """Plan grasp number ``index``, from 0, clear of all places where the hand has landed on the object.
 
-        After a grasp that the estimate had chosen and that missed the object with some fingers, the contacts' own
-        word counts for one grasp.
+        After a grasp that the estimate had chosen and that missed the object with some fingers, one grasp follows the
+        contacts alone.
         """
         trusted, self.choice = index >= self._fixed_grasps and not self._doubted, None
         if trusted and self._chooser is not None:
@@ -97,7 +97,7 @@ class Planner:
         return replace(chosen or self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
 
     def replan(self, index: int) -> GraspPlan:
-        """Another plan for the same grasp, after a person has refused the last one."""
+        """Another plan for the same grasp, after a person has vetoed the last one."""
         if self.choice is None or self.choice.decision.chosen is None:
             plan = replace(self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
             return replace(plan, reason=f"{plan.reason}, as the last was vetoed")
@@ -105,7 +105,7 @@ class Planner:
         return self._plan_of(self.choice, index)
 
     def _by_policy(self, index: int, chooser: PolicyChooser) -> GraspPlan:
-        """The policy's choice; the fixed rule where it has none, and where there is nothing to choose by."""
+        """The policy's choice; the fixed rule if it has none, or without an estimate."""
         knowledge = self._knowledge(index)
         if knowledge is None:
             self._by_estimate = False
@@ -131,16 +131,16 @@ class Planner:
         return Knowledge(known, expected, spread, self._slam.surface_grasps, left, self._here)
 
     def on_bounding_box(self, box: BoundingBox) -> None:
-        """Take note of the bounding box: the object is in its middle, and open fingers keep out of it.
+        """Note the bounding box: the object is in its middle, and open fingers keep out of it.
 
-        It counts until the estimate takes over: every time the object is carried it slips within the box.
+        It is used until the estimate takes over: every time the object is carried it slips within the box.
         """
         self._box = box
         if box.is_found:
             self._rule.centre_m = box.centre_world_m
 
     def on_landings(self, points_world_m: list[Array]) -> None:
-        """Take note of where fingertips stood on the object; it counts until the object has been moved."""
+        """Note where fingertips landed on the object; used until the object is moved."""
         self._landings_m += points_world_m
 
     def _best_by_estimate(self, index: int) -> GraspPlan | None:
@@ -157,7 +157,7 @@ class Planner:
         )
 
     def _expected_pose(self) -> Pose2 | None:
-        """Where the object is after it was carried; None where it is not known."""
+        """Pose of the object after it was carried; None if unknown."""
         pose = self._slam.world_T_object
         return None if pose is None or self._slam.is_lost else planar(self._hand_motion * pose)
 
@@ -174,7 +174,7 @@ class Planner:
     # --- carrying ----------------------------------------------------------------------------------------------
 
     def on_grasp(self, grasp: Grasp, plan: GraspPlan) -> Reorientation:
-        """Take note of a captured grasp; how the object should be carried from there."""
+        """Note a captured grasp. Returns how to carry the object now."""
         least = self._exploration.least_contacts if self._chooser is None else _LEAST_BY_POLICY
         self._doubted = self._by_estimate and len(grasp.touching) < least
         if grasp.touching and (self._doubted or not self._by_estimate):
@@ -187,7 +187,7 @@ class Planner:
         return Reorientation(turn_rad or 0.0, shift_m)
 
     def _turn(self, grasp: Grasp, plan: GraspPlan) -> float | None:
-        """How far to turn the object, None to leave it: as the policy would have it, where there is one to ask."""
+        """How far to turn the object, None to leave it; decided by the policy if there is one."""
         turn_rad = self._rule.turn(plan.frame.yaw_rad)
         if self._chooser is None:
             return turn_rad
@@ -200,7 +200,7 @@ class Planner:
         return self._chooser.turn(plan.frame, knowledge, grasp, turn_rad, self._has_room)
 
     def on_carry(self, hand_motion_world: Pose3) -> None:
-        """Take note that the hand carried the object since the last grasp."""
+        """Note that the hand carried the object since the last grasp."""
         self._hand_motion, motion = hand_motion_world, planar(hand_motion_world)
         self._box = None if self._box is None else self._box.move(motion)
         self._carried = not hand_motion_world.equals(Pose3(), 1e-9)
@@ -212,15 +212,16 @@ class Planner:
         self._rule.centre_m = np.asarray(planar(hand_motion_world).transformFrom(self.centre_m))
 
     def on_undo(self, hand_motion_world: Pose3) -> None:
-        """Take note that the last grasp was taken back; the hand carried the object so far since the one before."""
+        """Note that the last grasp was undone; the motion is the hand odometry since the one before."""
         self._hand_motion, self._doubted = hand_motion_world, False
 
     def on_estimate(self, index: int, is_placed: bool) -> None:
-        """Take note that grasp number ``index`` has been estimated: from here on its middle may count.
+        """Note that grasp number ``index`` has been estimated.
 
         Args:
             index: of the grasp, from 0.
-            is_placed: its contacts fit somewhere; else a policy has to look elsewhere, or it would try the same again.
+            is_placed: whether its contacts were registered; if not, a policy must choose another place, or it would try
+                the same again.
         """
         if self._chooser is not None and not is_placed:
             self._chooser.on_unplaced_grasp()
@@ -231,9 +232,9 @@ class Planner:
             self._rule.centre_m = np.asarray(expected.transformFrom(known.centre_m))
 
     def known_shape(self) -> KnownShape | None:
-        """The shape as estimated now; None before there is one.
+        """The present estimate of the shape; None before there is one.
 
-        In space its surface is that of the most probable model, as the result of the session would be by now.
+        In space its surface is that of the most probable model, as in the result of a session.
         """
         field = self._slam.surface
         if field is None:

@@ -1,6 +1,6 @@
-"""A policy at work in a session: it is told what is known, chooses among what the hand can do, and is recorded.
+"""Runs a policy in a session: gives it the belief and the feasible candidates, and records its decisions.
 
-Nothing here knows the truth: the belief is the estimation's, the candidates are kinematics.
+No ground truth is used: the belief comes from the estimation, the candidates from kinematics.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ _SAMPLED_SURFACES = 32
 
 @dataclass(frozen=True)
 class Knowledge:
-    """What a session knows when a grasp is chosen.
+    """The knowledge of a session when a grasp is chosen.
 
     Attributes:
         known: the shape as estimated.
-        world_T_object: where the object is expected now.
+        world_T_object: expected pose of the object.
         covariance: of that, (x m, y m, yaw rad), shape (3, 3).
         grasp_indices: which grasp each contact of the shape belongs to.
         grasps_left: that the session may still make.
-        here: where the hand is; None where that is not known.
+        here: pose of the hand; None if unknown.
     """
 
     known: KnownShape
@@ -50,13 +50,13 @@ class Knowledge:
 
 @dataclass(frozen=True)
 class Choice:
-    """One decision of a policy, with everything it was about.
+    """One decision of a policy, with its candidates.
 
     Attributes:
         number: of the grasp, from 1.
         offered: the candidates.
         decision: the policy's.
-        vetoed: candidates that a person has refused, in order.
+        vetoed: candidates that a person has vetoed, in order.
     """
 
     number: int
@@ -66,7 +66,7 @@ class Choice:
 
     @property
     def plan(self) -> GraspPlan | None:
-        """What to do, with the reason; None when the policy does not grasp."""
+        """The plan, with its reason; None if the policy does not grasp."""
         if self.decision.chosen is None:
             return None
         plan = self.offered.usable[self.decision.chosen].plan
@@ -79,16 +79,16 @@ class Choice:
 
     @property
     def reason(self) -> str:
-        """Why the policy decided so."""
+        """The reason of the decision."""
         return self.decision.reason
 
     @property
     def failure(self) -> str:
-        """What is wrong with the policy itself, in words; empty while its answers can be followed."""
+        """What is wrong with the policy itself; empty while its answers are valid."""
         return self.decision.failure
 
     def without_chosen(self) -> Choice:
-        """The next best decision after a person has refused the chosen candidate."""
+        """The next best decision after a person has vetoed the chosen candidate."""
         assert self.decision.chosen is not None
         vetoed = (*self.vetoed, self.decision.chosen)
         scores = [-np.inf if i in vetoed else score for i, score in enumerate(self.decision.scores)]
@@ -145,10 +145,10 @@ class PolicyChooser:
     """Chooses grasps and re-orientations by a policy.
 
     Args:
-        policy: what chooses.
-        limits: what the hand can do.
-        noise: how far the object strays when it is carried.
-        rng: the policy's own source of chance.
+        policy: see there.
+        limits: of the hand.
+        noise: slip of a carried object.
+        rng: the policy's random numbers.
     """
 
     def __init__(self, policy: Policy, limits: HandLimits, noise: MotionNoise, rng: np.random.Generator) -> None:
@@ -159,7 +159,7 @@ class PolicyChooser:
         self._met_m: list[Array] = []
 
     def choose(self, number: int, knowledge: Knowledge, has_room: HasRoom = anywhere) -> Choice:
-        """The next grasp among all the hand can do."""
+        """The next grasp among all candidates."""
         offered = offer(self._limits, knowledge.known, knowledge.world_T_object, knowledge.here, has_room)
         belief = self._belief(knowledge)
         decision = ask(self.policy, [one.candidate for one in offered.usable], belief, self._rng)
@@ -168,14 +168,14 @@ class PolicyChooser:
         return Choice(number, offered, decision)
 
     def on_decision(self, choice: Choice, knowledge: Knowledge) -> None:
-        """Take note of what is done: where its fingers are expected to touch."""
+        """Note the executed grasp and its expected contacts."""
         self._expected = None
         if choice.decision.chosen is not None:
             candidate = choice.offered.usable[choice.decision.chosen].candidate
             self._expected = predict_contacts(candidate, _as_modelled_object(knowledge, knowledge.world_T_object))
 
     def on_grasp(self, grasp: Grasp) -> None:
-        """Take note of the fingers that met nothing where they were expected to touch."""
+        """Note the fingers that met nothing where contacts were expected."""
         expected, self._expected = self._expected, None
         self._met_m = []
         if expected is None:
@@ -187,25 +187,25 @@ class PolicyChooser:
             seen.add(finger)
 
     def on_unplaced_grasp(self) -> None:
-        """Take note that the last grasp's contacts fit nowhere: where they were expected is as unknown as before."""
+        """Note that the last grasp was not registered: its expected places are as unknown as before."""
         self._missed_m += self._met_m
 
     @property
     def may_leave(self) -> bool:
-        """Whether the object stays where it is unless there is a reason to turn it."""
+        """Whether the object stays in place unless there is a reason to turn it."""
         return self._turns.may_leave
 
     def turn(
         self, frame: GraspFrame, knowledge: Knowledge, grasp: Grasp, otherwise: float, has_room: HasRoom = anywhere
     ) -> float | None:
-        """How to turn the object in hand, radians; None to leave it where it is.
+        """How to turn the object in hand, radians; None to leave it in place.
 
         Args:
             frame: of the hand.
-            knowledge: from before this grasp, the pose as certain as it will be after it.
+            knowledge: from before this grasp, with the pose as certain as after it.
             grasp: this one.
-            otherwise: the turn where nothing tells them apart, radians.
-            has_room: what else stands against a plan as long as the object is left where it is.
+            otherwise: the turn if all are equal, radians.
+            has_room: further obstacles of a plan while the object is left in place.
         """
         belief = with_contacts(self._belief(knowledge), grasp)
         return self._turns.choose(frame, knowledge.known, belief, otherwise, self._rng, has_room)

@@ -1,8 +1,8 @@
-"""What becomes of an object that has been grasped: how it is turned in hand, or that it is left where it is.
+"""Decides how a grasped object is turned in hand, or whether it is left in place.
 
-A carried object slips: its pose is less certain afterwards, and that takes time. What is gained are sides that the arm
-could not reach. A policy that weighs knowledge of the pose against that of the shape decides by both; the others choose
-among the turns alone.
+A carried object slips, which makes its pose less certain, and carrying takes time. The gain are sides that the arm
+could not reach. A policy that weighs information about the pose against that about the shape decides by both; the
+others only choose among the turns.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from tactile_lab.slam.tracking.contacts.contact_set import planar_rotation
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 
 _TURNS = 3
-"""Re-orientations to choose from, each way round."""
+"""Number of re-orientations to choose from, in each direction."""
 
 _YAWS = 7
-"""So many candidates around the object, in its middle, stand for all that follow a turn."""
+"""Number of candidates around the object that represent all grasps after a turn."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class RegraspPlanner:
 
     Attributes:
         policy: that chooses the grasps.
-        limits: what the hand can do.
-        noise: how far the object strays when it is carried.
+        limits: of the hand.
+        noise: slip of a carried object.
     """
 
     policy: Policy
@@ -65,10 +65,10 @@ class RegraspPlanner:
         Args:
             frame: of the hand that holds it.
             known: its shape.
-            belief: about it as it is held.
-            otherwise: the turn where nothing tells them apart.
-            rng: source of sampled worlds.
-            has_room: what else stands against a plan as long as the object is left where it is.
+            belief: about the held object.
+            otherwise: the turn if all are equal.
+            rng: of sampled worlds.
+            has_room: further obstacles of a plan while the object is left in place.
         """
         turns = self._turns(frame.yaw_rad)
         if self.policy.name == "random" or not turns or belief.surface is None:
@@ -88,7 +88,7 @@ class RegraspPlanner:
         rng: np.random.Generator,
         has_room: HasRoom,
     ) -> float | None:
-        """The turn after which a grasp tells most per second, if that is more than without any; all in equal worlds."""
+        """The turn with the most information per second afterwards, if more than without; in equal worlds."""
         chance = int(rng.integers(2**62))
         strayed = belief.pose_covariance + np.diag(self.noise.sigmas**2)
         lost = pose_nats(strayed, policy.settings) - pose_nats(belief.pose_covariance, policy.settings)
@@ -100,7 +100,7 @@ class RegraspPlanner:
         return turns[int(np.argmax(rates))] if max(rates) > left else None
 
     def _seconds(self, turn_rad: float) -> float:
-        """That carrying takes."""
+        """Duration of carrying."""
         return abs(turn_rad) / self.limits.cycle.carry_turn_rad_s + self.limits.cycle.rest_s
 
     def _turns(self, yaw_rad: float) -> list[float]:
@@ -113,7 +113,7 @@ class RegraspPlanner:
     def _after(
         self, turn_rad: float, frame: GraspFrame, known: KnownShape, belief: Belief, has_room: HasRoom = anywhere
     ) -> tuple[list[Candidate], Belief]:
-        """A few of the grasps that follow when the object was turned about the hand's vertical axis, and the belief."""
+        """A few grasps after a turn of the object about the hand's vertical axis, and the belief."""
         about = Pose2(frame.x_m, frame.y_m, 0.0)
         pose = about * Pose2(0.0, 0.0, turn_rad) * about.inverse() * belief.world_T_object
         few = self.limits.exploration.model_copy(update={"yaws": _YAWS, "shifts_m": (0.0,)})
@@ -123,7 +123,7 @@ class RegraspPlanner:
 
 
 def with_contacts(belief: Belief, grasp: Grasp) -> Belief:
-    """The belief with a grasp's contacts, where they are thought to lie on the object; the field is as it was."""
+    """The belief with a grasp's contacts at their estimated places on the object; the field is unchanged."""
     if not grasp.contacts:
         return belief
     pose, points_m, normals = belief.world_T_object, grasp.points_world_m.copy(), grasp.normals_world.copy()

@@ -1,4 +1,4 @@
-"""What an estimating session is asked to do: the session's own settings, and the planners'."""
+"""Settings of a session with an estimator: those of the session and of the planners."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tactile_lab.autonomy.variance_planner import ExplorationSettings
 
 
 class SessionSettings(ConductorSettings):
-    """A session whose grasps are planned by what is estimated; the section ``conductor`` of a rig file.
+    """A session whose grasps are planned by the estimate; the section ``conductor`` of a rig file.
 
     Attributes:
         plan, exploration: see there.

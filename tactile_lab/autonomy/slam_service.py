@@ -1,8 +1,8 @@
-"""All of a session that takes its time: tactile SLAM, and the planner that chooses grasps by it.
+"""The estimator service: tactile SLAM, and the planner that uses its estimate.
 
 Nothing here touches a device. The session asks it one question after the other (see
-:mod:`sessions.conductor.estimator_client`), so that it can live in the session's process or in one of its own, and
-answers alike in both.
+:mod:`sessions.conductor.estimator_client`), so that it can run in the session's process or in a separate one, with
+equal answers.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class SlamService:
     """The estimation and the planner of one session: an :class:`~sessions.conductor.estimator.EstimatorService`.
 
     Args:
-        slam: fresh.
-        planner: over that estimation.
+        slam: unused.
+        planner: uses that estimation.
     """
 
     def __init__(self, slam: TactileSlam, planner: Planner) -> None:
@@ -86,7 +86,7 @@ class SlamService:
         self.planner.on_carry(hand_motion_world)
 
     def estimate(self, grasp: Grasp, known: int) -> tuple[Estimate, ...]:
-        """See :meth:`sessions.conductor.estimator.Estimator.estimate`; the planner hears of the step too."""
+        """See :meth:`sessions.conductor.estimator.Estimator.estimate`; the planner is notified too."""
         self._memory.remember(grasp)
         step = self.slam.add_grasp(grasp)
         self.planner.on_estimate(step.index, step.verdict != "untracked")
@@ -105,19 +105,19 @@ class SlamService:
         self.planner.on_undo(hand_motion_world)
 
     def state(self) -> dict[str, Any]:
-        """Everything that the estimation knows, the source of chance too."""
+        """The complete state of the estimation, including its random numbers."""
         return dict(vars(self.slam))
 
 
 class SlamMemory:
     """What an estimation knew before each of its last grasps, so that they can be taken back.
 
-    A state holds everything, the source of chance too: after :meth:`undo` the estimation goes on exactly as if the
-    grasp had never been. States grow with the session, so that only the last few are kept; for what is farther back
-    the grasps are estimated again from the beginning, which comes to the same.
+    A state includes the random numbers: after :meth:`undo` the estimation continues exactly as if the grasp had never
+    been added. States grow with the session, so that only the last few are kept; to go back farther the grasps are
+    estimated again from the beginning, with the same result.
 
     Args:
-        slam: the estimation, fresh; its states are put back into this object.
+        slam: the estimation, unused; its states are restored into this object.
     """
 
     def __init__(self, slam: TactileSlam) -> None:
@@ -127,7 +127,7 @@ class SlamMemory:
         self._states: deque[dict[str, Any]] = deque(maxlen=KEPT_STATES)
 
     def remember(self, grasp: Grasp) -> None:
-        """Keep the present state; call this before every step, with the grasp that it is about to take."""
+        """Store the present state; call this before every step, with its grasp."""
         self._grasps.append(grasp)
         self._states.append(self._state())
 

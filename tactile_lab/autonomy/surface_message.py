@@ -1,4 +1,4 @@
-"""The estimated surface as viewers are told of it."""
+"""The estimated surface as a message for viewers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tactile_lab.autonomy.variance_planner import KnownShape
 def surface_message(known: KnownShape | None) -> dict[str, Any]:
     """The surface in the object frame, with the standard deviation at each vertex.
 
-    It is the one that the planner goes by. An outline (dimension 2) is closed and has no faces. Without a closed shape
+    It is the one that the planner uses. An outline (dimension 2) is closed and has no faces. Without a closed shape
     there are no vertices.
     """
     if known is None:

@@ -1,4 +1,4 @@
-"""The unknown part of a shape in words, as a person at the table says them.
+"""Describes the unknown part of a shape in words for the operator.
 
 Directions are those of someone who stands behind the arm: "far" is along the world's x axis, "left" along its y axis.
 """
@@ -16,7 +16,7 @@ from tactile_lab.slam.exploration.policy import Surface
 
 SECTORS = ("far", "far left", "left", "near left", "near", "near right", "right", "far right")
 KNOWN_WELL = 0.9
-"""Share of the surface from which nothing is called unknown."""
+"""Known share of the surface above which nothing is called unknown."""
 
 
 def direction(x: float, y: float) -> str:
@@ -38,7 +38,7 @@ def describe_unknown(known: KnownShape | None, world_T_object: Pose2 | None) -> 
 
 
 def _worst_sector(surface: Surface, centre_m: Array, world_T_object: Pose2) -> int:
-    """The sector, seen from the middle, that is known worst on average over its part of the surface."""
+    """The sector, seen from the middle, with the largest mean uncertainty of its part of the surface."""
     offsets_m = surface.points_m[:, :2] - centre_m
     turns = (np.arctan2(offsets_m[:, 1], offsets_m[:, 0]) + world_T_object.theta()) / (2.0 * np.pi)
     sectors = np.round(turns * len(SECTORS)).astype(int) % len(SECTORS)

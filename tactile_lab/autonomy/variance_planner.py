@@ -1,9 +1,9 @@
-"""Where to grasp next by what is known of the object: the reward of equation 4.20 over candidate grasps.
+"""Chooses the next grasp by the reward of equation 4.20 over candidate grasps.
 
 Candidates stand around the estimated object: every yaw of the arm's window, a few shifts across the hand, every
-closing. Where a candidate's fingers will touch is read off the estimated surface along their approach paths; the
-candidate whose predicted contacts are least known wins, among those that have room for the open hand, promise enough
-contacts, and whose contacts would also tell the object's pose (eq. 3.18): a grasp that cannot be placed adds nothing.
+closing. A candidate's contacts are predicted on the estimated surface along the approach paths; the candidate with the
+most uncertain predicted contacts wins, among those that have room for the open hand, have enough expected contacts, and
+determine the object's pose (eq. 3.18): a grasp that cannot be registered adds nothing.
 """
 
 from __future__ import annotations
@@ -32,24 +32,23 @@ from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extrac
 
 
 class ExplorationSettings(StrictModel):
-    """The candidates, and which of them count.
+    """The candidates, and their selection.
 
     Attributes:
-        yaws: how many, spread evenly over the arm's window.
+        yaws: number of yaws, spread evenly over the arm's window.
         shifts_m: offsets of the grasp frame across the hand.
-        least_contacts: candidates that promise fewer lose against all that promise as many.
-        least_observability: smallest eigenvalue of (3.18) that the predicted contacts should have; where no candidate
-            reaches it (a round object cannot tell its turn) it does not count.
-        policy: name of the policy that chooses among everything the hand can do (:mod:`tactile_lab.slam.exploration`);
+        least_contacts: candidates with fewer expected contacts lose against all that have as many.
+        least_observability: smallest eigenvalue of (3.18) that the predicted contacts should have; ignored if no
+            candidate reaches it (the yaw of a round object is unobservable).
+        policy: name of the policy that chooses among all feasible grasps (:mod:`tactile_lab.slam.exploration`);
             None for the reward of equation 4.20 alone, as above, every object being carried.
-        information: of the policy ``information``, whether it is named here or on the command line.
-        side_closings: closings with the hand leaning to one side that policies may choose besides, where a surface is
-            wanted.
-        side_heights_m: of the lowest fingertip there: from lower down it lifts what it grasps.
-        caution: standard deviations of the estimated surface that the open fingertips keep clear of besides, of at
-            most the clearance each; for policies.
-        clearance_m: distance from the estimated surface that the open fingertips' centres must keep.
-        contour_resolution_m, mesh_resolution_m: of the surface that the explored share is measured on.
+        information: settings of the policy ``information``, whether it is chosen here or on the command line.
+        side_closings: closings with the hand leaning to one side that policies may also choose if a surface is wanted.
+        side_heights_m: of the lowest fingertip there: from lower down it would lift the object.
+        caution: additional clearance of the open fingertips in standard deviations of the estimated surface, each at
+            most the clearance; for policies.
+        clearance_m: distance from the estimated surface that the open fingertips' centres keep.
+        contour_resolution_m, mesh_resolution_m: of the surface on which the explored share is measured.
     """
 
     yaws: int = Field(default=12, ge=1)
@@ -88,8 +87,8 @@ class KnownShape:
         origin_height_m: height of the object frame's origin over the table.
         centre_m: middle of the shape's extent, x, y.
         explored: share of the surface that is known, 0..1.
-        surface: what was measured; None where the contacts enclose nothing yet.
-        top_height_m: highest place of it over the table; None where it is not known.
+        surface: the measured surface; None if the contacts enclose nothing yet.
+        top_height_m: its highest point above the table; None if unknown.
     """
 
     field: Gpis
@@ -106,15 +105,15 @@ def known_shape(
 ) -> KnownShape:
     """Measure the estimated surface.
 
-    Where the contacts enclose nothing yet, the object frame's origin stands in for the middle and nothing is explored.
+    If the contacts enclose nothing yet, the object frame's origin is used as the centre and nothing is explored.
 
     Args:
         field: of the contacts.
         dimension: 2 or 3.
         origin_height_m: height of the object frame's origin over the table.
         settings: resolutions.
-        mesh: the surface of the most probable model, in space; without it the field's own is measured. What is
-            explored is judged by the field in any case, see :func:`_as_far_as_felt`.
+        mesh: the surface of the most probable model, in space; without it the field's own is measured. The explored
+            share always follows the field, see :func:`_as_far_as_felt`.
     """
     try:
         extracted = _surface(field, dimension, settings) if mesh is None else _as_far_as_felt(mesh, field)
@@ -135,15 +134,15 @@ def _surface(field: Gpis, dimension: int, settings: ExplorationSettings) -> Cont
 def _as_far_as_felt(mesh: SurfaceMesh, field: Gpis) -> SurfaceMesh:
     """A model's surface with the field's standard deviations.
 
-    The model concludes from a few contacts where a whole face is, and its sigma there is small if the model is right.
-    Exploring is to find out whether it is: so what counts as known is what contacts have told, which wears off with
-    the distance from them. The field's values are distances, so their standard deviation is the surface's.
+    The model infers a whole face from a few contacts, with a small sigma if the model is right. Exploration must find
+    out whether it is: so knowledge is measured by the field, whose certainty decreases with the distance from contacts.
+    The field's values are distances, so their standard deviation is the surface's.
     """
     return replace(mesh, sigma_m=field.sigma_inflation * np.sqrt(field.variance(mesh.vertices)))
 
 
 def closing_rays(table: Closing) -> ClosingRays:
-    """The usable parts of a closing's lines as rays in the grasp frame."""
+    """The usable parts of a closing's paths as rays in the grasp frame."""
     paths = [table.path(finger) for finger in FINGERS]
     return ClosingRays(
         fingers=FINGERS,
@@ -163,16 +162,16 @@ def choose_grasp(
     settings: ExplorationSettings,
     has_room: Callable[[GraspPlan], bool] = lambda plan: True,
 ) -> GraspPlan | None:
-    """The most promising grasp around an object at ``world_T_object``; None when no candidate has room.
+    """The most promising grasp around an object at ``world_T_object``; None if no candidate has room.
 
     Args:
         shape: as estimated.
-        world_T_object: where the object is expected, in the table plane.
+        world_T_object: expected pose in the table plane.
         closings: names to choose from.
-        table: gives the closing of a name at the height of this grasp.
-        yaw_window_rad: what the arm can reach.
+        table: returns a closing by name at the height of this grasp.
+        yaw_window_rad: reach of the arm.
         settings: the candidates.
-        has_room: what else stands against a grasp (where the hand has just landed on the object).
+        has_room: further obstacles of a grasp (such as a place where the hand has just landed).
     """
     known = ModelledObject(shape.field, shape.dimension, world_T_object, shape.origin_height_m)
     rays = {name: closing_rays(table(name)) for name in closings}
@@ -188,7 +187,7 @@ def choose_grasp(
 
 
 def _best(rated: Sequence[RatedCandidate], known: ModelledObject, settings: ExplorationSettings) -> RatedCandidate:
-    """The highest reward among the observable candidates with enough contacts; see the settings for what gives way."""
+    """The highest reward among the observable candidates with enough contacts; see the settings."""
     enough = [item for item in rated if len(item.contacts.fingers) >= settings.least_contacts]
     telling = (item for item in enough if _observability(item, known) >= settings.least_observability)
     if best := next(telling, None):

@@ -28,7 +28,7 @@ UNKNOWN = "–"
 
 
 @dataclass(frozen=True)
-class Judged:
+class EvaluatedRun:
     """One evaluation.
 
     Attributes:
@@ -75,7 +75,7 @@ class MethodSummary:
     figures: tuple[Figure, ...]
 
 
-def compare(judged: Sequence[Judged]) -> list[MethodSummary]:
+def compare(judged: Sequence[EvaluatedRun]) -> list[MethodSummary]:
     """One summary per method, in order of appearance.
 
     Several results of one method on one session are not independent runs: then each results folder is a separate group,
@@ -83,7 +83,7 @@ def compare(judged: Sequence[Judged]) -> list[MethodSummary]:
     """
     counts = Counter((each.session, each.method) for each in judged)
     repeated = {method for (_, method), count in counts.items() if count > 1}
-    groups: dict[str, list[Judged]] = {}
+    groups: dict[str, list[EvaluatedRun]] = {}
     for each in judged:
         name = f"{each.method}, {each.results}" if each.method in repeated else each.method
         groups.setdefault(name, []).append(each)
@@ -91,20 +91,20 @@ def compare(judged: Sequence[Judged]) -> list[MethodSummary]:
     return [_summary(method, group, first) for method, group in groups.items()]
 
 
-def _summary(method: str, group: Sequence[Judged], first: Sequence[Judged]) -> MethodSummary:
+def _summary(method: str, group: Sequence[EvaluatedRun], first: Sequence[EvaluatedRun]) -> MethodSummary:
     failed = sum(bool(each.evaluation.get("failed")) for each in group)
     return MethodSummary(
         method, len(group), failed, tuple(_figure(title, keys, group, first) for title, keys in FIGURES)
     )
 
 
-def _figure(title: str, keys: Sequence[str], group: Sequence[Judged], first: Sequence[Judged]) -> Figure:
+def _figure(title: str, keys: Sequence[str], group: Sequence[EvaluatedRun], first: Sequence[EvaluatedRun]) -> Figure:
     known = [value for each in group if (value := each.figure(keys)) is not None]
     mean = Interval.of(known) if known else None
     return Figure(title, len(known), Spread.of_known(known), mean, _difference(keys, group, first))
 
 
-def _difference(keys: Sequence[str], group: Sequence[Judged], first: Sequence[Judged]) -> Interval | None:
+def _difference(keys: Sequence[str], group: Sequence[EvaluatedRun], first: Sequence[EvaluatedRun]) -> Interval | None:
     """Mean difference to the first method over common sessions; None for the first method itself."""
     if group is first:
         return None
@@ -114,7 +114,7 @@ def _difference(keys: Sequence[str], group: Sequence[Judged], first: Sequence[Ju
     return Interval.of(differences) if differences else None
 
 
-def rows_csv(judged: Sequence[Judged]) -> str:
+def rows_csv(judged: Sequence[EvaluatedRun]) -> str:
     """One line per evaluation; unknown metrics are empty."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

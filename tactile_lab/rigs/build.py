@@ -1,4 +1,4 @@
-"""From a rig's description to connected devices, and to the decoders a replay needs."""
+"""Builds a rig's devices from its description, and the decoders for a replay."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from drivers.positioner.kinematics import mount_T_forearm
 from drivers.shadow.closing.posture import TipEllipsoid
 from drivers.shadow.device.hand import ShadowHand
 from drivers.shadow.device.hand_samples import HandDecoder
+from drivers.shadow.model.hand_info import check_modelled
 from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_images import PALMS
@@ -38,15 +39,17 @@ from tactile_lab.rigs.wires import LocalCamera
 
 
 def check_calibration(rig: Rig) -> None:
-    """Read every calibration file of a rig, so that a broken one shows before anything moves or is recorded.
+    """Read every calibration file of a rig, so that an invalid one is found before anything moves or is recorded.
 
     Raises:
-        ConfigurationError: a file that does not fit; names it.
+        ConfigurationError: an invalid file, with its name.
     """
     build_interpreter(rig)
     MotorMap.load(rig.files["motors"])
     if rig.description.wires is not None:
-        hand_setup(rig).check_files()
+        setup = hand_setup(rig)
+        setup.check_files()
+        check_modelled(setup.motors, setup.infos())
     if "camera" in rig.files:
         load_camera(rig.files["camera"])
         load_model(rig.files["markers"], MarkerSettings)
@@ -93,7 +96,7 @@ def build_runtime(rig: Rig, world: SimulatedWorld, recorder: Recorder) -> RigRun
 
 
 def build_interpreter(rig: Rig) -> Interpreter:
-    """Decoders and a fresh perception: what understands a rig's bytes, live and in replay alike."""
+    """Decoders and a new Perception for a rig's bytes, live and in a replay."""
     clock, description = VirtualClock(), rig.description
     kind, tips = description.fingertip_kind, fitted_tips(rig)
     linked = {f: _decoder(rig, kind, f, tip, clock) for f, tip in tips.items()} if isinstance(kind, LinkedKind) else {}
@@ -127,10 +130,10 @@ def _hand(rig: Rig, transport: Transport, clock: Clock) -> ShadowHand:
 
 
 def fitted_tips(rig: Rig) -> dict[str, Any]:
-    """What is known of each fingertip that a rig has, by finger; of those with a wire where linked ones have wires.
+    """Calibration of each fingertip of a rig, by finger; with wires, only of the wired ones.
 
     Raises:
-        ConfigurationError: a finger with a wire but without a calibration, or a file that does not fit.
+        ConfigurationError: a finger with a wire but without a calibration, or an invalid file.
     """
     kind, wires = rig.description.fingertip_kind, rig.description.wires
     known = kind.load(rig.files)
@@ -149,20 +152,20 @@ def force_tips(rig: Rig) -> dict[str, FingertipCalibration]:
 
 
 def force_ranges_N(rig: Rig) -> dict[str, float]:
-    """Calibrated range of the force fingertips, smallest axis; sensors that tell a smaller one do not connect."""
+    """Calibrated range of the force fingertips, smallest axis; sensors that report a smaller one do not connect."""
     range_N = rig.description.fingertip_kind.force_range_N(rig.description.fingertip_settings)
     return {} if range_N is None else dict.fromkeys(fitted_tips(rig), range_N)
 
 
 def _decoder(rig: Rig, kind: LinkedKind[Any], finger: str, calibration: Any, clock: Clock) -> LinkedFingertip:
-    """What understands a finger's bytes."""
+    """The decoder of a finger's bytes."""
     wire = None if rig.description.wires is None else force_wire(rig, finger)
     transport = _silent(fingertip_link(finger))
     return kind.device(finger, calibration, rig.description.fingertip_settings, transport, clock, wire)
 
 
 def _tip_surface(kind: FingertipKind[Any], calibration: Any) -> TipSurface:
-    """What a finger touches with; the usual tip where its calibration names no ellipsoid."""
+    """The touching surface of a finger; the default tip if its calibration has no ellipsoid."""
     if (surface := kind.surface(calibration)) is None:
         usual = TipEllipsoid()
         return TipSurface.upright(usual.semi_axes_m, usual.centre_distal_m)

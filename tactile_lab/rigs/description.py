@@ -1,4 +1,4 @@
-"""What a rig file says. One program, many rigs: the file names the devices and the calibration to use."""
+"""Rig files: the devices of a rig and the calibration to use."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ OTHER_VERSION = "Use the version of tactile-lab that recorded it; tactile-lab se
 
 
 _KINDS: Mapping[str, Registry[Any]] = {"fingertips": FINGERTIPS, "positioner": POSITIONERS}
-"""Keys that decide what other keys mean."""
+"""Keys that determine the meaning of other keys."""
 
 
 class CalibrationFiles(StrictModel):

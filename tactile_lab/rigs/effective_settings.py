@@ -1,4 +1,4 @@
-"""Which settings a rig works with: those of its file, and the usual ones where it says nothing."""
+"""The effective settings of a rig: those of its file, and defaults for the others."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class SettingInForce:
 
     Attributes:
         name: its keys in the rig file, joined by dots.
-        value: as a rig file would say it.
-        usual: the same for a rig file that does not say it; empty where there is no such value.
+        value: as in a rig file.
+        usual: the default; empty if there is none.
     """
 
     name: str

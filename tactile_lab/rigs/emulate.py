@@ -1,4 +1,4 @@
-"""Stand-ins for the devices of a rig of fingertips or of a hand, at the places its file names, for tries without."""
+"""Emulates the devices of a fingertip or hand rig at the addresses in its file, for tests without hardware."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _VOLTS_RATE_Hz = 1000.0
 
 
 def emulated_rig(name: str) -> AbstractContextManager[dict[str, str]]:
-    """Stand-ins for what a rig file of kind fingertips or hand names.
+    """Emulators of a rig file of kind fingertips or hand.
 
     Args:
         name: the file's path.
@@ -61,10 +61,10 @@ def emulated_rig(name: str) -> AbstractContextManager[dict[str, str]]:
 
 @contextmanager
 def emulate_sensors(rig: FingertipRig) -> Iterator[dict[str, str]]:
-    """Sensors of all fingers while the context lasts; gives finger to where it can be found, in words.
+    """Sensors of all fingers while the context lasts; returns the address of each finger as text.
 
     Raises:
-        ConfigurationError: a place that cannot be emulated here, or is taken.
+        ConfigurationError: an address that cannot be emulated here, or is in use.
     """
     with ExitStack() as running:
         for seed, (finger, wiring) in enumerate(rig.description.wires.items()):
@@ -80,7 +80,7 @@ def emulate_sensors(rig: FingertipRig) -> Iterator[dict[str, str]]:
 
 @contextmanager
 def emulated_hand(rig: HandRig) -> Iterator[dict[str, str]]:
-    """A hand at the far end of the rig's cable while the context lasts; gives where it can be found, in words.
+    """A hand at the far end of the rig's cable while the context lasts; returns its address as text.
 
     Raises:
         ConfigurationError: the rig names no far end.

@@ -1,4 +1,4 @@
-"""A rig of force fingertips alone: which sensor hangs on which wire. It can be checked, not run: there is no hand."""
+"""A rig with force fingertips only: which sensor is on which wire. It can be checked, but not run without a hand."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ KIND = "fingertips"
 
 
 def one_place_each(wires: dict[str, WireSettings]) -> dict[str, WireSettings]:
-    """Wires of known fingers that all end in places of their own. Raises ValueError."""
+    """Check that the fingers are known and their wires distinct. Raises ValueError."""
     if unknown := sorted(set(wires) - set(FINGERS)):
         raise ValueError(f"unknown finger {', '.join(unknown)}; the fingers are {', '.join(FINGERS)}")
     taken: dict[str, str] = {}
@@ -53,7 +53,7 @@ class FingertipRigDescription(StrictModel):
 
 @dataclass(frozen=True)
 class FingertipRig:
-    """A description with what its files say."""
+    """A description with the content of its files."""
 
     description: FingertipRigDescription
     calibrations: dict[str, FingertipCalibration]
@@ -76,7 +76,7 @@ class FingertipRig:
 
 
 def is_fingertip_rig(path: Path) -> bool:
-    """Whether a file calls itself a rig of fingertips. Raises ConfigurationError when it is no YAML."""
+    """Whether a file is a rig file of kind fingertips. Raises ConfigurationError if it is not YAML."""
     content = load(path)
     return isinstance(content, dict) and content.get("kind") == KIND
 

@@ -1,4 +1,4 @@
-"""A rig of a real hand alone: how it is reached, and its calibration. It can be checked, not run: nothing bears it."""
+"""A rig with a real hand only: its connection and calibration. It can be checked, but not run without a positioner."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class HandRig:
 
 
 def is_hand_rig(path: Path) -> bool:
-    """Whether a file calls itself a rig of a hand. Raises ConfigurationError when it is no YAML."""
+    """Whether a file is a rig file of kind hand. Raises ConfigurationError if it is not YAML."""
     content = load(path)
     return isinstance(content, dict) and content.get("kind") == KIND
 

@@ -1,4 +1,4 @@
-"""Where a session happens: a simulated world in this program, devices on wires, or emulators for those."""
+"""The laboratory of a session: a simulated world in this program, devices on wires, or their emulators."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ class Laboratory(Protocol):
         """
 
     def remarks(self) -> tuple[str, ...]:
-        """What was not as it should be with the place itself so far, in words."""
+        """Problems of the laboratory itself so far."""
 
 
 @dataclass(frozen=True)
 class SimulatedLaboratory:
-    """A world in this program, in time of its own."""
+    """A simulated world in this program, with its own time."""
 
     rig: Rig
     world: SimulatedWorld
@@ -90,7 +90,7 @@ class WiredLaboratory:
         return build_wired_bench(self.rig, recorder, self.clock, truth=truth, first_move=first_move)
 
     def remarks(self) -> tuple[str, ...]:
-        """Physics that could not keep up with the clock; see :class:`Laboratory`."""
+        """Whether the physics could not keep up with the clock; see :class:`Laboratory`."""
         lost_s = 0.0 if self.emulators is None else self.emulators.lost_s
         return (f"the emulated laboratory stalled for {lost_s:.1f} s: this computer is too slow",) if lost_s else ()
 

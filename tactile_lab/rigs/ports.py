@@ -1,4 +1,4 @@
-"""What a fingertip, a bridge or a hand could be plugged into: ports and interfaces of this computer."""
+"""Ports and interfaces of this computer to which a fingertip, a bridge or a hand can be connected."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _kernel_report(file: Path) -> str:
 
 
 def wait_for_change(clock: Clock, before: list[PortFound], seconds: float) -> tuple[list[PortFound], list[PortFound]]:
-    """Wait until a port goes or comes; which went and which came, both empty when none did in time."""
+    """Wait until a port is added or removed. Returns removed and added ports, both empty after the timeout."""
     end_ns = clock.now_ns() + round(seconds * NANOSECONDS)
     while clock.now_ns() < end_ns:
         clock.sleep_until_ns(clock.now_ns() + _LOOK_ns)

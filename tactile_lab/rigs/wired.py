@@ -36,7 +36,7 @@ def hand_setup(rig: Rig) -> HandSetup:
     description, files, wiring = rig.description, rig.files, wires_of(rig).hand
     return HandSetup(
         name=HAND_LINK,
-        ethercat=wiring.ethercat,
+        ethercat=wiring.ethercat.model_copy(update={"side": "right"}),  # the side that the kinematics are of
         master=wiring.master,
         hand=description.hand.on_wire.model_copy(update={"tactile": tactile_of(rig)}),
         joints=files["joints"].resolve(),
@@ -48,13 +48,13 @@ def hand_setup(rig: Rig) -> HandSetup:
 
 
 def tactile_of(rig: Rig) -> str:
-    """What the rig's palm is told to ask its fingertips for."""
+    """What the rig's palm requests from its fingertips."""
     kind = rig.description.fingertip_kind
     return kind.tactile if isinstance(kind, PalmKind) else "none"
 
 
 def simulation_settings(rig: Rig, object_name: str) -> SimulationSettings:
-    """The simulated world of a rig, with what the rig says of itself."""
+    """The simulated world of a rig, with the rig's own settings."""
     description = rig.description
     changes = {"object": object_name, "fingertips": description.fingertips, "positioner": description.positioner}
     return description.simulation.model_copy(update=changes)
@@ -145,7 +145,7 @@ def _hand_place(rig: Rig) -> HandPlace:
 
 
 def _camera_place(rig: Rig) -> Place | None:
-    """Where the plant's camera is served; a camera of this computer is used as it is, and sees what it sees."""
+    """Address of the plant's emulated camera; a camera of this computer is used directly."""
     camera, eye = wires_of(rig).camera, rig.description.simulation.camera
     if isinstance(camera, RemoteCamera) and (eye.stream_hz is not None or eye.late_ms):
         what, hint = "the emulated camera waits for triggers and answers immediately", "Remove stream_hz and late_ms"

@@ -1,4 +1,4 @@
-"""How a rig file says where each device of a laboratory is plugged in."""
+"""The wires in a rig file: the connection of each device."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class HandWiring(StrictModel):
 
 
 class RemoteCamera(StrictModel):
-    """A program that takes pictures: messages behind their length on a TCP connection (docs/real-laboratory.md)."""
+    """A program that takes pictures: length-prefixed messages on a TCP connection (docs/real-laboratory.md)."""
 
     wire: Literal["tcp"]
     host: str = Field(min_length=1)
@@ -44,7 +44,7 @@ class RemoteCamera(StrictModel):
 
 
 class LocalCamera(StrictModel):
-    """A camera of this computer, watched by a process of its own."""
+    """A camera of this computer, read by a separate process."""
 
     wire: Literal["source"]
     settings: CameraSourceSettings

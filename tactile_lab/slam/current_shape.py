@@ -79,7 +79,7 @@ def _extract(
 def _problem(extracted: object, wanted: type[Contour | SurfaceMesh]) -> str:
     """Why an outline or surface is invalid; empty if it is valid."""
     if not isinstance(extracted, wanted):
-        return f"gives a {type(extracted).__name__} where a {wanted.__name__} belongs"
+        return f"returned {type(extracted).__name__} instead of {wanted.__name__}"
     points_m = extracted.points_m if isinstance(extracted, Contour) else extracted.vertices
     if not np.isfinite(points_m).all() or np.isnan(extracted.sigma_m).any():
         return "gives points or standard deviations that are not finite"

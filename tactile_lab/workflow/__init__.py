@@ -1,1 +1,1 @@
-"""The jobs of the command line, free of printing: run a session, judge it, replay it, sweep over many."""
+"""The jobs of the command line, without printing: run, evaluate, replay and sweep sessions."""

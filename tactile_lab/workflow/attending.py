@@ -1,4 +1,4 @@
-"""Who is at a session beside the program: a person who guides it, or one who watches."""
+"""Who attends a session: an operator who guides it, or one who watches."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Attendance:
 
 
 def settings_for(settings: SessionSettings, attendance: Attendance) -> SessionSettings:
-    """The session's settings, with what was asked for on the command line."""
+    """The session's settings with the command line options applied."""
     asked = {"led_by": attendance.led_by, "automatic": attendance.automatic}
     changes = {name: value for name, value in asked.items() if value is not None}
     guided = settings.guided.model_copy(update=changes)

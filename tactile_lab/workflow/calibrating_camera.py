@@ -1,4 +1,4 @@
-"""Gathering views of a board from a camera, a folder or a video, and the stored lens calibration made of them."""
+"""Collects views of a board from a camera, a folder or a video, and stores the lens calibration."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _LENS_VALID_DAYS = 365.0
 
 @dataclass
 class Gathering:
-    """Views so far, and what became of each picture.
+    """Views so far, and the outcome of each picture.
 
     Attributes:
-        views: those that are used.
-        pictures: how many were looked at.
+        views: those used.
+        pictures: number examined.
         refused: reasons by picture.
-        alike: pictures that show nothing new.
-        newest: name of the picture that was looked at last.
+        alike: number of pictures that show nothing new.
+        newest: name of the picture that was examined last.
     """
 
     views: list[BoardView] = field(default_factory=list)
@@ -41,7 +41,7 @@ class Gathering:
 
     @property
     def coverage(self) -> Coverage:
-        """What the views have shown."""
+        """The coverage of the views."""
         return coverage(self.views)
 
 
@@ -85,7 +85,7 @@ def gather_views(
 
 
 def _take(found: Gathering, picture: Picture, board: AnyBoard) -> bool:
-    """Look at one picture; whether there is news."""
+    """Examine one picture. Returns whether it adds anything."""
     found.pictures += 1
     name = found.newest = picture.name
     view = view_of(name, picture.image, board)
@@ -112,7 +112,7 @@ def _nothing_found(source: str, board: AnyBoard, last: Image | None, found: Gath
 def lens_record(
     result: LensResult, measurer: str, board: AnyBoard, limits: LensLimits, serial: str, notes: str = ""
 ) -> CalibrationRecord:
-    """The result as the store keeps it."""
+    """The result as a record for the store."""
     names = [name for name in PARAMETERS if name in result.sigmas]
     variances = tuple(tuple(result.sigmas[name] ** 2 if name == other else 0.0 for other in names) for name in names)
     residuals = {

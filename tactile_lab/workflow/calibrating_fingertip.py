@@ -1,4 +1,4 @@
-"""A force fingertip's calibration on a rig: the wizard's plan and the station that measures it."""
+"""A force fingertip's calibration on a rig: the wizard's plan and its measurer."""
 
 from __future__ import annotations
 

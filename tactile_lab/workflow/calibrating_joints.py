@@ -1,4 +1,4 @@
-"""The joints' calibration on a rig: a block on its table, the wizard's plan, and the station that presses it."""
+"""The joints' calibration on a rig: a block on its table, the wizard's plan, and its measurer."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def from_touches(data: ForearmData, rig: Rig, settings: JointSettings) -> FoundJ
 
 @contextmanager
 def joint_wizard(request: JointRequest, onlooker: TrafficSink) -> Iterator[tuple[BlockWizard, CalibrationMeasurer]]:
-    """A wizard with a connected station; the hand is lifted off and everything closed in the end.
+    """A wizard with a connected measurer; the hand is lifted off and everything closed in the end.
 
     Args:
         request: see there.

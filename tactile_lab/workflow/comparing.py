@@ -1,4 +1,4 @@
-"""Sessions and their folders of results, judged beside one another, with what the truth and the clocks were worth."""
+"""Compares the results folders of sessions, with the quality of ground truth and clocks."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from drivers.core.errors import ConfigurationError, SessionError
 from sessions.recording.session import TRAJECTORY, Session
 from sessions.recording.session_events import EventKind, SessionEvent
 from sessions.recording.traffic.schemas import SESSION_EVENTS_TOPIC, TRANSFORMS_TOPIC
-from tactile_lab.evaluation.comparison import Judged, MethodSummary, compare, markdown, rows_csv
+from tactile_lab.evaluation.comparison import EvaluatedRun, MethodSummary, compare, markdown, rows_csv
 from tactile_lab.evaluation.files.plain import json_text, plain
 from tactile_lab.evaluation.truth.marker_truth import MarkerTruth, TruthReport, report_json
 from tactile_lab.evaluation.truth.session_truth import camera_datagrams
 from tactile_lab.evaluation.truth.time_alignment import ClockOffset, Track, clock_offset
 from tactile_lab.report.comparison_plot import comparison_svg
 from tactile_lab.rigs.description import rig_of_session
-from tactile_lab.workflow.judging import TruthChoice, judge_results, marker_detector
+from tactile_lab.workflow.finishing import TruthChoice, evaluate_results, marker_detector
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Everything that was judged.
+    """All evaluated results.
 
     Attributes:
-        judged: one a folder of results, in order.
+        judged: one per results folder, in order.
         truths: what each session's truth was worth, by session; None without a camera.
         clocks: offset of the camera's clock to the hand's, by session.
         unread: what of a recording could not be read, by session, in words; empty when all was.
         summaries: by method.
     """
 
-    judged: tuple[Judged, ...]
+    judged: tuple[EvaluatedRun, ...]
     truths: dict[str, TruthReport | None]
     clocks: dict[str, ClockOffset]
     unread: dict[str, str]
@@ -61,19 +61,19 @@ class Comparison:
 
 
 def compare_sessions(sessions: Sequence[Session], folders: Sequence[str], choice: TruthChoice) -> Comparison:
-    """Judge folders of results of sessions; all that hold results when none is named.
+    """Evaluate results folders of sessions; by default all that contain results.
 
     Raises:
         SessionError: a session has no such results, cannot be read, or is named twice.
         ConfigurationError: the chosen calibration cannot be used.
     """
     _check_different(sessions)
-    judged: list[Judged] = []
+    judged: list[EvaluatedRun] = []
     truths, clocks, unread = dict[str, TruthReport | None](), dict[str, ClockOffset](), dict[str, str]()
     for session in sessions:
         for results in result_folders(session, folders):
-            evaluation, truth, lost = judge_results(session, results, choice)
-            judged.append(Judged(session.manifest.name, results.name, evaluation.as_json()))
+            evaluation, truth, lost = evaluate_results(session, results, choice)
+            judged.append(EvaluatedRun(session.manifest.name, results.name, evaluation.as_json()))
             truths[session.manifest.name] = truth
             if lost:
                 unread[session.manifest.name] = lost
@@ -111,7 +111,7 @@ def _folder(session: Session, name: str) -> Path:
 
 
 def write_comparison(comparison: Comparison, out: Path) -> list[Path]:
-    """Write table, rows, everything, and a plot; the files. Raises WriteError."""
+    """Write table, rows, all data and a plot. Returns the files. Raises WriteError."""
     texts = {
         "comparison.md": markdown(comparison.summaries),
         "comparison.csv": rows_csv(comparison.judged),
@@ -124,7 +124,7 @@ def write_comparison(comparison: Comparison, out: Path) -> list[Path]:
 
 
 def session_clock_offset(session: Session, choice: TruthChoice) -> ClockOffset:
-    """How far the camera's clock is behind the hand's in one session, from the motion both saw."""
+    """Offset of the camera's clock from the hand's in one session, from the motion both saw."""
     detector = marker_detector(session, rig_of_session(session), choice)
     if detector is None:
         return ClockOffset(None, None, 0, "the session has no camera")
@@ -145,7 +145,7 @@ def _object_track(session: Session, detector: MarkerTruth) -> tuple[Array, Array
 
 
 def _hand_track(session: Session) -> tuple[Track | None, list[tuple[float, float]]]:
-    """The palm as the session showed it, and when it held the object; None before it was seen twice."""
+    """The palm's trajectory in the session, and when it held the object; None before two samples."""
     stamps, places, turns = [], [], []
     holds: list[tuple[float, float]] = []
     begun: float | None = None

@@ -1,4 +1,4 @@
-"""Other people's sessions and contacts."""
+"""Imports sessions and contacts from other sources."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tactile_lab.evaluation.files.mesh_io import read_mesh
 
 
 def import_session(archive: Path, root: Path, name: str | None = None) -> Session:
-    """A session out of a ZIP archive. Raises as :func:`sessions.exchange.archives.import_archive`."""
+    """Import a session from a ZIP archive. Raises as :func:`sessions.exchange.archives.import_archive`."""
     return import_archive(archive, root, name)
 
 

@@ -1,4 +1,4 @@
-"""Sheets of markers on the disk, their descriptions, and what a ruler says of the print."""
+"""Writes sheets of markers and their descriptions, and stores the measured scale of the print."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _text(model: StrictModel, head: str) -> str:
 
 
 def check_bar_words(scale: float, measured: bool) -> str:
-    """What is known of the print's scale, in words."""
+    """The print's scale as text."""
     if not measured:
         return f"check bar not measured yet: assumed to be {CHECK_BAR_mm:g} mm"
     return f"check bar measures {CHECK_BAR_mm * scale:g} mm: true scale {scale:.4f}"

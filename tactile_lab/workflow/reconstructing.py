@@ -1,4 +1,4 @@
-"""One estimation of recorded contacts: a log of contacts, or a session, by any method."""
+"""Estimates from recorded contacts, a contact log or a session, with any method."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from tactile_lab.evaluation.judged import Truth
 from tactile_lab.evaluation.prism import open_ring
 from tactile_lab.slam.shape.planar.outlines import is_simple
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
-from tactile_lab.workflow.judging import FinishedSession, estimate_rest, remove_results, write_evaluation
+from tactile_lab.workflow.finishing import FinishedSession, estimate_rest, remove_results, write_evaluation
 from tactile_lab.workflow.replaying import check_replaceable, recorded_seed, recorded_slam, replay_session
 
 _LEAST_MOTION = {"translation_m": 1e-5, "rotation_rad": 1e-4}
-"""Motions that a log calls exact are taken as almost so: smoothing needs some play."""
+"""Exact motions in a log are treated as almost exact: smoothing needs some tolerance."""
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """What a person asks of an estimation; None where the data or the defaults decide.
+    """Options of an estimation; None for those of the data or the defaults.
 
     Attributes:
         method: by name, see :class:`tactile_lab.slam.tracking.trackers.TrackingSettings`.
@@ -126,7 +126,7 @@ def reconstruct_log(
 
 
 def _label(settings: SlamSettings) -> str:
-    """What tells the results of one estimation from those of another."""
+    """The name that distinguishes the results of different estimations."""
     return settings.method if settings.shape_model == "auto" else f"{settings.method}-{settings.shape_model}"
 
 

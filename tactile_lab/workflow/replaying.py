@@ -1,4 +1,4 @@
-"""A recorded session, estimated again from its raw bytes."""
+"""Replays a recorded session from its raw bytes."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from tactile_lab.evaluation.truth.session_truth import session_truth
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import OTHER_VERSION, rig_of_session
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
-from tactile_lab.workflow.judging import (
+from tactile_lab.workflow.finishing import (
     RESULT_FILES,
     FinishedSession,
     estimate_rest,
+    finish,
     has_results,
-    judge,
     marker_detector,
 )
 
@@ -36,7 +36,7 @@ def replay_session(
     progress: Progress | None = None,
     speed: float = AS_FAST_AS_POSSIBLE,
 ) -> FinishedSession:
-    """Understand a recorded session again from its raw bytes, and judge it.
+    """Replay a recorded session from its raw bytes, and evaluate it.
 
     Args:
         session: the recording.
@@ -47,7 +47,7 @@ def replay_session(
 
     Raises:
         ConfigurationError: ``out`` holds other files.
-        SessionError: the recording cannot be used at all. One that was cut off is used up to the cut.
+        SessionError: the recording cannot be used at all. A truncated one is used up to its end.
     """
     if has_results(session) and out.resolve() == session.results.resolve():
         hint = "Choose another folder for the results (--into or --out)"
@@ -62,13 +62,13 @@ def replay_session(
     slam = TactileSlam(settings, seed, known_poses)
     estimate_rest(slam, grasps, progress)
     progress.phase(len(grasps), "model and evaluation")
-    finished = judge(session, rig, slam, grasps, out)
+    finished = finish(session, rig, slam, grasps, out)
     unread = _unread(replay.loss, len(grasps), session.manifest.counts.get("grasps"))
     return replace(finished, data_loss=session.manifest.data_loss, unread=unread, read_factor=replay.factor)
 
 
 def _unread(loss: Loss, grasps: int, recorded: int | None) -> str:
-    """What a replay could not read, in words."""
+    """What a replay could not read, as text."""
     if not loss:
         return ""
     known = "" if recorded is None else f" of {recorded}"
@@ -76,7 +76,7 @@ def _unread(loss: Loss, grasps: int, recorded: int | None) -> str:
 
 
 def true_poses(session: Session, grasp_count: int) -> tuple[Pose3 | None, ...]:
-    """The object's pose at each grasp by the marker camera; None where it was not seen.
+    """The object's pose at each grasp by the marker camera; None if it was not seen.
 
     Raises:
         SessionError, ConfigurationError: the recording, or the calibration in it, cannot be used.
@@ -85,7 +85,7 @@ def true_poses(session: Session, grasp_count: int) -> tuple[Pose3 | None, ...]:
 
 
 def check_replaceable(out: Path) -> None:
-    """Never write over what is no result of an estimation. Raises ConfigurationError."""
+    """Refuse to overwrite files that are not results of an estimation. Raises ConfigurationError."""
     hint = "Choose a new folder for the results (--into or --out)"
     try:
         strange = sorted(entry.name for entry in out.iterdir() if entry.name not in RESULT_FILES)

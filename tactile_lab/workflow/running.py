@@ -1,4 +1,4 @@
-"""The main job: a session on a rig, autonomous or guided, recorded and judged."""
+"""Runs a session on a rig, autonomous or guided, records and evaluates it."""
 
 from __future__ import annotations
 
@@ -28,26 +28,27 @@ from tactile_lab.slam.exploration.policies import make_policy
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.workflow.attending import Attendance, roles_for, settings_for
-from tactile_lab.workflow.judging import FinishedSession, estimate_rest, judge
+from tactile_lab.workflow.finishing import FinishedSession, estimate_rest, finish
 
 ALONE = Attendance()
 
 
 @dataclass(frozen=True)
 class SessionRequest:
-    """What a person asks for.
+    """Options of a session.
 
     Attributes:
-        rig: name of a shipped rig, or a rig file.
+        rig: name of a built-in rig, or a rig file.
         object_name: of the simulated rig's catalogue, or ``mesh:FILE``; any name in a real laboratory.
-        root: folder in which the session's folder is made.
-        method, dimension: of the estimation; how far objects stray is the rig's affair.
-        seed: of everything that is left to chance.
+        root: folder in which the session's folder is created.
+        method, dimension: of the estimation; slips are set in the rig file.
+        seed: of all random numbers.
         grasps: how many; the rig's own number when None.
         notes: the operator's.
         policy: name of the exploration policy; the rig's own way of choosing when None.
         bounding_box: feel the object's bounding box before the first grasp.
-        allow_uncalibrated: begin though a calibration is missing, expired, failed or foreign; the session records it.
+        allow_uncalibrated: start even if a calibration is missing, expired, failed or of another rig; the session
+            records it.
     """
 
     rig: str
@@ -70,7 +71,7 @@ def slam_settings(method: str, dimension: int, motion: MotionNoise) -> SlamSetti
 
 
 def refuse_known_pose(method: str) -> None:
-    """A running session does not know the truth. Raises ConfigurationError."""
+    """Refuse methods that need the truth, which a running session does not know. Raises ConfigurationError."""
     if method == "known-pose":
         hint = "Record with another method, then: tactile-lab reconstruct SESSION --method known-pose"
         raise ConfigurationError("a running session does not know the true poses", where="known-pose", hint=hint)
@@ -92,18 +93,18 @@ def check_request(request: SessionRequest) -> Rig:
 
 
 def run_session(request: SessionRequest, progress: Progress, attendance: Attendance = ALONE) -> FinishedSession:
-    """Run a session on a rig, and judge it.
+    """Run a session on a rig, and evaluate it.
 
     Args:
-        request: what is to be done.
-        progress: is told what happens.
-        attendance: who guides it, or watches.
+        request: its options.
+        progress: receives what happens.
+        attendance: who guides or watches it.
 
     Raises:
         ConfigurationError: the request cannot be met; nothing was recorded.
         DeviceError: the rig is not ready; the session folder says so, where there is one yet.
         SessionError: the session could not be recorded.
-        InterruptionError: a person ended it at once; the session folder is kept and readable.
+        InterruptionError: a person stopped it immediately; the session folder is kept and readable.
     """
     rig = check_request(request)
     check_calibration(rig)
@@ -122,16 +123,16 @@ def run_session(request: SessionRequest, progress: Progress, attendance: Attenda
 
 
 def _evaluate(session: RunningSession, rig: Rig, slam: TactileSlam, outcome: SessionOutcome) -> FinishedSession:
-    """The results, of all grasps; none where the estimation has failed, as it would fail on them again."""
+    """The results of all grasps; none if the estimation has failed, as it would fail again."""
     if isinstance(outcome.error, EstimationError):
         return FinishedSession(session.folder, session.results, problem=str(outcome.error))
     estimate_rest(slam, outcome.grasps)
-    return judge(session, rig, slam, outcome.grasps, session.results)
+    return finish(session, rig, slam, outcome.grasps, session.results)
 
 
 @contextmanager
 def _kept_when_interrupted(session: RunningSession) -> Iterator[None]:
-    """Whoever interrupts is told where the recording is. Raises InterruptionError."""
+    """Raises InterruptionError with the place of the recording."""
     try:
         yield
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""Many sessions, for one table."""
+"""Runs many sessions for one table."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from sessions.recording.session import Session
 from tactile_lab.evaluation.sweep import SweepRun
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import load_rig
-from tactile_lab.workflow.judging import differing_files
+from tactile_lab.workflow.finishing import differing_files
 from tactile_lab.workflow.replaying import recorded_seed, recorded_slam, replay_session
 from tactile_lab.workflow.running import SessionRequest, refuse_known_pose, run_session
 
 
 def check_sweep(rig: str, objects: Sequence[str] | None, root: Path, method: str) -> tuple[str, ...]:
-    """The objects of a sweep, the whole catalogue when None; what would fail in every run fails here.
+    """The objects of a sweep, by default the whole catalogue; errors of every run are found here.
 
     Raises:
         ConfigurationError: no such rig, object or calibration, a mesh that cannot be used, or a method that needs the
@@ -63,7 +63,7 @@ def run_for_sweep(
 
 
 def _early_end(outcome: SessionOutcome | None) -> str:
-    """After how many grasps a session ended that was to go on, and why; "" for one that is complete."""
+    """When and why a session ended early; "" for a complete one."""
     if outcome is None or outcome.ending is Ending.COMPLETE:
         return ""
     return f"after {len(outcome.grasps)} grasps: {outcome.reason}"

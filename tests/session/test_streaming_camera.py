@@ -12,7 +12,7 @@ from sessions.recording.session import Session
 from tactile_lab import rigs
 from tactile_lab.workflow import running
 from tactile_lab.workflow.comparing import session_clock_offset
-from tactile_lab.workflow.judging import TruthChoice
+from tactile_lab.workflow.finishing import TruthChoice
 
 LATE_ms = 60.0
 

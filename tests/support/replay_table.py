@@ -29,7 +29,7 @@ from tactile_lab.rigs import build
 from tactile_lab.rigs import wired_runtime as wired_runtime
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.workflow import replaying
-from tactile_lab.workflow.judging import differing_files
+from tactile_lab.workflow.finishing import differing_files
 from tactile_lab.workflow.running import SessionRequest, run_session
 from tests.support.stored_table import GrowingTable, Outline, parser
 

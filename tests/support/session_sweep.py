@@ -26,7 +26,7 @@ from sessions.recording.traffic.schemas import LOG_TOPIC
 from tactile_lab.rigs import laboratory
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import rig_of_session
-from tactile_lab.workflow.judging import differing_files, has_results
+from tactile_lab.workflow.finishing import differing_files, has_results
 from tactile_lab.workflow.replaying import recorded_seed, recorded_slam, replay_session
 from tactile_lab.workflow.running import SessionRequest, run_session
 from tests.support.faults import CounterWrap, Fault, FaultyTransport, MessageLayout, When, standard_faults

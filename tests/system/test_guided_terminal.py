@@ -15,7 +15,7 @@ from sessions.recording.listing import list_sessions
 from sessions.recording.session import Session
 from sessions.recording.traffic import schemas
 from tactile_lab.cli.main import main
-from tactile_lab.workflow.judging import differing_files
+from tactile_lab.workflow.finishing import differing_files
 
 PROGRAM = str(Path(__file__).parents[1] / "support" / "guided_program.py")
 PATIENCE_s = 600  # for a loaded machine; nothing is measured

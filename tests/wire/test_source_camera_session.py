@@ -26,7 +26,7 @@ from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.workflow import running
 from tactile_lab.workflow.comparing import compare_sessions
-from tactile_lab.workflow.judging import TruthChoice
+from tactile_lab.workflow.finishing import TruthChoice
 from tests.support.wire_rig import wire_rig
 
 pytestmark = pytest.mark.usefixtures("real_time_alone")

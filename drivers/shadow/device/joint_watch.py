@@ -142,7 +142,7 @@ class JointWatch:
         what = f"its sensor reads {count:.0f} counts, calibrated are {low:.0f} to {high:.0f}"
         if joint in self._broken:
             return what, "Its wire or connector is broken: look at it, or have the hand serviced"
-        return what, "Is this the hand's own calibration file? If so, calibrate the joint anew, or look at its sensor"
+        return what, "Is this the hand's own calibration file? If so, calibrate the joint again, or check its sensor"
 
     def _jump(self, joint: int) -> tuple[str, str]:
         what = f"its sensor jumps by more than a joint can turn, to {self._counts[joint]:.0f} counts"

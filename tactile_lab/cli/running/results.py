@@ -12,7 +12,7 @@ from sessions.recording.traffic.stream_counts import LATE_ns
 from tactile_lab.cli.console import answer, complain, emit_json, say, warn
 from tactile_lab.cli.sessions.evaluation_table import show_evaluation
 from tactile_lab.cli.sessions.tables import losses_in_words
-from tactile_lab.workflow.judging import FinishedSession
+from tactile_lab.workflow.finishing import FinishedSession
 
 FILES = (
     ("mesh.ply", "mesh"),

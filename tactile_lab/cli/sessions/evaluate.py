@@ -56,14 +56,14 @@ def evaluate(
     sessions, --results, another calibration, --from or --out, the sessions are not changed: all results are compared by
     method, with confidence intervals.
     """
-    from tactile_lab.workflow.judging import TruthChoice
+    from tactile_lab.workflow.finishing import TruthChoice
 
     del no_input
     choice = TruthChoice(lens, markers, basis.value)
     found = [choose_session(root, session) for session in sessions]
     if len(found) == 1 and not results and choice.is_recorded and out is None:
         from tactile_lab.cli.running.results import conclude
-        from tactile_lab.workflow.judging import evaluate_session
+        from tactile_lab.workflow.finishing import evaluate_session
 
         conclude(evaluate_session(found[0]), as_json)
         return

@@ -83,7 +83,7 @@ def replay(
     from tactile_lab.cli.console import say
     from tactile_lab.cli.running.progress import LiveProgress
     from tactile_lab.cli.running.results import conclude
-    from tactile_lab.workflow.judging import has_results
+    from tactile_lab.workflow.finishing import has_results
     from tactile_lab.workflow.replaying import recorded_seed, recorded_slam, replay_session
     from tactile_lab.workflow.running import slam_settings
 
@@ -134,7 +134,7 @@ def _tell_identity(recorded: Session, out: Path) -> bool:
     """Whether a replay reproduced the session's results; prints the comparison."""
     from sessions.recording.manifest import installed_versions
     from tactile_lab.cli.console import answer, warn
-    from tactile_lab.workflow.judging import differing_files
+    from tactile_lab.workflow.finishing import differing_files
 
     differing = differing_files(recorded.results, out)
     if not differing:

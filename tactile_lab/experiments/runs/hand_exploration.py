@@ -2,7 +2,7 @@
 
 Hand, sensors, contacts and friction are the simulated rig's; see
 :mod:`tactile_lab.experiments.runs.kinematic_exploration` for the same without physics. What counts as explored stands
-in :mod:`tactile_lab.experiments.runs.hand_judge`.
+in :mod:`tactile_lab.experiments.runs.coverage_monitor`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.autonomy.slam_service import SlamService
 from tactile_lab.experiments.cells import Cell, Setting, grid
-from tactile_lab.experiments.runs.hand_judge import Judge, UntilExplored
+from tactile_lab.experiments.runs.coverage_monitor import CoverageMonitor, UntilExplored
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
@@ -55,12 +55,12 @@ def explore_by_hand(cell: Cell) -> dict[str, Any]:
     try:
         roles = autonomous_roles(runtime, slam, conductor, seed=cell.seed, dimension=dimension)
         shape = partial(roles.estimator.ask, SlamService.known_shape)
-        judge = Judge(world.object_model.mesh, slam, shape, dimension, int(cell["actions"]))
-        roles = replace(roles, decisions=UntilExplored(roles.estimator, judge))
-        outcome = Conductor(runtime, conductor, roles, Watch(world, judge)).run()
+        monitor = CoverageMonitor(world.object_model.mesh, slam, shape, dimension, int(cell["actions"]))
+        roles = replace(roles, decisions=UntilExplored(roles.estimator, monitor))
+        outcome = Conductor(runtime, conductor, roles, Watch(world, monitor)).run()
     finally:
         runtime.close()
-    return {**judge.figures(slam.finish()), "status": judge.status(str(outcome.ending))}
+    return {**monitor.figures(slam.finish()), "status": monitor.status(str(outcome.ending))}
 
 
 def estimation(rig: Rig, cell: Cell) -> TactileSlam:
@@ -77,24 +77,24 @@ def conductor_settings(rig: Rig, cell: Cell) -> SessionSettings:
 
 
 class Watch(NullProgress):
-    """Shows a running session on the simulated rig to its judge.
+    """Shows a running session on the simulated rig to its monitor.
 
     Args:
         world: the truth.
-        judge: of the session.
+        monitor: of the session.
     """
 
-    def __init__(self, world: SimulatedWorld, judge: Judge) -> None:
-        self._world, self._judge = world, judge
+    def __init__(self, world: SimulatedWorld, monitor: CoverageMonitor) -> None:
+        self._world, self._monitor = world, monitor
         self._captured = False
         self._begun_ns = world.clock.now_ns()
 
     def phase(self, number: int, name: str) -> None:
         """The first step after a capture: the object is still as it was measured."""
         if self._captured:
-            self._judge.truth.append(self._world.truth().world_T_object)
+            self._monitor.truth.append(self._world.truth().world_T_object)
         self._captured = name == "capture"
 
     def grasp_done(self, report: GraspReport) -> None:
         """See what is explored now."""
-        self._judge.look((self._world.clock.now_ns() - self._begun_ns) / NANOSECONDS / 60)
+        self._monitor.look((self._world.clock.now_ns() - self._begun_ns) / NANOSECONDS / 60)

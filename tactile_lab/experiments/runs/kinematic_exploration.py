@@ -1,6 +1,6 @@
 """Policies over the hand's own candidates without physics: seconds a session, so that many can be compared.
 
-Planner, candidates, policies, estimation and judge are those of a session on the simulated rig
+Planner, candidates, policies, estimation and monitor are those of a session on the simulated rig
 (:mod:`tactile_lab.experiments.runs.hand_exploration`); the grasps are done by
 :class:`tactile_lab.experiments.data.kinematic_hand.KinematicHand`.
 """
@@ -21,8 +21,8 @@ from tactile_lab.autonomy.slam_service import SlamService
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data.kinematic_hand import KinematicHand
 from tactile_lab.experiments.data.solids import solid
+from tactile_lab.experiments.runs.coverage_monitor import CoverageMonitor, UntilExplored
 from tactile_lab.experiments.runs.hand_exploration import OBJECTS, RIG, conductor_settings, estimation
-from tactile_lab.experiments.runs.hand_judge import Judge, UntilExplored
 from tactile_lab.rigs.build import force_tips
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.slam.tactile_slam import TactileSlam
@@ -42,12 +42,12 @@ def explore_by_kinematics(cell: Cell) -> dict[str, Any]:
     calibration = next(iter(force_tips(rig).values()))
     tip = TipEllipsoid(calibration.semi_axes_m, calibration.centre_distal_m)
     planner = planner_for(slam, settings, tip, cell.seed, dimension)
-    judge = Judge(body.mesh, slam, planner.known_shape, dimension, int(cell["actions"]))
-    decisions = UntilExplored(LocalClient(SlamService(slam, planner)), judge)
+    monitor = CoverageMonitor(body.mesh, slam, planner.known_shape, dimension, int(cell["actions"]))
+    decisions = UntilExplored(LocalClient(SlamService(slam, planner)), monitor)
     rng = np.random.default_rng([cell.seed, 52183])
     hand = KinematicHand(body, settings.cycle, tip, settings.plan.yaw_window_rad, rng)
-    ending = _session(hand, decisions, planner, slam, judge, settings)
-    return {**judge.figures(slam.finish()), "status": judge.status(ending)}
+    ending = _session(hand, decisions, planner, slam, monitor, settings)
+    return {**monitor.figures(slam.finish()), "status": monitor.status(ending)}
 
 
 def _session(
@@ -55,13 +55,13 @@ def _session(
     decisions: UntilExplored,
     planner: Planner,
     slam: TactileSlam,
-    judge: Judge,
+    monitor: CoverageMonitor,
     settings: SessionSettings,
 ) -> str:
     """Grasps until the decisions end it, or the object is lost by the limits of a session; how it ended."""
     missed = empty = 0
     while True:
-        index = len(judge.grasps)
+        index = len(monitor.grasps)
         decisions.prepare(index)
         decision = decisions.decide(index)
         if not isinstance(decision, DoGrasp):
@@ -72,14 +72,14 @@ def _session(
             if (missed := missed + 1) >= settings.missed_approaches:
                 return "object lost"
             continue
-        judge.truth.append(hand.world_T_body)
+        monitor.truth.append(hand.world_T_body)
         wanted = decisions.on_capture(attempt.grasp, attempt.plan)
         assert not isinstance(wanted, Veto)
         decisions.on_carry(hand.carry(wanted, attempt))
         step = slam.add_grasp(attempt.grasp)
         planner.on_estimate(step.index, step.verdict != "untracked")
         decisions.on_estimate(step)
-        judge.look(hand.elapsed_s / 60)
+        monitor.look(hand.elapsed_s / 60)
         missed, empty = 0, 0 if attempt.grasp.touching else empty + 1
         if empty >= settings.safety.empty_grasps or _has_strayed(decisions, settings):
             return "object lost"

@@ -1,1 +1,1 @@
-"""Is a rig fit to work? Nothing moves."""
+"""Checks whether a rig is ready, without moving it."""

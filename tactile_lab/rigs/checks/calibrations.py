@@ -1,4 +1,4 @@
-"""How old the calibrations of a rig are, and what speaks against using them. For ``rig check``."""
+"""Age of a rig's calibrations, and objections to using them, for ``rig check``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Is a rig fit to work? Connect every device, listen for a moment, and tell what each one says. Nothing moves."""
+"""Checks a rig: connects every device, reads it for a moment and reports its state. Nothing moves."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from tactile_lab.rigs.laboratory import open_laboratory
 
 LISTEN_ns = 500_000_000
 SETTLE_ns = 500_000_000
-"""Before that: what is done for the first time takes longer than a cycle."""
+"""Warm-up before that: first executions take longer than a cycle."""
 
 Figures = dict[str, float | str]
 
@@ -95,7 +95,7 @@ def _devices(rig: Rig, seed: int, move: bool) -> list[Finding]:
 
 
 def _asking_who(rig: Rig) -> Rig:
-    """The same rig, whose motors and fingertips are also asked for what never changes, such as firmware and names."""
+    """The same rig, which also reads constant data of motors and fingertips, such as firmware and names."""
     hand, files = rig.description.hand, dict(rig.files)
     polling = load_rates(rates) if (rates := files.pop("rates", None)) is not None else hand.polling
     asking = hand.model_copy(update={"polling": ask_once(polling), "tactile_names": True})
@@ -106,7 +106,7 @@ def _asking_who(rig: Rig) -> Rig:
 
 
 def _names_told(runtime: RigRuntime) -> TactileNames:
-    """What the fingertips say through the palm from now on."""
+    """Collects what the fingertips send through the palm."""
     names = TactileNames()
 
     def take(transport: str, sample: Any) -> None:
@@ -181,7 +181,7 @@ def _base(runtime: RigRuntime, watch: StreamWatch, share: float) -> Finding:
 
 
 def _fingertip(finger: str, runtime: RigRuntime, watch: StreamWatch, names: TactileNames, rig: Rig) -> Finding:
-    """A finger without a sensor is allowed, but nobody should have to notice it by themselves."""
+    """A finger without a sensor is allowed, but must be reported."""
     if (tip := runtime.fingertips.get(finger)) is None:
         return Finding(f"fingertip {finger}", True, "none: the fingertip calibration does not name it")
     link, device = fingertip_link(finger), runtime.wrench_devices.get(finger)
@@ -207,7 +207,7 @@ def _camera(runtime: RigRuntime, watch: StreamWatch) -> Finding:
 
 
 def _problems(device: object) -> tuple[str, ...]:
-    """What a device that can tell finds wrong with itself."""
+    """Problems that a device reports about itself."""
     return device.health() if isinstance(device, WatchedInstrument) else ()
 
 

@@ -1,4 +1,4 @@
-"""What a look at a rig's devices gives."""
+"""Findings of a rig check."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 TOLERATED_LOSS = 0.01
-"""A driver bridges single lost cycles; a device that loses a larger share is not fit to work."""
+"""A driver bridges single lost cycles; a device that loses a larger share is not ready."""
 
 LOSSY = "more than 1 % of its cycles are lost: close other programs on this computer, then check its cable"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What one device said.
+    """The state of one device.
 
     Attributes:
-        device: which.
-        ok: whether it is fit to work.
-        detail: found or not, what is wrong and what to do, and the figures, in words.
+        device: its name.
+        ok: whether it is ready.
+        detail: what was found, what is wrong and what to do, with figures, as text.
         figures: the same figures for programs; names carry the unit.
     """
 
@@ -29,12 +29,12 @@ class Finding:
 
 
 def told_losses(health: Sequence[str], share: float, losses: Sequence[str] = ()) -> tuple[tuple[str, ...], list[str]]:
-    """What speaks against a device, and what is only told: losses so rare that its driver bridges them.
+    """Problems of a device, and minor remarks: losses so rare that its driver bridges them.
 
     Args:
-        health: the device's words about itself.
+        health: problems reported by the device.
         share: of its cycles that were lost.
-        losses: which of these words are about losses, besides those that count lost cycles.
+        losses: which of the problems are losses, besides lost cycles.
     """
     minor = [words for words in health if share < TOLERATED_LOSS and (words in losses or words.endswith("cycles lost"))]
     wrong = tuple(words for words in health if words not in minor)

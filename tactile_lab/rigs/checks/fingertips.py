@@ -1,4 +1,4 @@
-"""Are the force fingertips of a rig fit to work? Connect each, listen for a second, and tell. Nothing moves."""
+"""Checks the force fingertips of a rig: connects each and reads it for a second. Nothing moves."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _POLL_ns = 2_000_000
 
 
 def check_fingertips(rig: FingertipRig, clock: Clock) -> list[Finding]:
-    """One finding a finger.
+    """One finding per finger.
 
     Raises:
         ConfigurationError: a calibration file that a wire names.
@@ -89,7 +89,7 @@ def _words(tip: Nano17, samples: list[WrenchSample], usable: Array) -> str:
 
 
 def _other_baud(rig: FingertipRig, finger: str, clock: Clock) -> str:
-    """Whether a silent device answers under other settings than the rig file's, such as another rate, in words."""
+    """Whether a silent device answers with other settings than the rig file's, such as another rate; as text."""
     wiring = rig.description.wires[finger]
     for other in WIRES[wiring.wire].alternatives(wiring):
         if _answers(rig.device(finger, clock, other)):

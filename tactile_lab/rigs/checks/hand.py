@@ -1,4 +1,4 @@
-"""Is a real hand fit to work? Connect it, listen for a moment with zero demands, and tell. Nothing moves."""
+"""Checks a real hand: connects it and reads it for a moment with zero demands. Nothing moves."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def check_hand(rig: HandRig, clock: Clock, *, move: bool = False) -> list[Findin
     Args:
         rig: of a hand alone.
         clock: the monotonic one.
-        move: nudge every motor as well, to see whether it moves the joint its map says.
+        move: also move every motor slightly, to check that it moves the joint in the map.
 
     Raises:
         ConfigurationError: a file the rig names, or a master that is not installed.
@@ -74,14 +74,14 @@ def _hear(
 
 
 def _asking_who(setup: HandSetup) -> HandSetup:
-    """The same hand, whose motors and fingertips are also asked once for what never changes: firmware, names."""
+    """The same hand, which also reads constant data of motors and fingertips once: firmware, names."""
     settings = setup.settings()
     asking = settings.model_copy(update={"polling": ask_once(settings.polling), "tactile_names": True})
     return setup.model_copy(update={"hand": asking, "rates": None})
 
 
 def ask_once(rates: PollingRates) -> PollingRates:
-    """The same rates, with the motors' slow data asked for once, after connecting."""
+    """The same rates, with the motors' slow data requested once after connecting."""
     return rates.model_copy(update={"slow_data": _ONCE})
 
 
@@ -103,7 +103,7 @@ def _close(hand: ShadowHand) -> None:
 
 
 def _listen(hand: ShadowHand, tips: TactileLook, clock: Clock, cycle_ns: int) -> tuple[HandSample, CycleStatistics]:
-    """As many cycles as fit the time, however long a busy computer takes for them."""
+    """Run cycles for a time, however long a busy computer takes for each."""
     statistics, pace = CycleStatistics(), CyclePace(clock, cycle_ns)
     for _ in range(LISTEN_ns // cycle_ns):
         statistics.add(*pace.wait())
@@ -152,7 +152,7 @@ def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
 
 
 def firmware(sample: HandSample) -> str:
-    """Revisions of the motors' firmware, which should be one; empty while none has told."""
+    """Revisions of the motors' firmware, which should be equal; empty while none was received."""
     revisions = sample.motor.slow[SlowData.SVN_REVISION]
     return ", ".join(f"{revision:.0f}" for revision in np.unique(revisions[np.isfinite(revisions)]))
 

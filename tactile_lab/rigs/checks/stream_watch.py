@@ -1,4 +1,4 @@
-"""How regularly the messages of each device come, while a rig runtime is listened to."""
+"""Measures how regularly the messages of each device arrive."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sessions.recording.traffic import schemas
 
 
 class StreamWatch:
-    """A sink for a recorder that keeps nothing but the stamps of what the devices sent."""
+    """A sink for a recorder that keeps only the stamps of received messages."""
 
     def __init__(self) -> None:
         self._stamps_ns: dict[str, list[int]] = defaultdict(list)
@@ -21,7 +21,7 @@ class StreamWatch:
         self._stamps_ns[topic].append(stamp_ns)
 
     def figures(self, transport: str) -> dict[str, float | str]:
-        """Rate, jitter and longest gap of what came on a transport; empty for fewer than three messages.
+        """Rate, jitter and longest gap of a transport's messages; empty for fewer than three messages.
 
         The jitter is the standard deviation of the intervals.
         """
@@ -37,7 +37,7 @@ class StreamWatch:
 
 
 def in_words(figures: dict[str, float | str]) -> str:
-    """Rate and jitter for people; empty where there are none."""
+    """Rate and jitter as text; empty if unknown."""
     if not {"rate_Hz", "jitter_ms"} <= set(figures):
         return ""
     return f"{figures['rate_Hz']:.0f} messages/s, jitter {figures['jitter_ms']:.2f} ms"

@@ -1,4 +1,4 @@
-"""Do the fingertips that send through the palm send, and who are they? For ``rig check`` of a hand alone."""
+"""Checks and identifies the fingertips that send through the palm, for ``rig check`` of a hand alone."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _UNREAD = "not read: set hand.tactile to biotac in the rig file"
 
 
 class TactileLook:
-    """Fingertips of a hand alone, whose calibration nobody has named.
+    """Fingertips of a hand alone, without calibration.
 
     Args:
-        tactile: what the palm asks them for, as the rig file says.
+        tactile: what the palm requests from them, from the rig file.
     """
 
     def __init__(self, tactile: TactileKind) -> None:
@@ -28,13 +28,13 @@ class TactileLook:
             self._tips = {finger: self._kind.sensor(finger, usual, settings) for finger in FINGERS}
 
     def take(self, sample: HandSample) -> None:
-        """Listen to one sample of the hand."""
+        """Take one sample of the hand."""
         self._names.take(sample)
         for tip in self._tips.values():
             tip.update(sample)
 
     def findings(self) -> list[Finding]:
-        """One for each finger that has to send, or that says who it is."""
+        """One finding for each finger that must send, or that identifies itself."""
         named = [finger for finger in FINGERS if self._names.kind(finger) not in (None, TactileProtocol.NONE)]
         return [self._finding(finger) for finger in (self._tips or named)]
 

@@ -34,7 +34,7 @@ def ask(policy: Policy, candidates: Sequence[Candidate], belief: Belief, rng: np
 def _problem(decision: object, offered: int) -> str:
     """Why a decision is invalid; empty if it is valid."""
     if not isinstance(decision, Decision):
-        return f"answers a {type(decision).__name__} where a Decision belongs"
+        return f"returned {type(decision).__name__} instead of a Decision"
     if len(decision.scores) != offered:
         return f"scores {len(decision.scores)} of {offered} candidates"
     if np.isnan(decision.scores).any() or (decision.promised_gain is not None and np.isnan(decision.promised_gain)):

@@ -111,7 +111,7 @@ def session_with(policy: str, folder: Path) -> tuple[DiscWorld, Sink]:
         ("return Decision('mine', 'grasp', None, (0.0,) * len(candidates), 'why')", "and chooses None"),
         ("return Decision('mine', 'wait', None, (0.0,) * len(candidates), 'why')", "'wait' where grasp, stop, nothing"),
         ("return Decision('mine', 'grasp', 0, (), 'why')", "scores 0 of"),
-        ("return 0", "answers a int where a Decision belongs"),
+        ("return 0", "returned int instead of a Decision"),
     ],
 )
 def test_a_session_goes_on_by_the_heuristic_planner_when_its_policy_fails(
@@ -174,7 +174,7 @@ def judged(log: Path, out: Path, shape: str | None = None) -> Evaluation:
             "return Contour(np.ones((9, 2)), np.full(9, np.nan), True)",
             _NOT_FINITE,
         ),
-        ("return None", "gives a NoneType where a Contour belongs"),
+        ("return None", "returned NoneType instead of Contour"),
     ],
 )
 def test_a_shape_model_that_fails_leaves_the_trajectory(

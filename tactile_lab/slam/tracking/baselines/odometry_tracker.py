@@ -93,7 +93,7 @@ class KnownPoseTracker(OdometryTracker):
         truth_T_map = start.inverse() * space.pose(first.placed[-1].row, 0.0)
         self._ahead = [None if pose is None else space.motion(pose * truth_T_map) for pose in poses[1:]]
         self._given: Array | None = None
-        self._judge = HypothesisScorer(noise, UNEXPLAINED_COST)
+        self._scorer = HypothesisScorer(noise, UNEXPLAINED_COST)
 
     def predict(self, motion: Array) -> None:
         super().predict(motion)
@@ -109,7 +109,7 @@ class KnownPoseTracker(OdometryTracker):
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
         """Contacts that fit nothing are left out: at known poses they must be wrong."""
         super().update_shape(contacts, certain)
-        self._map, _ = self._judge.clean(self._map, len(self._map.placed) - 1)
+        self._map, _ = self._scorer.clean(self._map, len(self._map.placed) - 1)
         if len(self._map.placed) % _KERNEL_EVERY == 0:
             self._map = self._map.with_best_kernel()
 
@@ -119,9 +119,9 @@ class KnownPoseTracker(OdometryTracker):
         The initial kernel is that of the accepted contacts: wrong ones would shorten it to explain all.
         """
         kernel = self._map.with_best_kernel().settings
-        self._map, _ = self._judge.clean(replace(self._map.with_all_contacts(), settings=kernel))
+        self._map, _ = self._scorer.clean(replace(self._map.with_all_contacts(), settings=kernel))
         for _ in range(_LOOKS):
             seen = self._map.left_out_count
-            self._map = FacetedScorer(self._judge, self._noise).without_errors(self._map.with_best_kernel())
+            self._map = FacetedScorer(self._scorer, self._noise).without_errors(self._map.with_best_kernel())
             if self._map.left_out_count == seen:
                 break

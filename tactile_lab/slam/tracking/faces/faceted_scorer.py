@@ -57,18 +57,18 @@ _FIELD_STEPS = 10
 class FacetedScorer:
     """Scores hypotheses whose object has flat faces."""
 
-    def __init__(self, judge: HypothesisScorer, noise: MotionNoise, mechanisms: Mechanisms | None = None) -> None:
+    def __init__(self, scorer: HypothesisScorer, noise: MotionNoise, mechanisms: Mechanisms | None = None) -> None:
         """
         Args:
-            judge: for smooth objects, with the price of contacts that are left out.
+            scorer: for smooth objects, with the price of contacts that are left out.
             noise: of the motion model.
             mechanisms: which are on; None for all.
         """
-        self._judge, self._noise, self._mechanisms = judge, noise, mechanisms or Mechanisms()
+        self._scorer, self._noise, self._mechanisms = scorer, noise, mechanisms or Mechanisms()
 
     def better(self, contact_map: ContactMap) -> Hypothesis:
         """The map, or the one with poses smoothed together with flat faces if those explain its contacts better."""
-        smooth = self._judge.score(contact_map)
+        smooth = self._scorer.score(contact_map)
         sharp = self.smooth_with_facets(contact_map) or self._sharp(contact_map) or self._sharp_without_one(contact_map)
         if sharp is None or sharp.cost > smooth.cost + _HOPELESS_nats:
             return smooth
@@ -92,11 +92,11 @@ class FacetedScorer:
 
     def without_errors(self, contact_map: ContactMap) -> ContactMap:
         """The map at its poses, without the contacts that neither a field nor flat faces explain."""
-        cleaned, _ = self._judge.clean(contact_map)
+        cleaned, _ = self._scorer.clean(contact_map)
         sharp = self._sharp(cleaned) or self._sharp_without_one(cleaned)
         if sharp is None:
             return cleaned
-        return _likelier(self._judge.score(cleaned), self._mechanisms.improve("doubts", sharp, self._reconsider)).map
+        return _likelier(self._scorer.score(cleaned), self._mechanisms.improve("doubts", sharp, self._reconsider)).map
 
     def _without_pulls(self, best: Hypothesis) -> list[ContactMap]:
         """The map without each of the most influential contacts; empty for an object without flat faces."""
@@ -146,7 +146,7 @@ class FacetedScorer:
 
     def smooth(self, contact_map: ContactMap) -> Hypothesis:
         """As :meth:`better`, after the poses were smoothed with the field, and contacts left out that do not fit it."""
-        return self.better(self._judge.smooth(contact_map, _FIELD_STEPS).map)
+        return self.better(self._scorer.smooth(contact_map, _FIELD_STEPS).map)
 
     def smooth_with_facets(self, contact_map: ContactMap) -> Hypothesis | None:
         """Poses and faces smoothed together; None if there are no faces that enclose anything."""
@@ -173,7 +173,7 @@ class FacetedScorer:
         constant = 0.5 * len(contacts) * (contacts.dimension + 1) * np.log(2 * np.pi)
         motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
         misfit = motion - explained - float(constant)
-        return Hypothesis(contact_map, misfit, intrusion, self._judge.price(contact_map))
+        return Hypothesis(contact_map, misfit, intrusion, self._scorer.price(contact_map))
 
     def _sharp_without_one(self, contact_map: ContactMap) -> Hypothesis | None:
         """The most likely sharp outline of all contacts but one of those that the field explains worst.

@@ -27,7 +27,7 @@ class Branching:
         contacts: of the grasp, world frame.
         motion: of the hand before it, a pose vector.
         noise: of the motion model.
-        judge: scores the result.
+        scorer: scores the result.
         settings: of the search.
         space: kind of the pose vectors.
         mechanisms: those that are on.
@@ -36,7 +36,7 @@ class Branching:
     contacts: ContactSet
     motion: Array
     noise: MotionNoise
-    judge: HypothesisScorer
+    scorer: HypothesisScorer
     settings: JointSettings
     space: PoseVectors
     mechanisms: Mechanisms
@@ -55,7 +55,7 @@ class Branching:
         covariance = last.covariance + np.diag(self.space.sigmas(self.noise.after(self.motion)) ** 2)
         grasp = PlacedGrasp(self.contacts, row, covariance, self.motion).put_aside()
         longer = hypothesis.map.with_grasp(grasp)
-        return replace(hypothesis, map=longer, left_out=self.judge.price(longer))
+        return replace(hypothesis, map=longer, left_out=self.scorer.price(longer))
 
     def _place(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The most likely continuations of all hypotheses, without contacts that do not fit them.
@@ -71,8 +71,8 @@ class Branching:
 
     def _clean(self, branch: Hypothesis) -> Hypothesis:
         """The branch without contacts of the last grasp that do not fit."""
-        cleaned, misfit = self.judge.clean(branch.map, len(branch.map.placed) - 1)
-        return Hypothesis(cleaned, misfit, branch.intrusion, self.judge.price(cleaned))
+        cleaned, misfit = self.scorer.clean(branch.map, len(branch.map.placed) - 1)
+        return Hypothesis(cleaned, misfit, branch.intrusion, self.scorer.price(cleaned))
 
     def _propose(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Continuations of a hypothesis, scored by single contacts only."""

@@ -36,22 +36,22 @@ _DOUBTFUL = 2
 """Number of left-out contacts from which a grasp's place is searched again."""
 
 
-def relocate_last(hypothesis: Hypothesis, relocate: Relocate, judge: HypothesisScorer) -> list[Hypothesis]:
+def relocate_last(hypothesis: Hypothesis, relocate: Relocate, scorer: HypothesisScorer) -> list[Hypothesis]:
     """The hypothesis with its last grasp at other places on the object.
 
     Args:
         hypothesis: whose last grasp is left out, or on a part that nothing else supports.
         relocate: proposes places.
-        judge: scores them.
+        scorer: scores them.
     """
     last = len(hypothesis.map.placed) - 1
     contacts = hypothesis.map.placed[last].contacts_world
     anywhere = relocate(hypothesis.map.without_grasp(last), contacts)[:_TRIED]
-    return _place_at(hypothesis, last, anywhere, judge, _most(contacts), Moved.FREELY)
+    return _place_at(hypothesis, last, anywhere, scorer, _most(contacts), Moved.FREELY)
 
 
 def propose_pushes(
-    hypothesis: Hypothesis, noise: MotionNoise, settings: ProposalSettings, judge: HypothesisScorer
+    hypothesis: Hypothesis, noise: MotionNoise, settings: ProposalSettings, scorer: HypothesisScorer
 ) -> list[Hypothesis]:
     """The hypothesis with its last grasp at a place after a push, if the object was left in place and fits badly.
 
@@ -59,14 +59,14 @@ def propose_pushes(
         hypothesis: to improve.
         noise: of the motion model.
         settings: of the search.
-        judge: scores them.
+        scorer: scores them.
     """
     last = len(hypothesis.map.placed) - 1
     grasp = hypothesis.map.placed[last]
     if not _is_doubtful(grasp) or not _was_left(grasp, noise):
         return []
     near = _near(hypothesis, last, noise, settings)
-    return _place_at(hypothesis, last, near, judge, _most(grasp.contacts_world), Moved.PUSHED)
+    return _place_at(hypothesis, last, near, scorer, _most(grasp.contacts_world), Moved.PUSHED)
 
 
 def associate_deferred(
@@ -74,7 +74,7 @@ def associate_deferred(
     noise: MotionNoise,
     settings: ProposalSettings,
     relocate: Relocate | None,
-    judge: HypothesisScorer,
+    scorer: HypothesisScorer,
     *,
     pushes: bool = True,
 ) -> Hypothesis:
@@ -85,7 +85,7 @@ def associate_deferred(
         noise: of the motion model.
         settings: of the search near the predicted pose.
         relocate: proposes places anywhere for left-out grasps; None for none.
-        judge: scores them.
+        scorer: scores them.
         pushes: whether the closing hand may have pushed an object left in place.
     """
     for index, grasp in enumerate(hypothesis.map.placed[1:], start=1):
@@ -93,12 +93,12 @@ def associate_deferred(
             continue
         near, contacts = _near(hypothesis, index, noise.accumulate(2), settings), grasp.contacts_world
         fitting = max(_LEAST_FITTING, len(grasp.kept) + 1)
-        candidates = _place_at(hypothesis, index, near, judge, fitting, Moved.AS_MEANT)
+        candidates = _place_at(hypothesis, index, near, scorer, fitting, Moved.AS_MEANT)
         if pushes and _was_left(grasp, noise):
-            candidates += _place_at(hypothesis, index, near, judge, fitting, Moved.PUSHED)
+            candidates += _place_at(hypothesis, index, near, scorer, fitting, Moved.PUSHED)
         if relocate is not None and not grasp.used:
             anywhere = relocate(hypothesis.map.without_grasp(index), contacts)[:_TRIED]
-            candidates += _place_at(hypothesis, index, anywhere, judge, _most(contacts), Moved.FREELY)
+            candidates += _place_at(hypothesis, index, anywhere, scorer, _most(contacts), Moved.FREELY)
         hypothesis = min([hypothesis, *candidates], key=cost)
     return hypothesis
 
@@ -125,23 +125,23 @@ def _most(contacts: ContactSet) -> int:
 
 
 def _place_at(
-    hypothesis: Hypothesis, index: int, rows: Array, judge: HypothesisScorer, fitting: int, moved: Moved
+    hypothesis: Hypothesis, index: int, rows: Array, scorer: HypothesisScorer, fitting: int, moved: Moved
 ) -> list[Hypothesis]:
     """The hypothesis with one grasp at the most likely poses that enough contacts fit, smoothed."""
     found = []
     for row in rows:
         grasp = replace(hypothesis.map.placed[index], row=row, left_out=frozenset(), moved=moved)
-        cleaned, _ = judge.clean(_with(hypothesis.map, index, grasp), index)
+        cleaned, _ = scorer.clean(_with(hypothesis.map, index, grasp), index)
         if len(cleaned.placed[index].kept) >= fitting:
-            found.append(judge.score(cleaned))
+            found.append(scorer.score(cleaned))
     likeliest = sorted(found, key=cost)[:_SMOOTHED]
-    return [_following(judge.smooth(one.map, 15), index, judge) for one in likeliest]
+    return [_following(scorer.smooth(one.map, 15), index, scorer) for one in likeliest]
 
 
-def _following(hypothesis: Hypothesis, index: int, judge: HypothesisScorer) -> Hypothesis:
+def _following(hypothesis: Hypothesis, index: int, scorer: HypothesisScorer) -> Hypothesis:
     """The hypothesis with one grasp moved as the motion model expects, if that is no less likely."""
     bound = replace(hypothesis.map.placed[index], moved=Moved.AS_MEANT)
-    return min(judge.score(hypothesis.map.with_placed(index, bound)), hypothesis, key=cost)
+    return min(scorer.score(hypothesis.map.with_placed(index, bound)), hypothesis, key=cost)
 
 
 def _with(contact_map: ContactMap, index: int, grasp: PlacedGrasp) -> ContactMap:

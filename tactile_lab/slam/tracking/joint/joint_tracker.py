@@ -79,8 +79,8 @@ class JointTracker:
         self._noise, self._settings, self._kernel_every = noise, settings, kernel_every
         self._space = first.space
         self.mechanisms = Mechanisms(settings.without)
-        self._judge = HypothesisScorer(noise, settings.proposals.unexplained_cost, self.mechanisms)
-        self._hypotheses = [self._judge.score(self._without_free_space(first))]
+        self._scorer = HypothesisScorer(noise, settings.proposals.unexplained_cost, self.mechanisms)
+        self._hypotheses = [self._scorer.score(self._without_free_space(first))]
         self._branches: list[Hypothesis] = []
         self._motion = np.zeros(self._space.size)
         self._whole: tuple[ContactMap, ContactMap] | None = None
@@ -110,7 +110,7 @@ class JointTracker:
     def _with_faces(self, best: ContactMap) -> ContactMap:
         if self._has_ended or len(best.placed) < _LEAST_FOR_FACES:
             return self.map
-        return unfold(FacetedScorer(self._judge, self._noise, self.mechanisms).better(best).map)
+        return unfold(FacetedScorer(self._scorer, self._noise, self.mechanisms).better(best).map)
 
     @property
     def hypotheses(self) -> tuple[Hypothesis, ...]:
@@ -128,13 +128,13 @@ class JointTracker:
     def weigh(self, contacts: ContactSet) -> bool:
         """Branch every hypothesis into the poses proposed for this grasp, smooth the most likely ones and rank them."""
         contacts = contacts if self.mechanisms.has("free space") else contacts.without_free_places()
-        given = self._motion, self._noise, self._judge, self._settings, self._space, self.mechanisms
+        given = self._motion, self._noise, self._scorer, self._settings, self._space, self.mechanisms
         step = Branching(contacts, *given)
         branches = likeliest(step.branches(self._hypotheses), self._settings.smoothed, self._settings.branch_gap)
-        smoothed = [self._judge.smooth(branch.map, self._settings.iterations) for branch in branches]
+        smoothed = [self._scorer.smooth(branch.map, self._settings.iterations) for branch in branches]
         smoothed += self.mechanisms.add("pushes", lambda: self._push(min(smoothed, key=cost)))
         smoothed += self.mechanisms.add("relocation", lambda: self._relocate_grasp(min(smoothed, key=cost)))
-        self._branches = self._likeliest(self._judge.different(smoothed), self._settings.hypotheses)
+        self._branches = self._likeliest(self._scorer.different(smoothed), self._settings.hypotheses)
         self.effective_count = float(1 / np.sum(weights(self._branches) ** 2))
         return self._branches[0].map.placed[-1].used
 
@@ -167,10 +167,10 @@ class JointTracker:
             self._share_best_kernel()
             if self._settings.estimate_motion:
                 self._trust(estimated_noise(self._hypotheses[0].map, self._configured))
-            self._hypotheses = sorted((self._judge.score(one.map) for one in self._hypotheses), key=cost)
+            self._hypotheses = sorted((self._scorer.score(one.map) for one in self._hypotheses), key=cost)
         lag = self._settings
         if count > 2 * lag.window:
-            self._hypotheses = [self._judge.condense(one, lag.window, lag.remembered) for one in self._hypotheses]
+            self._hypotheses = [self._scorer.condense(one, lag.window, lag.remembered) for one in self._hypotheses]
 
     def adopt(self, corrected: ContactMap) -> None:
         """Accept a corrected map; other poses only if grasps were settled before.
@@ -190,17 +190,17 @@ class JointTracker:
         """
         readable = len(self.map.placed) > 2 and len(self.map.placed[-1].contacts_world) > 0
         if self._settings.backwards and not self._has_settled and readable:
-            self._hypotheses = self._judge.different(self._hypotheses + self._backwards())
+            self._hypotheses = self._scorer.different(self._hypotheses + self._backwards())
         self._regroup()
         for _ in range(2):
             iterations = self._settings.final_iterations
-            smoothed = [self._judge.smooth(one.map, iterations) for one in self._hypotheses]
-            self._hypotheses = self._likeliest(self._judge.different(smoothed), self._settings.hypotheses)
+            smoothed = [self._scorer.smooth(one.map, iterations) for one in self._hypotheses]
+            self._hypotheses = self._likeliest(self._scorer.different(smoothed), self._settings.hypotheses)
             self._share_best_kernel()
         looked = [self.mechanisms.improve("second look", one, self._readmit) for one in self._hypotheses]
         self._hypotheses = [self._associate_deferred(one) for one in looked]
         faceted = self._score_with_facets()
-        faceted[0] = replace(faceted[0], map=self._judge.with_covariances(faceted[0].map))
+        faceted[0] = replace(faceted[0], map=self._scorer.with_covariances(faceted[0].map))
         self._hypotheses = [replace(one, map=unfold(one.map)) for one in faceted]
         self._has_ended = True
 
@@ -211,14 +211,14 @@ class JointTracker:
         which contacts are left out, so that trajectories that differ only in these are tested once. Grasps are
         relocalized on a few objects: a wrong turn may be repairable in one hypothesis and not in another.
         """
-        sharp = FacetedScorer(self._judge, self._noise, self.mechanisms)
-        known = self._judge.different(self._hypotheses, by_contacts=False)
+        sharp = FacetedScorer(self._scorer, self._noise, self.mechanisms)
+        known = self._scorer.different(self._hypotheses, by_contacts=False)
         found = [sharp.better(one.map) for one in known]
         best = min(found, key=cost)
-        limit = self._judge.score(best.map).cost
+        limit = self._scorer.score(best.map).cost
         likelier = self.mechanisms.add("splicing", lambda: self._spliced_below(limit, best, known))
         ranked = sorted(found + [sharp.better(one.map) for one in likelier], key=cost)
-        hopeful = [one for one in self._judge.different(ranked) if one.cost < ranked[0].cost + _HOPEFUL_nats][:_PLACED]
+        hopeful = [one for one in self._scorer.different(ranked) if one.cost < ranked[0].cost + _HOPEFUL_nats][:_PLACED]
         hopeful = hopeful if self.mechanisms.has("placing from several") else hopeful[:1]
         placing = [self._relocalize(one, sharp) for one in hopeful]
         best, *placed = sorted(placing, key=cost)
@@ -226,12 +226,12 @@ class JointTracker:
             self.mechanisms.changed.add("placing from several")
         return [
             self.mechanisms.improve("regular faces", best, sharp.regular),
-            *self._judge.unlike(placed + ranked, [best]),
+            *self._scorer.unlike(placed + ranked, [best]),
         ]
 
     def _spliced_below(self, limit: float, best: Hypothesis, known: list[Hypothesis]) -> list[Hypothesis]:
         """Other splices of a hypothesis that are more likely than a limit and differ from all known trajectories."""
-        others = self._judge.unlike(self._splice(best), known, by_contacts=False)
+        others = self._scorer.unlike(self._splice(best), known, by_contacts=False)
         return [one for one in others if one.cost < limit]
 
     def _relocalize(self, hypothesis: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
@@ -245,15 +245,15 @@ class JointTracker:
 
     def _retry_unplaced(self, best: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
         """The hypothesis with grasps placed that did not fit the shape with a wrong contact, if more likely."""
-        again = self._associate_deferred(self._judge.score(best.map))
+        again = self._associate_deferred(self._scorer.score(best.map))
         return best if again.map is best.map else min(best, sharp.better(again.map), key=cost)
 
     def _readmit(self, hypothesis: Hypothesis) -> Hypothesis:
         """The hypothesis after testing all contacts again: some were left out while the object was little known."""
-        looked, _ = self._judge.clean(hypothesis.map.with_all_contacts())
+        looked, _ = self._scorer.clean(hypothesis.map.with_all_contacts())
         if looked.left_out_count == hypothesis.map.left_out_count:
             return hypothesis
-        return min(self._judge.smooth(looked, self._settings.final_iterations), hypothesis, key=cost)
+        return min(self._scorer.smooth(looked, self._settings.final_iterations), hypothesis, key=cost)
 
     def _associate_deferred(self, hypothesis: Hypothesis) -> Hypothesis:
         relocate = self._relocate if self.mechanisms.has("relocation") else None
@@ -261,11 +261,11 @@ class JointTracker:
         return self.mechanisms.improve(
             "deferred association",
             hypothesis,
-            lambda given: associate_deferred(given, noise, proposals, relocate, self._judge, pushes=pushes),
+            lambda given: associate_deferred(given, noise, proposals, relocate, self._scorer, pushes=pushes),
         )
 
     def _push(self, best: Hypothesis) -> list[Hypothesis]:
-        return propose_pushes(best, self._noise, self._settings.proposals, self._judge)
+        return propose_pushes(best, self._noise, self._settings.proposals, self._scorer)
 
     def _backwards(self) -> list[Hypothesis]:
         """The hypotheses of the same grasps in the opposite order."""
@@ -280,14 +280,14 @@ class JointTracker:
             tracker.update_shape(grasp.contacts_world, certain=True)
             tracker.resample()
         self.mechanisms.changed |= tracker.mechanisms.changed
-        return [self._judge.score(self.map.reread(one.map)) for one in tracker.hypotheses]
+        return [self._scorer.score(self.map.reread(one.map)) for one in tracker.hypotheses]
 
     def _regroup(self) -> None:
         """Splice the most likely hypothesis, and repeat with a more likely result."""
         for _ in range(_MOST_REGROUPINGS):
             best = min(self._hypotheses, key=cost)
             spliced = self._splice(best) if self.mechanisms.has("splicing") else []
-            found = self._judge.different(self._hypotheses + spliced)
+            found = self._scorer.different(self._hypotheses + spliced)
             self._hypotheses = self._likeliest(found, self._settings.hypotheses)
             if any(kept is one for kept in self._hypotheses for one in spliced):
                 self.mechanisms.changed.add("splicing")
@@ -297,10 +297,11 @@ class JointTracker:
     def _splice(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """The hypothesis spliced at its least likely steps."""
         others = [
-            self._judge.score(one) for one in splice_trajectories(hypothesis.map, self._noise, self._settings.proposals)
+            self._scorer.score(one)
+            for one in splice_trajectories(hypothesis.map, self._noise, self._settings.proposals)
         ]
         promising = sorted(others, key=cost)[: self._settings.smoothed]
-        return [self._judge.smooth(other.map, self._settings.iterations) for other in promising]
+        return [self._scorer.smooth(other.map, self._settings.iterations) for other in promising]
 
     def _relocate_grasp(self, best: Hypothesis) -> list[Hypothesis]:
         """Poses anywhere on the object, if a grasp does not fit the known part of it near the predicted pose."""
@@ -308,14 +309,14 @@ class JointTracker:
         gain = self._hypotheses[0].cost - best.cost
         expected = contacts >= _LEAST_TO_RELOCATE and known >= _LEAST_KNOWN
         asked = expected and gain <= _POOR_GAIN * contacts
-        return relocate_last(best, self._relocate, self._judge) if self._relocate and asked else []
+        return relocate_last(best, self._relocate, self._scorer) if self._relocate and asked else []
 
     def _likeliest(self, hypotheses: list[Hypothesis], count: int) -> list[Hypothesis]:
         return likeliest(hypotheses, count, self._settings.evidence_gap)
 
     def _trust(self, noise: MotionNoise) -> None:
         """Continue with another noise of the motion model."""
-        self._noise, self._judge = (
+        self._noise, self._scorer = (
             noise,
             HypothesisScorer(noise, self._settings.proposals.unexplained_cost, self.mechanisms),
         )

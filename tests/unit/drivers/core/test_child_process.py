@@ -157,8 +157,8 @@ def test_every_process_is_started_by_the_one_command() -> None:
     ("body", "words"),
     [
         ("raise KeyError('joint')", r"echo: the program itself failed \(KeyError: 'joint', in .*line 4\)"),
-        ("print('a library says hello')", "echo: its process says what is no answer: 'a library says hello'"),
-        ("print('[1, 2]')", "says what is no answer"),
+        ("print('a library says hello')", "echo: unexpected output of its process: 'a library says hello'"),
+        ("print('[1, 2]')", "unexpected output of its process"),
     ],
 )
 def test_what_a_child_says_wrongly_is_told_in_words(

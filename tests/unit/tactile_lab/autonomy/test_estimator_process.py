@@ -32,7 +32,7 @@ from tactile_lab.autonomy.estimator_process import EstimatorProcess
 from tactile_lab.autonomy.estimator_worker import pack
 from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
-from tactile_lab.workflow.judging import estimate_rest
+from tactile_lab.workflow.finishing import estimate_rest
 from tests.support import questions
 from tests.support.disc_world import Disc, DiscWorld
 from tests.support.questions import Counting

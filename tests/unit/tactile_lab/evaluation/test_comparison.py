@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from tactile_lab.evaluation.comparison import Judged, compare, markdown, rows_csv, short_table, table
+from tactile_lab.evaluation.comparison import EvaluatedRun, compare, markdown, rows_csv, short_table, table
 from tactile_lab.evaluation.spread import Interval, Spread
 from tactile_lab.report.comparison_plot import comparison_svg
 
 
-def judged(session: str, method: str, rmse_mm: float | None, failed: bool = False) -> Judged:
+def judged(session: str, method: str, rmse_mm: float | None, failed: bool = False) -> EvaluatedRun:
     content: dict[str, Any] = {
         "object": "box",
         "method": method,
@@ -25,7 +25,7 @@ def judged(session: str, method: str, rmse_mm: float | None, failed: bool = Fals
         "failed": failed,
         "pose": None if rmse_mm is None else {"rmse_mm": rmse_mm, "rmse_deg": 1.0},
     }
-    return Judged(session, "results", content)
+    return EvaluatedRun(session, "results", content)
 
 
 EVALUATIONS = [
@@ -57,7 +57,7 @@ def test_methods_are_gathered_and_compared_with_the_first_session_by_session() -
 
 
 def test_results_of_one_method_on_one_session_are_no_further_runs_of_it() -> None:
-    again = [Judged(each.session, "other settings", each.evaluation) for each in EVALUATIONS[:3]]
+    again = [EvaluatedRun(each.session, "other settings", each.evaluation) for each in EVALUATIONS[:3]]
     first, other, icp = compare([*EVALUATIONS[:3], *again, *EVALUATIONS[3:]])
     names = (first.method, other.method, icp.method)
     assert names == ("joint, 2-D, results", "joint, 2-D, other settings", "icp, 2-D")

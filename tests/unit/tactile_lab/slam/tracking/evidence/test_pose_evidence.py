@@ -224,15 +224,15 @@ def test_the_noise_of_the_motion_is_learnt_from_the_slips(scale: float) -> None:
 
 def test_trajectories_are_one_where_the_contacts_leave_the_difference_open() -> None:
     contact_map = true_map("ellipse", count=6)
-    judge = HypothesisScorer(NOISE, 2.0)
+    scorer = HypothesisScorer(NOISE, 2.0)
     variances, ways = np.linalg.eigh(np.linalg.inv(PoseEvidence(contact_map, NOISE).information(contact_map.rows)))
     length = 2 * np.sqrt(variances[-1])
 
     def moved(way: Array) -> Hypothesis:
-        return judge.score(contact_map.with_rows(contact_map.rows + np.vstack([np.zeros(3), way.reshape(-1, 3)])))
+        return scorer.score(contact_map.with_rows(contact_map.rows + np.vstack([np.zeros(3), way.reshape(-1, 3)])))
 
-    best, open_way, certain_way = judge.score(contact_map), moved(length * ways[:, -1]), moved(length * ways[:, 0])
+    best, open_way, certain_way = scorer.score(contact_map), moved(length * ways[:, -1]), moved(length * ways[:, 0])
     assert np.abs(open_way.map.rows - contact_map.rows).max() > 0.03
-    assert len(judge.different([best, open_way])) == 1
-    assert len(judge.different([best, certain_way])) == 2
-    assert judge.unlike([certain_way, open_way], [best]) == [certain_way]
+    assert len(scorer.different([best, open_way])) == 1
+    assert len(scorer.different([best, certain_way])) == 2
+    assert scorer.unlike([certain_way, open_way], [best]) == [certain_way]

@@ -1,14 +1,14 @@
-"""Judging a session of the hand that explores: what is explored after every action, and what its decisions promised.
+"""Coverage of an exploring session after every action, and the expected and actual gain of its decisions.
 
 A session ends when the object is explored, when its budget of actions is spent, or when the object is lost. In the
-plane it is explored by A and B of :mod:`tactile_lab.experiments.coverage_criteria`, on the outline at the height of the
-fingertips. In space the surface counts without the underside, which nothing can touch: A, 90 % of it lies within 5 mm
-of the estimated surface and 90 % of that within 5 mm of the true one, ends the session; B, a contact lies within 12 mm
-of 90 % besides (half the distance of neighbouring fingertips). The estimated surface is that of the most probable
-model, which the planner goes by and a session would end with. It may fit by luck, and not after the next grasp: so in
-space a goal is reached at the first of two successive looks that both find it reached, or at the last look that the
-budget allows. *Touched* is what contacts came near (4.5 mm in the plane, 12 mm in space) where they truly lay,
-whatever the estimate makes of them: that is what a decision promises.
+plane it counts as explored by A and B of :mod:`tactile_lab.experiments.coverage_criteria`, on the outline at the height
+of the fingertips. In space the surface counts without the underside, which nothing can touch: A, 90 % of it lies within
+5 mm of the estimated surface and 90 % of that within 5 mm of the true one, ends the session; B, a contact lies within
+12 mm of 90 % besides (half the distance of neighbouring fingertips). The estimated surface is that of the most probable
+model, which the planner uses and a session would end with. It may fit by luck, and not after the next grasp: so in
+space a goal is reached at the first of two successive checks that both find it reached, or at the last check that the
+budget allows. *Touched* is the surface near true contact positions (4.5 mm in the plane, 12 mm in space), independent
+of the estimate: the gain that a decision predicts.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _CONTACT_IN_SPACE_m = 0.012
 
 @dataclass(frozen=True)
 class Look:
-    """What is explored after a grasp.
+    """Coverage after a grasp.
 
     Attributes:
         actions: so far.
@@ -66,13 +66,13 @@ class Look:
     shares: dict[str, float]
 
 
-class Judge:
-    """Judges a session while it runs; nothing of it reaches the session but that it may end.
+class CoverageMonitor:
+    """Monitors the coverage of a running session; the session only learns from it when to end.
 
     Args:
-        mesh: the true surface, in the frame whose poses are told.
+        mesh: the true surface, in the frame of the true poses.
         slam: the estimation.
-        shape: gives the shape as the session's planner knows it now.
+        shape: returns the present shape of the session's planner.
         dimension: 2 or 3.
         budget: of actions.
     """
@@ -92,9 +92,9 @@ class Judge:
         self.grasps: list[Grasp] = []
         self.choices: dict[int, Choice] = {}
         self.looks: list[Look] = []
-        """One a grasp."""
+        """One per grasp."""
         self.actions = 0
-        """Approaches so far: every grasp is one, done or given up, and a tap on the top before it another."""
+        """Approaches so far: each grasp, finished or given up, is one, and a tap on the top before it another."""
         self.carried = 0
         """How often the object was carried."""
 
@@ -243,36 +243,36 @@ class Judge:
 
 
 class UntilExplored(PolicyDecisions):
-    """Follows the policy until the judge says that all is explored, or the budget spent.
+    """Follows the policy until the monitor reports that the object is explored or the budget spent.
 
     Args:
-        estimator: where the planner with the policy is asked.
-        judge: says so.
+        estimator: client of the planner with the policy.
+        monitor: decides when to end.
     """
 
-    def __init__(self, estimator: EstimatorClient, judge: Judge) -> None:
-        super().__init__(estimator, judge.keep)
-        self._judge = judge
+    def __init__(self, estimator: EstimatorClient, monitor: CoverageMonitor) -> None:
+        super().__init__(estimator, monitor.keep)
+        self._monitor = monitor
 
     def prepare(self, index: int) -> None:
-        if not self._judge.is_over:
+        if not self._monitor.is_over:
             super().prepare(index)
 
     def on_arrival(self, landings_world_m: list[Array]) -> None:
         assert self.suggested is not None
-        self._judge.actions += 2 if self.suggested.tap else 1
+        self._monitor.actions += 2 if self.suggested.tap else 1
         super().on_arrival(landings_world_m)
 
     def on_capture(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
-        self._judge.grasps.append(grasp)
+        self._monitor.grasps.append(grasp)
         return super().on_capture(grasp, plan)
 
     def on_carry(self, hand_motion_world: Pose3) -> None:
-        self._judge.carried += not hand_motion_world.equals(Pose3(), 1e-9)
+        self._monitor.carried += not hand_motion_world.equals(Pose3(), 1e-9)
         super().on_carry(hand_motion_world)
 
     def decide(self, index: int) -> Decision:
-        return End("explored, or the budget is spent") if self._judge.is_over else super().decide(index)
+        return End("explored, or the budget is spent") if self._monitor.is_over else super().decide(index)
 
 
 def _see(grasp: Grasp, pose: Pose3) -> Array:

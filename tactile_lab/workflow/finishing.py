@@ -1,4 +1,4 @@
-"""From a session and its estimation to a folder of results: model, evaluation, report."""
+"""Finishes a session's estimation: writes model, evaluation and report to a results folder."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ from tactile_lab.slam.tactile_slam import TactileSlam
 EVALUATION = "evaluation.json"
 _KNOWN = ("known.csv", "known.ply")
 REPLAYABLE = ("trajectory.csv", "contacts.csv", "contour.csv", "mesh.ply", "mesh.glb", *_KNOWN, "slam.json")
-"""Result files that a replay of the same session gives again, byte for byte."""
+"""Result files that a replay of the same session reproduces, byte for byte."""
 RESULT_FILES = (*REPLAYABLE, "timing.json", TRUTH_TRAJECTORY, EVALUATION, report.REPORT)
-"""All files of a folder of results."""
+"""All files of a results folder."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class FinishedSession:
         folder: the session's; the log's file.
         results: the folder of these results.
         outcome: how the autonomous part ended; None for a replay.
-        evaluation: None when there was nothing to judge.
+        evaluation: None if there was nothing to evaluate.
         data_loss: what was dropped or not recorded while the session ran, by kind.
         unread: what of the recording could not be read, in words; "" when all of it was.
         problem: why there is no evaluation, "" when there is one.
@@ -80,12 +80,14 @@ class TruthChoice:
 
     @property
     def is_recorded(self) -> bool:
-        """Whether this is what a session does by itself."""
+        """Whether all choices are the session's own."""
         return self.lens is None and self.markers is None and self.basis == "corners"
 
 
-def judge_results(session: Session, results: Path, choice: TruthChoice) -> tuple[Evaluation, TruthReport | None, str]:
-    """Judge one folder of results with a truth of one's choice; nothing is written.
+def evaluate_results(
+    session: Session, results: Path, choice: TruthChoice
+) -> tuple[Evaluation, TruthReport | None, str]:
+    """Evaluate one results folder with a chosen ground truth; nothing is written.
 
     Returns:
         The evaluation, what the truth was worth (None without a camera), and what of the recording could not be read.
@@ -102,7 +104,7 @@ def judge_results(session: Session, results: Path, choice: TruthChoice) -> tuple
 
 
 def evaluate_session(session: Session) -> FinishedSession:
-    """Judge a session's results again, against the markers in its recorded pictures and its true mesh.
+    """Evaluate a session's results again, with the markers in its recorded pictures and its true mesh.
 
     Raises:
         SessionError: there are no results, or the recording cannot be read.
@@ -136,15 +138,15 @@ def _replayed_content(file: Path) -> object:
 
 
 def estimate_rest(slam: TactileSlam, grasps: Sequence[Grasp], progress: Progress | None = None) -> None:
-    """Take the grasps that the estimation has not seen: all of a replay, the last one of a session cut short."""
+    """Add the grasps that the estimation has not seen: all of a replay, or the last one of an interrupted session."""
     progress = progress or NullProgress()
     for number, grasp in enumerate(grasps[slam.step_count :], slam.step_count + 1):
         progress.phase(number, "estimate")
         slam.add_grasp(grasp)
 
 
-def judge(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp], out: Path) -> FinishedSession:
-    """Finish the estimation and write model, evaluation and report; what stands in the way is told in the record."""
+def finish(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp], out: Path) -> FinishedSession:
+    """Finish the estimation and write model, evaluation and report; an error is stored in the returned record."""
     remove_results(out)
     if not grasps:
         return FinishedSession(session.folder, out, problem="no grasp was recorded")
@@ -159,7 +161,7 @@ def judge(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp]
 
 
 def remove_results(out: Path) -> None:
-    """Files of an earlier replay: what this one does not write should not look like its own."""
+    """Remove the files of an earlier replay, so that they cannot be mistaken for those of this one."""
     try:
         for name in RESULT_FILES:
             (out / name).unlink(missing_ok=True)
@@ -175,7 +177,7 @@ def _write_evaluation(session: Session, rig: Rig, out: Path) -> tuple[Evaluation
 
 
 def write_evaluation(out: Path, truth: Truth, object_name: str) -> Evaluation:
-    """Judge the results in a folder, and put the evaluation and the truth beside them.
+    """Evaluate the results in a folder, and write the evaluation and the truth next to them.
 
     Raises:
         SessionError, ShapeError: as :func:`tactile_lab.evaluation.evaluation.evaluate`.
@@ -189,7 +191,7 @@ def write_evaluation(out: Path, truth: Truth, object_name: str) -> Evaluation:
 
 
 def marker_detector(session: Session, rig: Rig, choice: TruthChoice | None = None) -> MarkerTruth | None:
-    """Finds the object in what the session's camera sent; None for a rig without a camera.
+    """Finds the object in the session's camera data; None for a rig without a camera.
 
     Raises:
         ConfigurationError: the chosen or recorded calibration cannot be used, or is of another rig.

@@ -9,8 +9,8 @@ import trimesh
 from drivers.simulation.objects import object_model
 from tactile_lab.experiments.catalogue import experiment
 from tactile_lab.experiments.data.true_surface import lay_over, reachable_points, surface_within, true_share
+from tactile_lab.experiments.runs.coverage_monitor import CoverageMonitor, Look
 from tactile_lab.experiments.runs.hand_exploration import OBJECTS
-from tactile_lab.experiments.runs.hand_judge import Judge, Look
 from tactile_lab.slam.exploration.policy import Surface
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 
@@ -37,14 +37,14 @@ def test_truth_is_laid_over_the_estimate_by_the_contacts() -> None:
     np.testing.assert_allclose(lay_over(source[:5, :2], source, moved), moved[:5, :2], atol=1e-9)
 
 
-def judged(shares: list[float], dimension: int, budget: int = 20) -> Judge:
+def monitored(shares: list[float], dimension: int, budget: int = 20) -> CoverageMonitor:
     """After grasps that cost three actions each and left so much explored, by each of the measures."""
     slam = TactileSlam(SlamSettings.model_validate({"dimension": dimension}))
-    judge = Judge(object_model("cube-6").mesh, slam, lambda: None, dimension, budget)
+    monitor = CoverageMonitor(object_model("cube-6").mesh, slam, lambda: None, dimension, budget)
     for share in shares:
-        judge.actions += 3
-        judge.looks.append(Look(judge.actions, judge.actions / 10, {"A": share, "B": share, "touched": share}))
-    return judge
+        monitor.actions += 3
+        monitor.looks.append(Look(monitor.actions, monitor.actions / 10, {"A": share, "B": share, "touched": share}))
+    return monitor
 
 
 @pytest.mark.parametrize(
@@ -60,17 +60,17 @@ def test_in_space_two_successive_looks_have_to_agree(
     shares: list[float], in_space: int | None, in_the_plane: int
 ) -> None:
     for dimension, actions in ((3, in_space), (2, in_the_plane)):
-        judge = judged(shares, dimension)
-        assert judge.is_explored == judge.is_over == (actions is not None)
-        figures = judge.figures(TactileSlam().finish())
+        monitor = monitored(shares, dimension)
+        assert monitor.is_explored == monitor.is_over == (actions is not None)
+        figures = monitor.figures(TactileSlam().finish())
         assert figures["actions_A"] == actions
         assert figures["at_most_A"] == (actions or 20)
 
 
 @pytest.mark.parametrize(("budget", "actions"), [(6, 6), (5, None), (7, None)])
 def test_the_last_look_of_the_budget_needs_no_other(budget: int, actions: int | None) -> None:
-    judge = judged([0.5, 0.92], 3, budget)
-    assert judge.figures(TactileSlam().finish())["actions_A"] == actions
+    monitor = monitored([0.5, 0.92], 3, budget)
+    assert monitor.figures(TactileSlam().finish())["actions_A"] == actions
 
 
 def test_runs_of_the_experiment() -> None:
