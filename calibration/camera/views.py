@@ -94,7 +94,8 @@ def adds_something(view: BoardView, views: Sequence[BoardView]) -> bool:
 class Coverage:
     """Coverage of the views.
 
-    Attributes: regions: corners in each ninth of the picture, by name.
+    Attributes:
+        regions: corners in each ninth of the picture, by name.
         tilts: views with the board tilted each way.
         flat: views with the board nearly parallel to the picture.
         distances: nearest and farthest, in sides of the board; zero without views.

@@ -26,7 +26,8 @@ class ViewSettings(StrictModel):
     """Poses at which the board is shown.
 
     Attributes:
-        pictures: their number. centre_m: middle of the board's places, world; above the camera.
+        pictures: their number.
+        centre_m: middle of the board's places, world; above the camera.
         spread_m: largest distance from it, per axis.
         tilt_rad: largest tilt of the palm.
         turn_rad: largest turn about the vertical.

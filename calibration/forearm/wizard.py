@@ -36,7 +36,8 @@ class WizardSettings(StrictModel):
 
     Attributes:
         needs: the least motion.
-        limits: of a result. touch, board: errors of the observations.
+        limits: of a result.
+        touch, board: errors of the observations.
         valid_days: how long a result may be used.
     """
 

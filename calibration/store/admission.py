@@ -72,7 +72,8 @@ def admit(
 ) -> tuple[str, ...]:
     """Refuse invalid files, or return the objections if the caller allows them.
 
-    Returns: The objections as text, for the session's record; empty if there are none.
+    Returns:
+        The objections as text, for the session's record; empty if there are none.
 
     Raises:
         ConfigurationError: there are objections, and they are not allowed.

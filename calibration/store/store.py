@@ -77,8 +77,8 @@ class CalibrationRecord(StrictModel):
 
     Attributes:
         kind: what was calibrated; the role of its file in a rig.
-        rig: the installation it belongs to (in the rig file). devices: serial numbers of the devices it belongs to, by
-            device name; empty if unknown.
+        rig: the installation it belongs to (in the rig file).
+        devices: serial numbers of the devices it belongs to, by device name; empty if unknown.
         method: how it was found.
         created_utc, valid_until_utc: ISO 8601; None: no expiry.
         software: versions of the software.

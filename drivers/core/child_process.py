@@ -182,7 +182,8 @@ class ChildProcess:
     def close(self, patience_s: float = 5.0) -> bytes:
         """Close its command pipe and wait until it has ended, or kill it after a timeout; idempotent.
 
-        Returns: output that was not read.
+        Returns:
+            output that was not read.
         """
         if self._process is None:
             return b""

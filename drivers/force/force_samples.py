@@ -57,9 +57,9 @@ class ForceTipSettings(StrictModel):
     """Limits of a force fingertip's samples.
 
     Attributes:
-        force_range_N, torque_range_Nm: the calibration's range per axis, that of an SI-12-0.12 unless given
-            (protocols: Nano17 ratings); a reading beyond it is invalid. contact_force_N: below this force no contact is
-            computed (several times the drift).
+        force_range_N, torque_range_Nm: the calibration's range per axis, that of an SI-12-0.12 unless given (protocols:
+            Nano17 ratings); a reading beyond it is invalid.
+        contact_force_N: below this force no contact is computed (several times the drift).
         minimum_samples: samples a capture needs.
         tare_samples: the newest samples that a tare averages.
         tare_spread_N, tare_spread_Nm: their largest spread, maximum minus minimum on any axis.

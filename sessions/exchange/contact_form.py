@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
@@ -20,8 +20,8 @@ _LARGEST_OBJECT_m = 2.0
 _LARGEST_WORKSPACE_m = 20.0
 """Contacts of one session that are farther apart must be in millimetres."""
 
-_MOST_CORNERS = 2000
-"""Of a true outline."""
+_MOST_GRASPS, _MOST_CONTACTS, _MOST_CORNERS = 10_000, 100, 2000
+"""Of a log, of one grasp, and of a true outline."""
 
 
 def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -142,6 +142,20 @@ class Document(StrictModel):
     motion_sigma: MotionSigma | None = None
     object: ObjectTruth | None = None
     grasps: tuple[GraspEntry, ...] = Field(min_length=1)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_bounded(cls, content: Any) -> Any:
+        """Before every entry is looked at: millions of wrong ones would be millions of complaints."""
+        grasps = content.get("grasps") if isinstance(content, dict) else None
+        if isinstance(grasps, list) and len(grasps) > _MOST_GRASPS:
+            raise ValueError(f"grasps: {len(grasps)} are more than the {_MOST_GRASPS} that are read")
+        for index, grasp in enumerate(grasps if isinstance(grasps, list) else ()):
+            for key in ("contacts", "closing_lines"):
+                entries = grasp.get(key) if isinstance(grasp, dict) else None
+                if isinstance(entries, list) and len(entries) > _MOST_CONTACTS:
+                    raise ValueError(f"grasps.{index}.{key}: {len(entries)} are more than {_MOST_CONTACTS}")
+        return content
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Self:

@@ -33,14 +33,23 @@ SIGMAS = ("point_sigma_m", "normal_sigma_rad")
 _TEXTS = {"finger"}
 _WRONG_UNIT = re.compile(r"_(?:mm|cm|um|deg|degrees|ms|us|ns|mN|kg|g)$")
 _LARGEST_FORCE_N = 1000.0
+_MOST_ROWS = 50_000
 
 Row = Mapping[str, Any]
+
+
+def _check_count(rows: int, path: Path) -> None:
+    """Raises ConfigurationError for more contacts than a person would bring in at a time."""
+    if rows > _MOST_ROWS:
+        what = f"has {rows} lines, more than the {_MOST_ROWS} that are read at a time"
+        raise ConfigurationError(what, where=str(path), hint="Divide it")
 
 
 def read_csv(path: Path) -> list[dict[str, str]]:
     """The lines of a CSV table without their empty values. Raises ConfigurationError."""
     try:
         text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8-sig")
+        _check_count(text.count("\n"), path)
         with io.StringIO(text, newline="") as file:
             lines = csv.DictReader(line for line in file if not line.startswith("#"))
             rows = [{str(name).strip(): value for name, value in row.items()} for row in lines]
@@ -82,6 +91,7 @@ def read_json(path: Path) -> dict[str, Any]:
     rows = document.get("contacts")
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
         raise ConfigurationError("contacts: must be a list of objects", where=str(path))
+    _check_count(len(rows), path)
     if unknown := set(document) - {"format", "contacts", "object", "note", *SIGMAS}:
         raise ConfigurationError(f"unknown key {sorted(unknown)[0]!r}", where=str(path), hint="See docs/sessions.md")
     for name in SIGMAS:

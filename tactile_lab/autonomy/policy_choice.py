@@ -33,7 +33,8 @@ class Knowledge:
 
     Attributes:
         known: the shape as estimated.
-        world_T_object: expected pose of the object. covariance: of that, (x m, y m, yaw rad), shape (3, 3).
+        world_T_object: expected pose of the object.
+        covariance: of that, (x m, y m, yaw rad), shape (3, 3).
         grasp_indices: which grasp each contact of the shape belongs to.
         grasps_left: that the session may still make.
         here: pose of the hand; None if unknown.

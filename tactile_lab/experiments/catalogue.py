@@ -13,6 +13,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
     for study in (
         planar.METHODS_2D,
         solids.METHODS_3D,
+        solids.EVERYDAY,
         solids.KNOWN_SHAPE,
         solids.SOLID_LIMIT,
         solids.METHODS_6DOF,

@@ -13,6 +13,7 @@ import json
 import multiprocessing
 import os
 import signal
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -36,6 +37,8 @@ ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_
 
 _LOOK_s = 0.5
 """A wait is never longer: a Ctrl+C that comes just before it would be heard when the next run is done."""
+_ASKED = 25
+"""So often a process that has died is asked, within as long, how it ended."""
 _ROOT = Path(__file__).resolve().parents[2]
 _PLOTS = ("plots", "plot_data", "plot_sheet")
 _PARTS = ("tactile_lab", "calibration", "drivers", "sessions")
@@ -166,7 +169,8 @@ class _WorkerWatch:
     def deaths(self) -> str:
         """Which worker died of what, and at which run; the pool ends the others by SIGTERM."""
         self._hear()
-        ended = {number: process.exitcode for number, process in self._processes.items() if process.exitcode}
+        codes = {number: _exit_code(process) for number, process in self._processes.items()}
+        ended = {number: code for number, code in codes.items() if code}
         own = {number: code for number, code in ended.items() if code != -signal.SIGTERM} or ended
         told = [f"{_cause(code)} at {self._words(number)}" for number, code in own.items()]
         return f"a worker process was {'; '.join(told)}" if told else "a worker process died"
@@ -174,6 +178,15 @@ class _WorkerWatch:
     def _words(self, process_id: int) -> str:
         key = self._at.get(process_id)
         return "its start" if key is None else self._cells[key].words()
+
+
+def _exit_code(process: BaseProcess) -> int | None:
+    """How a process ended. Its pipe closes a moment before, and the pool's own thread may be asking just now."""
+    for _ in range(_ASKED):
+        if process.exitcode is not None:
+            break
+        time.sleep(_LOOK_s / _ASKED)
+    return process.exitcode
 
 
 def _cause(code: int) -> str:

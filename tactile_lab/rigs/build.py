@@ -21,6 +21,7 @@ from drivers.positioner.kinematics import mount_T_forearm
 from drivers.shadow.closing.posture import TipEllipsoid
 from drivers.shadow.device.hand import ShadowHand
 from drivers.shadow.device.hand_samples import HandDecoder
+from drivers.shadow.model.hand_info import check_modelled
 from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_images import PALMS
@@ -46,7 +47,9 @@ def check_calibration(rig: Rig) -> None:
     build_interpreter(rig)
     MotorMap.load(rig.files["motors"])
     if rig.description.wires is not None:
-        hand_setup(rig).check_files()
+        setup = hand_setup(rig)
+        setup.check_files()
+        check_modelled(setup.motors, setup.infos())
     if "camera" in rig.files:
         load_camera(rig.files["camera"])
         load_model(rig.files["markers"], MarkerSettings)

@@ -36,7 +36,7 @@ def hand_setup(rig: Rig) -> HandSetup:
     description, files, wiring = rig.description, rig.files, wires_of(rig).hand
     return HandSetup(
         name=HAND_LINK,
-        ethercat=wiring.ethercat,
+        ethercat=wiring.ethercat.model_copy(update={"side": "right"}),  # the side that the kinematics are of
         master=wiring.master,
         hand=description.hand.on_wire.model_copy(update={"tactile": tactile_of(rig)}),
         joints=files["joints"].resolve(),

@@ -26,7 +26,8 @@ class SlamStep:
         effective_count: effective number of particles or hypotheses.
         observability: smallest eigenvalue of (3.18) of this grasp's contacts for motions on the table.
         verdict: "first", "tracked", "uncertain" or "untracked".
-        reason: the verdict as text. contacts: number of contacts of this dimension.
+        reason: the verdict as text.
+        contacts: number of contacts of this dimension.
         contacts_used: number of them used for the shape.
         seconds: computing time.
     """

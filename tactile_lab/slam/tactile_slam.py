@@ -88,10 +88,11 @@ class TactileSlam:
         known_poses: Sequence[Pose3 | None] | None = None,
     ) -> None:
         """
+
         Args:
             settings: see there.
-            seed: of all random numbers. known_poses: true ``world_T_object`` of every grasp, in order, only for method
-                "known-pose".
+            seed: of all random numbers.
+            known_poses: true ``world_T_object`` of every grasp, in order, only for method "known-pose".
 
         Raises:
             ConfigurationError: the method needs poses and has none, or is given poses that it must not use.

@@ -1,8 +1,10 @@
 """Access control of the page: who may see it and press its buttons.
 
-The page itself listens on a random address of the loopback network, new for each session, and is reached only through
-this gate. The gate accepts a visitor who uses one of its known host names (so that no other web site open in the same
-browser can press a button) and who has the token if there is one: once in the address, then in a cookie.
+The page itself listens on a socket in a folder of this user's alone, asks every request for a secret of this program,
+and so is reached only through this gate (:mod:`tactile_lab.view.inner_door`). The gate accepts a visitor who has the
+token: once in the address, then in a cookie. A page of the loopback interface also wants one of its known host names;
+no other web site open in the same browser can press a button there. Elsewhere any name will do: a web site that takes
+the page's address for its own has no cookie.
 """
 
 from __future__ import annotations
@@ -15,6 +17,8 @@ import re
 import secrets
 from dataclasses import dataclass
 from http import HTTPStatus
+
+from tactile_lab.view.inner_door import InnerDoor
 
 COOKIE = "tactile_lab_token"
 _HEAD_BYTES, _HEAD_TIMEOUT_s, _BLOCK = 16_384, 10.0, 65_536
@@ -33,11 +37,6 @@ def is_loopback(address: str) -> bool:
 def new_token() -> str:
     """A token that cannot be guessed."""
     return secrets.token_urlsafe(24)
-
-
-def inner_address() -> str:
-    """A random address of the loopback network, which no web page can guess (Linux answers on all of 127/8)."""
-    return str(ipaddress.IPv4Address((127 << 24) | (1 << 16) | secrets.randbelow((1 << 24) - (2 << 16))))
 
 
 @dataclass(frozen=True)
@@ -62,17 +61,18 @@ class Gate:
     """Decides about requests.
 
     Args:
-        names: host names and addresses of the page.
+        names: host names and addresses of the page; None for any, which needs a token.
         token: "" for none.
     """
 
-    def __init__(self, names: frozenset[str], token: str) -> None:
+    def __init__(self, names: frozenset[str] | None, token: str) -> None:
+        assert names is not None or token
         self._names, self._token = names, token
 
     def verdict(self, head: Head) -> tuple[HTTPStatus, str]:
         """OK: pass it on; SEE_OTHER with the cookie to set; anything else with the reason."""
         host = head.headers.get("host", "")
-        if _host_name(host) not in self._names:
+        if self._names is not None and _host_name(host) not in self._names:
             return HTTPStatus.FORBIDDEN, f"this page is not known as {host[:80]}"
         origin = head.headers.get("origin")
         if origin is not None and origin.partition("://")[2] != host:
@@ -104,7 +104,7 @@ def _cookie(header: str) -> str:
     return ""
 
 
-async def serve(gate: Gate, address: str, port: int, inner: tuple[str, int]) -> asyncio.Server:
+async def serve(gate: Gate, address: str, port: int, inner: InnerDoor) -> asyncio.Server:
     """Listen, and forward accepted requests to ``inner``. Raises OSError if the address is not available."""
 
     async def visit(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -115,9 +115,7 @@ async def serve(gate: Gate, address: str, port: int, inner: tuple[str, int]) -> 
     return await asyncio.start_server(visit, address, port, limit=_HEAD_BYTES)
 
 
-async def _visit(
-    gate: Gate, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, inner: tuple[str, int]
-) -> None:
+async def _visit(gate: Gate, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, inner: InnerDoor) -> None:
     data = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _HEAD_TIMEOUT_s)
     head = parse_head(data)
     status, text = (HTTPStatus.BAD_REQUEST, "not a page request") if head is None else gate.verdict(head)
@@ -125,8 +123,8 @@ async def _visit(
         writer.write(_answer(status, text))
         await writer.drain()
         return
-    inner_reader, inner_writer = await asyncio.open_connection(*inner)
-    inner_writer.write(_closing(data))
+    inner_reader, inner_writer = await inner.connect()
+    inner_writer.write(inner.marked(_closing(data)))
     await asyncio.gather(_carry(reader, inner_writer), _carry(inner_reader, writer))
 
 

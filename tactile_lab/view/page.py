@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import ipaddress
+import socket
 import threading
 from collections.abc import Callable
 from contextlib import redirect_stdout
@@ -17,7 +19,8 @@ from drivers.core.errors import DeviceError
 from sessions.guided.operator import Ask
 from tactile_lab.view.controls import Controls
 from tactile_lab.view.drawing import Drawing
-from tactile_lab.view.gate import Gate, inner_address, is_loopback, serve
+from tactile_lab.view.gate import Gate, is_loopback, serve
+from tactile_lab.view.inner_door import InnerDoor
 from tactile_lab.view.scene import Scene
 from tactile_lab.view.wizard_feed import QUIT
 from tactile_lab.view.wizard_panel import WizardPanel
@@ -55,8 +58,9 @@ class Page:
                 "a token is needed to listen on this address", where=address, hint="Listen on 127.0.0.1, or use --token"
             )
         self._door, self._token = (address, port), token
-        with redirect_stdout(StringIO()):  # viser greets on standard output
-            self._inner = viser.ViserServer(host=inner_address(), port=0, label=title, verbose=False)
+        self._inner_door = InnerDoor()
+        with redirect_stdout(StringIO()), self._inner_door.in_place_of_ports():  # viser greets on standard output
+            self._inner = viser.ViserServer(port=0, label=title, verbose=False)
         refuse_tunnels(self._inner)
         self._inner.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
         self._inner.gui.set_panel_label(title)
@@ -73,9 +77,8 @@ class Page:
         """Start listening. Raises DeviceError if the address is not available."""
         self._thread.start()
         address, port = self._door
-        inner = (self._inner.get_host(), self._inner.get_port())
         gate = Gate(_names(address), self._token)
-        opened = asyncio.run_coroutine_threadsafe(serve(gate, address, port, inner), self._loop)
+        opened = asyncio.run_coroutine_threadsafe(serve(gate, address, port, self._inner_door), self._loop)
         try:
             server = opened.result(10)
         except (OSError, TimeoutError) as error:
@@ -83,7 +86,8 @@ class Page:
             raise DeviceError(f"cannot listen on port {port} ({error})", where=address) from error
         self._server = server
         bound = server.sockets[0].getsockname()[1]
-        shown = f"[{address}]" if ":" in address else address
+        name = socket.gethostname() if _is_every(address) else address
+        shown = f"[{name}]" if ":" in name else name
         self.url = f"http://{shown}:{bound}/" + (f"?token={self._token}" if self._token else "")
         return self
 
@@ -102,6 +106,7 @@ class Page:
         self._loop.close()
         with redirect_stdout(StringIO()):
             self._inner.stop()
+        self._inner_door.close()
 
     def draw(self) -> None:
         """Show what has changed in the scene."""
@@ -139,8 +144,16 @@ async def _end_visits() -> None:
     await asyncio.gather(*others, return_exceptions=True)
 
 
-def _names(address: str) -> frozenset[str]:
-    """Valid host names of a page at an address."""
+def _names(address: str) -> frozenset[str] | None:
+    """Valid host names of a page at an address; None for any: others reach this computer by name and by address."""
     if is_loopback(address):
         return frozenset({address, "localhost", "127.0.0.1", "::1"})
-    return frozenset({address.lower()})
+    return None
+
+
+def _is_every(address: str) -> bool:
+    """Whether it stands for all addresses of this computer, as 0.0.0.0 does."""
+    try:
+        return ipaddress.ip_address(address).is_unspecified
+    except ValueError:
+        return False

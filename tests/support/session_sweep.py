@@ -67,9 +67,10 @@ BLIND: dict[str, dict[str, dict[str, str]]] = {
 STRIKES_AT_s = 7.0
 """When the faults strike: in a session of one grasp the fingers are closing then."""
 
-LONGEST_s = {"hand": 1.0, "base": 0.5, "ft/MF": 0.5, "camera": 1.5}
-"""From the fault to the session's end, where it ends: ten lost cycles, 0.2 s without a fingertip, a second for a
-picture, and the cycles that stop the hand. A finger whose angle seems to stand still is stopped by force."""
+LONGEST_s = {"hand": 3.0, "base": 0.5, "ft/MF": 0.5, "camera": 1.5}
+"""From the fault to the session's end, where it ends: 2 s in which a hand may come back, ten lost cycles of the
+positioner, 0.2 s without a fingertip, a second for a picture, and the cycles that stop the hand. A finger whose angle
+seems to stand still is stopped by force."""
 
 UNTIL_IT_MOVES_s = {("base", "stuck value"): 5.0}
 """The same for what cannot be seen before the device is to move."""

@@ -13,8 +13,8 @@ LARGEST_YAML_bytes = 1 * MB
 """Rig files, calibrations, settings and session descriptions are a hundredth of it; more takes minutes to parse."""
 LARGEST_TABLE_bytes = 16 * MB
 """A CSV table: 100 000 timed contacts, or an hour of presses."""
-LARGEST_JSON_bytes = 32 * MB
-"""A contact log of 16 000 grasps."""
+LARGEST_JSON_bytes = 16 * MB
+"""A contact log of 8000 grasps; a document of nothing but brackets takes twenty times as much in memory."""
 LARGEST_MESH_bytes = 64 * MB
 """A binary mesh of more than a million triangles."""
 

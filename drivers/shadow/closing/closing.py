@@ -180,7 +180,7 @@ SIDEWAYS: Mapping[str, Leaning] = {
     for side, lean_rad in (("left", np.pi / 2), ("right", -np.pi / 2))
 }
 """Closings with the palm upright, the fingertips one above the other. The hand comes along the grasp frame's -y axis
-from its left, first finger down, or along +y from its right, first finger up (decision 43). The forearm, 100 mm thick,
+from its left, first finger down, or along +y from its right, first finger up (decision 45). The forearm, 100 mm thick,
 keeps the lowest fingertip at 18 mm from the left and at 30 mm from the right."""
 
 SIDES = ("left", "right")

@@ -15,6 +15,7 @@ from drivers.shadow.device.motor_polling import load_rates
 from drivers.shadow.ethercat.hand_transport import EthercatSettings, EthercatTransport, find_palm
 from drivers.shadow.ethercat.pysoem_transport import PysoemTransport
 from drivers.shadow.model.gains import load_gains
+from drivers.shadow.model.hand_info import HandInfo, check_map, load_infos
 from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.motor_configuration import load_configurations
@@ -83,12 +84,18 @@ class HandSetup(StrictModel):
         return (EthercatTransport if self.master == "own" else PysoemTransport)(self.name, settings, clock)
 
     def check_files(self) -> None:
-        """Read every file that is named. Raises ConfigurationError."""
+        """Read every file that is named, and compare them with what stands beside them. Raises ConfigurationError."""
         self.settings()
         self.motor_map()
         JointCalibration.load(self.joints)
+        check_map(self.motors, self.infos())
         if self.boards is not None:
             load_configurations(self.boards)
+
+    def infos(self) -> dict[Path, HandInfo]:
+        """What the hand's own folders say of it, by file. Raises ConfigurationError."""
+        files = (self.joints, self.motors, self.boards, self.rates, self.gains)
+        return load_infos(file for file in files if file is not None)
 
     def motor_map(self) -> MotorMap:
         """Which motor pulls which joint. Raises ConfigurationError."""

@@ -8,9 +8,11 @@ from drivers.core.errors import DeviceError
 from drivers.shadow.protocol.palm_images import (
     BRIDGE_PRODUCT,
     SHADOW_VENDOR,
+    SIDES,
     WHICH_PALMS,
     PalmImage,
     PalmName,
+    Side,
     describe_product,
     palm_of_product,
 )
@@ -52,7 +54,12 @@ class HandIdentity:
 
 
 def checked_image(
-    bridge: BoardIdentity, palm: BoardIdentity, stated: PalmName | None, serial: int | None, where: str
+    bridge: BoardIdentity,
+    palm: BoardIdentity,
+    stated: PalmName | None,
+    serial: int | None,
+    where: str,
+    side: Side | None = None,
 ) -> PalmImage:
     """The process image of a hand's palm, by its product code.
 
@@ -61,6 +68,7 @@ def checked_image(
         stated: the palm that must be there; any that can be driven when None.
         serial: the hand that must be there; any when None.
         where: the interface or device, for messages.
+        side: the side that must be there, where the product code tells it; any when None.
 
     Raises:
         DeviceError: a board that does not belong there, with what to do.
@@ -78,6 +86,9 @@ def checked_image(
     if stated not in (None, image.name):
         hint = f'Set hand.palm to "{image.name}", or leave it out'
         raise DeviceError(f"a {image.name} palm, not a {stated}", where=where, hint=hint)
+    if side is not None and SIDES.get(palm.product, side) != side:
+        what = f"the palm of a {SIDES[palm.product]} hand, not of a {side} one (product {palm.product:#x})"
+        raise DeviceError(what, where=where, hint="Its contacts would be mirrored: connect the hand of the rig file")
     if serial not in (None, palm.serial):
         hint = "Use the rig file and the calibration of the connected hand"
         raise DeviceError(f"hand {palm.serial}, not hand {serial}", where=where, hint=hint)

@@ -27,7 +27,7 @@ from drivers.ethercat.registers import AlCode, AlState, AlStatus, Register
 from drivers.shadow.ethercat.cables import CableWatch
 from drivers.shadow.ethercat.hand_identity import HandIdentity
 from drivers.shadow.ethercat.ring import HandRing, image_telegram
-from drivers.shadow.protocol.palm_images import PalmName
+from drivers.shadow.protocol.palm_images import PalmName, Side
 
 _WRITTEN, _READ = 2, 1
 _SLAVES = 2
@@ -40,6 +40,7 @@ class EthercatSettings(StrictModel):
         interface: network interface the hand is plugged into.
         palm: the palm that must be there; any that can be driven when left out.
         serial: the hand that must be there; any when left out.
+        side: the side that must be there, as far as the palm's product code tells it; any when left out.
         watchdog_s: palm leaves OP when no command came for so long; when left out it relies on its motors, which halt
             by themselves after 20 ms, as Shadow's own driver does.
         poll_every: the slaves' states are looked at every so many cycles.
@@ -49,6 +50,7 @@ class EthercatSettings(StrictModel):
     interface: str = Field(min_length=1)
     palm: PalmName | None = None
     serial: int | None = None
+    side: Side | None = None
     watchdog_s: float | None = Field(default=None, gt=0.0, le=5.0)
     poll_every: int = Field(default=100, ge=1)
     master: MasterSettings = MasterSettings()
@@ -108,7 +110,7 @@ def find_palm(settings: EthercatSettings, clock: Clock, port: Port | None = None
     master = EtherCatMaster(port or RawPort(settings.interface), clock, settings.master)
     master.open()
     try:
-        _, _, image = HandRing(master, settings.palm, settings.serial).look()
+        _, _, image = HandRing(master, settings.palm, settings.serial, side=settings.side).look()
         return image.name
     finally:
         master.close()
@@ -127,7 +129,7 @@ class EthercatTransport:
     def __init__(self, name: str, settings: EthercatSettings, clock: Clock, port: Port | None = None) -> None:
         self.name, self._settings, self._clock = name, settings, clock
         self._master = EtherCatMaster(port or RawPort(settings.interface), clock, settings.master)
-        self._ring = HandRing(self._master, settings.palm, settings.serial, settings.watchdog_s)
+        self._ring = HandRing(self._master, settings.palm, settings.serial, settings.watchdog_s, settings.side)
         self._cables = CableWatch(HandRing.BRIDGE, HandRing.PALM)
         self._incomplete = ""
         self._hand: HandIdentity | None = None

@@ -201,7 +201,7 @@ class PysoemTransport:
             raise self._wrong(f"{max(count, 0)} EtherCAT slaves instead of 2", "Check the hand's cable and power")
         first, palm = master.slaves
         bridge, board = _board(first, 0), _board(palm, int.from_bytes(palm.eeprom_read(SERIAL_WORD)[:4], "little"))
-        image = checked_image(bridge, board, self._settings.palm, self._settings.serial, self.name)
+        image = checked_image(bridge, board, self._settings.palm, self._settings.serial, self.name, self._settings.side)
         master.config_map()
         if (len(palm.output), len(palm.input)) != (image.command_bytes, image.status_bytes):
             what = f"its EEPROM describes {len(palm.output)} + {len(palm.input)} bytes of process data"

@@ -11,7 +11,7 @@ from drivers.ethercat.frames import Command, Telegram
 from drivers.ethercat.master import EtherCatMaster, Slave
 from drivers.ethercat.registers import FMMU_BYTES, SYNC_MANAGER_BYTES, AlState, Register
 from drivers.shadow.ethercat.hand_identity import SERIAL_WORD, BoardIdentity, HandIdentity, checked_image
-from drivers.shadow.protocol.palm_images import IMAGE_BASE, PalmImage, PalmName
+from drivers.shadow.protocol.palm_images import IMAGE_BASE, PalmImage, PalmName, Side
 
 _VENDOR, _PRODUCT, _REVISION = 0x08, 0x0A, 0x0C
 _ALL_REGISTERS = bytes(256)
@@ -39,8 +39,10 @@ class HandRing:
         palm: PalmName | None = None,
         serial: int | None = None,
         watchdog_s: float | None = None,
+        side: Side | None = None,
     ) -> None:
         self._master, self._palm, self._serial, self._watchdog_s = master, palm, serial, watchdog_s
+        self._side = side
 
     def bring_up(self) -> HandIdentity:
         """From power-up, or from wherever the slaves are, to OP with an all-zero image exchanged.
@@ -82,7 +84,7 @@ class HandRing:
         """
         self._check_ring()
         bridge, palm = self._identify(0), self._identify(1)
-        return bridge, palm, checked_image(bridge, palm, self._palm, self._serial, self._master.where)
+        return bridge, palm, checked_image(bridge, palm, self._palm, self._serial, self._master.where, self._side)
 
     def _check_ring(self) -> None:
         count = self._master.count_slaves()

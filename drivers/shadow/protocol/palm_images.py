@@ -98,6 +98,11 @@ PALMS: dict[PalmName, PalmImage] = {
 }
 """The palms that can be driven."""
 
+Side = Literal["right", "left"]
+
+SIDES: dict[int, Side] = {0x01000000: "right", 0x01000001: "left"}
+"""Side of the hand by the palm's product code; the other palms' codes do not tell it."""
+
 USUAL_PALM: PalmName = "0220"
 """That of most hands, and of emulated ones that nobody wants otherwise."""
 

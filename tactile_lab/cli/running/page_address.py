@@ -23,7 +23,7 @@ Listen = Annotated[
     typer.Option(
         "--listen",
         metavar="ADDRESS",
-        help="Address of the page; --token is required for addresses other than this computer's loopback.",
+        help="Address of the page; 0.0.0.0: all of this computer's. Whoever has the token may press buttons.",
         rich_help_panel=_PANEL,
     ),
 ]
@@ -32,7 +32,8 @@ Token = Annotated[
     typer.Option(
         "--token",
         envvar="TACTILE_LAB_TOKEN",
-        help="Access token that visitors of the page must give; 'new' creates one.",
+        help="Access token that visitors of the page must give.",
+        show_default="a new one",
         rich_help_panel=_PANEL,
     ),
 ]
@@ -55,18 +56,14 @@ class PageAddress:
         return cls(address, port, token) if view else None
 
     def check(self) -> tuple[str, int, str]:
-        """Address, port and token to use. Raises ConfigurationError."""
-        from tactile_lab.view.gate import is_loopback, new_token
+        """Address, port and token to use. Raises ConfigurationError.
 
-        token = new_token() if self.token == "new" else self.token
-        if not token and not is_loopback(self.address):
-            hint = "Use --token new, or listen on 127.0.0.1"
-            raise ConfigurationError(
-                "anyone who can reach this address could control the session", where=self.address, hint=hint
-            )
-        if token and (
-            len(token) < LEAST_TOKEN or not all(c.isalnum() or c in "-_" for c in token) or not token.isascii()
-        ):
+        There is a token always: on this computer, too, other users' programs could press the buttons.
+        """
+        from tactile_lab.view.gate import new_token
+
+        token = new_token() if self.token in ("", "new") else self.token
+        if len(token) < LEAST_TOKEN or not all(c.isalnum() or c in "-_" for c in token) or not token.isascii():
             text = f"a token needs at least {LEAST_TOKEN} letters, digits, - or _"
             raise ConfigurationError(text, where="--token", hint="Use --token new to create one")
         return self.address, self.port, token

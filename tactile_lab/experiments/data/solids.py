@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from skimage.measure import marching_cubes
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.simulation.mesh_object import load_truth_mesh
 from drivers.simulation.objects import CATALOGUE, object_model
+from tactile_lab.experiments.data.household import HOUSEHOLD, blend, capped_cylinder, surface_of
 from tactile_lab.experiments.data.ray_casting import first_hits
 from tactile_lab.slam.shape.surfaces.sampling import nearest_on_mesh
 
@@ -27,8 +27,8 @@ DATA_VARIABLE = "TACTILE_LAB_DATA"
 
 YCB_PREFIX = "ycb:"
 YCB_NAMES = ("cracker_box", "mug", "mustard_bottle", "tomato_soup_can")
-
-_MUG_GRID_m = 0.0015
+MORE_YCB_NAMES = ("foam_brick", "potted_meat_can", "sugar_box")
+"""Scans that only the experiments on everyday things take."""
 
 
 class Solid:
@@ -81,7 +81,7 @@ def solid(name: str) -> Solid:
         return Solid(name, SOLIDS[name]())
     if name in CATALOGUE:
         return Solid(name, object_model(name).mesh)
-    known = ", ".join([*SOLIDS, *CATALOGUE, *(YCB_PREFIX + ycb for ycb in YCB_NAMES)])
+    known = ", ".join([*SOLIDS, *CATALOGUE, *(YCB_PREFIX + ycb for ycb in (*YCB_NAMES, *MORE_YCB_NAMES))])
     raise ConfigurationError(f"there is no solid {name!r}", where="shape", hint=f"Available solids: {known}")
 
 
@@ -97,7 +97,9 @@ def ycb_path(name: str) -> Path:
         raise ConfigurationError(f"the mesh of {YCB_PREFIX}{name} is missing", where=DATA_VARIABLE, hint=hint)
     path = Path(folder) / "ycb_meshes" / f"ycb_{name}.ply"
     if not path.is_file():
-        raise ConfigurationError(f"no mesh {path.name}", where=str(path.parent), hint=f"Names: {', '.join(YCB_NAMES)}")
+        raise ConfigurationError(
+            f"no mesh {path.name}", where=str(path.parent), hint="Copy the scans of the YCB set there"
+        )
     return path
 
 
@@ -108,40 +110,16 @@ def _ellipsoid() -> trimesh.Trimesh:
     return mesh
 
 
-def _bottle() -> trimesh.Trimesh:
-    """A body of 70 mm with rounded shoulders and a neck of 28 mm, 130 mm high."""
-    radii_mm = [0, 32, 35, 35, 34, 30, 23, 17, 14, 14, 12, 0]
-    heights_mm = [-65, -65, -61, 12, 22, 32, 41, 47, 53, 63, 65, 65]
-    mesh: trimesh.Trimesh = trimesh.creation.revolve(np.column_stack([radii_mm, heights_mm]) / 1000, sections=96)
-    return mesh
-
-
 def _mug() -> trimesh.Trimesh:
     """A filled mug: a cylinder of 76 mm and 96 mm height, and a ring of 16 mm thickness for a handle towards +x."""
-    axes = [np.arange(low, high, _MUG_GRID_m) for low, high in ((-0.042, 0.086), (-0.042, 0.043), (-0.052, 0.053))]
-    x, y, z = np.meshgrid(*axes, indexing="ij")
-    body = _capped_cylinder(np.hypot(x, y), z, radius_m=0.038, half_height_m=0.048)
-    handle = np.hypot(np.hypot(x - 0.044, z) - 0.028, y) - 0.008
-    distances_m = _blend(body, handle, 0.006)
-    vertices, faces, _, _ = marching_cubes(distances_m, 0.0, spacing=(_MUG_GRID_m,) * 3)  # type: ignore[no-untyped-call]
-    mesh = trimesh.Trimesh(vertices + [axis[0] for axis in axes], faces)
-    if mesh.volume < 0:
-        mesh.invert()
-    return mesh
+
+    def distance(x: Any, y: Any, z: Any) -> Any:
+        body = capped_cylinder(np.hypot(x, y), z, radius_m=0.038, half_length_m=0.048)
+        handle = np.hypot(np.hypot(x - 0.044, z) - 0.028, y) - 0.008
+        return blend(body, handle, 0.006)
+
+    return surface_of(distance, (-0.042, -0.042, -0.052), (0.086, 0.043, 0.053))
 
 
-def _capped_cylinder(radial_m: Any, z_m: Any, *, radius_m: float, half_height_m: float) -> Any:
-    """Signed distance to a standing cylinder, negative inside."""
-    beside, above = radial_m - radius_m, np.abs(z_m) - half_height_m
-    outside = np.hypot(np.maximum(beside, 0.0), np.maximum(above, 0.0))
-    return np.minimum(np.maximum(beside, above), 0.0) + outside
-
-
-def _blend(one_m: Any, other_m: Any, width_m: float) -> Any:
-    """The union of two solids given by signed distances, their seam rounded over ``width_m``."""
-    near = np.maximum(width_m - np.abs(one_m - other_m), 0.0) / width_m
-    return np.minimum(one_m, other_m) - near**2 * width_m / 4
-
-
-SOLIDS: Mapping[str, Callable[[], trimesh.Trimesh]] = {"ellipsoid": _ellipsoid, "mug": _mug, "bottle": _bottle}
-"""Solids that the rig's catalogue does not have; origin in the middle of their height."""
+SOLIDS: Mapping[str, Callable[[], trimesh.Trimesh]] = {"ellipsoid": _ellipsoid, "mug": _mug, **HOUSEHOLD}
+"""Solids that the rig's catalogue does not have."""

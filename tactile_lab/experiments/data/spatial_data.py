@@ -2,9 +2,11 @@
 
 On the table the five fingers come from the sides, tilted downward by up to 30 degrees, towards one of three
 heights in turn (a fifth, a half and four fifths of the object's); in most grasps one of them presses from
-above instead. In free motion the palm comes from a new side every time. A finger that meets nothing tries up to
-five other ways. The hand re-centres from its own last contacts, never from an estimate, so every method sees the
-same data for one solid, motion, noise and seed. Noise as in :mod:`tactile_lab.experiments.data.sensing`.
+above instead. Everyday things are tall, and all of their height is grasped: the middle of a grasp goes up and down in
+even shares of it, the fingers within a hand's breadth of that. In free motion the palm comes from a new side every
+time. A finger that meets nothing tries up to five other ways. The hand re-centres from its own last contacts, never
+from an estimate, so every method sees the same data for one solid, motion, noise and seed. Noise as in
+:mod:`tactile_lab.experiments.data.sensing`.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ from tactile_lab.experiments.data.solids import Solid, solid
 from tactile_lab.slam.shape.surfaces.sampling import sample_mesh_with_normals
 
 Motion: TypeAlias = Literal["table", "free"]
+Heights: TypeAlias = Literal["three", "all"]
 
 _FAN_rad = np.deg2rad([-75.0, -25.0, 25.0, 75.0, 180.0])
 _FAN_SIGMA_rad = float(np.deg2rad(12.0))
@@ -37,6 +40,9 @@ _REACH_m = 0.150
 _LEVELS = (0.2, 0.5, 0.8)
 _LEVEL_SIGMA_m = 0.003
 _EDGE_m = 0.004
+_HALF_BREADTH_m = 0.033
+_GOLDEN = (np.sqrt(5) - 1) / 2
+"""Multiples of it, but for whole numbers, divide an interval ever more evenly."""
 _TOP_SHARE = 0.7
 _TRIES = 6
 _TABLE_CLEARANCE_m = 0.002
@@ -70,6 +76,7 @@ def simulate(
     motion_scale: float = 1.0,
     count: int = 24,
     outlier_share: float = 0.0,
+    heights: Heights = "three",
 ) -> SpatialGrasps:
     """Grasps of a solid that slips between them.
 
@@ -81,12 +88,14 @@ def simulate(
         motion_scale: slip relative to that.
         count: number of grasps.
         outlier_share: share of contacts that are grossly wrong.
+        heights: on the table, "three" levels in turn, or "all" of the solid's height.
 
     Raises:
         ConfigurationError: no such solid, or its mesh is not on this machine.
     """
     rng = np.random.default_rng([seed, 31607, round(1000 * motion_scale), ("table", "free").index(motion)])
-    session = (_OnTable if motion == "table" else _InSpace)(solid(shape), motion_scale, rng)
+    on_table = _OnTable if heights == "three" else _AtAllHeights
+    session = (on_table if motion == "table" else _InSpace)(solid(shape), motion_scale, rng)
     grasps: list[Grasp] = []
     truth: list[Pose3] = []
     hand_motion = Pose3()
@@ -226,8 +235,7 @@ class _OnTable(_Session):
         rng, height = self._rng, self.solid.height_m
         angles = _FAN_rad + rng.normal(0.0, _FAN_SIGMA_rad, 5)
         tilts = np.deg2rad(rng.uniform(0.0, 30.0, 5))
-        heights = _LEVELS[index % 3] * height + rng.normal(0.0, _LEVEL_SIGMA_m, 5)
-        heights = np.clip(heights, _EDGE_m, height - _EDGE_m)
+        heights = np.clip(self.levels_m(index), _EDGE_m, height - _EDGE_m)
         aims = np.column_stack([rng.normal(0.0, 0.014 * spread, (5, 2)), heights])
         if rng.random() < _TOP_SHARE:
             finger = rng.integers(0, 4)
@@ -236,6 +244,10 @@ class _OnTable(_Session):
         ways = -_directions(angles, tilts)
         world_T_foot = spatial(planar(self.world_T_palm))
         return _Rays(transform_points(world_T_foot, aims - _REACH_m * ways), rotate(world_T_foot, ways))
+
+    def levels_m(self, index: int) -> Array:
+        """Heights that the fingers of a grasp aim at, shape (5,)."""
+        return _LEVELS[index % 3] * self.solid.height_m + self._rng.normal(0.0, _LEVEL_SIGMA_m, 5)
 
     def hand_step(self) -> tuple[Array, Rot3]:
         shift = np.append(self._rng.normal(0.0, 0.005, 2), 0.0)
@@ -248,6 +260,17 @@ class _OnTable(_Session):
     def approach(self, middle_world_m: Array) -> None:
         place = middle_world_m[:2] + self._rng.normal(0.0, 0.008, 2)
         self.world_T_palm = spatial(planar_pose(place, self._rng.normal(0.0, 0.1)), _REACH_m)
+
+
+class _AtAllHeights(_OnTable):
+    """The same with grasps all over the height."""
+
+    def levels_m(self, index: int) -> Array:
+        """As wide as a hand is, or as the solid is high."""
+        height = self.solid.height_m
+        breadth = min(_HALF_BREADTH_m, height / 2)
+        middle = breadth + ((index + 1) * _GOLDEN % 1.0) * (height - 2 * breadth)
+        return np.asarray(middle + self._rng.uniform(-breadth, breadth, 5))
 
 
 class _InSpace(_Session):

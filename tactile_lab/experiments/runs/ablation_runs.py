@@ -68,6 +68,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         "face extents": _shape("face extents"),
         "corners": _shape("corners"),
         "contradictions": _shape("contradictions"),
+        "held-out contacts": _shape("held-out contacts"),
         "field": _shape("field"),
         "polygon": _shape("polygon"),
         "polyhedron": _shape("polyhedron"),
@@ -81,7 +82,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
 )
 """What is left out, by name, as settings."""
 
-_IN_SPACE_ONLY = ("polyhedron", "prism", "standing field", "strays", "pose uncertainty")
+_IN_SPACE_ONLY = ("polyhedron", "prism", "standing field", "strays", "held-out contacts", "pose uncertainty")
 _IN_PLANE_ONLY = ("corners", "without one")
 _LONG_ONLY = ("fixed lag",)
 _LONG_TOO = (NOTHING, "fixed lag", "loops")

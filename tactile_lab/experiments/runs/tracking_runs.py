@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -13,8 +14,10 @@ from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.data import planar_data, spatial_data
 from tactile_lab.experiments.data.sensing import SimulatedGrasps, SLIP_SIGMA_m, SLIP_SIGMA_rad
 from tactile_lab.experiments.run_metrics import contour_figures, slam_figures
+from tactile_lab.experiments.touched_metrics import touched_figures
 from tactile_lab.slam.graph.faces import FaceSettings, assign_to_segments, contour_segments
 from tactile_lab.slam.graph.pose_graph import PoseGraphSettings, find_loops, optimise_poses
+from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.shape.surfaces.surface import Contour
@@ -22,6 +25,9 @@ from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import compose, planar_motion, row_pose_in_space
+
+_Data = TypeVar("_Data", bound=SimulatedGrasps)
+Figures: TypeAlias = Callable[[_Data, SlamResult], dict[str, Any]]
 
 WITHOUT_GRAPH = "particle, no graph"
 """The calibrated filter whose poses the pose graph does not correct."""
@@ -57,7 +63,16 @@ def track_in_space(cell: Cell) -> dict[str, Any]:
     return _track(data, cell, dimension=3, freedom="space")
 
 
-def _track(data: SimulatedGrasps, cell: Cell, dimension: int, freedom: str = "table") -> dict[str, Any]:
+def track_everyday_thing(cell: Cell) -> dict[str, Any]:
+    """A method on grasps all over a thing on the table, judged where it was touched. Cell: as on the table."""
+    scale = cell["noise"] / 100
+    data = spatial_data.simulate(cell["shape"], cell.seed, motion_scale=scale, count=cell["grasps"], heights="all")
+    return _track(data, cell, dimension=3, figures=touched_figures)
+
+
+def _track(
+    data: _Data, cell: Cell, dimension: int, freedom: str = "table", figures: Figures[_Data] | None = None
+) -> dict[str, Any]:
     settings = _slam_settings(cell, dimension, freedom)
     slam = TactileSlam(settings, cell.seed, data.world_T_body if settings.method == "known-pose" else None)
     for grasp in data.grasps:
@@ -65,7 +80,8 @@ def _track(data: SimulatedGrasps, cell: Cell, dimension: int, freedom: str = "ta
     started = time.perf_counter()
     result = slam.finish()
     finishing_s = time.perf_counter() - started
-    return {**slam_figures(data, result), "finish_ms": round(1e3 * finishing_s, 1)}
+    further = figures(data, result) if figures else {}
+    return {**slam_figures(data, result), **further, "finish_ms": round(1e3 * finishing_s, 1)}
 
 
 def _slam_settings(cell: Cell, dimension: int, freedom: str) -> SlamSettings:

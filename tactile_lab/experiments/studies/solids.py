@@ -4,24 +4,34 @@ from __future__ import annotations
 
 from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.cells import Cell, Setting, grid
-from tactile_lab.experiments.data.solids import YCB_NAMES, YCB_PREFIX, ycb_path
+from tactile_lab.experiments.data.household import HOUSEHOLD
+from tactile_lab.experiments.data.solids import MORE_YCB_NAMES, YCB_NAMES, YCB_PREFIX, ycb_path
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.runs import contact_limit, known_shape, solid_limit, tracking_runs
-from tactile_lab.experiments.studies.columns import AGAINST_KNOWN, MEAN_DISTANCE, REGISTRATION, TRACKING_COLUMNS
+from tactile_lab.experiments.studies.columns import (
+    AGAINST_KNOWN,
+    FINISH,
+    MEAN_DISTANCE,
+    REGISTRATION,
+    STEP,
+    TRACKING_COLUMNS,
+)
 from tactile_lab.experiments.studies.planar import METHODS
 from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, ranges
+from tactile_lab.experiments.summary import Column
 
 FACETED_SOLIDS = ("box-12x6x6", "triangular-prism", "hexagonal-prism", "l-block")
 CURVED_SOLIDS = ("ellipsoid", "cylinder", "sphere", "mug", "bottle")
 SCANNED_SOLIDS = tuple(YCB_PREFIX + name for name in YCB_NAMES)
+EVERYDAY_SCANS = tuple(YCB_PREFIX + name for name in (*YCB_NAMES, *MORE_YCB_NAMES))
 SPATIAL_GRASPS = 24
 
 
-def scans_left_out() -> str:
+def scans_left_out(scans: tuple[str, ...] = SCANNED_SOLIDS) -> str:
     """Why scanned solids are left out, "" where they are here."""
     try:
-        for name in YCB_NAMES:
-            ycb_path(name)
+        for name in scans:
+            ycb_path(name.removeprefix(YCB_PREFIX))
     except ConfigurationError as error:
         return f"scanned solids are left out: {error}"
     return ""
@@ -33,6 +43,15 @@ def _solids() -> tuple[str, ...]:
 
 def _methods_on_table(grasps: int) -> list[Setting]:
     return grid(noise=[100], shape=_solids(), method=METHODS, grasps=[grasps])
+
+
+def _everyday_scans_left_out() -> str:
+    return scans_left_out(EVERYDAY_SCANS)
+
+
+def _everyday_things(grasps: int) -> list[Setting]:
+    shapes = (*HOUSEHOLD, *(() if _everydayscans_left_out() else EVERYDAY_SCANS))
+    return grid(noise=[100], shape=shapes, method=("known-pose", "joint"), grasps=sorted({grasps, grasps * 3 // 2}))
 
 
 def _known_on_table(grasps: int) -> list[Setting]:
@@ -70,6 +89,26 @@ METHODS_3D = Experiment(
     kind=_followable,
     grasps=SPATIAL_GRASPS,
     left_out=scans_left_out,
+)
+
+EVERYDAY = Experiment(
+    "everyday-3d",
+    "Everyday things on a table, grasped at all heights: known poses against estimated ones, where they were touched.",
+    _everyday_things,
+    tracking_runs.track_everyday_thing,
+    (
+        Column("Hausdorff where touched, mm", "touched_hausdorff_mm", 2, versus=True),
+        Column("mean distance there, mm", "touched_mean_mm", 2, kind="median"),
+        Column("within 2 sigma there", "touched_within_2_sigma", 0, kind="percent"),
+        Column("surface touched", "touched_share", 0, kind="percent"),
+        REGISTRATION,
+        STEP,
+        FINISH,
+    ),
+    ranges("method", "Hausdorff distance where touched, mm", "touched_hausdorff_mm", lambda cell: str(cell["shape"])),
+    pooled=("shape",),
+    grasps=SPATIAL_GRASPS,
+    left_out=_everyday_scans_left_out,
 )
 
 KNOWN_SHAPE = Experiment(

@@ -89,10 +89,10 @@ class TrackingSettings(StrictModel):
     """Settings of tracking.
 
     Attributes:
-        method: "joint" keeps several trajectories, proposed by the measurement and smoothed with the shape;
-            "thesis-pf" is algorithm 3.1 with (3.9) and the gate, "thesis-pf-graph" the same with the pose graph behind;
-            "particle" is that filter with the calibrated likelihood. Baselines: "known-pose" is given the true poses,
-            "odometry" believes the hand's motion, "icp" registers each grasp to those before.
+        method: "joint" keeps several trajectories, proposed by the measurement and smoothed with the shape; "thesis-pf"
+            is algorithm 3.1 with (3.9) and the gate, "thesis-pf-graph" the same with the pose graph behind; "particle"
+            is that filter with the calibrated likelihood. Baselines: "known-pose" is given the true poses, "odometry"
+            believes the hand's motion, "icp" registers each grasp to those before.
         dimension: 2 for the horizontal contour, 3 for the surface.
         freedom: "table", the object stands on the table and only turns and slides; "space", it is held free.
         motion: slip of the object relative to the hand's motion.
@@ -102,8 +102,8 @@ class TrackingSettings(StrictModel):
         likelihood: of the calibrated one.
         joint: parameters of the hypotheses.
         icp: parameters of the registration baseline.
-        kernel_every: kernel parameters are estimated again after this many grasps. contour_grid_m, surface_grid_m:
-            spacing of the grid that particles look the field up in.
+        kernel_every: kernel parameters are estimated again after this many grasps.
+        contour_grid_m, surface_grid_m: spacing of the grid that particles look the field up in.
     """
 
     method: Method = "joint"

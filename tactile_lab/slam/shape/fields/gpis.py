@@ -127,6 +127,13 @@ class Gpis:
             points_m, normals, self.settings, observations, self.kernel, self.prior, self.noise_scale, factor
         )
 
+    def of_some(self, kept: NDArray[np.intp]) -> Self:
+        """The field of some contacts by their indices, its kernel as it is; normals are observed."""
+        seen = self.observations
+        sigmas = seen.value_sigma_m[kept], seen.gradient_sigma[kept]
+        fewer = type(self).fit(self.contacts_m[kept], self.normals[kept], *sigmas, self.settings)
+        return fewer.with_log_parameters(self.kernel.log_parameters)
+
     def optimise(
         self, *, noise: bool = False, max_iterations: int = 30, longest_m: float = _LENGTH_BOUNDS_m[1]
     ) -> Self:
@@ -177,6 +184,17 @@ class Gpis:
         by_kernel = log_parameter_traces(self.kernel, self.observations.points_m, self._gradient_count, outer)
         by_noise = 2 * self.noise_scale**2 * (np.diag(outer) @ self.observations.noise_variance)
         return 0.5 * np.append(by_kernel, by_noise)
+
+    def log_density_given_others(self, asked: NDArray[np.intp]) -> float:
+        """Logarithm of the joint density of some contacts, value and normal, given all others; normals are observed.
+
+        Args:
+            asked: indices of the contacts, shape (a,).
+        """
+        each = np.arange(self.contacts_m.shape[1] + 1)
+        together = (asked[:, None] + len(self.contacts_m) * each).reshape(1, -1)
+        cost = negative_log_densities(self._factor, self._weights, together)[0]
+        return float(-cost - 0.5 * together.size * np.log(2 * np.pi))
 
     def leave_one_out_costs(self, asked: NDArray[np.intp]) -> Array:
         """Negative log density of some contacts, value and normal, each given all others, up to a constant.

@@ -22,6 +22,7 @@ ShapePart: TypeAlias = Literal[
     "standing field",
     "strays",
     "contradictions",
+    "held-out contacts",
     "corners",
     "right angles",
     "face extents",

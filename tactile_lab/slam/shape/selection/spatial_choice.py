@@ -9,8 +9,10 @@ import numpy as np
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.model import FittedShape
+from tactile_lab.slam.shape.selection.held_out import foretells_better
 from tactile_lab.slam.shape.solids.planes import divide
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
 from tactile_lab.slam.shape.solids.prism import Prism
@@ -25,8 +27,12 @@ _LARGEST_SHARE_OFF, _LARGEST_SHARE_FILLED = 0.15, 0.05
 _KERNEL_STEPS = 10
 _LEFT_OUT_nats = 12.0
 """A contact that is off the surface by centimetres is as improbable as an outlier among twenty good contacts."""
+_BEYOND_DOUBT_nats = 3.0
+"""A sharp solid that explains each contact so much better than the field is taken at once: no curved thing came near
+(2.7 was the most), looking takes its time, and a face of few contacts may be missing where some are held out."""
 
 OutlineChoice = Callable[[Gpis, "Array | None"], FittedShape]
+Fit = Callable[[Gpis], FittedShape]
 
 
 def best_spatial_shape(
@@ -39,7 +45,8 @@ def best_spatial_shape(
     """The field itself, or a solid with flat faces or upright walls if that is the more probable one.
 
     A sharp solid is only taken if it holds what is known: its contacts lie on its surface, and it does not fill
-    places that fingers went through.
+    places that fingers went through. And it has to foretell contacts that it was not fitted to better than the field
+    does (:mod:`tactile_lab.slam.shape.selection.held_out`).
 
     Args:
         field: the field as a shape, taken unless another model is more probable; without a table it keeps all contacts.
@@ -56,11 +63,23 @@ def best_spatial_shape(
     if floor_m is not None and "standing field" not in without:
         field = _try_make(lambda: StandingField.fit(gpis, floor_m)) or field
     best, most = field, -np.inf if "field" in without else field.log_evidence or -np.inf
-    for shape in _candidates(gpis, best_outline, free_points_m, floor_m):
+    for fit in _candidates(gpis.settings, best_outline, free_points_m, floor_m):
+        shape = _try_make(lambda fit=fit: fit(gpis))  # type: ignore[misc]
+        if shape is None:
+            continue
         evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=most)
-        if evidence > most:
+        if evidence > most and _earned(fit, evidence, gpis, floor_m):
             best, most = shape, evidence
     return best
+
+
+def _earned(fit: Fit, evidence: float, gpis: Gpis, floor_m: float | None) -> bool:
+    """Whether a sharp solid with more evidence than the field has not got it by following its own contacts."""
+    if not gpis.settings.without.isdisjoint({"field", "held-out contacts"}):
+        return True
+    if evidence - gpis.log_marginal_likelihood() > _BEYOND_DOUBT_nats * len(gpis.contacts_m):
+        return True
+    return foretells_better(fit, gpis, _COARSE_m, floor_m)
 
 
 def _without_strays(gpis: Gpis) -> Gpis:
@@ -83,15 +102,15 @@ def _without_strays(gpis: Gpis) -> Gpis:
 
 
 def _candidates(
-    gpis: Gpis, best_outline: OutlineChoice, free_points_m: Array | None, floor_m: float | None
-) -> list[FittedShape]:
-    upright, without = floor_m is not None, gpis.settings.without
-    makers: list[Callable[[], FittedShape]] = []
-    if "polyhedron" not in without:
-        makers.append(lambda: Polyhedron.fit(gpis, free_points_m, upright=upright))
-    if upright and "prism" not in without:
-        makers.append(lambda: Prism.fit(gpis, best_outline, free_points_m))
-    return [shape for shape in map(_try_make, makers) if shape is not None]
+    settings: GpisSettings, best_outline: OutlineChoice, free_points_m: Array | None, floor_m: float | None
+) -> list[Fit]:
+    """What makes each sharp solid from a field."""
+    upright, fits = floor_m is not None, list[Fit]()
+    if "polyhedron" not in settings.without:
+        fits.append(lambda gpis: Polyhedron.fit(gpis, free_points_m, upright=upright))
+    if upright and "prism" not in settings.without:
+        fits.append(lambda gpis: Prism.fit(gpis, best_outline, free_points_m))
+    return fits
 
 
 def _try_make(maker: Callable[[], FittedShape]) -> FittedShape | None:

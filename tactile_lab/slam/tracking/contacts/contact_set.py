@@ -112,7 +112,8 @@ def _free_places(
     """Free places and the contact of each, by the approach paths; if those are unknown, in the fingertips.
 
     Args:
-        grasp, contacts, counted: all contacts, and those that count. origin: of the object frame, world frame.
+        grasp, contacts, counted: all contacts, and those that count.
+        origin: of the object frame, world frame.
     """
     if not grasp.approach_paths:
         places = [fingertip_places(contacts.points_m[i], contacts.normals[i]) for i in range(len(contacts))]

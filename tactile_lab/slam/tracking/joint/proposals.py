@@ -104,7 +104,8 @@ def propose(
         settings: see there.
         space: kind of the pose vectors.
 
-    Returns: Pose vectors of shape (m, size), and their fit.
+    Returns:
+        Pose vectors of shape (m, size), and their fit.
     """
     spread = quasi_normal(settings.samples, space.size) * space.sigmas(noise)
     spread[settings.samples // 2 :] *= 2.0

@@ -129,6 +129,8 @@ def test_a_planar_log_keeps_the_horizontal_part(tmp_path):
             {"mesh": "../secret.ply"},
             "is not the name of a file in the log's own folder",
         ),
+        (["grasps"], [{}] * 10_001, "grasps: 10001 are more than the 10000"),
+        (["grasps", 0, "contacts"], [{}] * 101, r"grasps\.0\.contacts: 101 are more than 100"),
         (["object"], {"mesh": "/etc/truth.ply"}, "log's own folder"),
         (["object"], {"mesh": ".."}, "log's own folder"),
         (["grasps", 0, "contacts", 0, "point_world_m"], [1e6, 0.0, 0.0], "millimetres"),

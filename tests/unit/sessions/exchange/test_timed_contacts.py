@@ -145,3 +145,9 @@ def test_a_file_that_can_not_be_read_is_told(tmp_path):
     (tmp_path / "c.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ConfigurationError, match="is not a CSV table"):
         read_timed_contacts(tmp_path / "c.csv")
+
+
+def test_a_table_of_more_lines_than_a_person_brings_in_is_refused_before_it_is_read(tmp_path):
+    (tmp_path / "table.csv").write_text("time_s,x_m,y_m\n" + "0,1,2\n" * 50_001)
+    with pytest.raises(ConfigurationError, match="has 50002 lines, more than the 50000"):
+        read_timed_contacts(tmp_path / "table.csv", ImportSettings())

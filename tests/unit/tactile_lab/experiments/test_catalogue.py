@@ -20,6 +20,7 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "methods-2d": ({"shape": ["rectangle"], "noise": ["50"], "method": ["known-pose", "odometry", "joint"]}, 4),
     "contour-limit": ({"shape": ["L"], "noise": ["50"]}, 4),
     "methods-3d": ({"shape": ["l-block"], "method": ["known-pose", "odometry"]}, 4),
+    "everyday-3d": ({"shape": ["wedge"], "method": ["known-pose"]}, 4),
     "solid-limit": ({"shape": ["triangular-prism"]}, 4),
     "known-shape": ({"shape": ["cylinder"]}, 3),
     "methods-6dof": ({"shape": ["ellipsoid"], "method": ["known-pose", "icp"]}, 4),

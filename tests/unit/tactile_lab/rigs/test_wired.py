@@ -66,6 +66,16 @@ def test_descriptions_that_contradict_themselves(tmp_path: Path, changes: dict[s
         load_rig(changed(tmp_path, **changes))
 
 
+def test_a_left_hand_by_its_own_folder_is_refused_before_anything_is_connected(tmp_path: Path) -> None:
+    joints = tmp_path / "calibration.yaml"
+    joints.write_bytes(Path(CALIBRATION["joints"]).read_bytes())
+    (tmp_path / "general_info.yaml").write_text("side: left\nfingers: [th, ff, mf, rf, lf]\n")
+    rig = load_rig(changed(tmp_path, calibration=CALIBRATION | {"joints": str(joints)}, wires=without_camera(tmp_path)))
+    assert hand_setup(rig).ethercat.side == "right"
+    with pytest.raises(ConfigurationError, match=r"general_info\.yaml: is of a left hand"):
+        check_calibration(rig)
+
+
 def test_the_published_files_of_a_hand_can_be_named_and_drive_it(tmp_path: Path, lab_data: Path) -> None:
     folder = lab_data / "shadow_hand_config" / "378"
     published = {

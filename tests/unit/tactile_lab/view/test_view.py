@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import socket
+import stat
 import subprocess
 import sys
 import urllib.error
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -32,7 +34,8 @@ from tactile_lab.view import page_transport
 from tactile_lab.view.controls import history_html, status_html
 from tactile_lab.view.drawing import patches
 from tactile_lab.view.feed import ViewFeed
-from tactile_lab.view.gate import Gate, Head, inner_address, is_loopback, new_token, parse_head
+from tactile_lab.view.gate import Gate, Head, is_loopback, new_token, parse_head
+from tactile_lab.view.inner_door import InnerDoor
 from tactile_lab.view.page import Page
 from tactile_lab.view.page_transport import QUEUE_LENGTH
 from tactile_lab.view.scene import Scene, ellipse
@@ -187,6 +190,27 @@ def test_other_web_sites_in_the_same_browser_are_refused(asked: Head) -> None:
     assert gate().verdict(asked)[0] is HTTPStatus.FORBIDDEN
 
 
+def test_other_computers_reach_a_page_by_any_name_but_never_without_the_token() -> None:
+    door = Gate(None, TOKEN)
+    for host in ("lab-pc:8090", "192.168.7.2:8090", "[fe80::1]:8090"):
+        assert door.verdict(Head("/", {"host": host}))[0] is HTTPStatus.FORBIDDEN
+        assert door.verdict(Head("/", {"host": host, "cookie": f"tactile_lab_token={TOKEN}"}))[0] is HTTPStatus.OK
+        foreign = {"host": host, "cookie": f"tactile_lab_token={TOKEN}", "origin": "http://evil.example"}
+        assert door.verdict(Head("/", foreign))[0] is HTTPStatus.FORBIDDEN
+
+
+def test_the_secret_of_the_inner_door_is_this_program_s_and_no_visitor_s() -> None:
+    door = InnerDoor()
+    visited = b"GET / HTTP/1.1\r\nHost: a\r\nx-tactile-lab-door: guessed\r\n\r\n"
+    head = parse_head(door.marked(visited))
+    assert head is not None
+    assert head.headers["x-tactile-lab-door"] not in ("", "guessed")
+    assert head.headers["host"] == "a"
+    assert stat.S_IMODE(door.path.parent.stat().st_mode) == 0o700
+    door.close()
+    assert not door.path.parent.exists()
+
+
 def test_token_is_asked_for_once_and_then_in_the_cookie() -> None:
     door = gate(TOKEN)
     assert door.verdict(head())[0] is HTTPStatus.FORBIDDEN
@@ -207,16 +231,14 @@ def test_loopback_is_told_from_the_rest() -> None:
     assert [is_loopback(name) for name in ("127.0.0.1", "::1", "localhost", "0.0.0.0", "lab.example")] == [
         *(True, True, True, False, False)
     ]
-    assert is_loopback(inner_address())
-    assert inner_address() != inner_address()
 
 
 def test_other_addresses_need_a_token() -> None:
-    with pytest.raises(ConfigurationError, match="control the session"):
-        PageAddress("0.0.0.0", 8090, "").check()
     with pytest.raises(ConfigurationError, match="at least 16"):
         PageAddress("0.0.0.0", 8090, "short").check()
-    assert PageAddress("0.0.0.0", 8090, "new").check()[2] != ""
+    for address in ("0.0.0.0", "127.0.0.1"):
+        assert len(PageAddress(address, 8090, "new").check()[2]) >= 16
+        assert PageAddress(address, 8090, "").check()[2] != PageAddress(address, 8090, "").check()[2]
     with pytest.raises(BadParameter, match="needs --view"):
         PageAddress.if_wanted(False, "0.0.0.0", 8090, "")
     with pytest.raises(DeviceError, match="a token is needed"):
@@ -249,20 +271,43 @@ def test_page_is_served_to_whoever_has_the_token(page: ViewFeed) -> None:
     assert b"<html" in body.lower()
 
 
+@pytest.mark.parametrize("cookie", ["", "Cookie: tactile_lab_token=wrong\r\n"])
+def test_no_websocket_is_opened_without_the_token(page: ViewFeed, cookie: str) -> None:
+    """A raw client: not one byte of it reaches the page, whatever it sends behind its request."""
+    port = urlsplit(page.url).port
+    asked = f"GET / HTTP/1.1\r\nHost: localhost:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n{cookie}\r\n"
+    with socket.create_connection(("127.0.0.1", port or 0), timeout=20) as client:
+        client.sendall(asked.encode() + b"\x82\x05press" * 100)
+        answered = client.makefile("rb").read()
+    assert answered.startswith(b"HTTP/1.1 403")
+    assert answered.count(b"HTTP/1.1") == 1
+
+
 def test_page_makes_no_public_tunnel_and_is_reached_through_its_door_only() -> None:
     """In a process of its own: viser leaves its event loop unclosed."""
     code = """
+import os, socket
 from viser import _messages
 from tactile_lab.view.page import Page
 with Page("127.0.0.1", 0, "", "test") as page:
-    inner = page._inner
-    print(_messages.ShareUrlRequest in inner._websock_server._incoming_handlers, inner.get_host(), page.url)
+    print(_messages.ShareUrlRequest in page._inner._websock_server._incoming_handlers)
+    listening = [line.split() for line in open("/proc/net/tcp").readlines()[1:]]
+    files = (f"/proc/self/fd/{number}" for number in os.listdir("/proc/self/fd"))
+    own = {os.readlink(file) for file in files if os.path.exists(file)}
+    print(sum(f"socket:[{line[9]}]" in own for line in listening if line[3] == "0A"))
+    with socket.socket(socket.AF_UNIX) as stranger:
+        stranger.connect(str(page._inner_door.path))
+        stranger.sendall(b"GET / HTTP/1.1\\r\\nHost: localhost\\r\\n\\r\\n")
+        print(stranger.recv(100).split(b" ")[1].decode())
+    place = page._inner_door.path
+print(place.exists())
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True)
-    tunnels, inner, url = done.stdout.split()[-3:]
+    tunnels, ports, status, left = done.stdout.split()[-4:]
     assert tunnels == "False"
-    assert inner.startswith("127.")
-    assert inner not in url
+    assert ports == "1"  # the gate's
+    assert status == "403"
+    assert left == "False"
 
 
 def test_page_is_drawn_again_and_again_without_a_complaint() -> None:

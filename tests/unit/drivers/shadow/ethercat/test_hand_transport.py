@@ -387,6 +387,7 @@ def test_a_link_failure_takes_the_demands_away_and_stays_until_reconnected() -> 
         (ChainSettings(product=77), {}, r"does not know \(product 0x4d\)"),
         (ChainSettings(palm="0240"), {"palm": "0220"}, 'a 0240 palm, not a 0220. Set hand.palm to "0240"'),
         (ChainSettings(serial=3), {"serial": 4}, "hand 3, not hand 4"),
+        (ChainSettings(palm="0230", product=0x01000001), {"side": "right"}, "the palm of a left hand, not of a right"),
     ],
 )
 def test_a_wrong_device_is_named_with_what_to_do(chain: ChainSettings, settings: Any, words: str) -> None:

@@ -24,8 +24,8 @@ def on_body(data: SpatialGrasps) -> np.ndarray:
 def test_solids_are_closed_and_have_a_graspable_size(name: str) -> None:
     mesh = solid(name).mesh
     assert mesh.is_watertight
-    assert mesh.volume > 1e-4
-    assert np.all(mesh.extents < 0.14)
+    assert mesh.volume > 9e-5
+    assert np.all(mesh.extents < 0.15)
 
 
 @pytest.mark.parametrize("motion", ["table", "free"])

@@ -10,9 +10,11 @@ from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.metrics.metrics import mesh_errors
+from tactile_lab.slam.shape.selection.held_out import foretells_better
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
+from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.solids.prism import Prism, ear_triangles
-from tactile_lab.slam.shape.surfaces.sampling import nearest_on_mesh, polygon_area
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, nearest_on_mesh, polygon_area
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh, extract_mesh
 from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m, l_block
 from tests.support.solid_examples import box_mesh, contacts_on, cylinder_mesh, ellipsoid_mesh, field_on, l_block_mesh
@@ -150,3 +152,26 @@ def test_ears_leave_no_slivers_on_straight_sides_that_many_points_lie_on(turn_ra
 def test_an_outline_that_crosses_itself_can_not_be_filled() -> None:
     with pytest.raises(ShapeError, match="crosses itself"):
         ear_triangles(np.array([[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.0], [-1.0, 1.0], [3.0, 1.5]]))
+
+
+def rounded_box_mesh(edge_m: float = 0.012) -> trimesh.Trimesh:
+    """100 x 70 x 80 mm with all edges round: the convex hull of balls at its corners."""
+    half = np.array([0.05, 0.035, 0.04]) - edge_m
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=edge_m).vertices
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
+    mesh = trimesh.convex.convex_hull(np.vstack([ball + sign * half for sign in signs]))
+    mesh.apply_translation([0.0, 0.0, 0.04])
+    return mesh
+
+
+def test_faces_that_only_follow_their_own_contacts_are_not_taken() -> None:
+    field = field_on(rounded_box_mesh(), 110, seed=1)
+    faces = Polyhedron.fit(field)
+    assert faces.log_evidence > field.log_marginal_likelihood()
+    shape = best_shape(field, floor_m=0.0)
+    assert shape.name == "standing gpis"
+    surface = shape.mesh()
+    within = distances_to_mesh(surface.vertices, rounded_box_mesh()) < 2 * surface.sigma_m
+    assert within[surface.vertices[:, 2] > 0.01].mean() > 0.85
+    assert not foretells_better(Polyhedron.fit, field, 0.006, 0.0)
+    assert foretells_better(Polyhedron.fit, field_on(box_mesh(), 100, seed=3), 0.006, 0.0)

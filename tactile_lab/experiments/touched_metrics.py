@@ -1,0 +1,99 @@
+"""Figures of merit over what was touched: a surface is judged within reach of the contacts, nowhere else.
+
+A place counts if a contact lies within :data:`REACH_m` of it that does not face the other way, as the outside of a cup
+does for its inside. What faces the table does not count: no finger comes there.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from drivers.core.contacts import Array
+from drivers.core.poses import rotate, transform_points
+from tactile_lab.experiments.data.spatial_data import SpatialGrasps
+from tactile_lab.slam.result import SlamResult
+from tactile_lab.slam.shape.metrics.alignment import align_meshes
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, sample_mesh_with_normals
+
+REACH_m = 0.015
+
+NOTHING_TOUCHED: dict[str, Any] = {
+    "touched_hausdorff_mm": None,
+    "touched_mean_mm": None,
+    "touched_within_2_sigma": None,
+    "touched_share": None,
+}
+
+_FACING_AWAY = -0.5
+_UNDERSIDE = -0.9
+_LARGEST_EDGE_m = 0.004
+_SAMPLES = 20_000
+
+
+def touched_figures(data: SpatialGrasps, result: SlamResult) -> dict[str, Any]:
+    """Of a run on the table: Hausdorff and mean distance after the best fit of the touched parts, and what of the
+    estimate's touched part is within two sigma; the share of the true surface that was touched.
+    """
+    estimate, field = result.mesh, result.surface
+    if estimate is None or field is None:
+        return dict(NOTHING_TOUCHED)
+    truth = _divided(data.mesh)
+    seen = trimesh.Trimesh(estimate.vertices, estimate.faces, process=False)
+    near_truth, near_seen = _true_contacts(data), _Contacts(field.contacts_m, field.normals)
+    touched_truth, touched_seen = near_truth.part_of(truth), near_seen.part_of(seen)
+    if len(touched_truth.faces) == 0 or len(touched_seen.faces) == 0:
+        return dict(NOTHING_TOUCHED)
+    fit = align_meshes(touched_seen, touched_truth, upright=True)
+    moved = trimesh.Trimesh(transform_points(fit, estimate.vertices), estimate.faces, process=False)
+    there = distances_to_mesh(sample_mesh_with_normals(touched_truth, _SAMPLES)[0], moved)
+    back = distances_to_mesh(transform_points(fit, sample_mesh_with_normals(touched_seen, _SAMPLES)[0]), data.mesh)
+    vertices = near_seen.near(estimate.vertices, estimate.normals)
+    errors = distances_to_mesh(np.asarray(moved.vertices)[vertices], data.mesh)
+    return {
+        "touched_hausdorff_mm": 1e3 * float(max(there.max(), back.max())),
+        "touched_mean_mm": 1e3 * float(there.mean() + back.mean()) / 2,
+        "touched_within_2_sigma": float(np.mean(errors <= 2 * estimate.sigma_m[vertices])),
+        "touched_share": float(touched_truth.area / data.mesh.area),
+    }
+
+
+class _Contacts:
+    """Contacts in a surface's frame: places and outward normals, each of shape (n, 3)."""
+
+    def __init__(self, points_m: Array, normals: Array) -> None:
+        self._points_m, self._normals = points_m, normals
+        self._tree = cKDTree(points_m)
+
+    def near(self, points_m: Array, normals: Array) -> NDArray[np.bool_]:
+        """Whether places with outward normals, shapes (q, 3), count."""
+        found = self._tree.query_ball_point(points_m, REACH_m)
+        pairs = zip(found, normals, strict=True)
+        faced = [bool(rows) and (self._normals[rows] @ way).max() > _FACING_AWAY for rows, way in pairs]
+        return np.array(faced, dtype=bool) & (normals[:, 2] > _UNDERSIDE)
+
+    def part_of(self, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+        """The triangles of a mesh that count, by their middles."""
+        kept = self.near(mesh.triangles_center, mesh.face_normals)
+        return trimesh.Trimesh(mesh.vertices, mesh.faces[kept], process=False)
+
+
+def _true_contacts(data: SpatialGrasps) -> _Contacts:
+    """Where the contacts were measured, by the true poses."""
+    pairs = [(pose.inverse(), grasp) for pose, grasp in zip(data.world_T_body, data.grasps, strict=True)]
+    pairs = [(pose, grasp) for pose, grasp in pairs if grasp.contacts]
+    points = [transform_points(pose, grasp.points_world_m) for pose, grasp in pairs]
+    normals = [rotate(pose, np.array([contact.normal_world for contact in grasp.contacts])) for pose, grasp in pairs]
+    return _Contacts(np.vstack(points), np.vstack(normals))
+
+
+def _divided(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """The same surface in triangles small enough to be judged by their middles."""
+    vertices, faces = trimesh.remesh.subdivide_to_size(  # type: ignore[no-untyped-call]
+        mesh.vertices, mesh.faces, _LARGEST_EDGE_m, max_iter=12
+    )
+    return trimesh.Trimesh(vertices, faces, process=False)
