@@ -50,7 +50,7 @@ def _everyday_scans_left_out() -> str:
 
 
 def _everyday_things(grasps: int) -> list[Setting]:
-    shapes = (*HOUSEHOLD, *(() if _everydayscans_left_out() else EVERYDAY_SCANS))
+    shapes = (*HOUSEHOLD, *(() if _everyday_scans_left_out() else EVERYDAY_SCANS))
     return grid(noise=[100], shape=shapes, method=("known-pose", "joint"), grasps=sorted({grasps, grasps * 3 // 2}))
 
 
