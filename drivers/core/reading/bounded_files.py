@@ -54,5 +54,5 @@ def check_plain(path: Path, found: os.stat_result, most_bytes: int) -> None:
 
 
 def _too_large(path: Path, size: int, most_bytes: int) -> ConfigurationError:
-    what = f"is {size / MB:.1f} MB large, more than the {most_bytes / MB:g} MB that are read of such a file"
+    what = f"is too large: {size:,} bytes, and at most {most_bytes:,} are read of such a file"
     return ConfigurationError(what, where=str(path), hint="Check that it is the right file")

@@ -146,10 +146,10 @@ def lab(tmp_path: Path) -> Path:
 def test_a_rig_shows_the_settings_that_are_not_the_usual_ones(lab: Path) -> None:
     answer = CliRunner().invoke(app, ["rig", "show", str(lab)])
     assert answer.exit_code == 0
-    (line,) = [line for line in answer.stderr.splitlines() if "pose_weight" in line]
+    (line,) = [line for line in answer.stdout.splitlines() if "pose_weight" in line]
     assert line.split() == ["conductor.exploration.information.pose_weight", "0.25", "1.0"]
-    assert "least_gain" not in answer.stderr
-    everything = CliRunner().invoke(app, ["rig", "show", str(lab), "--all"]).stderr
+    assert "least_gain" not in answer.stdout
+    everything = CliRunner().invoke(app, ["rig", "show", str(lab), "--all"]).stdout
     assert "conductor.exploration.information.least_gain" in everything
 
 
@@ -163,5 +163,5 @@ def test_a_rig_is_shown_to_programs_as_sessions_keep_it(lab: Path) -> None:
 
 def test_a_rig_file_that_says_no_more_than_it_must_has_usual_settings_alone() -> None:
     content = yaml.safe_load(shipped_rigs()["sim"].read_text())
-    bare = describe({**content, "conductor": {}, "motion": {}}, where="rig")
+    bare = describe({**content, "conductor": {}, "motion": {}, "hand": {}}, where="rig")
     assert [item for item in effective_settings(bare) if item.value != item.usual] == []
