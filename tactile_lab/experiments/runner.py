@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
 from multiprocessing.process import BaseProcess
@@ -44,7 +45,7 @@ _PLOTS = ("plots", "plot_data", "plot_sheet")
 _PARTS = ("tactile_lab", "calibration", "drivers", "sessions")
 _WITHOUT = ("cli", "workflow", "view", "report", "experiments/results", *(f"experiments/{name}.py" for name in _PLOTS))
 """Parts of tactile_lab that show results or take orders, and compute none; but for:"""
-_WITH = ("workflow/calibrating_forearm.py",)
+_WITH = tuple(f"workflow/{name}.py" for name in ("attending", "calibrating_forearm", "finishing", "running"))
 
 Finished = Callable[[Row, int, int], None]
 """Told about each finished run, the number of those done, and of all."""
@@ -115,14 +116,29 @@ def _execute(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
     return _in_processes(cells, work, jobs)
 
 
+@contextmanager
+def _inherited() -> Iterator[None]:
+    """Workers that start here have one thread each, and import nothing from the current folder."""
+    wanted = {**ONE_THREAD, "PYTHONSAFEPATH": "1"}
+    own = {name: os.environ.get(name) for name in wanted}
+    os.environ.update(wanted)
+    try:
+        yield
+    finally:
+        for name, value in own.items():
+            os.environ.pop(name)
+            if value is not None:
+                os.environ[name] = value
+
+
 def _in_processes(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
     """Rows as they are finished; the processes end with this generator, however it ends."""
-    os.environ.update(ONE_THREAD, PYTHONSAFEPATH="1")  # inherited: no worker imports from the current folder
     context = multiprocessing.get_context("spawn")
     watch = _WorkerWatch(context.SimpleQueue(), cells)
     pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare_worker, initargs=(watch.begun,))
     try:
-        waiting = {pool.submit(_execute_in_worker, cell, work) for cell in cells}
+        with _inherited():
+            waiting = {pool.submit(_execute_in_worker, cell, work) for cell in cells}
         while waiting:
             watch.look(pool)
             ready, waiting = wait(waiting, _LOOK_s, return_when=FIRST_COMPLETED)

@@ -21,7 +21,10 @@ def streaming_rig(folder: Path) -> Path:
     shipped = Path(rigs.__file__).parent
     content = yaml.safe_load((shipped / "sim.yaml").read_text())
     content["calibration"] = {role: str(shipped / file) for role, file in content["calibration"].items()}
-    content["conductor"] = {"exploration": {"policy": None}}  # the object is carried: what never moves is never late
+    content["conductor"] = {
+        "probing": {"top": False},
+        "exploration": {"policy": None},
+    }  # the object is carried: what never moves is never late
     content.setdefault("simulation", {})["camera"] = {"stream_hz": 15.0, "late_ms": LATE_ms}
     path = folder / "streaming.yaml"
     path.write_text(yaml.safe_dump(content))

@@ -30,6 +30,7 @@ def wire_rig(folder: Path, **changes: Any) -> Path:
         wire["host"] = f"{net}.{11 + number}"
     content["hand"] |= {"cycle_s": 0.004}
     content["base"] |= {"lost_limit": 100}
+    content["conductor"]["probing"] = {"top": False}  # 15 s of real time in every session
     content["conductor"]["safety"] = {"tip_stale_s": 2.0, "stale_s": 5.0, "first_moves_scale": 1.0}
     path = folder / "wire.yaml"
     path.write_text(yaml.safe_dump(content | changes))

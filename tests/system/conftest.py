@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 from tactile_lab.cli.main import main
+from tests.support.low_rig import low_rig
 from tests.support.warm_terminal import WarmProgram
 
 COMMAND = [sys.executable, "-m", "tactile_lab.cli.main"]
@@ -88,7 +89,8 @@ def recorded_root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def record(folder: Path) -> None:
     """Run the session; what it said on standard error and, last of all, on standard output, is kept beside it."""
     folder.mkdir(exist_ok=True)
-    answer = call("run", "--grasps", 2, "--seed", 1, "--notes", "for the tests", "--out", folder / "runs", "--json")
+    words = ("--rig", low_rig(folder), "--grasps", 2, "--seed", 1, "--notes", "for the tests")
+    answer = call("run", *words, "--out", folder / "runs", "--json")
     assert answer.code == 0, answer.err
     (folder / "run.err").write_text(answer.err)
     (folder / "run.json").write_text(answer.out)

@@ -16,13 +16,15 @@ import pytest
 
 from sessions.recording.traffic import disk as traffic_disk
 from tests.support.interruptible import interruptible
+from tests.support.low_rig import low_rig
 from tests.support.warm_terminal import Piped, WarmProgram
 
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 def start(program: WarmProgram, root: Path, grasps: int = 8, method: str = "odometry") -> Piped:
-    words = ("--grasps", grasps, "--seed", 1, "--method", method, "--out", root)
+    rig = low_rig(root.parent)
+    words = ("--rig", rig, "--grasps", grasps, "--seed", 1, "--method", method, "--out", root)
     return program.pipes(root, "run", *words)
 
 
@@ -121,7 +123,7 @@ def test_ctrl_c_while_the_result_is_judged_keeps_the_session(program, tmp_path, 
 
 
 def test_a_full_disk_ends_the_session_and_the_recorded_part_replays(tmp_path, inside, monkeypatch):
-    room, write = [900_000], os.write
+    rig, room, write = low_rig(tmp_path.parent), [900_000], os.write
 
     def write_while_there_is_room(descriptor: int, data: bytes) -> int:
         room[0] -= len(data)
@@ -131,7 +133,7 @@ def test_a_full_disk_ends_the_session_and_the_recorded_part_replays(tmp_path, in
 
     with monkeypatch.context() as patched:
         patched.setattr(traffic_disk.os, "write", write_while_there_is_room)
-        answer = inside("run", "--grasps", 4, "--seed", 1, "--method", "odometry", "--out", tmp_path)
+        answer = inside("run", "--rig", rig, "--grasps", 4, "--seed", 1, "--method", "odometry", "--out", tmp_path)
     assert answer.code == 1
     assert "the disk is full" in answer.err
     folder = only_session(tmp_path)

@@ -6,6 +6,8 @@ import json
 import re
 from pathlib import Path
 
+from tests.support.low_rig import low_rig
+
 EVALUATION_KEYS = {
     "schema_version", "method", "seed", "object", "grasps", "contacts", "shape", "pose", "loops", "time", "status",
     "aligned", "shape_best_fit",
@@ -66,7 +68,7 @@ def test_a_replay_in_another_process_is_identical(tactile_lab, session_copy):
 
 
 def test_a_second_run_with_the_same_seed_gives_the_same_files(inside, recorded, tmp_path):
-    assert inside("run", "--grasps", 2, "--seed", 1, "--out", tmp_path).code == 0
+    assert inside("run", "--rig", low_rig(tmp_path.parent), "--grasps", 2, "--seed", 1, "--out", tmp_path).code == 0
     (again,) = tmp_path.iterdir()
     same_bytes(recorded / "results", again / "results")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 
@@ -14,6 +15,7 @@ from tactile_lab.cli.app import app
 from tactile_lab.cli.options import Method
 from tactile_lab.slam.shape.selection.models import SHAPE_MODELS
 from tactile_lab.slam.tactile_slam import SlamSettings
+from tests.support.repository import REPOSITORY
 
 COMMANDS = (
     "run",
@@ -175,7 +177,9 @@ def test_the_program_is_a_module_too():
 
 
 def test_make_alone_lists_the_targets():
-    done = subprocess.run(["make"], capture_output=True, text=True, timeout=60, check=True)
+    outer = {"MAKEFLAGS", "MAKELEVEL", "MFLAGS"}  # of the make that runs the tests
+    own = {name: value for name, value in os.environ.items() if name not in outer}
+    done = subprocess.run(["make"], capture_output=True, text=True, timeout=60, check=True, env=own, cwd=REPOSITORY)
     targets = [line.split()[0] for line in done.stdout.splitlines()[1:]]
     assert targets[0] == "help"
     assert {"demo", "test", "check", "bench", "clean"} <= set(targets)

@@ -53,7 +53,7 @@ def test_a_session_with_a_policy_a_figure_a_shape_model_and_a_command(written: W
     heaviest, circle, touches = written("heaviest.py"), written("circle.py"), written("touches.py")
     rig, runs = rig_file(tmp_path, QUICK, rig_keys("quickest.py")), tmp_path / "runs"
     keys = yaml.safe_load(rig.read_text())
-    keys["conductor"] = {"fixed_grasps": 1, **rig_keys("quickest.py")["conductor"]}
+    keys["conductor"] |= {"fixed_grasps": 1, **rig_keys("quickest.py")["conductor"]}
     rig.write_text(yaml.safe_dump(keys))
 
     ran = tactile_lab(
