@@ -29,7 +29,7 @@ def session(recorded):
 def first_grasp(session, tmp_path_factory):
     """The session up to its first picture."""
     folder = tmp_path_factory.mktemp("piece") / "first-grasp"
-    extract(session, folder, Piece(to_s=10.0))
+    extract(session, folder, Piece(to_s=16.0))
     return Session.open(folder)
 
 
