@@ -10,7 +10,7 @@ READY  := $(VENV)/ready
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help demo test check bench results experiments coverage lock clean mutants
+.PHONY: help demo test test-long check bench results experiments coverage lock clean mutants
 
 help:  ## This list
 	@echo "make TARGET:"
@@ -19,8 +19,11 @@ help:  ## This list
 demo: $(READY)  ## A whole autonomous session on the simulated rig, evaluated, with its report
 	$(BIN)/tactile-lab run --rig sim --object box-10x6x4 --grasps 16 --seed 1 --out runs
 
-test: check  ## Linters, types, layers, then all tests
+test: check  ## Linters, types, layers, then all tests but the long ones
 	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
+
+test-long: $(READY)  ## The long tests that make test leaves out: whole sessions in real time, studies over seeds
+	$(BIN)/python -m pytest -n auto --dist loadfile -m long
 
 check: $(READY)  ## Linters, types and the layer contract
 	$(BIN)/ruff check .
@@ -45,7 +48,7 @@ experiments: $(READY)  ## The stored experiments again, by their commands, store
 	$(BIN)/tactile-lab experiment commands | while read -r command; do eval "$(BIN)/$$command --store" </dev/null || exit 1; done
 
 coverage: $(READY)  ## All tests, and how much of each package they run through, as a stored result
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --cov --cov-report=json
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "" --cov --cov-report=json
 	$(BIN)/python -m tests.support.package_coverage coverage.json --store
 
 lock:  ## Resolve the dependencies again, with hashes

@@ -31,6 +31,7 @@ def streaming_rig(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_the_lateness_of_a_streaming_camera_is_found_from_the_recording(tmp_path: Path) -> None:
     rig = str(streaming_rig(tmp_path))
     request = running.SessionRequest(rig, "box-10x6x4", tmp_path, method="odometry", grasps=2)

@@ -122,6 +122,7 @@ def test_without_anybody_to_ask_it_ends_and_says_how_to_script_it(inside, data, 
     assert files(tmp_path) == []
 
 
+@pytest.mark.long
 def test_from_the_first_question_to_the_stored_result_on_the_simulated_rig(program, tmp_path):
     (tmp_path / "settings.yaml").write_text(yaml.safe_dump(SETTINGS))
     words = ("--settings", "settings.yaml", "--touches", 3, "--out", "forearm.yaml", "--replace")

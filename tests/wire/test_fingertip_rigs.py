@@ -98,6 +98,7 @@ def test_sensors_that_are_not_there_are_told_each_in_its_words(rig: Path) -> Non
     assert "Plug the adapter in" in findings["TH"].detail
 
 
+@pytest.mark.long
 def test_a_wrong_baud_rate_is_found_out(rig: Path) -> None:
     with emulate_sensors(load_fingertip_rig(rig)):
         digital, controller = (found(changed(rig, finger, baud=baud)) for finger, baud in (("MF", 19200), ("TH", 9600)))
@@ -105,6 +106,7 @@ def test_a_wrong_baud_rate_is_found_out(rig: Path) -> None:
     assert "It answers at 19200 baud: correct wires.TH.baud" in controller["TH"].detail
 
 
+@pytest.mark.long
 def test_another_sensor_than_the_rig_names_is_found_out(rig: Path) -> None:
     with emulate_sensors(load_fingertip_rig(rig)):
         box, digital = (found(changed(rig, finger, serial="FT77777"))[finger] for finger in ("FF", "MF"))

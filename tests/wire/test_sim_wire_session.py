@@ -135,6 +135,7 @@ def test_a_device_that_dies_ends_the_session_in_order(
     check_ended_in_order(folder, words)
 
 
+@pytest.mark.long
 def test_a_world_that_stands_still_ends_the_session_in_order(
     rig: Rig, laboratory: WiredLaboratory, tmp_path: Path
 ) -> None:

@@ -62,6 +62,7 @@ def placed(markers: MarkerSettings) -> tuple[tuple[PrintedMarker, Pose3], tuple[
     return (world, markers.world_T_worldmarker.pose()), (target, TRUTH * on_object)
 
 
+@pytest.mark.long
 def test_a_session_with_a_video_for_its_camera_is_judged_by_what_it_shows(tmp_path: Path) -> None:
     if shutil.which("ip") is None:
         pytest.skip("no ip command to make virtual interfaces with")

@@ -98,6 +98,7 @@ def test_a_policy_plans_in_the_process_of_a_session_on_wires(written: Written, m
         assert elsewhere.ask(SlamService.plan, 0).plan == service.plan(0).plan
 
 
+@pytest.mark.long
 def test_a_session_with_fingertips_and_a_positioner_of_its_own(written: Written, tmp_path: Path) -> None:
     rig_extensions = [written("six_floats.py"), written("text_positioner.py")]
     rig = rig_file(tmp_path, rig_keys("six_floats.py"), rig_keys("text_positioner.py"))

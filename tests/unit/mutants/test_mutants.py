@@ -135,6 +135,7 @@ def test_the_nearest_tests_come_first(tree: Path) -> None:
     ]
 
 
+@pytest.mark.long
 def test_mutations_are_killed_survive_or_never_end_and_the_tree_stays_as_it_is(tree: Path, copy: Copy) -> None:
     tests = Nearest(tree).tests("drivers/clamping.py")
     killed = copy.verdict(mutation("    return min(value, 1000) * 2", "    return min(value, 1000) / 2"), tests, 60.0)

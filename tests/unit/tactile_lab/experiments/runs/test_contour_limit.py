@@ -11,6 +11,8 @@ import pytest
 from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.runs.contour_limit import limit_of_contour
 
+pytestmark = pytest.mark.long  # means over seeds
+
 
 @cache
 def hausdorff_mm(setting: tuple[tuple[str, Any], ...], seed: int) -> float:

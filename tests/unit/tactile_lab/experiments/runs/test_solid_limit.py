@@ -11,6 +11,8 @@ import pytest
 from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.runs.solid_limit import limit_of_solid
 
+pytestmark = pytest.mark.long  # means over seeds
+
 
 @cache
 def figures(setting: tuple[tuple[str, Any], ...], seed: int) -> dict[str, Any]:
