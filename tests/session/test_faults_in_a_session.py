@@ -23,6 +23,7 @@ def test_a_link_that_fails_ends_the_session_in_order_and_its_recording_is_whole(
     assert swept.replay.startswith("read")
 
 
+@pytest.mark.long
 def test_a_session_goes_on_under_losses_counts_them_and_replays_identically(tmp_path):
     swept = run_with("sim", {"hand": "drop", "base": "truncate", "ft/MF": "stale sequence"}, tmp_path)
     assert not swept.ended

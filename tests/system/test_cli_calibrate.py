@@ -140,6 +140,7 @@ def test_from_the_first_question_to_the_stored_result_on_the_simulated_rig(progr
     assert np.linalg.norm(mount.translation()) < 0.004
 
 
+@pytest.mark.long
 def test_a_session_on_an_expired_calibration_is_refused_or_says_that_it_was_allowed(inside, tmp_path):
     shutil.copytree(RIGS / "calibrations", tmp_path / "calibrations")
     rig = Path(shutil.copy(RIGS / "sim.yaml", tmp_path / "mine.yaml"))

@@ -110,6 +110,7 @@ def test_ctrl_c_at_the_beginning(tmp_path, delay_s):
     assert process.returncode == 130
 
 
+@pytest.mark.long
 def test_ctrl_c_while_the_result_is_judged_keeps_the_session(program, tmp_path, inside):
     process = start(program, tmp_path, grasps=1, method="joint")  # judging it takes a while
     process.until(r"^ +1/1 ")

@@ -120,10 +120,10 @@ def test_a_session_is_completed_and_replays_to_the_same_grasp(
 @pytest.mark.parametrize(
     ("device", "words"),
     [
-        ("camera", "camera: lost"),
+        pytest.param("camera", "camera: lost", marks=pytest.mark.long),
         ("hand", "no valid status for 2 s"),
         ("ft/MF", "MF: no reading from the fingertip"),
-        ("base", "cycles in a row without a status"),
+        pytest.param("base", "cycles in a row without a status", marks=pytest.mark.long),
     ],
 )
 def test_a_device_that_dies_ends_the_session_in_order(

@@ -192,6 +192,7 @@ def test_the_command_compares_and_stores(tmp_path: Path) -> None:
     assert list(load_normals(out)) == ["RF"]
 
 
+@pytest.mark.long
 def test_on_recorded_presses_learning_halves_the_error_and_states_it_truly(lab_data: Path) -> None:
     folder = lab_data / "biotac_normal"
     recording = read_presses(folder / "X1.txt", folder / "Y1.txt")

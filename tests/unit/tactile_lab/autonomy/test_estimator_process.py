@@ -161,6 +161,7 @@ def everything(clock: Any) -> tuple[list[tuple[str, str]], list[bytes], list[byt
     return run.sink.kept, contacts, poses, result.contour.points_m.tobytes(), chance
 
 
+@pytest.mark.long
 def test_a_session_is_the_same_wherever_it_thinks() -> None:
     """With an undo, a policy that draws lots, and the final shape made of what came home."""
     here, there = everything(VirtualClock()), everything(BriefClock())

@@ -157,6 +157,7 @@ def test_intel_keeps_its_shape_with_a_fifth_of_the_loops_wrong(lab_data: Path) -
     assert np.isfinite(solution.covariances).all()
 
 
+@pytest.mark.long
 def test_manhattan_is_where_it_is_with_a_fifth_of_the_loops_wrong(lab_data: Path) -> None:
     odometry, loops = read_edges(lab_data / "pose_graphs" / "manhattanOlson3500.txt")
     true_steps, _ = read_edges(lab_data / "pose_graphs" / "manhattanOlson3500_groundtruth.txt")
