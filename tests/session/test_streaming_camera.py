@@ -5,35 +5,24 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-import yaml
 
 from sessions.conductor.progress import NullProgress
 from sessions.recording.session import Session
-from tactile_lab import rigs
 from tactile_lab.workflow import running
 from tactile_lab.workflow.comparing import session_clock_offset
 from tactile_lab.workflow.finishing import TruthChoice
+from tests.support.low_rig import low_rig
 
 LATE_ms = 60.0
-
-
-def streaming_rig(folder: Path) -> Path:
-    shipped = Path(rigs.__file__).parent
-    content = yaml.safe_load((shipped / "sim.yaml").read_text())
-    content["calibration"] = {role: str(shipped / file) for role, file in content["calibration"].items()}
-    content["conductor"] = {
-        "probing": {"top": False},
-        "exploration": {"policy": None},
-    }  # the object is carried: what never moves is never late
-    content.setdefault("simulation", {})["camera"] = {"stream_hz": 15.0, "late_ms": LATE_ms}
-    path = folder / "streaming.yaml"
-    path.write_text(yaml.safe_dump(content))
-    return path
+STREAMING = {
+    "conductor": {"exploration": {"policy": None}},  # the object is carried: what never moves is never late
+    "simulation": {"camera": {"stream_hz": 15.0, "late_ms": LATE_ms}},
+}
 
 
 @pytest.mark.long
 def test_the_lateness_of_a_streaming_camera_is_found_from_the_recording(tmp_path: Path) -> None:
-    rig = str(streaming_rig(tmp_path))
+    rig = str(low_rig(tmp_path, STREAMING))
     request = running.SessionRequest(rig, "box-10x6x4", tmp_path, method="odometry", grasps=2)
     finished = running.run_session(request, NullProgress())
     session = Session.open(finished.folder)

@@ -9,13 +9,10 @@ from typing import Any
 
 import yaml
 
-from tactile_lab import rigs
-
 Written = Callable[..., Path]
 """Writes an extension into a test's folder."""
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
-SHIPPED = Path(rigs.__file__).parent
 
 
 def code(file: str) -> str:
@@ -33,22 +30,3 @@ def rig_keys(file: str) -> dict[str, Any]:
     """The page's block of rig-file keys that names this file among its extensions."""
     blocks = [yaml.safe_load(text) for text in re.findall(r"^```yaml\n(.*?)^```$", PAGE.read_text(), re.M | re.S)]
     return next(block for block in blocks if file in block["extensions"])
-
-
-def rig_file(folder: Path, *keys: dict[str, Any]) -> Path:
-    """The shipped simulated rig in a folder of its own, with further keys; lists and mappings are joined."""
-    content = yaml.safe_load((SHIPPED / "sim.yaml").read_text())
-    content["calibration"] = {role: str(SHIPPED / file) for role, file in content["calibration"].items()}
-    for more in ({"conductor": {"probing": {"top": False}}}, *keys):
-        for key, value in more.items():
-            known = content.get(key)
-            content[key] = (
-                {**known, **value}
-                if isinstance(known, dict)
-                else [*(known or []), *value]
-                if isinstance(value, list)
-                else value
-            )
-    path = folder / "rig.yaml"
-    path.write_text(yaml.safe_dump(content))
-    return path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -11,11 +12,23 @@ from tactile_lab import rigs
 SHIPPED = Path(rigs.__file__).parent
 
 
-def low_rig(folder: Path) -> Path:
-    """A rig file in ``folder``; a session begins with its first grasp, as on a rig that knows its objects to be low."""
+def low_rig(folder: Path, *keys: dict[str, Any]) -> Path:
+    """A rig file in ``folder``, with further keys; lists and mappings are joined.
+
+    A session begins with its first grasp, as on a rig that knows its objects to be low.
+    """
     content = yaml.safe_load((SHIPPED / "sim.yaml").read_text())
     content["calibration"] = {role: str(SHIPPED / file) for role, file in content["calibration"].items()}
-    content["conductor"] = {"probing": {"top": False}}
-    path = folder / "low.yaml"
+    for more in ({"conductor": {"probing": {"top": False}}}, *keys):
+        for key, value in more.items():
+            known = content.get(key)
+            content[key] = (
+                {**known, **value}
+                if isinstance(known, dict)
+                else [*(known or []), *value]
+                if isinstance(value, list)
+                else value
+            )
+    path = folder / "rig.yaml"
     path.write_text(yaml.safe_dump(content))
     return path

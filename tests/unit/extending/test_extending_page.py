@@ -27,7 +27,8 @@ from tactile_lab.autonomy.slam_service import SlamService
 from tactile_lab.cli.app import app
 from tactile_lab.evaluation.files.tables import read_contour
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
-from tests.support.extending_page import PAGE, SHIPPED, Written, files, rig_file, rig_keys
+from tests.support.extending_page import PAGE, Written, files, rig_keys
+from tests.support.low_rig import SHIPPED, low_rig
 
 TIPS = SHIPPED / "calibrations" / "simulated-hand" / "fingertips.yaml"
 QUICK = {"conductor": {"fixed_grasps": 1}}
@@ -51,7 +52,7 @@ def test_the_page_has_one_example_of_each() -> None:
 def test_a_session_with_a_policy_a_figure_a_shape_model_and_a_command(written: Written, tmp_path: Path) -> None:
     written("quickest.py")
     heaviest, circle, touches = written("heaviest.py"), written("circle.py"), written("touches.py")
-    rig, runs = rig_file(tmp_path, QUICK, rig_keys("quickest.py")), tmp_path / "runs"
+    rig, runs = low_rig(tmp_path, QUICK, rig_keys("quickest.py")), tmp_path / "runs"
     keys = yaml.safe_load(rig.read_text())
     keys["conductor"] |= {"fixed_grasps": 1, **rig_keys("quickest.py")["conductor"]}
     rig.write_text(yaml.safe_dump(keys))
@@ -101,7 +102,7 @@ def test_a_policy_plans_in_the_process_of_a_session_on_wires(written: Written, m
 @pytest.mark.long
 def test_a_session_with_fingertips_and_a_positioner_of_its_own(written: Written, tmp_path: Path) -> None:
     rig_extensions = [written("six_floats.py"), written("text_positioner.py")]
-    rig = rig_file(tmp_path, rig_keys("six_floats.py"), rig_keys("text_positioner.py"))
+    rig = low_rig(tmp_path, rig_keys("six_floats.py"), rig_keys("text_positioner.py"))
     runs = tmp_path / "runs"
 
     shown = json.loads(tactile_lab("rig", "show", rig, "--json").stdout)

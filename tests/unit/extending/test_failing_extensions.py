@@ -29,7 +29,8 @@ from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.workflow.attending import Attendance, roles_for
 from tactile_lab.workflow.reconstructing import Wishes, reconstruct_log
 from tests.support.disc_world import Disc, DiscWorld
-from tests.support.extending_page import Written, rig_file
+from tests.support.extending_page import Written
+from tests.support.low_rig import low_rig
 
 POLICY = """
 import numpy as np
@@ -269,7 +270,7 @@ def test_a_driver_that_raises_is_named_and_the_session_is_kept(
     written: Written, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = written("mine.py", FINGERTIP.format(answer="return 1.0 / 0.0"))
-    rig = rig_file(tmp_path, {"extensions": ["mine.py"], "fingertips": "mine"})
+    rig = low_rig(tmp_path, {"extensions": ["mine.py"], "fingertips": "mine"})
     code, told = ended(capsys, "run", "--rig", rig, "--grasps", 1, "--out", tmp_path / "runs", "--no-input")
     assert code == 1
     assert "this extension failed: ZeroDivisionError: float division by zero (line 9)" in told
@@ -284,7 +285,7 @@ def test_a_load_that_is_no_number_stops_the_hand_as_an_infinite_one(
     written: Written, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     written("mine.py", FINGERTIP.format(answer="return float('nan')"))
-    rig = rig_file(tmp_path, {"extensions": ["mine.py"], "fingertips": "mine"})
+    rig = low_rig(tmp_path, {"extensions": ["mine.py"], "fingertips": "mine"})
     ended(capsys, "run", "--rig", rig, "--grasps", 1, "--out", tmp_path / "runs", "--no-input")
     (folder,) = (tmp_path / "runs").iterdir()
     assert "its load is not a number" in Session.open(folder).manifest.problem

@@ -18,7 +18,8 @@ from drivers.core.registry import Registry
 from drivers.fingertips.kinds import FINGERTIPS
 from tactile_lab.rigs.description import describe, load_rig
 from tactile_lab.slam.exploration.policies import POLICIES, make_policy
-from tests.support.extending_page import Written, rig_file
+from tests.support.extending_page import Written
+from tests.support.low_rig import low_rig
 
 REGISTER = "from tactile_lab.slam.exploration.policies import POLICIES\nPOLICIES.register({name!r}, {item})\n"
 
@@ -118,7 +119,7 @@ def test_the_kinds_of_fingertips_are_known() -> None:
     ],
 )
 def test_a_rig_file_that_names_extensions_wrongly(tmp_path: Path, named: object, words: str) -> None:
-    path = rig_file(tmp_path)
+    path = low_rig(tmp_path)
     path.write_text(yaml.safe_dump({**yaml.safe_load(path.read_text()), "extensions": named}))
     with pytest.raises(ConfigurationError, match=words):
         load_rig(str(path))
@@ -133,13 +134,13 @@ def test_a_rig_file_that_names_extensions_wrongly(tmp_path: Path, named: object,
 )
 def test_a_rig_file_that_names_a_kind_that_nobody_registered(tmp_path: Path, key: str, words: str) -> None:
     with pytest.raises(ConfigurationError, match=words):
-        load_rig(str(rig_file(tmp_path, {key: "clay"})))
+        load_rig(str(low_rig(tmp_path, {key: "clay"})))
 
 
 def test_a_kind_of_fingertip_cannot_have_the_name_of_another_key(written: Written, tmp_path: Path) -> None:
     text = "from drivers.fingertips.nano17 import Nano17Kind\nfrom drivers.fingertips.kinds import FINGERTIPS\n"
     written("mine.py", text + "FINGERTIPS.register('hand', Nano17Kind())\n")
-    rig = rig_file(tmp_path, {"extensions": ["mine.py"], "fingertips": "hand"})
+    rig = low_rig(tmp_path, {"extensions": ["mine.py"], "fingertips": "hand"})
     with pytest.raises(ConfigurationError, match=r"mine\.py: the fingertip kind 'hand' has the name of another key"):
         load_rig(str(rig))
 
