@@ -12,7 +12,7 @@ import numpy as np
 from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.guided.console import OperatorConsole
 from sessions.guided.motion import GuidedMotion
 from sessions.guided.operator import Ask, Request, Stage
@@ -32,7 +32,7 @@ class GraspByKeys(GraspCycle):
         motion: supervised motion that reads the operator's requests.
         settings: speeds, forces, times.
         console: the operator's console.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
         yaw_window_rad: yaws the arm can reach.
     """
 
@@ -41,10 +41,10 @@ class GraspByKeys(GraspCycle):
         motion: GuidedMotion,
         settings: CycleSettings,
         console: OperatorConsole,
-        tip: TipEllipsoid,
+        hand: HandShape,
         yaw_window_rad: tuple[float, float],
     ) -> None:
-        super().__init__(motion, settings, tip, yaw_window_rad)
+        super().__init__(motion, settings, hand, yaw_window_rad)
         self._guided, self._console = motion, console
         self._above_m: float | None = None
         """Height above the grasp height; None if the hand has not been sent to this grasp."""

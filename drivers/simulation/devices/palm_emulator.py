@@ -128,6 +128,7 @@ class PalmEmulator:
         self._outbox: list[Datagram] = []
         self._last_packet = (np.int16(0), np.uint16(0))
         self._shown = np.zeros(len(SENSORS), np.uint16)
+        self._absent = set(np.flatnonzero(~motors.is_fitted).tolist())
         self.faults = PalmFaults()
 
     def write(self, payload: bytes) -> None:
@@ -195,7 +196,7 @@ class PalmEmulator:
             return 0, 0, torque, misc
         arrived, had_errors = _ALL_OF[parity], 0
         for motor in range(parity, MOTORS, 2):
-            if motor in self.faults.silent:
+            if motor in self.faults.silent or motor in self._absent:
                 arrived &= ~(1 << motor)
                 torque[motor >> 1], misc[motor >> 1] = self._last_packet if motor >> 1 == 9 else (0, 0)
             elif motor in self.faults.wrong_type:
