@@ -164,10 +164,9 @@ class BoxProber:
         """
         front_m = max((float(points[:, 0].max()) for points in found.values()), default=_ASSUMED_m)
         landed, met = 0, []
+        aside_m = self._toucher.first_finger_side * _THUMB_ASIDE_m
         for lane_m in self._thumb_lanes_m(found):
-            place = self._axes.transformFrom(
-                np.array([front_m + _BEYOND_m, lane_m - self._toucher.first_finger_side * _THUMB_ASIDE_m])
-            )
+            place = self._axes.transformFrom(np.array([front_m + _BEYOND_m, lane_m - aside_m]))
             frame = GraspFrame(float(place[0]), float(place[1]), float(self._axes.theta()))
             points = self._toucher.close_thumb(frame)
             if points is None:

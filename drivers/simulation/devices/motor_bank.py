@@ -59,9 +59,8 @@ class MotorBank:
         self._plant, self._rng = plant, rng
         self._sign = motor_map.sign
         self.is_fitted = motor_map.is_fitted
-        self._joint_from_motor = np.array(
-            [[float(motor_map.numbers.get(joint) == motor) for motor in range(MOTORS)] for joint in DRIVEN_JOINTS]
-        )
+        pulls = [motor_map.numbers.get(joint) for joint in DRIVEN_JOINTS]
+        self._joint_from_motor = np.array([[float(motor == own) for motor in range(MOTORS)] for own in pulls])
         classes = [motor_class(joint) for joint in motor_map.names]
         self._stall_Nm = np.array([motor.stall_Nm for motor in classes])
         self._stall_mA = np.array([motor.stall_current_mA for motor in classes])
