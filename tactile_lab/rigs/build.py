@@ -56,7 +56,7 @@ def check_calibration(rig: Rig) -> None:
 
 
 def _check_fingers(rig: Rig) -> None:
-    """Raises ConfigurationError where the hand has too few fingers for a grasp, or a wire is of one it does not have."""
+    """Raises ConfigurationError where the hand has too few fingers for a grasp, or lacks one that has a wire."""
     form, wires = hand_form(rig), rig.description.wires
     if len(form.fingers) < _LEAST_FINGERS:
         what = f"is of a hand with {' and '.join(form.fingers)} only: a grasp needs three fingers"

@@ -2,9 +2,9 @@
 
 A closing is described in the *grasp frame*: origin on the table below the middle of the grasp, z up, the four fingers
 on the +x side and the thumb on the -x side, the first finger towards +y. Every fingertip's centre runs along a
-straight line, horizontal where the hand is upright; the palm stands still above. A left hand closes as the mirror image
-in the frame's x-z plane: its first finger is towards -y. The whole grasp is then three numbers
-(x, y, yaw of the grasp frame in the world) and one progress ``u`` in 0..1 for each finger, so that a contact is
+straight line, horizontal where the hand is upright; the palm stands still above. A left hand closes as the mirror
+image in the frame's x-z plane: its first finger is towards -y. The whole grasp is then three numbers (x, y, yaw of the
+grasp frame in the world) and one progress ``u`` in 0..1 for each finger, so that a contact is
 predicted by intersecting a line with a surface.
 
 The postures are solved once for each closing and height (:mod:`drivers.shadow.closing.posture`, a fraction of a second)
@@ -208,8 +208,8 @@ SIDEWAYS: Mapping[str, Leaning] = {
     for side, lean_rad in (("left", np.pi / 2), ("right", -np.pi / 2))
 }
 """Closings of a right hand with the palm upright, the fingertips one above the other. The hand comes along the grasp
-frame's -y axis from its left, first finger down, or along +y from its right, first finger up (decision 45). The forearm,
-100 mm thick, keeps the lowest fingertip at 18 mm with the first finger down and at 30 mm with it up."""
+frame's -y axis from its left, first finger down, or along +y from its right, first finger up (decision 45). The
+forearm, 100 mm thick, keeps the lowest fingertip at 18 mm with the first finger down and at 30 mm with it up."""
 
 SIDES = ("left", "right")
 """Where the palm may stand in a closing of :data:`SIDEWAYS`, seen along the grasp frame's x axis."""

@@ -5,7 +5,8 @@ degrees) a joint, read piecewise linearly and continued with the end pair. ``sr_
 joints whose two sensors both depend on both angles (the thumb's THJ1 and THJ2): points ((countsA, countsB), degreesA,
 degreesB), read by linear interpolation on the Delaunay triangulation of the counts plane. THJ5 and WRJ1 have two
 sensors each, averaged before the table is read. Every joint's own sensor is read, so J1 and J2 of a finger are both
-known although one tendon drives their sum. What a hand does not have (a Lite hand's wrist) is not read: it stays at zero.
+known although one tendon drives their sum. What a hand does not have (a Lite hand's wrist) is not read: it stays at
+zero.
 """
 
 from __future__ import annotations

@@ -4,9 +4,10 @@ Link origins and axes are those of Shadow's published model ``shadowhand_motor.u
 the fingers' J3 and of THJ1 is the one of Shadow's manual and current xacro; the URDF stops at 0.
 
 The palm frame of a right hand has z along the fingers, x to the thumb's side and -y out of the palm. A finger's distal
-frame sits on its J1 axis with z along the fingertip. Flexion is a positive rotation about x. A left hand is the right one
-mirrored in the planes x = 0 of forearm and palm: its palm has the thumb on the side of -x, and every frame is the mirror
-image of the right hand's at the same angles. So joint angles, limits and calibrations mean the same on both sides.
+frame sits on its J1 axis with z along the fingertip. Flexion is a positive rotation about x. A left hand is the right
+one mirrored in the planes x = 0 of forearm and palm: its palm has the thumb on the side of -x, and every frame is the
+mirror image of the right hand's at the same angles. So joint angles, limits and calibrations mean the same on both
+sides.
 
 Every function takes joint vectors of shape (..., 24) in the order of :data:`JOINTS`, radians; the ``*_matrices``
 functions work on whole batches without building pose objects.
@@ -144,7 +145,10 @@ def forearm_T_palm_matrix(joints_rad: Array, side: Side = "right") -> Array:
 
 
 def link_T_matrices(joints_rad: Array) -> Array:
-    """Every joint's child link in its parent link's frame, right hand, shape (..., 24, 4, 4), order of :data:`JOINTS`."""
+    """Every joint's child link in its parent link's frame, shape (..., 24, 4, 4), order of :data:`JOINTS`.
+
+    Those of a right hand.
+    """
     return _parent_T_child(joints_rad)[..., : len(JOINTS), :, :]
 
 

@@ -1,4 +1,4 @@
-"""The emulated hand's motor boards, up to 20: demands, halts, flags, answers (protocols: Motor demands; Motor answers)."""
+"""The emulated hand's motor boards: demands, halts, flags, answers (protocols: Motor demands; Motor answers)."""
 
 from __future__ import annotations
 
