@@ -167,12 +167,14 @@ def _check_one_to_one(numbers: Mapping[str, int], backwards: tuple[str, ...], wh
 def _missing_motors(named: set[str]) -> list[str]:
     """Motors that a hand with those named must have too.
 
-    A finger is there as a whole or not at all; Lite hands have neither wrist nor THJ3, and a thumb in any case.
+    A finger is there as a whole or not at all. Lite hands have neither wrist nor THJ3, and never a little finger.
     """
     of_finger = {
         finger: {name for name in DRIVEN_JOINTS if name.startswith(finger)} for finger in ("FF", "MF", "RF", "LF")
     }
     groups = [*of_finger.values(), {"WRJ1", "WRJ2"}]
+    if named & of_finger["LF"]:
+        return sorted(set(DRIVEN_JOINTS) - named)
     needed = {"THJ1", "THJ2", "THJ4", "THJ5"}.union(*(group for group in groups if group & named))
     if not any(group & named for group in of_finger.values()):
         needed |= of_finger["FF"]
