@@ -29,6 +29,7 @@ from drivers.shadow.protocol.palm_codec import (
     PalmStatus,
 )
 from drivers.shadow.protocol.palm_images import PALMS, PalmImage
+from drivers.shadow.protocol.palm_variants import MAGNETIC_TIP_BYTES
 from drivers.simulation.devices.motor_bank import MotorBank
 from drivers.simulation.hand_plant import HandPlant
 from drivers.simulation.sections import TactileSection
@@ -37,6 +38,7 @@ from drivers.simulation.settings import JointSensorSettings
 _ADC_FULL_SCALE = 4095
 _ALL_OF = tuple(sum(1 << motor for motor in range(parity, MOTORS, 2)) for parity in (0, 1))
 _IDLE_us, _IDLE_SPREAD_us = 410, 20
+_TIP_BYTES = {"0230": 32, "0250": MAGNETIC_TIP_BYTES}  # other palms have what a fingertip of theirs sends
 
 
 class JointSensors:
@@ -207,9 +209,8 @@ class PalmEmulator:
         return arrived, had_errors, torque, misc
 
     def _tips(self, slots: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        if self._image.name != "0230":
-            return slots
-        return np.hstack((slots, np.zeros_like(slots)))
+        size = _TIP_BYTES.get(self._image.name, slots.shape[1])
+        return np.hstack((slots, np.zeros((len(slots), size - slots.shape[1]), np.uint8)))
 
     def _auxiliary(self, command: PalmCommand) -> PalmAuxiliary | None:
         if self._image.name != "0230":

@@ -24,7 +24,7 @@ def plain(value: object) -> object:
     return np.asarray(value).tolist() if isinstance(value, np.ndarray | tuple) else value
 
 
-@pytest.mark.parametrize("name", ["0220", "0230", "0240"])
+@pytest.mark.parametrize("name", ["0220", "0230", "0240", "0250"])
 def test_register_bytes_are_those_of_shadows_master(name: str, lab_data: Path) -> None:
     golden = json.loads((lab_data / "golden_vectors.json").read_text())
     palm = PALMS[name]  # type: ignore[index]
