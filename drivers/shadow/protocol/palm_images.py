@@ -116,9 +116,7 @@ SIDES: dict[int, Side] = {0x01000000: "right", 0x01000001: "left"}
 USUAL_PALM: PalmName = "0220"
 """That of most hands, and of emulated ones that nobody wants otherwise."""
 
-WHICH_PALMS = (
-    "Palms 0220, 0230, 0240 and 0250 are supported; ask Shadow Robot which of their process images this board has"
-)
+WHICH_PALMS = "Palms 0220, 0230, 0240 and 0250 are supported; ask Shadow Robot which process image this board has"
 """Advice for a product code that is none of theirs."""
 
 _OTHER_PRODUCTS = {

@@ -1,8 +1,8 @@
-"""Process images of the rarer palms: 0240 with its motion sensor, 0230 with tactile links, 0250 with magnetic fingertips.
+"""Process images of the rarer palms: 0240 with its motion sensor, 0230 with tactile links, 0250 with magnetic tips.
 
-Layouts follow Shadow's headers (protocols: Palm images; Palm 0250); each ends with the CAN bridge's 12 bytes. The 0240's
-status is that of the 0220, the 0250's command that of the 0240. What a magnetic fingertip's 78 bytes mean is not known:
-they are kept as they come.
+Layouts follow Shadow's headers (protocols: Palm images; Palm 0250); each ends with the CAN bridge's 12 bytes. The
+0240's status is that of the 0220, the 0250's command that of the 0240. What a magnetic fingertip's 78 bytes mean is not
+known: they are kept as they come.
 """
 
 from __future__ import annotations

@@ -25,7 +25,8 @@ from drivers.shadow.protocol.palm_images import PALMS
 from tactile_lab import rigs
 from tests.support.memory_port import MemoryPort
 
-CALIBRATION = JointCalibration.load(Path(rigs.__file__).parent / "calibrations" / "simulated-hand" / "joints.yaml")
+FILES = Path(rigs.__file__).parent / "calibrations" / "simulated-hand"
+CALIBRATION = JointCalibration.load(FILES / "joints.yaml")
 MS = 1_000_000
 
 
@@ -91,8 +92,8 @@ def test_the_product_code_tells_the_palm_without_touching_the_slaves(palm: Any) 
 
 
 def test_a_product_code_that_can_not_be_driven_is_told_with_what_to_do() -> None:
-    wire = Wire(ChainSettings(product=0x0A))
-    with pytest.raises(DeviceError, match=r"a board this program does not know \(product 0xa\)") as told:
+    wire = Wire(ChainSettings(product=0x0B))
+    with pytest.raises(DeviceError, match=r"a board this program does not know \(product 0xb\)") as told:
         find_palm(EthercatSettings(interface="memory"), wire.clock, wire.port)
     assert "0220, 0230, 0240 and 0250 are supported; ask Shadow Robot" in str(told.value)
     with pytest.raises(DeviceError, match="not open"):
@@ -111,7 +112,9 @@ def test_a_stated_palm_is_not_looked_for() -> None:
 
 
 def setup_of(ethercat: EthercatSettings, **hand: Any) -> HandSetup:
-    return HandSetup(ethercat=ethercat, hand=HandSettings(**hand), joints=Path("joints.yaml"), motors=Path("m.yaml"))
+    return HandSetup(
+        ethercat=ethercat, hand=HandSettings(**hand), joints=FILES / "joints.yaml", motors=FILES / "motors.yaml"
+    )
 
 
 @pytest.mark.parametrize("palm", ["0220", "0230", "0240", "0250"])
