@@ -65,7 +65,7 @@ class HandProcess:
         patience_s: float = PATIENCE_s,
         check_map: bool = False,
     ) -> None:
-        self.name, self._tap = setup.name, tap
+        self.name, self._setup, self._tap = setup.name, setup, tap
         self._check_map = check_map
         self._start = {"setup": setup.model_dump(mode="json"), "patience_s": patience_s}
         self._child = RecordProcess("drivers.shadow.device.hand_worker", setup.name)

@@ -103,6 +103,8 @@ class TurnedBoxToucher:
         c, s = np.cos(turn_rad), np.sin(turn_rad)
         self.outline_m = corners @ np.array([[c, s], [-s, c]])
 
+    first_finger_side = 1.0
+
     def expect_tallest(self, height_m: float) -> None:
         """Nothing is in the way here."""
 
