@@ -67,7 +67,7 @@ def object_name(cell: Cell) -> str:
 
 def explore_everyday(cell: Cell) -> dict[str, Any]:
     """One session. Cell: object, pose, dimension, grasps; the rig, where it is not :data:`RIG`."""
-    rig, dimension = load_rig(str(cell.get("rig", RIG))), int(cell["dimension"])
+    rig, dimension = load_rig(str(dict(cell.setting).get("rig", RIG))), int(cell["dimension"])
     world = simulated_world(rig, cell.seed, object_name(cell))
     runtime, watch = build_runtime(rig, world, NullRecorder()), ForceWatch(world)
     runtime.observer.interpreter.listener = watch.on_sample
