@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import struct
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -44,7 +43,7 @@ def start_table(repeats: int = _REPEATS) -> TimingTable:
         SessionError: a session does not begin.
     """
     cases: tuple[tuple[str, Callable[[], Start], str], ...] = (
-        ("python -c pass", lambda: _run([sys.executable, "-c", "pass"]), "a Python that does nothing"),
+        ("python -c pass", lambda: _run([_program()[0], "-c", "pass"]), "a Python that does nothing"),
         ("tactile-lab --help", lambda: _run(_program("--help")), "until it has ended"),
         ("tactile-lab run --help", lambda: _run(_program("run", "--help")), "until it has ended"),
         ("tactile-lab run", first_cycle, "until the first cycles on rig sim are recorded"),
