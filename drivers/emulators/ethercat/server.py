@@ -5,7 +5,8 @@ when standard input ends, so it never outlives the program that started it.
 
 Orders: ``{"cable": {...}}`` sets fields of :class:`~drivers.emulators.ethercat.ring.CableFaults`; ``{"hung": true}``
 stops the palm's processor; ``{"service_ns": n}`` slows it; ``{"silent": [motors]}``; ``{"fall": [state, code]}`` lets
-the palm leave its state; ``{"power_cycle": true}``; ``{"announce": [bus, identifier, hex]}`` lets a motor send a frame on its CAN bus. Every answer contains the counts.
+the palm leave its state; ``{"power_cycle": true}``; ``{"announce": [bus, identifier, hex]}`` lets a motor send a frame
+on its CAN bus. Every answer contains the counts.
 """
 
 from __future__ import annotations
