@@ -46,9 +46,7 @@ def serve() -> None:
 def become(order: dict[str, Any], streams: list[int]) -> None:
     """Become the program, as the leader of a process session. Never returns."""
     os.setsid()
-    os.close(
-        os.open(order["streams"][0], os.O_RDWR)
-    )  # becomes the controlling terminal
+    os.close(os.open(order["streams"][0], os.O_RDWR))  # becomes the controlling terminal
     for descriptor, stream in enumerate(streams):
         os.dup2(stream, descriptor)
         os.close(stream)
