@@ -100,6 +100,13 @@ def test_a_product_code_that_can_not_be_driven_is_told_with_what_to_do() -> None
         wire.port.send(b"")
 
 
+def test_two_hands_on_one_cable_are_told_with_their_serial_numbers() -> None:
+    wire = Wire(ChainSettings(serial=378))
+    wire.hand.ring.slaves += emulated_hand(wire.clock, CALIBRATION, ChainSettings(serial=554)).ring.slaves
+    with pytest.raises(DeviceError, match=r"two hands on one cable, 378 and 554\. Connect each hand to an interface"):
+        wire.transport.open()
+
+
 def test_a_stated_palm_is_not_looked_for() -> None:
     stated = EthercatSettings(interface="nosuch0", palm="0240")
     looked_for = setup_of(EthercatSettings(interface="nosuch0"), palm="0230").with_known_palm(VirtualClock())
