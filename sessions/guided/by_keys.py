@@ -133,7 +133,8 @@ class GraspByKeys(GraspCycle):
         """Close or open fingers by steps along their paths; each stops when it touches."""
         table = self._table()
         way_m = self._console.settings.finger_step_m * request.steps
-        moving = set(request.fingers)
+        asked = [finger for finger in request.fingers if finger in self._fingers]
+        moving = set(asked)
         cycles = self._motion.cycles(abs(way_m) / (self.settings.closing_m_s * self._motion.supervisor.speed_scale))
         for _ in range(cycles):
             if way_m > 0.0:
@@ -144,7 +145,7 @@ class GraspByKeys(GraspCycle):
                 self._progress[finger] = float(np.clip(self._progress[finger] + step, *table.path(finger).valid))
             self._motion.set_fingers(table, self._progress)
             self._motion.tick()
-        stopped = [finger for finger in request.fingers if finger not in moving]
+        stopped = [finger for finger in asked if finger not in moving]
         if stopped and way_m > 0.0:
             self._console.tell(f"{', '.join(stopped)} stopped")
 

@@ -54,7 +54,11 @@ class Bench:
         self.hand.close()
 
 
-@pytest.mark.parametrize("kind", FOLDERS, ids=lambda kind: kind.name)
+QUICK = ("rh_E_v4", "lh_E_v5", "rh_lite_v1", "rh_extra_lite_v1", "rh_E_v3_no_mf_rf_lf")
+KINDS = [pytest.param(kind, id=kind.name, marks=[] if kind.name in QUICK else pytest.mark.long) for kind in FOLDERS]
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_every_motor_that_a_hand_has_moves_its_own_joint(tmp_path: Path, kind: HandFolder) -> None:
     findings = list(Bench(setup_of(write_folder(tmp_path, kind))).moves())
     assert {finding.joint for finding in findings} == set(kind.numbers)
