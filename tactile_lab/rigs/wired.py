@@ -93,10 +93,17 @@ def require_right_hand(rig: Rig) -> None:
 
 
 def with_form(rig: Rig) -> Rig:
-    """A rig with its hand's side and fingers named, so that a session keeps which hand it was."""
-    form = hand_form(rig)
-    hand = rig.description.hand.model_copy(update={"side": form.side, "fingers": form.fingers})
-    return replace(rig, description=rig.description.model_copy(update={"hand": hand}))
+    """A rig with its hand's side and fingers named, so that a session keeps which hand it was.
+
+    A simulated hand is of that side too, unless the rig says otherwise.
+    """
+    form, description = hand_form(rig), rig.description
+    changes: dict[str, object] = {
+        "hand": description.hand.model_copy(update={"side": form.side, "fingers": form.fingers})
+    }
+    if "side" not in description.simulation.model_fields_set:
+        changes["simulation"] = description.simulation.model_copy(update={"side": form.side})
+    return replace(rig, description=description.model_copy(update=changes))
 
 
 def with_palm(rig: Rig, clock: Clock) -> Rig:

@@ -83,6 +83,7 @@ def test_a_left_hand_is_told_by_its_own_folder_and_a_session_keeps_that(tmp_path
     kept = with_form(rig)
     (tmp_path / "general_info.yaml").unlink()
     assert hand_form(kept).is_left
+    assert kept.description.simulation.side == "left"
 
 
 def test_a_left_hands_files_are_refused_on_a_right_hand_before_anything_is_connected(tmp_path: Path) -> None:
