@@ -58,7 +58,7 @@ class EmulationPlan:
         simulation: the plant, and how imperfect the devices are.
         seed: of everything random.
         hand: the hand.
-        base: what the positioner's emulator is told: ``wiring`` and ``settings`` of the rig file, and ``world_T_mount``.
+        base: what the positioner's emulator is told: ``wiring``, ``settings`` and ``world_T_mount`` of the rig.
         tips: calibration file of the fingertips.
         wires: of linked fingertips, by finger; each of a kind that has an emulator.
         camera: address and TCP port of the camera, if there is one.

@@ -1,7 +1,7 @@
 """The emulated control box: modes, the pendant's switches, and the program that ur-rtde uploads.
 
-It does not interpret programs: it knows the numbers of the commands of that package's own program, version 1.6, and does
-what the program's text says. It has no joints either: the tool centre goes where it is sent, at once.
+It does not interpret programs: it knows the numbers of the commands of that package's own program, version 1.6, and
+does what the program's text says. It has no joints either: the tool centre goes where it is sent, at once.
 """
 
 from __future__ import annotations
@@ -92,7 +92,9 @@ class ControlBox:
             case "timestamp":
                 return self._clock.now_ns() / NANOSECONDS
             case "actual_TCP_pose":
-                return tuple(tcp_of(self._forearm.place() * self._flange_T_forearm.inverse() * self._flange_T_tcp).tolist())
+                return tuple(
+                    tcp_of(self._forearm.place() * self._flange_T_forearm.inverse() * self._flange_T_tcp).tolist()
+                )
             case "actual_TCP_force":
                 return (self.pushed_N, 0.0, (self.payload_kg - self._mass_kg) * _GRAVITY_m_s2, 0.0, 0.0, 0.0)
             case "payload" | "speed_scaling" | "target_speed_fraction":
@@ -115,8 +117,8 @@ class ControlBox:
             self._owners |= dict.fromkeys(names, client)
         return types
 
-    def release(self, client: object) -> None:
-        """A client has gone."""
+    def on_gone(self, client: object) -> None:
+        """A client has hung up."""
         self._owners = {name: owner for name, owner in self._owners.items() if owner is not client}
 
     def on_inputs(self, values: Mapping[str, Value]) -> None:
@@ -162,32 +164,26 @@ class ControlBox:
     # --- the pendant, and what befalls an arm ------------------------------------------------------------------
 
     def befall(self, event: str, value: float = 0.0) -> None:
-        """Something that a person or the world does; see the cases."""
-        match event:
-            case "protective stop" | "emergency stop":
-                self.safety_bits = _PROTECTIVE if event == "protective stop" else _EMERGENCY
-                self._end(_PAUSED)
-            case "release":
-                self.safety_bits, self.robot_mode = _NORMAL, _RUNNING
-            case "stop program":
-                self.stop_program()
-            case "start program":
-                self.runtime_state = _PLAYING
-            case "power off":
-                self.robot_mode = _IDLE
-                self._end(_STOPPED)
-            case "speed slider":
-                self.speed_fraction = value
-            case "push":
-                self.pushed_N = value
-            case "local control":
-                self.remote = False
-            case "unplug" | "plug":
-                self.plugged = event == "plug"
-            case "carry":
-                self._mass_kg = value
-            case _:
-                raise ValueError(event)
+        """Something that a person or the world does, by its name in :data:`EVENTS`. Raises KeyError for another."""
+        EVENTS[event](self, value)
+
+    def stop_by_safety(self, safety_bits: int) -> None:
+        """The safety system stops the arm and holds its program."""
+        self.safety_bits = safety_bits
+        self._end(_PAUSED)
+
+    def release(self, value: float = 0.0) -> None:
+        """A person has released the stop and switched the arm on; its program does not run."""
+        self.safety_bits, self.robot_mode = _NORMAL, _RUNNING
+
+    def power_off(self, value: float = 0.0) -> None:
+        """The brakes are on."""
+        self.robot_mode = _IDLE
+        self._end(_STOPPED)
+
+    def carry(self, mass_kg: float) -> None:
+        """Something else hangs on the flange."""
+        self._mass_kg = mass_kg
 
     def stop_program(self) -> None:
         """The program ends; the arm stands."""
@@ -236,3 +232,24 @@ class ControlBox:
     def _end_freedrive(self) -> None:
         self.free = False
         self._stand()
+
+
+def _set(name: str) -> Callable[[ControlBox, float], None]:
+    return lambda box, value: setattr(box, name, value)
+
+
+EVENTS: Mapping[str, Callable[[ControlBox, float], None]] = {
+    "protective stop": lambda box, _: box.stop_by_safety(_PROTECTIVE),
+    "emergency stop": lambda box, _: box.stop_by_safety(_EMERGENCY),
+    "release": ControlBox.release,
+    "stop program": lambda box, _: box.stop_program(),
+    "start program": lambda box, _: setattr(box, "runtime_state", _PLAYING),
+    "power off": ControlBox.power_off,
+    "speed slider": _set("speed_fraction"),
+    "push": _set("pushed_N"),
+    "carry": ControlBox.carry,
+    "local control": lambda box, _: setattr(box, "remote", False),
+    "unplug": lambda box, _: setattr(box, "plugged", False),
+    "plug": lambda box, _: setattr(box, "plugged", True),
+}
+"""What befalls an arm; of some the value counts: a share, newtons, kilograms."""

@@ -153,7 +153,7 @@ class UrHost:
 
     def _hang_up(self, connection: Connection) -> None:
         self._connections.remove(connection)
-        self._box.release(connection.rtde)
+        self._box.on_gone(connection.rtde)
         self._selector.unregister(connection.wire)
         with contextlib.suppress(OSError):
             connection.wire.close()

@@ -99,7 +99,9 @@ def outside(q: Array, settings: UrSettings) -> Refusal | None:
             return Refusal(what, "Move the arm there by the pendant, or correct base.ranges in the rig file")
     if not is_reachable(q, settings):
         distance_m = float(np.linalg.norm(q[:3]))
-        what = f"the tool centre is {distance_m:.3f} m from the arm's base, {float(np.hypot(*q[:2])):.3f} m from its axis"
+        what = (
+            f"the tool centre is {distance_m:.3f} m from the arm's base, {float(np.hypot(*q[:2])):.3f} m from its axis"
+        )
         least_m, most_m = settings.reach_m
         return Refusal(f"{what}: not within {least_m:g} to {most_m:g} m", "Move the arm, or correct base.reach_m")
     return None

@@ -1,7 +1,8 @@
 """The arm through the package ur-rtde: taken over with checks, streamed to, given back.
 
-The package uploads a program of its own to the control box, which obeys commands in RTDE's input registers; the box stops
-that program, and so the arm, when no command has come for the time of its watchdog. Only the arm's own process uses this.
+The package uploads a program of its own to the control box, which obeys commands in RTDE's input registers; the box
+stops that program, and so the arm, when no command has come for the time of its watchdog. Only the arm's own process
+uses this.
 """
 
 from __future__ import annotations
@@ -120,18 +121,18 @@ class RtdeArm:
                 dashboard.disconnect()
 
     def _prepare(self) -> None:
-        """Set tool and watchdog; what was set is read back. An arm that knows its load feels nothing at rest."""
+        """Set tool, then the watchdog; what was set is read back. An arm that knows its load feels nothing at rest."""
         settings = self._settings
         assert settings.flange_T_forearm is not None
         self._told(self._control.setPayload, settings.payload_kg, list(settings.centre_of_gravity_m))
         self._told(self._control.setTcp, list(settings.flange_T_forearm))
-        self._told(self._control.setWatchdog, settings.watchdog_hz)
         tcp = self._told(self._control.getTCPOffset)
         self._refuse(_unlike("tool centre", tcp, settings.flange_T_forearm, _SAME_PLACE))
         payload_kg = settings.payload_kg or 0.0
         self._await(lambda: abs(self._news.getPayload() - payload_kg) <= _SAME_PAYLOAD_kg)
         self._refuse(_unlike("payload", [self._news.getPayload()], [payload_kg], _SAME_PAYLOAD_kg))
         self._await_calm()
+        self._told(self._control.setWatchdog, settings.watchdog_hz)
         self._refuse(before_motion(self.state(), self.q(), settings))
 
     def _await(self, condition: Callable[[], bool]) -> None:

@@ -1,8 +1,8 @@
 """The arm in a process of its own: ``python -m drivers.positioner.ur.worker``, started by ``UrProcess``.
 
-Takes lines of JSON on standard input: first the arm and its limits, then commands, each of which is answered by a status
-on standard output. Between them it streams places to the arm, whatever the session is busy with, and brakes when no
-command comes. When its standard input ends, the session is gone: it brakes, gives the arm back, and ends.
+Takes lines of JSON on standard input: first the arm and its limits, then commands, each of which is answered by a
+status on standard output. Between them it streams places to the arm, whatever the session is busy with, and brakes
+when no command comes. When its standard input ends, the session is gone: it brakes, gives the arm back, and ends.
 """
 
 from __future__ import annotations
@@ -33,6 +33,10 @@ from drivers.positioner.ur.codec import (
 from drivers.positioner.ur.limiter import MotionLimiter
 from drivers.positioner.ur.rtde_arm import RtdeArm
 from drivers.positioner.ur.settings import UrSettings
+from drivers.shadow.device.real_time import request_real_time
+
+_PRIORITY = 70
+"""Where permitted the stream comes before sessions and emulators, and after the hand."""
 
 _RUNS = ArmFlags.HEARD | ArmFlags.PROGRAM
 """Without these the arm stops by itself, and would take no command."""
@@ -71,7 +75,7 @@ class UrWorker:
     def __init__(self, arm: Arm, settings: UrSettings, pipe: Records, clock: Clock) -> None:
         self._arm, self._settings, self._pipe, self._clock = arm, settings, pipe, clock
         self._last: ArmCommand | None = None
-        self._commanded_ns = clock.now_ns()
+        self._commanded_ns = self._taken_ns = clock.now_ns()
         self._limiter = self._limiter_from(arm.q())
 
     def _limiter_from(self, q: Array) -> MotionLimiter:
@@ -107,8 +111,10 @@ class UrWorker:
         """One step of the stream. An arm that cannot take it any more is not streamed to until a restart."""
         try:
             self._step()
-        except DeviceError:
-            self._arm.braked = True  # its state, in the next statuses, says why
+            self._taken_ns = self._clock.now_ns()
+        except DeviceError:  # its state, in the next statuses, says why; one target alone may be late
+            if self._clock.now_ns() - self._taken_ns > self._settings.unheard_s * NANOSECONDS:
+                self._arm.braked = True
 
     def _step(self) -> None:
         arm, last = self._arm, self._last
@@ -157,6 +163,7 @@ def main() -> None:
         found = arm.connect()
         pipe.put(RecordKind.READY, clock.now_ns(), json.dumps({"found": found}).encode())
         pipe.flush()
+        request_real_time(_PRIORITY)
         stream(UrWorker(arm, settings, pipe, clock), orders, clock, settings.cycle_s)
     except TactileLabError as error:
         pipe.put(RecordKind.ERROR, clock.now_ns(), str(error).encode())
