@@ -27,7 +27,9 @@ from drivers.positioner.ur.settings import UrSettings, UrWiring
 pytestmark = pytest.mark.skipif(find_spec("rtde_control") is None, reason="the package ur-rtde is not installed")
 
 TOOL = (0.0, 0.0, 0.06, 0.0, 0.0, 1.5)
-SETTINGS = UrSettings(payload_kg=4.6, flange_T_forearm=TOOL, reach_m=(0.2, 1.3), lost_limit=2000, unheard_s=1.0, watchdog_hz=2.0)
+SETTINGS = UrSettings(
+    payload_kg=4.6, flange_T_forearm=TOOL, reach_m=(0.2, 1.3), lost_limit=2000, unheard_s=1.0, watchdog_hz=2.0
+)
 HERE = np.array([0.5, 0.0, 0.36, 0.0, 0.0, 0.0])
 THERE = np.array([0.6, 0.1, 0.4, 0.3, 0.0, 0.1])
 CYCLES = 6000

@@ -9,7 +9,7 @@ from typing import Protocol
 from drivers.core.errors import CodecError
 
 _HEAD = struct.Struct(">HB")
-_VERSION = 2
+_VERSION, _DATA = 2, ord("U")
 
 _FORMATS = {
     "BOOL": "?",
@@ -85,12 +85,15 @@ class RtdeClient:
     def feed(self, data: bytes) -> bytes:
         """Take bytes; the bytes of the answers. Raises CodecError for what is no package."""
         self._rest += data
-        return b"".join(package(kind, self._answer(kind, body)) for kind, body in self._packages() if kind != ord("U"))
+        try:
+            return b"".join(package(kind, self._answer(kind, body)) for kind, body in self._packages() if kind != _DATA)
+        except (struct.error, UnicodeDecodeError, IndexError) as error:
+            raise CodecError(f"a package with a damaged content ({error})", where="rtde") from error
 
     def data(self) -> bytes:
         """One data package of the outputs as they are."""
         body = b"\x01" + b"".join(_pack(name, self._box.output(name)) for name in self._outputs)
-        return package(ord("U"), body)
+        return package(_DATA, body)
 
     def _packages(self) -> Iterator[tuple[int, bytes]]:
         while len(self._rest) >= _HEAD.size:
@@ -100,7 +103,7 @@ class RtdeClient:
             if len(self._rest) < size:
                 return
             body, self._rest = self._rest[_HEAD.size : size], self._rest[size:]
-            if kind == ord("U"):
+            if kind == _DATA:
                 self._take_inputs(body)
             yield kind, body
 
