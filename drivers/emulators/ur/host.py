@@ -93,17 +93,17 @@ class UrHost:
 
     def turn(self) -> None:
         """Serve what has come within a few milliseconds. A box whose cable is pulled hears and says nothing."""
-        self._box.tick()
-        if not self._box.plugged:
+        if self._box.plugged:
+            for key, _ in self._selector.select(_TURN_s):
+                if isinstance(key.data, Connection):
+                    self._serve(key.data)
+                else:
+                    self._accept(self._listening[key.data], key.data)
+            for connection in list(self._connections):
+                self._stream(connection)
+        else:
             time.sleep(_TURN_s)
-            return
-        for key, _ in self._selector.select(_TURN_s):
-            if isinstance(key.data, Connection):
-                self._serve(key.data)
-            else:
-                self._accept(self._listening[key.data], key.data)
-        for connection in list(self._connections):
-            self._stream(connection)
+        self._box.tick()  # last: a busy machine may have kept this process from commands that came in time
 
     def close(self) -> None:
         """Hang up and stop listening."""

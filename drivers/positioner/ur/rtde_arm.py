@@ -37,6 +37,7 @@ _OUTPUTS = [
 ]
 _ANSWER_s = 2.0
 _SAME_PAYLOAD_kg, _SAME_PLACE = 0.01, 1e-4
+_SILENT_ns = 50_000_000
 _FIRST_LOCAL_VERSION = 5
 """PolyScope of this version and later can be in local control."""
 
@@ -179,7 +180,12 @@ class RtdeArm:
         return q
 
     def servo(self, q: Array) -> None:
-        """Stream the next place, shape (6,). Raises DeviceError when the arm does not take it."""
+        """Stream the next place, shape (6,). Raises DeviceError when the arm does not take it.
+
+        While the arm is silent nothing is sent: the package would wait for it, and hear no command meanwhile.
+        """
+        if self._clock.now_ns() - self._heard_ns > _SILENT_ns:
+            return
         settings = self._settings
         self._end_freedrive()
         self._servoing = True
