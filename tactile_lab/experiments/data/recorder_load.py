@@ -89,8 +89,9 @@ class LoadStatus:
 
 def read_status(path: Path) -> LoadStatus:
     """How far a load has come, or had come when it was killed."""
-    content = path.read_bytes()
-    ticks, longest, late, finished, *counts = _STATUS.unpack(content.ljust(_STATUS.size, b"\0")[: _STATUS.size])
+    with path.open("rb") as file:
+        content = file.read(_STATUS.size)
+    ticks, longest, late, finished, *counts = _STATUS.unpack(content.ljust(_STATUS.size, b"\0"))
     return LoadStatus(ticks, longest, late, bool(finished), dict(zip(STREAMS, counts, strict=True)))
 
 
