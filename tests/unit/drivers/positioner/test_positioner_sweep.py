@@ -10,7 +10,7 @@ from drivers.core.clock import VirtualClock
 from drivers.core.transports import Datagram, MemoryTransport, Transport
 from drivers.positioner.codec import PositionerStatus, decode_command, encode_status
 from drivers.positioner.positioner import Positioner, PositionerSample
-from tests.support.driver_sweep import DriverSweep, SweptBench
+from tests.support.driver_sweep import DriverSweep, SweptDevice
 from tests.support.faults import Field, MessageLayout
 
 
@@ -40,7 +40,7 @@ class TestPositioner(DriverSweep):
     harmless: ClassVar[frozenset[str]] = frozenset({"counter wrap", "duplicate"})
     stops: ClassVar[frozenset[str]] = frozenset({"unplug", "delay", "stuck value", "flip a bit"})
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         clock = VirtualClock()
         transport = MemoryTransport("base", Carriage(clock))
 
@@ -53,4 +53,4 @@ class TestPositioner(DriverSweep):
             sample = device.exchange()
             return [sample] if sample.fresh else []
 
-        return SweptBench(transport, clock, build, lambda: None, use)
+        return SweptDevice(transport, clock, build, lambda: None, use)
