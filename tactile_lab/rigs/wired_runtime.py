@@ -23,7 +23,7 @@ from tactile_lab.rigs.wired import camera_source, force_wire, hand_setup, wires_
 from tactile_lab.rigs.wires import RemoteCamera
 
 
-def build_wired_bench(
+def build_wired_runtime(
     rig: Rig,
     recorder: Recorder,
     clock: Clock,

@@ -18,7 +18,7 @@ from drivers.positioner.ur.codec import (
     encode_arm_status,
 )
 from drivers.positioner.ur.device import UrPositioner
-from tests.support.driver_sweep import DriverSweep, SweptBench
+from tests.support.driver_sweep import DriverSweep, SweptDevice
 from tests.support.faults import Field, MessageLayout
 
 _ARM = ArmState(0.0, 7, 2, 1, 1.0, (0.0, 0.0, 0.0), ArmFlags.HEARD | ArmFlags.PROGRAM)
@@ -63,7 +63,7 @@ class TestPositioner(DriverSweep):
     carriage: ClassVar[type[Carriage]] = Carriage
     device: ClassVar[type[Positioner]] = Positioner
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         clock = VirtualClock()
         transport = MemoryTransport("base", self.carriage(clock))
 
@@ -76,7 +76,7 @@ class TestPositioner(DriverSweep):
             sample = device.exchange()
             return [sample] if sample.fresh else []
 
-        return SweptBench(transport, clock, build, lambda: None, use)
+        return SweptDevice(transport, clock, build, lambda: None, use)
 
 
 class TestUrArm(TestPositioner):
