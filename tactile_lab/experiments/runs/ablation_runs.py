@@ -62,14 +62,10 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         "free space": _joint("free space"),
         "splicing": _joint("splicing"),
         "relocation": _joint("relocation"),
-        "second look": _joint("second look"),
         "deferred association": _joint("deferred association"),
         "faces": _joint("faces"),
         "doubts": _joint("doubts"),
-        "without one": _joint("without one"),
-        "released contacts": _joint("released contacts"),
         "placing on the object": _joint("placing on the object"),
-        "placing from several": _joint("placing from several"),
         "regular faces": _joint("regular faces"),
         "right angles": _shape("right angles"),
         "face extents": _shape("face extents"),
@@ -90,23 +86,19 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
 """What is left out, by name, as settings."""
 
 _IN_SPACE_ONLY = ("polyhedron", "prism", "standing field", "strays", "held-out contacts", "pose uncertainty")
-_IN_PLANE_ONLY = ("corners", "without one")
+_IN_PLANE_ONLY = ("corners",)
 _LONG_ONLY = ("fixed lag",)
 _LONG_TOO = (NOTHING, "fixed lag", "loops")
-_CARRIED_TOO = (NOTHING, "relocation", "deferred association", "aside branch", "second look", "backward reading")
+_CARRIED_TOO = (NOTHING, "relocation", "deferred association", "aside branch", "backward reading")
 _TELLING: Mapping[str, frozenset[str]] = MappingProxyType(
     {
         name: frozenset({name, *further})
         for name, further in {
             "splicing": (),
             "relocation": ("deferred association",),
-            "second look": (),
             "deferred association": (),
             "doubts": (),
-            "without one": (),
-            "released contacts": (),
             "placing on the object": (),
-            "placing from several": (),
             "regular faces": (),
         }.items()
     }
