@@ -1,7 +1,7 @@
-"""How long the program takes to start, as ratios to a Python that does nothing.
+"""Start-up times of the program, as ratios to a Python interpreter that does nothing.
 
-Everything is measured from outside, from the start of a new process: to its end, or until the first cycles of its
-session stand in the recording, which is at most 80 ms of session time after the first.
+All times are measured from outside, from the start of a new process until its end, or until the first cycles of its
+session are in the recording. They are written at most 80 ms of session time after the first cycle.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ _MAGIC_BYTES, _POLL_s = 8, 0.005
 
 @dataclass(frozen=True)
 class Start:
-    """One start: processor time of the process, and how long it took beside whatever else the machine did; seconds."""
+    """One start: processor time of the process, and elapsed time, which depends on the load of the machine; seconds."""
 
     processor_s: float
     wall_s: float
 
 
 def start_table(repeats: int = _REPEATS) -> TimingTable:
-    """Medians of processor times, and the median of the whole time in the note; one start before is not counted.
+    """Medians of processor times, with the median elapsed time in the note; a first start is not counted.
 
-    The program starts in one thread and waits for nothing, so that on a quiet core both are the same.
+    The program starts in one thread and waits for nothing, so both are equal on an idle core.
 
     Raises:
-        SessionError: a session does not begin.
+        SessionError: a session does not start.
     """
     cases: tuple[tuple[str, Callable[[], Start], str], ...] = (
         ("python -c pass", lambda: _run([_program()[0], "-c", "pass"]), "a Python that does nothing"),
@@ -60,7 +60,7 @@ def _timing(name: str, note: str, starts: Sequence[Start]) -> Timing:
 
 
 def first_cycle() -> Start:
-    """From the start of ``tactile-lab run`` until its recording has messages. Raises SessionError."""
+    """Times from the start of ``tactile-lab run`` until its recording has messages. Raises SessionError."""
     with tempfile.TemporaryDirectory() as folder:
         begun = time.perf_counter()
         process = _start(_program("run", "--grasps", "1", "--out", folder))
@@ -75,7 +75,7 @@ def first_cycle() -> Start:
 
 
 def has_messages(recording: Path) -> bool:
-    """Whether a recording has its first chunk; read without unpacking anything."""
+    """Whether a recording has its first chunk; nothing is decompressed for this."""
     with recording.open("rb") as file:
         file.seek(_MAGIC_BYTES)
         while len(head := file.read(9)) == 9:
