@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tactile_lab.evaluation.spread import Interval, quantile
 from tactile_lab.experiments.cells import Row
-from tactile_lab.experiments.runs.ablation_runs import CARRIED, LONG, PLANE, SPACE, WRONG
+from tactile_lab.experiments.runs.ablation_runs import CARRIED, LONG, PLANE, SPACE, WITHOUT, WRONG
 from tactile_lab.experiments.summary import LEFT_OUT, NOTHING, UNKNOWN, Column, Group, group_runs, markdown, paired
 
 PAGE, MAP = Path("docs/results/ablation.md"), Path("docs/estimator.md")
@@ -43,7 +43,8 @@ distance up to 20 mm, so that one lost object does not hide the others. "Same" i
 same to a micrometre; of these, those in which the mechanism itself reports that it changed nothing were not run
 again. Means of fewer than five runs have no interval: they are anecdotes. Time is processor time without the
 mechanism over that with all, of the runs that were made twice. Under "carried off" somebody puts the object elsewhere,
-by up to 15 cm and any angle, after two thirds of the grasps. {count} runs.
+by up to 15 cm and any angle, after two thirds of the grasps. {count} runs. Mechanisms that are "gone" were deleted for
+what is seen here ([decision 35](../decisions/0035-ablation.md)).
 
 """
 
@@ -108,8 +109,12 @@ def _table(groups: Sequence[Group]) -> list[list[str]]:
         same = sum(bool((row.figures or {}).get("same")) for row in group.rows)
         found = [_bold(paired(group, column, groups), column.digits) for column in _SHOWN]
         times = [_ratio(group, groups, key) for _, key in _TIMES]
-        body.append([str(group[LEFT_OUT]), str(len(group.rows)), str(same), *found, *times])
+        body.append([_titled(str(group[LEFT_OUT])), str(len(group.rows)), str(same), *found, *times])
     return [head, *body]
+
+
+def _titled(name: str) -> str:
+    return name if name in WITHOUT else f"{name} (gone)"
 
 
 def _bold(interval: Interval | None, digits: int, *, with_interval: bool = True) -> str:

@@ -36,7 +36,7 @@ SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         SPACE: ("box-12x6x6", "triangular-prism", "ellipsoid", "cylinder", "hexagonal-prism", "l-block"),
     }
 )
-GRASPS: Mapping[str, int] = MappingProxyType({PLANE: 12, WRONG: 12, CARRIED: 12, LONG: 36, SPACE: 12})
+GRASPS: Mapping[str, int] = MappingProxyType({PLANE: 12, WRONG: 12, CARRIED: 12, LONG: 60, SPACE: 12})
 CARRIED_BEFORE, FARTHEST_m = 8, 0.15
 """Grasp before which somebody puts the object elsewhere, and by how much at most per axis; it is also turned."""
 CHECK_EVERY = 5
@@ -56,8 +56,6 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         NOTHING: {},
         "backward reading": {"joint": {"backwards": False}},
         "several trajectories": {"joint": {"hypotheses": 1}},
-        "aside branch": _joint("aside branch"),
-        "valleys": _joint("valleys"),
         "stiff slips": {"motion": {"gripped": False}},
         "free space": _joint("free space"),
         "splicing": _joint("splicing"),
@@ -79,7 +77,6 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         "standing field": _shape("standing field"),
         "strays": _shape("strays"),
         "pose uncertainty": _joint("pose uncertainty"),
-        "loops": {"back_end": {"enabled": False}},
         "fixed lag": {"joint": {"window": 1000}},
     }
 )
@@ -88,8 +85,8 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
 _IN_SPACE_ONLY = ("polyhedron", "prism", "standing field", "strays", "held-out contacts", "pose uncertainty")
 _IN_PLANE_ONLY = ("corners",)
 _LONG_ONLY = ("fixed lag",)
-_LONG_TOO = (NOTHING, "fixed lag", "loops")
-_CARRIED_TOO = (NOTHING, "relocation", "deferred association", "aside branch", "backward reading")
+_LONG_TOO = (NOTHING, "fixed lag")
+_CARRIED_TOO = (NOTHING, "relocation", "deferred association", "backward reading")
 _TELLING: Mapping[str, frozenset[str]] = MappingProxyType(
     {
         name: frozenset({name, *further})

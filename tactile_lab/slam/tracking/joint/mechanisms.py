@@ -12,8 +12,6 @@ Mechanism: TypeAlias = Literal[
     "splicing",
     "relocation",
     "pushes",
-    "aside branch",
-    "valleys",
     "free space",
     "deferred association",
     "faces",
@@ -22,7 +20,7 @@ Mechanism: TypeAlias = Literal[
     "regular faces",
     "pose uncertainty",
 ]
-"""Backward reading, the beam, the fixed lag and the loops have settings of their own, shape models theirs."""
+"""Backward reading, the beam and the fixed lag have settings of their own, shape models theirs."""
 
 _Value = TypeVar("_Value")
 
