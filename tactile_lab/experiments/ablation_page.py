@@ -93,10 +93,11 @@ def _full(groups: Sequence[Group]) -> str:
         for title, key in (("registration", "registration_mm"), ("Hausdorff distance", "hausdorff_mm"))
     ]
     shapes = dict.fromkeys(str(row.cell["shape"]) for row in full.rows)
+    seeds = sorted({row.cell.seed for row in full.rows})
     return (
         f"All mechanisms: {', '.join(spreads)} (median / p90 / maximum), {len(full.failures)} of {len(full.rows)} runs "
         f"failed, a step takes {quantile(full.pool('step_ms'), 0.5):.0f} ms and the end "
-        f"{full.spread('finish_ms').median / 1e3:.1f} s (medians). {', '.join(shapes)}."
+        f"{full.spread('finish_ms').median / 1e3:.1f} s (medians). {', '.join(shapes)}; seeds {seeds[0]} to {seeds[-1]}."
     )
 
 
