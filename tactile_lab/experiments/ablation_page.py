@@ -97,7 +97,8 @@ def _full(groups: Sequence[Group]) -> str:
     return (
         f"All mechanisms: {', '.join(spreads)} (median / p90 / maximum), {len(full.failures)} of {len(full.rows)} runs "
         f"failed, a step takes {quantile(full.pool('step_ms'), 0.5):.0f} ms and the end "
-        f"{full.spread('finish_ms').median / 1e3:.1f} s (medians). {', '.join(shapes)}; seeds {seeds[0]} to {seeds[-1]}."
+        f"{full.spread('finish_ms').median / 1e3:.1f} s (medians). {', '.join(shapes)}; "
+        f"seeds {seeds[0]} to {seeds[-1]}."
     )
 
 

@@ -63,6 +63,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         "deferred association": _joint("deferred association"),
         "faces": _joint("faces"),
         "doubts": _joint("doubts"),
+        "without one": _joint("without one"),
         "placing on the object": _joint("placing on the object"),
         "regular faces": _joint("regular faces"),
         "right angles": _shape("right angles"),
@@ -83,7 +84,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
 """Settings that switch a mechanism off, by its name."""
 
 _IN_SPACE_ONLY = ("polyhedron", "prism", "standing field", "strays", "held-out contacts", "pose uncertainty")
-_IN_PLANE_ONLY = ("corners",)
+_IN_PLANE_ONLY = ("corners", "without one")
 _LONG_ONLY = ("fixed lag",)
 _LONG_TOO = (NOTHING, "fixed lag")
 _CARRIED_TOO = (NOTHING, "relocation", "deferred association", "backward reading")
@@ -95,6 +96,7 @@ _TELLING: Mapping[str, frozenset[str]] = MappingProxyType(
             "relocation": ("deferred association",),
             "deferred association": (),
             "doubts": (),
+            "without one": (),
             "placing on the object": (),
             "regular faces": (),
         }.items()

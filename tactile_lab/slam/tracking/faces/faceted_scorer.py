@@ -27,7 +27,7 @@ from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother, smoot
 from tactile_lab.slam.tracking.faces.flat_faces import flat_faces
 from tactile_lab.slam.tracking.faces.regular_faces import made_regular
 from tactile_lab.slam.tracking.faces.solid_face_extents import solid_ends
-from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer
+from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
 
 _ORDERING_RESOLUTION_m = 0.002
@@ -64,7 +64,7 @@ class FacetedScorer:
     def better(self, contact_map: ContactMap) -> Hypothesis:
         """The map, or the one with poses smoothed together with flat faces if those explain its contacts better."""
         smooth = self._scorer.score(contact_map)
-        sharp = self.smooth_with_facets(contact_map) or self._sharp(contact_map)
+        sharp = self.smooth_with_facets(contact_map) or self._sharp(contact_map) or self._sharp_without_one(contact_map)
         if sharp is None or sharp.cost > smooth.cost + _HOPELESS_nats:
             return smooth
         settled = self._mechanisms.improve("doubts", sharp, self._reconsider)
@@ -75,7 +75,7 @@ class FacetedScorer:
     def without_errors(self, contact_map: ContactMap) -> ContactMap:
         """The map at its poses, without the contacts that neither a field nor flat faces explain."""
         cleaned, _ = self._scorer.clean(contact_map)
-        sharp = self._sharp(cleaned)
+        sharp = self._sharp(cleaned) or self._sharp_without_one(cleaned)
         if sharp is None:
             return cleaned
         return _likelier(self._scorer.score(cleaned), self._mechanisms.improve("doubts", sharp, self._reconsider)).map
@@ -147,6 +147,21 @@ class FacetedScorer:
         motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
         misfit = motion - explained - float(constant)
         return Hypothesis(contact_map, misfit, intrusion, self._scorer.price(contact_map))
+
+    def _sharp_without_one(self, contact_map: ContactMap) -> Hypothesis | None:
+        """The most likely sharp outline of all contacts but one of those that the field explains worst.
+
+        A single wrong contact can be enough for faces that enclose nothing. In space this identifies round bodies.
+        """
+        if contact_map.dimension == 3 or not self._mechanisms.has("without one"):
+            return None
+        costs = contact_map.fit().leave_one_out_costs(np.arange(len(contact_map.contacts)))
+        worst = [contact_map.origins[each] for each in np.argsort(-costs)[:_MOST_DOUBTS]]
+        found = [self._sharp(contact_map.without_contact(*each)) for each in worst]
+        best = min((each for each in found if each is not None), key=cost, default=None)
+        if best is not None:
+            self._mechanisms.changed.add("without one")
+        return best
 
     def _reconsider(self, sharp: Hypothesis) -> Hypothesis:
         """Leave out contacts that a sharp shape explains only by themselves; restore those it explains better."""

@@ -16,6 +16,7 @@ Mechanism: TypeAlias = Literal[
     "deferred association",
     "faces",
     "doubts",
+    "without one",
     "placing on the object",
     "regular faces",
     "pose uncertainty",
