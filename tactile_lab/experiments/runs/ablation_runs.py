@@ -56,6 +56,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         NOTHING: {},
         "backward reading": {"joint": {"backwards": False}},
         "several trajectories": {"joint": {"hypotheses": 1}},
+        "valleys": _joint("valleys"),
         "stiff slips": {"motion": {"gripped": False}},
         "free space": _joint("free space"),
         "splicing": _joint("splicing"),

@@ -17,9 +17,11 @@ from drivers.core.contacts import Array
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved
 from tactile_lab.slam.tracking.contacts.free_space import free_space_costs
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.pose_vectors import PoseVectors
 from tactile_lab.slam.tracking.evidence.fixed_lag import condense
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost, pushed_nats
 from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
+from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
 
 _EXPECTED_RIGHT = 99.0
 """Prior number of right contacts per wrong one."""
@@ -27,8 +29,15 @@ _EXPECTED_RIGHT = 99.0
 _BREAK_COST = 20.0
 """Negative log probability that the object moves independently of the hand."""
 
+_REMEMBERED = 8
+"""Number of maps whose information matrix is cached, for pairwise comparison of trajectories."""
+
 _SAME_TRANSLATION_m = 0.001
 _SAME_ROTATION_rad = 0.03
+_SAME_VALLEY = 0.5
+"""Trajectories count as equal if their squared Mahalanobis distance per component is below this: poses that the data do
+not distinguish differ by two on average.
+"""
 
 
 @dataclass(frozen=True)
@@ -56,13 +65,16 @@ class Hypothesis:
 class HypothesisScorer:
     """Scores, smooths and cleans hypotheses."""
 
-    def __init__(self, noise: MotionNoise, unexplained_cost: float) -> None:
+    def __init__(self, noise: MotionNoise, unexplained_cost: float, mechanisms: Mechanisms | None = None) -> None:
         """
         Args:
             noise: of the motion model.
             unexplained_cost: negative log likelihood of a contact that nothing explains.
+            mechanisms: which are on; None for all.
         """
         self._noise, self._unexplained_cost = noise, unexplained_cost
+        self._mechanisms = mechanisms or Mechanisms()
+        self._informed: dict[int, tuple[ContactMap, Array]] = {}
 
     def score(self, contact_map: ContactMap) -> Hypothesis:
         """The hypothesis of a map as it is."""
@@ -103,10 +115,56 @@ class HypothesisScorer:
     def with_covariances(self, contact_map: ContactMap) -> ContactMap:
         """The map with the covariance of each pose given all contacts and motions."""
         size, count = contact_map.space.size, len(contact_map.placed)
-        joint = np.linalg.inv(PoseEvidence(contact_map, self._noise).information(contact_map.rows))
+        joint = np.linalg.inv(self._information(contact_map))
         blocks = joint.reshape(count - 1, size, count - 1, size)[np.arange(count - 1), :, np.arange(count - 1)]
         later = [replace(one, covariance=block) for one, block in zip(contact_map.placed[1:], blocks, strict=True)]
         return replace(contact_map, placed=(contact_map.placed[0], *later))
+
+    def different(self, hypotheses: list[Hypothesis], *, by_contacts: bool = True) -> list[Hypothesis]:
+        """The most likely ones of those with equal trajectories.
+
+        Args:
+            hypotheses: to choose from.
+            by_contacts: those that leave out other contacts count as different, even if they are close.
+        """
+        return self.unlike(hypotheses, [], by_contacts=by_contacts)
+
+    def unlike(
+        self, hypotheses: list[Hypothesis], known: list[Hypothesis], *, by_contacts: bool = True
+    ) -> list[Hypothesis]:
+        """As :meth:`different`, of those that differ from all known trajectories."""
+        kept: list[Hypothesis] = []
+        for one in sorted(hypotheses, key=cost):
+            if not any(self._same(one.map, other.map, by_contacts) for other in (*known, *kept)):
+                kept.append(one)
+        return kept
+
+    def _same(self, one: ContactMap, other: ContactMap, by_contacts: bool) -> bool:
+        """Whether two trajectories are equal: close, or different only where contacts do not determine poses.
+
+        An optimiser that stops when little is gained ends at many places of one valley; kept apart, they would displace
+        true alternatives.
+        """
+        gaps = one.space.deviation(one.rows, other.rows)
+        if _near(gaps, one.space):
+            return True
+        if not self._mechanisms.has("valleys"):
+            return False
+        if not _near(gaps[0], one.space) or _left_out_contacts(one, by_contacts) != _left_out_contacts(
+            other, by_contacts
+        ):
+            return False
+        steps = gaps[1:].ravel()
+        return bool(steps @ self._information(other) @ steps < _SAME_VALLEY * len(steps))
+
+    def _information(self, contact_map: ContactMap) -> Array:
+        """Information of all poses but the first; cached for the last maps."""
+        if id(contact_map) not in self._informed:
+            while len(self._informed) >= _REMEMBERED:
+                del self._informed[next(iter(self._informed))]
+            found = PoseEvidence(contact_map, self._noise).information(contact_map.rows)
+            self._informed[id(contact_map)] = contact_map, found
+        return self._informed[id(contact_map)][1]
 
     def price(self, contact_map: ContactMap) -> float:
         """Cost of the contacts that are left out, and of the steps in which the object did not move with the hand.
@@ -134,20 +192,6 @@ class HypothesisScorer:
         return Hypothesis(contact_map, misfit, float(intrusion), self.price(contact_map))
 
 
-def different(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
-    """The most likely ones of those with equal trajectories, most likely first."""
-    return unlike(hypotheses, [])
-
-
-def unlike(hypotheses: list[Hypothesis], known: list[Hypothesis]) -> list[Hypothesis]:
-    """As :func:`different`, of those that differ from all known trajectories."""
-    kept: list[Hypothesis] = []
-    for one in sorted(hypotheses, key=cost):
-        if not any(_same(one.map, other.map) for other in (*known, *kept)):
-            kept.append(one)
-    return kept
-
-
 def cost(hypothesis: Hypothesis) -> float:
     """The sort key of hypotheses."""
     return hypothesis.cost
@@ -166,9 +210,13 @@ def weights(hypotheses: list[Hypothesis]) -> Array:
     return np.asarray(relative / relative.sum())
 
 
-def _same(one: ContactMap, other: ContactMap) -> bool:
-    """Whether the poses of two trajectories differ by less than the resolution."""
-    space, gaps = one.space, one.space.deviation(one.rows, other.rows)
+def _left_out_contacts(contact_map: ContactMap, by_contacts: bool) -> list[frozenset[int] | bool]:
+    """The left-out contacts of each grasp; or only whether all are left out."""
+    return [grasp.left_out if by_contacts else grasp.used for grasp in contact_map.placed]
+
+
+def _near(gaps: Array, space: PoseVectors) -> bool:
+    """Whether poses differ by less than the resolution."""
     limits = np.where(np.arange(space.size) < space.translations, _SAME_TRANSLATION_m, _SAME_ROTATION_rad)
     return bool((np.abs(gaps) <= limits).all())
 

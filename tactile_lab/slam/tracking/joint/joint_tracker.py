@@ -29,15 +29,7 @@ from tactile_lab.slam.tracking.joint.deferred_association import (
     propose_pushes,
     relocate_last,
 )
-from tactile_lab.slam.tracking.joint.hypotheses import (
-    Hypothesis,
-    HypothesisScorer,
-    cost,
-    different,
-    likeliest,
-    unlike,
-    weights,
-)
+from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost, likeliest, weights
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
 from tactile_lab.slam.tracking.joint.settings import JointSettings
 from tactile_lab.slam.tracking.joint.trajectory_splicing import splice_trajectories
@@ -84,7 +76,7 @@ class JointTracker:
         self._noise, self._settings, self._kernel_every = noise, settings, kernel_every
         self._space = first.space
         self.mechanisms = Mechanisms(settings.without)
-        self._scorer = HypothesisScorer(noise, settings.proposals.unexplained_cost)
+        self._scorer = HypothesisScorer(noise, settings.proposals.unexplained_cost, self.mechanisms)
         self._hypotheses = [self._scorer.score(self._without_free_space(first))]
         self._branches: list[Hypothesis] = []
         self._motion = np.zeros(self._space.size)
@@ -139,7 +131,7 @@ class JointTracker:
         smoothed = [self._scorer.smooth(branch.map, self._settings.iterations) for branch in branches]
         smoothed += self.mechanisms.add("pushes", lambda: self._push(min(smoothed, key=cost)))
         smoothed += self.mechanisms.add("relocation", lambda: self._relocate_grasp(min(smoothed, key=cost)))
-        self._branches = self._likeliest(different(smoothed), self._settings.hypotheses)
+        self._branches = self._likeliest(self._scorer.different(smoothed), self._settings.hypotheses)
         self.effective_count = float(1 / np.sum(weights(self._branches) ** 2))
         return self._branches[0].map.placed[-1].used
 
@@ -189,12 +181,12 @@ class JointTracker:
         """
         readable = len(self.map.placed) > 2 and len(self.map.placed[-1].contacts_world) > 0
         if self._settings.backwards and not self._has_settled and readable:
-            self._hypotheses = different(self._hypotheses + self._backwards())
+            self._hypotheses = self._scorer.different(self._hypotheses + self._backwards())
         self._regroup()
         for _ in range(2):
             iterations = self._settings.final_iterations
             smoothed = [self._scorer.smooth(one.map, iterations) for one in self._hypotheses]
-            self._hypotheses = self._likeliest(different(smoothed), self._settings.hypotheses)
+            self._hypotheses = self._likeliest(self._scorer.different(smoothed), self._settings.hypotheses)
             self._share_best_kernel()
         self._hypotheses = [self._associate_deferred(one) for one in self._hypotheses]
         faceted = self._score_with_facets()
@@ -209,18 +201,18 @@ class JointTracker:
         which contacts are left out, so that trajectories that differ only in these are tested once.
         """
         sharp = FacetedScorer(self._scorer, self._noise, self.mechanisms)
-        known = different(self._hypotheses)
+        known = self._scorer.different(self._hypotheses, by_contacts=False)
         found = [sharp.better(one.map) for one in known]
         best = min(found, key=cost)
         limit = self._scorer.score(best.map).cost
         likelier = self.mechanisms.add("splicing", lambda: self._spliced_below(limit, best, known))
         ranked = sorted(found + [sharp.better(one.map) for one in likelier], key=cost)
         best = self.mechanisms.improve("regular faces", self._relocalize(ranked[0], sharp), sharp.regular)
-        return [best, *unlike(ranked[1:], [best])]
+        return [best, *self._scorer.unlike(ranked[1:], [best])]
 
     def _spliced_below(self, limit: float, best: Hypothesis, known: list[Hypothesis]) -> list[Hypothesis]:
         """Other splices of a hypothesis that are more likely than a limit and differ from all known trajectories."""
-        others = unlike(self._splice(best), known)
+        others = self._scorer.unlike(self._splice(best), known, by_contacts=False)
         return [one for one in others if one.cost < limit]
 
     def _relocalize(self, hypothesis: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
@@ -268,7 +260,7 @@ class JointTracker:
         for _ in range(_MOST_REGROUPINGS):
             best = min(self._hypotheses, key=cost)
             spliced = self._splice(best) if self.mechanisms.has("splicing") else []
-            found = different(self._hypotheses + spliced)
+            found = self._scorer.different(self._hypotheses + spliced)
             self._hypotheses = self._likeliest(found, self._settings.hypotheses)
             if any(kept is one for kept in self._hypotheses for one in spliced):
                 self.mechanisms.changed.add("splicing")
@@ -299,7 +291,7 @@ class JointTracker:
         """Continue with another noise of the motion model."""
         self._noise, self._scorer = (
             noise,
-            HypothesisScorer(noise, self._settings.proposals.unexplained_cost),
+            HypothesisScorer(noise, self._settings.proposals.unexplained_cost, self.mechanisms),
         )
 
     def _share_best_kernel(self) -> None:

@@ -12,6 +12,7 @@ Mechanism: TypeAlias = Literal[
     "splicing",
     "relocation",
     "pushes",
+    "valleys",
     "free space",
     "deferred association",
     "faces",

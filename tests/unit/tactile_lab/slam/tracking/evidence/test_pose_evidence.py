@@ -17,7 +17,7 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, devi
 from tactile_lab.slam.tracking.evidence.evidence_kernels import assemble, pull
 from tactile_lab.slam.tracking.evidence.motion_cost import estimated_noise
 from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence, third_derivative
-from tactile_lab.slam.tracking.joint.hypotheses import HypothesisScorer
+from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer
 from tactile_lab.slam.tracking.joint.proposals import GraspMatch, ProposalSettings, propose, quasi_normal
 from tests.support.simulated_contacts import true_map
 
@@ -220,3 +220,19 @@ def test_the_noise_of_the_motion_is_learnt_from_the_slips(scale: float) -> None:
     learnt = estimated_noise(contact_map, configured)
     assert abs(np.log(learnt.translation_m / 0.010)) < 0.7 * abs(np.log(scale))
     assert abs(np.log(learnt.rotation_rad / np.deg2rad(20.0))) < 0.7 * abs(np.log(scale))
+
+
+def test_trajectories_are_one_where_the_contacts_leave_the_difference_open() -> None:
+    contact_map = true_map("ellipse", count=6)
+    scorer = HypothesisScorer(NOISE, 2.0)
+    variances, ways = np.linalg.eigh(np.linalg.inv(PoseEvidence(contact_map, NOISE).information(contact_map.rows)))
+    length = 2 * np.sqrt(variances[-1])
+
+    def moved(way: Array) -> Hypothesis:
+        return scorer.score(contact_map.with_rows(contact_map.rows + np.vstack([np.zeros(3), way.reshape(-1, 3)])))
+
+    best, open_way, certain_way = scorer.score(contact_map), moved(length * ways[:, -1]), moved(length * ways[:, 0])
+    assert np.abs(open_way.map.rows - contact_map.rows).max() > 0.03
+    assert len(scorer.different([best, open_way])) == 1
+    assert len(scorer.different([best, certain_way])) == 2
+    assert scorer.unlike([certain_way, open_way], [best]) == [certain_way]
