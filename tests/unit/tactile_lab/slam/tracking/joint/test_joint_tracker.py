@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from drivers.core.contacts import Array
 from tactile_lab.experiments.data.planar_data import simulate
@@ -13,9 +12,6 @@ from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise, planar_motion
-from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
-from tactile_lab.slam.tracking.joint import joint_tracker
-from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
 from tactile_lab.slam.tracking.joint.settings import JointSettings
 from tests.support.simulated_contacts import true_map
@@ -79,22 +75,3 @@ def test_the_end_is_told_as_it_is() -> None:
     tracker, _ = drifting_box(50, count=4)
     tracker.finish()
     assert tracker.refined is tracker.map
-
-
-def test_the_way_back_from_a_wrong_turn_may_be_open_from_the_second_hypothesis_alone(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    tracker, _ = drifting_box(50, count=6)
-    asked: list[Hypothesis] = []
-
-    def placed_from_the_second(best: Hypothesis, *_: object) -> Hypothesis:
-        asked.append(best)
-        return replace(best, misfit=best.misfit - 200.0) if len(asked) == 2 else best
-
-    monkeypatch.setattr(joint_tracker, "relocalize", placed_from_the_second)
-    monkeypatch.setattr(joint_tracker, "_HOPEFUL_nats", np.inf)
-    monkeypatch.setattr(FacetedScorer, "regular", lambda _, best: best)
-    tracker.finish()
-    assert 2 <= len(asked) <= 3
-    assert np.array_equal(tracker.map.rows, asked[1].map.rows)
-    assert not np.array_equal(tracker.map.rows, asked[0].map.rows)
