@@ -7,7 +7,7 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.closing import closing
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.guided.console import OperatorConsole
 from sessions.guided.motion import GuidedMotion
 from sessions.guided.operator import Ask, Stage
@@ -20,17 +20,19 @@ from sessions.recording.recorder import Level
 class GraspByHand:
     """The steps of a grasp as prompts; the hand has no demands, the positioner stays or is moved by hand.
 
+    A positioner that can be led is let go while the person guides, turns or opens, and holds still in between.
+
     Args:
         motion: supervised cycles that read the operator's requests; nothing is moved.
         settings: the length of a capture.
         console: the operator's console.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
     """
 
     def __init__(
-        self, motion: GuidedMotion, settings: CycleSettings, console: OperatorConsole, tip: TipEllipsoid
+        self, motion: GuidedMotion, settings: CycleSettings, console: OperatorConsole, hand: HandShape
     ) -> None:
-        self._motion, self.settings, self._console, self._tip = motion, settings, console, tip
+        self._motion, self.settings, self._console, self._hand = motion, settings, console, hand
         self._plan: GraspPlan | None = None
         self.landings_world_m: list[Array] = []
         self.jammed: tuple[str, ...] = ()
@@ -39,20 +41,22 @@ class GraspByHand:
     def plan(self) -> GraspPlan:
         """The grasp as the person does it: its frame follows from the palm's pose."""
         assert self._plan is not None
-        table = closing(self._plan.closing, self._plan.height_m, self._tip)
+        table = closing(self._plan.closing, self._plan.height_m, self._hand)
         world_T_grasp = self._motion.runtime.perception.world_T_palm * table.grasp_T_palm.inverse()
         frame = GraspFrame(float(world_T_grasp.x()), float(world_T_grasp.y()), float(world_T_grasp.rotation().yaw()))
         return GraspPlan(frame, self._plan.closing, self._plan.height_m, "led by hand")
 
     def descend(self, plan: GraspPlan) -> bool:
         self._plan = plan
-        self._motion.runtime.stop()
+        self._motion.runtime.lead_by_hand()
         prompt = "Guide the open hand around the object without touching it. SPACE: zero the fingertips"
         self._console.enter(Stage.GUIDE, prompt, Ask.NEXT, Ask.GIVE_UP)
         for request in self._motion.requests():
             if request.ask in (Ask.NEXT, Ask.GO) and self._zero():
+                self._motion.runtime.stop()
                 self._motion.supervisor.on_approach()
                 return True
+        self._motion.runtime.stop()
         return False
 
     def _zero(self) -> bool:
@@ -87,9 +91,11 @@ class GraspByHand:
         runtime = self._motion.runtime
         world_T_before = runtime.perception.world_T_palm
         runtime.begin_hold()
+        runtime.lead_by_hand()
         for request in self._motion.requests():
             if request.ask in (Ask.NEXT, Ask.GO):
                 break
+        runtime.stop()
         runtime.end_hold()
         return runtime.perception.world_T_palm * world_T_before.inverse()
 
@@ -97,8 +103,10 @@ class GraspByHand:
         self._console.enter(
             Stage.RELEASE, "Open the hand and move it away. SPACE: no finger touches any more", Ask.NEXT
         )
+        self._motion.runtime.lead_by_hand()
         for request in self._motion.requests():
             if request.ask in (Ask.NEXT, Ask.GO):
+                self._motion.runtime.stop()
                 return
 
     def lift(self) -> None:
