@@ -28,7 +28,7 @@ class TouchSettings(StrictModel):
         beyond_m: how far beyond the middle a rake goes.
         lowest_m: height of the fingertips over the table where a tap has missed the object.
         side_m_s: speed toward an object's side, palm upright; a stiff fingertip reaches 0.45 N at 20 mm/s.
-        side_heights_m: height of the lowest fingertip in such a touch, the palm on the left and on the right. The
+        side_heights_m: height of the lowest fingertip in such a touch, the first finger down and up. The
             forearm lets it come no lower; from higher up it would tip objects over.
     """
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from gtsam import Pose3
 
-from drivers.core.contacts import FINGERS, Array, Grasp
+from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.closing import SIDES, Closing, closing
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_plan import GraspPlan, evade
 from sessions.motion.guard import Guard
@@ -26,7 +26,7 @@ class GraspCycle:
     Args:
         motion: supervised motion.
         settings: speeds, forces, times.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
         yaw_window_rad: yaws the arm can reach.
     """
 
@@ -34,21 +34,25 @@ class GraspCycle:
         self,
         motion: Motion,
         settings: CycleSettings,
-        tip: TipEllipsoid | None = None,
+        hand: HandShape | None = None,
         yaw_window_rad: tuple[float, float] = (-np.pi, np.pi),
     ) -> None:
         self._motion, self.settings = motion, settings
-        self._toucher = Toucher(motion, settings, tip or TipEllipsoid())
+        self._toucher = Toucher(motion, settings, hand or HandShape())
         self._guard = Guard(motion, settings.touch.met_N, settings.held_up_rad)
-        self._tip, self._yaw_window_rad = tip or TipEllipsoid(), yaw_window_rad
+        self._hand, self._yaw_window_rad = hand or HandShape(), yaw_window_rad
         self._plan: GraspPlan | None = None
-        self._progress = dict.fromkeys(FINGERS, 0.0)
+        self._progress = dict.fromkeys(self._fingers, 0.0)
         self._touching: frozenset[str] = frozenset()
         self.landings_world_m: list[Array] = []
         """Centres of the tips, (3,) each, at each landing on the object in the last approach."""
 
         self.jammed: tuple[str, ...] = ()
         """The fingertips that were pressed so hard in the last re-orientation that it stopped early."""
+
+    @property
+    def _fingers(self) -> tuple[str, ...]:
+        return self._hand.form.fingers
 
     @property
     def plan(self) -> GraspPlan:
@@ -96,7 +100,7 @@ class GraspCycle:
     def _above(self) -> Array:
         """Where the hand may travel, above the grasp or, from the side, above where it comes down beside the object."""
         table = self._table()
-        above_m = travel_height_m(table, self._motion, self.settings, self._tip)
+        above_m = travel_height_m(table, self._motion, self.settings, self._hand)
         return self._motion.base_joints(self.plan.frame, table, above_m, self._away_m)
 
     @property
@@ -137,9 +141,9 @@ class GraspCycle:
 
     def _note_landing(self) -> None:
         """Remember where the hand met something: at the fingertip that did, or, not knowing better, at the foremost."""
-        fingers = [finger for finger in self._guard.met if finger in FINGERS] or list(FINGERS)
+        fingers = [finger for finger in self._guard.met if finger in self._fingers] or list(self._fingers)
         ahead = np.asarray(self.plan.frame.pose.rotation().rotate(np.array(self._table().approach)))
-        places = [self._motion.tip_centre_world_m(finger, self._tip) for finger in fingers]
+        places = [self._motion.tip_centre_world_m(finger, self._hand) for finger in fingers]
         self.landings_world_m.append(max(places, key=lambda place: float(place @ ahead)))
 
     def _come_down(self) -> list[str]:
@@ -152,9 +156,9 @@ class GraspCycle:
 
         def met() -> bool:
             felt = {*self._pressed_fingers(s.landing_force_N), *self._motion.bent(s.held_up_rad)}
-            hit.extend(finger for finger in FINGERS if finger in felt - set(hit))
+            hit.extend(finger for finger in self._fingers if finger in felt - set(hit))
             if hit:
-                self.landings_world_m.append(self._motion.tip_centre_world_m(hit[0], self._tip))
+                self.landings_world_m.append(self._motion.tip_centre_world_m(hit[0], self._hand))
             return bool(hit)
 
         if self._motion.probe_base(down, s.descent_m_s, met):
@@ -172,7 +176,7 @@ class GraspCycle:
         """
         s, table = self.settings, self._table()
         step_m = s.closing_m_s * self._motion.supervisor.speed_scale * self._motion.cycle_s
-        moving, touched = set(FINGERS), dict.fromkeys(FINGERS, 0)
+        moving, touched = set(self._fingers), dict.fromkeys(self._fingers, 0)
         self._motion.runtime.begin_closing()
         while moving and not self._pressed_fingers(s.closing_most_N):
             loads_N = self._motion.loads_N()
@@ -184,15 +188,15 @@ class GraspCycle:
                 self._progress[finger] += step_m / table.path(finger).length_m
             self._motion.set_fingers(table, self._progress)
             self._motion.tick()
-        self._touching = frozenset(finger for finger in FINGERS if touched[finger] >= s.touch_cycles)
+        self._touching = frozenset(finger for finger in self._fingers if touched[finger] >= s.touch_cycles)
 
     def _may_close(self, finger: str) -> bool:
         return self._progress[finger] < self._table().path(finger).valid[1] and not self._meets_thumb(finger)
 
     def _meets_thumb(self, finger: str) -> bool:
         """Whether this tip and the thumb's (any other's, for the thumb) are about to touch each other."""
-        centres = {f: self._table().path(f).centre_m(self._progress[f]) for f in FINGERS}
-        others = [f for f in FINGERS if f != "TH"] if finger == "TH" else ["TH"]
+        centres = {f: self._table().path(f).centre_m(self._progress[f]) for f in self._fingers}
+        others = self._hand.form.long_fingers if finger == "TH" else ("TH",)
         gap_m = min(float(np.linalg.norm(centres[finger] - centres[other])) for other in others)
         return gap_m < self.settings.finger_gap_m
 
@@ -304,8 +308,8 @@ class GraspCycle:
         """
         table, closed, opened = self._table(), self._progress, self._open_progress()
         step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))
-        shares = dict.fromkeys(FINGERS, 0.0)
-        while closed_still := {finger for finger in FINGERS if shares[finger] < 1.0}:
+        shares = dict.fromkeys(self._fingers, 0.0)
+        while closed_still := {finger for finger in self._fingers if shares[finger] < 1.0}:
             for finger in closed_still & self._overloaded_fingers() or closed_still:
                 shares[finger] = min(1.0, shares[finger] + step)
             self._progress = {finger: u + shares[finger] * (opened[finger] - u) for finger, u in closed.items()}
@@ -325,7 +329,7 @@ class GraspCycle:
 
     def _open_progress(self) -> dict[str, float]:
         """Progress of the open hand."""
-        return {finger: self._table().path(finger).valid[0] for finger in FINGERS}
+        return {finger: self._table().path(finger).valid[0] for finger in self._fingers}
 
     def _table(self) -> Closing:
-        return closing(self.plan.closing, self.plan.height_m, self._tip)
+        return closing(self.plan.closing, self.plan.height_m, self._hand)

@@ -16,7 +16,7 @@ import numpy as np
 
 from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.closing import SIDES, LOWEST_m, closing, sideways
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.box_fit import fit_box, on_sides
 from sessions.motion.grasp_plan import GraspPlan
@@ -88,13 +88,13 @@ class SidePlanner:
 
     Attributes:
         box: of the object, as felt.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
         yaw_window_rad: of the arm.
         reach: of the palm.
     """
 
     box: BoundingBox
-    tip: TipEllipsoid
+    hand: HandShape
     yaw_window_rad: tuple[float, float]
     reach: SideReach
     _points_m: list[Array] = field(default_factory=list)
@@ -191,7 +191,7 @@ class SidePlanner:
     def _deepest(
         self, name: str, yaw_rad: float, height_m: float, box: StandingBox, surely: StandingBox
     ) -> SideCandidate | None:
-        approach = np.array(closing(name, height_m, self.tip).approach[:2])
+        approach = np.array(closing(name, height_m, self.hand).approach[:2])
         c, s = np.cos(yaw_rad), np.sin(yaw_rad)
         way = np.array([[c, -s], [s, c]]) @ approach
         half_m = box.half_along_m(way)
@@ -200,15 +200,15 @@ class SidePlanner:
             plan = GraspPlan(GraspFrame(float(x), float(y), yaw_rad), name, height_m)
             if self._was_blocked(plan, float(depth_m)) or not self._is_in_reach(plan, way):
                 continue
-            if not is_way_clear(plan, self.tip, box):
+            if not is_way_clear(plan, self.hand, box):
                 continue
-            if touches := expected_touches(plan, self.tip, box, surely):
+            if touches := expected_touches(plan, self.hand, box, surely):
                 return SideCandidate(plan, float(depth_m), touches)
         return None
 
     def _is_in_reach(self, plan: GraspPlan, way: Array) -> bool:
         """Whether the palm stays in the workspace, where the hand comes down beside the object too."""
-        palm = plan.frame.pose * closing(plan.closing, plan.height_m, self.tip).grasp_T_palm
+        palm = plan.frame.pose * closing(plan.closing, plan.height_m, self.hand).grasp_T_palm
         places = np.array([palm.translation()[:2], palm.translation()[:2] - self.reach.standoff_m * way])
         return bool(np.linalg.norm(places - np.array(self.reach.centre_m), axis=1).max() < self.reach.radius_m)
 
@@ -241,7 +241,9 @@ class SidePlanner:
     def _is_near_side_new(self, plan: GraspPlan) -> bool:
         """Whether the side that the hand comes from is worth a touch there, and is not tipped over by it."""
         box = self._standing_box()
-        way = np.asarray(plan.frame.pose.rotation().rotate(np.array(closing(plan.closing, plan.height_m).approach)))[:2]
+        way = np.asarray(
+            plan.frame.pose.rotation().rotate(np.array(closing(plan.closing, plan.height_m, self.hand).approach))
+        )[:2]
         half_m = box.half_along_m(way)
         heights_m = np.arange(plan.height_m, min(plan.height_m + _ROW_m, box.size_m[2]), _ROW_m / 3)
         front = np.array([box.x_m, box.y_m]) - half_m * way

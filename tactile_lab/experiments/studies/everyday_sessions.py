@@ -37,6 +37,9 @@ RIG, GRASPS = "sim", 16
 LOW = "cube-6"
 """An object of the simulated rig, for comparison."""
 
+HAND_RIGS = {"sim": "right hand, five fingers", "sim-left": "left hand", "sim-lite": "Lite hand"}
+"""Rigs that differ in their hand, and which it is."""
+
 POSES = ("standing", "lying")
 
 
@@ -49,6 +52,11 @@ def settings(grasps: int) -> list[Setting]:
     ]
 
 
+def settings_of_hands(grasps: int) -> list[Setting]:
+    """A box on the rigs of a right hand with five fingers, a left one, and a Lite hand."""
+    return grid(rig=list(HAND_RIGS), object=["box-10x6x4"], pose=["standing"], dimension=[2], grasps=[grasps])
+
+
 def object_name(cell: Cell) -> str:
     """The object of a cell as the simulated rig names it. Raises ConfigurationError without the scans."""
     name = str(cell["object"])
@@ -58,8 +66,8 @@ def object_name(cell: Cell) -> str:
 
 
 def explore_everyday(cell: Cell) -> dict[str, Any]:
-    """One session. Cell: object, pose, dimension, grasps."""
-    rig, dimension = load_rig(RIG), int(cell["dimension"])
+    """One session. Cell: object, pose, dimension, grasps; the rig, where it is not :data:`RIG`."""
+    rig, dimension = load_rig(str(dict(cell.setting).get("rig", RIG))), int(cell["dimension"])
     world = simulated_world(rig, cell.seed, object_name(cell))
     runtime, watch = build_runtime(rig, world, NullRecorder()), ForceWatch(world)
     runtime.observer.interpreter.listener = watch.on_sample
