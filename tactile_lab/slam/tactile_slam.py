@@ -14,8 +14,8 @@ Grasps that cannot be registered:
   ``placement_limit_m`` (few contacts, or a direction not observed): "uncertain". A particle filter does not use the
   contacts, because they could not be removed from its only map; joint hypotheses use them and remain revisable.
 
-A session is lost when the last ``lost_after`` grasps are untracked, or more than half of all. A grasp that was untracked
-when it was taken and has a place by now does not count.
+A session is lost when the last ``lost_after`` grasps are untracked, or more than half of all. A grasp that was
+untracked when it was taken and has a place by now does not count.
 """
 
 from __future__ import annotations
