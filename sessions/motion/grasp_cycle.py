@@ -40,6 +40,7 @@ class GraspCycle:
         self._motion, self.settings = motion, settings
         self._toucher = Toucher(motion, settings, tip or TipEllipsoid())
         self._guard = Guard(motion, settings.touch.met_N, settings.held_up_rad)
+        self._landing = Guard(motion, settings.landing_force_N, settings.held_up_rad)
         self._tip, self._yaw_window_rad = tip or TipEllipsoid(), yaw_window_rad
         self._plan: GraspPlan | None = None
         self._progress = dict.fromkeys(FINGERS, 0.0)
@@ -79,10 +80,12 @@ class GraspCycle:
             if not hit:
                 self._motion.supervisor.on_approach()
                 return True
-            landed.update(hit)
             self.lift()
+            if not (fingers := [finger for finger in hit if finger in FINGERS]):
+                return False  # a link above the fingertips: a little aside it would land again
+            landed.update(fingers)
             shift_m, window = self.settings.landing_shift_m, self._yaw_window_rad
-            self._plan = evade(plan, self.plan, hit, landed, self._table(), shift_m, window)
+            self._plan = evade(plan, self.plan, fingers, landed, self._table(), shift_m, window)
         return False
 
     def _move_above(self) -> None:
@@ -117,7 +120,7 @@ class GraspCycle:
         self._guard.restart()
         beside = motion.base_joints(self.plan.frame, table, 0.0, self._away_m)
         if not motion.probe_base(beside, s.beside_m_s, self._guard.is_met):
-            self._note_landing()
+            self._note_landing(self._guard)
             motion.climb(self._above(), s.travel_m_s)
             return False
         motion.tare(s.rest_s)
@@ -128,39 +131,30 @@ class GraspCycle:
             motion.tick()
             if self._guard.is_met():
                 motion.set_base(motion.runtime.perception.base_q)
-                self._note_landing()
+                self._note_landing(self._guard)
                 self._toucher.capture()
                 self.lift()
                 return False
         motion.supervisor.on_approach()
         return True
 
-    def _note_landing(self) -> None:
+    def _note_landing(self, guard: Guard) -> None:
         """Remember where the hand met something: at the fingertip that did, or, not knowing better, at the foremost."""
-        fingers = [finger for finger in self._guard.met if finger in FINGERS] or list(FINGERS)
+        fingers = [finger for finger in guard.met if finger in FINGERS] or list(FINGERS)
         ahead = np.asarray(self.plan.frame.pose.rotation().rotate(np.array(self._table().approach)))
         places = [self._motion.tip_centre_world_m(finger, self._tip) for finger in fingers]
         self.landings_world_m.append(max(places, key=lambda place: float(place @ ahead)))
 
-    def _come_down(self) -> list[str]:
-        """Guarded descent. Returns the fingers that landed on something, with their tips or with other links, which
-        bends them.
-        """
-        s = self.settings
-        down = self._motion.base_joints(self.plan.frame, self._table())
-        hit: list[str] = []
-
-        def met() -> bool:
-            felt = {*self._pressed_fingers(s.landing_force_N), *self._motion.bent(s.held_up_rad)}
-            hit.extend(finger for finger in FINGERS if finger in felt - set(hit))
-            if hit:
-                self.landings_world_m.append(self._motion.tip_centre_world_m(hit[0], self._tip))
-            return bool(hit)
-
-        if self._motion.probe_base(down, s.descent_m_s, met):
-            self._motion.wait(s.rest_s)
-            met()
-        return hit
+    def _come_down(self) -> tuple[str, ...]:
+        """Guarded descent. Returns what landed on something: fingers, or links that cannot tell which they are."""
+        s, guard, motion = self.settings, self._landing, self._motion
+        guard.restart()
+        if motion.probe_base(motion.base_joints(self.plan.frame, self._table()), s.descent_m_s, guard.is_met):
+            motion.wait(s.rest_s)
+            guard.is_met()
+        if guard.met:
+            self._note_landing(guard)
+        return guard.met
 
     # --- close and measure -------------------------------------------------------------------------------------
 

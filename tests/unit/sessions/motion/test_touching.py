@@ -73,7 +73,8 @@ def test_a_tap_beside_the_object_meets_nothing_and_the_hand_rises_again() -> Non
     motion = motion_on(world)
     assert len(Toucher(motion, QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0))) == 0
     table = closing(TAP.closing, TAP_HEIGHT_m, TIP)
-    above = motion.base_joints(GraspFrame(0.0, 0.0, 0.0), table, QUICK.lift_m)
+    lowest_m = QUICK.touch.lowest_m + TIP.semi_axes_m[2] - TAP_HEIGHT_m
+    above = motion.base_joints(GraspFrame(0.0, 0.0, 0.0), table, lowest_m + QUICK.lift_m)
     np.testing.assert_allclose(world.base_q, above, atol=1e-6)
 
 
