@@ -14,7 +14,8 @@ from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_plan import GraspPlan, evade
 from sessions.motion.guard import Guard
 from sessions.motion.motion import GraspFrame, Motion
-from sessions.motion.touching import Toucher, travel_height_m
+from sessions.motion.side_survey import LOW_m
+from sessions.motion.touching import SideTouch, Toucher, travel_height_m
 
 _HASTE_N, _FLIGHT_N = 1.0, 3.0
 """Limits of the force error in force control: toward the object, and away from it."""
@@ -66,9 +67,12 @@ class GraspCycle:
         finger and try again. If thumb and fingers have both landed, the object is too long in that direction: turn.
 
         Returns:
-            Whether the hand has descended around the object, fingers open.
+            Whether the hand has descended around the object, fingers open; after a touch alone, whether there was room
+            for it: the hand has risen again, and only :meth:`capture` may follow.
         """
         self._plan, self.landings_world_m = plan, []
+        if plan.only_touch:
+            return self._touch(plan)
         if self._table().is_sideways:
             return self._come_from_the_side()
         landed: set[str] = set()
@@ -87,6 +91,23 @@ class GraspCycle:
             shift_m, window = self.settings.landing_shift_m, self._yaw_window_rad
             self._plan = evade(plan, self.plan, fingers, landed, self._table(), shift_m, window)
         return False
+
+    def _touch(self, plan: GraspPlan) -> bool:
+        """Only touch, and rise again."""
+        self._touching = frozenset()
+        if not self._table().is_sideways:
+            self._toucher.tap(plan.frame, plan.height_m)
+            return True
+        felt = self._touch_side(plan)
+        if felt is None:
+            self._note_landing(self._toucher.guard)
+        return felt is not None
+
+    def _touch_side(self, plan: GraspPlan) -> SideTouch | None:
+        """Touch the side that a grasp from the side comes from."""
+        side = next(side for side in SIDES if plan.closing.endswith(side))
+        low_m = LOW_m if plan.only_touch else 0.0
+        return self._toucher.touch_side(plan.frame, side, self.settings.standoff_m, plan.height_m, low_m)
 
     def _move_above(self) -> None:
         table, s = self._table(), self.settings
@@ -114,8 +135,7 @@ class GraspCycle:
         """
         s, motion, table = self.settings, self._motion, self._table()
         if self.plan.tap:
-            side = next(side for side in SIDES if table.name.endswith(side))
-            self._toucher.touch_side(self.plan.frame, side, s.standoff_m, table.height_m)
+            self._touch_side(self.plan)
         self._move_above()
         self._guard.restart()
         beside = motion.base_joints(self.plan.frame, table, 0.0, self._away_m)

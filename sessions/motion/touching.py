@@ -103,7 +103,8 @@ class Toucher:
 
     def __init__(self, motion: Motion, cycle: CycleSettings, tip: TipEllipsoid) -> None:
         self._motion, self._cycle, self._tip = motion, cycle, tip
-        self._guard = Guard(motion, cycle.touch.met_N, cycle.held_up_rad)
+        self.guard = Guard(motion, cycle.touch.met_N, cycle.held_up_rad)
+        """Ends approaches, and tells what met something in the last."""
 
     @property
     def settings(self) -> TouchSettings:
@@ -119,10 +120,14 @@ class Toucher:
         self.expect_tallest(height_m)
         self._motion.supervisor.on_approach()
 
-    def tap(self, frame: GraspFrame) -> Array:
+    def tap(self, frame: GraspFrame, lowest_m: float = 0.0) -> Array:
         """Come down on the object under a grasp frame, lay the fingertips on it, and rise again.
 
         Slowly from a little above the tallest thing that is known.
+
+        Args:
+            frame: the fingertips are around its origin.
+            lowest_m: so far down the fingertips go where nothing is met, but never onto the table.
 
         Returns:
             Where fingertips touched something, shape (n, 3), world frame.
@@ -130,10 +135,11 @@ class Toucher:
         s, table, motion = self.settings, closing(TAP.closing, TAP_HEIGHT_m, self._tip), self._motion
         self._poise(table, TAP, frame)
         touching_m = self._tip.semi_axes_m[2] - TAP_HEIGHT_m
-        near_m = max(s.lowest_m, motion.tallest_m + s.near_m)
+        lowest_m = max(s.lowest_m, lowest_m)
+        near_m = max(lowest_m, motion.tallest_m + s.near_m)
         motion.runtime.begin_closing()
         found = np.empty((0, 3))
-        near, lowest = (motion.base_joints(frame, table, m + touching_m) for m in (near_m, s.lowest_m))
+        near, lowest = (motion.base_joints(frame, table, m + touching_m) for m in (near_m, lowest_m))
         if self._approach(near, self._cycle.descent_m_s) or self._approach(lowest, s.tap_m_s, is_careful=True):
             motion.supervisor.on_approach()
             self._lay_on(table, TAP, _DOWN, frame, s.force_N, s.sink_m)
@@ -164,8 +170,8 @@ class Toucher:
         known = len(motion.runtime.perception.probed)
         self._poise(table, COLUMN, lane, from_m)
         begin, end = (motion.base_joints(lane, table, 0.0, away_m) for away_m in (from_m, -s.beyond_m))
-        self._guard.restart()
-        if not motion.probe_base(begin, self._cycle.beside_m_s, self._guard.is_met):
+        self.guard.restart()
+        if not motion.probe_base(begin, self._cycle.beside_m_s, self.guard.is_met):
             self._rise_over(lane, table, from_m)
             return None
         motion.tare(self._cycle.rest_s)
@@ -206,8 +212,8 @@ class Toucher:
         table = closing(ROW.closing, s.rake_height_m, self._tip)
         begin, end = (frame.shifted_inside(np.array([x - s.row_m, 0.0])) for x in (from_m, -s.beyond_m))
         self._poise(table, ROW, begin)
-        self._guard.restart()
-        if not motion.probe_base(motion.base_joints(begin, table), self._cycle.descent_m_s, self._guard.is_met):
+        self.guard.restart()
+        if not motion.probe_base(motion.base_joints(begin, table), self._cycle.descent_m_s, self.guard.is_met):
             self._rise()
             return None
         motion.wait(self._cycle.rest_s)
@@ -232,9 +238,9 @@ class Toucher:
         table = closing(ROW.closing, s.rake_height_m, self._tip)
         progress = {finger: table.path(finger).valid[0] for finger in FINGERS}
         self._poise(table, Pattern(ROW.closing, progress), frame)
-        self._guard.restart()
-        if not motion.probe_base(motion.base_joints(frame, table), self._cycle.descent_m_s, self._guard.is_met):
-            stands = "TH" in self._guard.met
+        self.guard.restart()
+        if not motion.probe_base(motion.base_joints(frame, table), self._cycle.descent_m_s, self.guard.is_met):
+            stands = "TH" in self.guard.met
             met_m = motion.tip_centre_world_m("TH", self._tip)
             self._rise()
             return met_m[None] if stands else None
@@ -282,11 +288,11 @@ class Toucher:
     def _approach(self, goal: Array, speed_m_s: float, *, is_careful: bool = False) -> bool:
         """Move toward ``goal`` until the hand touches something; then the positioner stops."""
         motion = self._motion
-        self._guard.restart()
+        self.guard.restart()
         for q in motion.line(goal, speed_m_s, is_careful=is_careful):
             motion.set_base(q)
             motion.tick()
-            if self._guard.is_met():
+            if self.guard.is_met():
                 motion.set_base(motion.runtime.perception.base_q)
                 return True
         return False
@@ -308,7 +314,7 @@ class Toucher:
         """
         s, motion = self.settings, self._motion
         rates = motor_rates(table, pattern.progress, direction_grasp, self._tip)
-        rates = {f: motors for f, motors in rates.items() if f in self._guard.met or self._height_m(f) <= up_to_m}
+        rates = {f: motors for f, motors in rates.items() if f in self.guard.met or self._height_m(f) <= up_to_m}
         gone_m = dict.fromkeys(rates, 0.0)
         start, sunk_m, step_m = motion.runtime.perception.base_q.copy(), 0.0, 2.0 * sink_m / motion.cycles(s.press_s)
         way = np.zeros(6)
