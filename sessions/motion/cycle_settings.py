@@ -27,6 +27,8 @@ class TouchSettings(StrictModel):
         row_m: x of the fingertips in the row's own grasp frame.
         beyond_m: how far beyond the middle a rake goes.
         lowest_m: height of the fingertips over the table where a tap has missed the object.
+        below_top_m: a tap without a grasp goes no farther below the top: what stands between the fingers, a neck or a
+            rim, must not reach the knuckles.
         side_m_s: speed toward an object's side, palm upright; a stiff fingertip reaches 0.45 N at 20 mm/s.
         side_heights_m: height of the lowest fingertip in such a touch, the palm on the left and on the right. The
             forearm lets it come no lower; from higher up it would tip objects over.
@@ -48,6 +50,7 @@ class TouchSettings(StrictModel):
     row_m: float = Field(default=0.012, ge=0.0)
     beyond_m: float = Field(default=0.030, ge=0.0)
     lowest_m: float = Field(default=0.012, ge=0.0)
+    below_top_m: float = Field(default=0.03, gt=0.0)
     side_m_s: float = Field(default=0.015, gt=0.0)
     side_heights_m: tuple[float, float] = (0.020, 0.032)
 

@@ -96,7 +96,7 @@ class GraspCycle:
         """Only touch, and rise again."""
         self._touching = frozenset()
         if not self._table().is_sideways:
-            self._toucher.tap(plan.frame, plan.height_m)
+            self._toucher.tap(plan.frame, self.settings.touch.below_top_m)
             return True
         felt = self._touch_side(plan)
         if felt is None:

@@ -26,8 +26,7 @@ class GraspPlan:
         height_m: height of the fingertip centres above the table.
         reason: why this grasp was chosen, for people.
         tap: touch first: tap on the top, or from the side touch the side that the hand comes from.
-        only_touch: only touch, and do not close. ``height_m``
-            is then how far a tap goes down, or the height of the lowest fingertip on a side.
+        only_touch: only touch, and do not close: tap on the top, or touch the side that a closing from there comes to.
     """
 
     frame: GraspFrame

@@ -120,14 +120,14 @@ class Toucher:
         self.expect_tallest(height_m)
         self._motion.supervisor.on_approach()
 
-    def tap(self, frame: GraspFrame, lowest_m: float = 0.0) -> Array:
+    def tap(self, frame: GraspFrame, below_top_m: float = np.inf) -> Array:
         """Come down on the object under a grasp frame, lay the fingertips on it, and rise again.
 
         Slowly from a little above the tallest thing that is known.
 
         Args:
             frame: the fingertips are around its origin.
-            lowest_m: so far down the fingertips go where nothing is met, but never onto the table.
+            below_top_m: no farther down than this below the tallest thing that is known, and never onto the table.
 
         Returns:
             Where fingertips touched something, shape (n, 3), world frame.
@@ -135,7 +135,7 @@ class Toucher:
         s, table, motion = self.settings, closing(TAP.closing, TAP_HEIGHT_m, self._tip), self._motion
         self._poise(table, TAP, frame)
         touching_m = self._tip.semi_axes_m[2] - TAP_HEIGHT_m
-        lowest_m = max(s.lowest_m, lowest_m)
+        lowest_m = max(s.lowest_m, motion.tallest_m - below_top_m)
         near_m = max(lowest_m, motion.tallest_m + s.near_m)
         motion.runtime.begin_closing()
         found = np.empty((0, 3))

@@ -29,9 +29,6 @@ _TAPS_APART_m, _LANES_APART_m, _HEIGHTS_APART_m = 0.04, 0.025, 0.025
 _INSIDE_m = 0.008
 """From the edges of a face to the places where it is touched."""
 
-_BELOW_TOP_m = 0.030
-"""A tap goes no farther below the top: a neck that stands between the fingers must not reach the palm."""
-
 _FINGERS_APART_m = 0.023
 """In a hand whose palm is upright."""
 
@@ -82,14 +79,12 @@ class TouchPlanner:
     def _taps(self) -> Iterator[StandingCandidate]:
         """Side by side over the top."""
         box, yaw = self.felt.standing_box, float(np.mean(self.yaw_window_rad))
-        top_m = box.size_m[2]
         for along_m in _places(box.size_m[0] / 2, _TAPS_APART_m):
             for across_m in _places(box.size_m[1] / 2, _TAPS_APART_m):
                 x, y = _at(box, along_m, across_m)
                 frame = GraspFrame(x, y, yaw)
                 if touches := self._tapped(frame, box):
-                    lowest_m = max(self.settings.lowest_m, top_m - _BELOW_TOP_m)
-                    yield self._candidate(frame, TAP.closing, lowest_m, touches, "tap on the top")
+                    yield self._candidate(frame, TAP.closing, TAP_HEIGHT_m, touches, "tap on the top")
 
     def _tapped(self, frame: GraspFrame, box: StandingBox) -> dict[str, Array]:
         """Where fingertips meet the top, by finger."""
