@@ -12,7 +12,7 @@ class TouchSettings(StrictModel):
 
     Attributes:
         tap_m_s: speed of the hand coming down on the top; a stiff fingertip reaches 1.1 N at 40 mm/s.
-        near_m: from so far above a top that is known on it comes down at that speed.
+        near_m: from so far above a top that is known on the hand comes down slowly.
         met_N: force on a fingertip that ends the approach.
         force_N: force that every fingertip is then brought to.
         most_N: force on any fingertip at which the hand stops moving.
@@ -63,7 +63,8 @@ class CycleSettings(StrictModel):
         travel_m_s, turn_rad_s: speeds above the object.
         clearance_m: how far the hand stays above the tallest thing on the table while it travels.
         standoff_m: how far before a grasp from the side the hand comes down.
-        descent_m_s: speed of the guarded descent.
+        descent_m_s: speed of the guarded descent, as far as the object's top.
+        landing_m_s: and beside it.
         beside_m_s: the same where nothing is expected below.
         approach_m_s: speed of the guarded approach from the side.
         landing_force_N: a fingertip force during the descent that means the object is under it.
@@ -95,6 +96,7 @@ class CycleSettings(StrictModel):
     clearance_m: float = Field(default=0.03, ge=0.0)
     standoff_m: float = Field(default=0.13, gt=0.0)
     descent_m_s: float = Field(default=0.05, gt=0.0)
+    landing_m_s: float = Field(default=0.035, gt=0.0)
     beside_m_s: float = Field(default=0.08, gt=0.0)
     approach_m_s: float = Field(default=0.05, gt=0.0)
     landing_force_N: float = Field(default=0.25, gt=0.0)

@@ -9,6 +9,7 @@ from gtsam import Pose3
 
 from drivers.core.contacts import FINGERS, Array, Grasp
 from drivers.shadow.closing.closing import SIDES, Closing, closing
+from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import TipEllipsoid
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_plan import GraspPlan, evade
@@ -166,12 +167,20 @@ class GraspCycle:
         self.landings_world_m.append(max(places, key=lambda place: float(place @ ahead)))
 
     def _come_down(self) -> tuple[str, ...]:
-        """Guarded descent. Returns what landed on something: fingers, or links that cannot tell which they are."""
-        s, guard, motion = self.settings, self._landing, self._motion
+        """Guarded descent, slower from the object's top on.
+
+        Returns:
+            What landed on something: fingers, or links that cannot tell which they are.
+        """
+        s, guard, motion, table = self.settings, self._landing, self._motion, self._table()
+        to_top_m = motion.tallest_m + s.touch.near_m - open_hand(table.name, table.height_m, self._tip).lowest_m
+        top, down = (motion.base_joints(self.plan.frame, table, above_m) for above_m in (max(0.0, to_top_m), 0.0))
         guard.restart()
-        if motion.probe_base(motion.base_joints(self.plan.frame, self._table()), s.descent_m_s, guard.is_met):
-            motion.wait(s.rest_s)
-            guard.is_met()
+        if motion.probe_base(top, s.descent_m_s, guard.is_met):
+            guard.restart()
+            if motion.probe_base(down, s.landing_m_s, guard.is_met):
+                motion.wait(s.rest_s)
+                guard.is_met()
         if guard.met:
             self._note_landing(guard)
         return guard.met

@@ -21,14 +21,15 @@ from tactile_lab.experiments.summary import UNKNOWN, markdown
 DOCS = Path("docs")
 PAGE, PICTURES = "everyday-objects.md", "pictures/everyday"
 
-_INTRODUCTION = """What came of whole sessions of the simulated hand (rig `sim`, five Nano17, 0.3 kg) on everyday objects, as
-`tactile-lab run --rig sim --object mesh:FILE --dimension 3 --grasps {grasps} --seed {seeds} --pose POSE` runs them:
-nothing is known of an object before. Seven are scans of the YCB set, which are not in the repository; the others are
-made by `tactile_lab/experiments/data/household.py`. One session an object: what one seed shows, no statistics."""
+_INTRODUCTION = """What came of whole sessions of the simulated hand (rig `sim`, five Nano17, 0.3 kg) on everyday
+objects, as `tactile-lab run --rig sim --object mesh:FILE --dimension 3 --grasps {grasps} --seed {seeds} --pose POSE`
+runs them: nothing is known of an object before. Seven are scans of the YCB set, which are not in the repository; the
+others are made by `tactile_lab/experiments/data/household.py`. One session an object: what one seed shows, no
+statistics."""
 
-_KEY = """In the pictures: grey the object, blue the model (best fit), from the front and from above; dots are contacts of
-closing fingers, squares those of touches without a grasp. No finger comes to the underside, nor into what is narrow and
-deep: there the model guesses."""
+_KEY = """In the pictures: grey the object, blue the model (best fit), from the front and from above; dots are
+contacts of closing fingers, squares those of touches without a grasp. No finger comes to the underside, nor into what
+is narrow and deep: there the model guesses."""
 
 _COLUMNS = (
     ("grasps and touches", "grasps_done", 0, 1.0),
@@ -98,7 +99,7 @@ def _figures(row: Row) -> Iterator[str]:
 
 
 def _entry(row: Row) -> str:
-    figures = row.figures or {}
+    figures: Mapping[str, Any] = row.figures or {}
     shown = f"![{_title(row)}]({PICTURES}/{_file(row)})" if "picture" in figures else "There is no model."
     return f"## {_title(row)}\n\n{fill(_sentence(figures['ending'], figures['reason']), WIDTH)}\n\n{shown}"
 
@@ -121,9 +122,8 @@ def _file(row: Row) -> str:
 
 def pictures(rows: Sequence[Row]) -> dict[str, str]:
     """The pictures as SVG, by the names of their files."""
-    return {
-        _file(row): draw_object(row.figures["picture"]) for row in _one_each(rows) if "picture" in (row.figures or {})
-    }
+    found = {_file(row): (row.figures or {}).get("picture") for row in _one_each(rows)}
+    return {name: draw_object(shown) for name, shown in found.items() if shown is not None}
 
 
 def draw_object(shown: Mapping[str, Any]) -> str:

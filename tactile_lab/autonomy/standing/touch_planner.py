@@ -123,14 +123,14 @@ def _touched(front_m: Array, height_m: float, top_m: float) -> dict[str, Array]:
     heights_m = height_m + _FINGERS_APART_m * np.arange(4)
     met_m = heights_m[heights_m < min(LOW_m, top_m)]
     if not len(met_m):
-        met_m = [heights_m[heights_m < max(top_m, height_m + 1e-9)].mean()]
+        met_m = heights_m[heights_m < max(top_m, height_m + 1e-9)].mean(keepdims=True)
     return {finger: np.array([*front_m, z]) for finger, z in zip(FINGERS, met_m, strict=False)}
 
 
 def _places(half_m: float, apart_m: float) -> Array:
     """Evenly spread from the middle, as far as a face reaches from there."""
     count = int(max(0.0, half_m - _INSIDE_m) // apart_m)
-    return apart_m * np.arange(-count, count + 1)
+    return np.asarray(apart_m * np.arange(-count, count + 1))
 
 
 def _at(box: StandingBox, along_m: float, across_m: float) -> tuple[float, float]:

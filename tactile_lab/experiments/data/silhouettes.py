@@ -43,7 +43,7 @@ def _outlines(points_mm: Array) -> Lines:
     indices = ((points_mm - low) / _PIXEL_mm).round().astype(int)
     filled = np.zeros(indices.max(axis=0) + _BORDER + 1, dtype=bool)
     filled[tuple(indices.T)] = True
-    filled = binary_closing(filled, np.ones((2 * _CLOSED + 1,) * 2))
+    filled = binary_closing(filled, np.ones((2 * _CLOSED + 1,) * 2, dtype=bool))
     found = find_contours(filled.astype(float), _THROUGH_PIXELS)  # type: ignore[no-untyped-call]
     lines = [approximate_polygon(line, _TOLERANCE_mm / _PIXEL_mm) for line in found]  # type: ignore[no-untyped-call]
     return [_rounded(low + _PIXEL_mm * line) for line in lines if len(line) > 3]

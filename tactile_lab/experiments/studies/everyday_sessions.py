@@ -160,7 +160,7 @@ def judge_model(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch, 
     shape = contour_figures(result.contour, true_outline(mesh)) if dimension == 2 else mesh_figures(result.mesh, mesh)
     registration = registration_rms_mm(points, poses[:count], truth, dimension) if count else None
     figures = {**shape, "registration_mm": registration}
-    if dimension == 3 and sum(map(len, points)):
+    if dimension == 3 and any(grasp.contacts for grasp in done):
         return {**figures, **touched_figures(TouchedObject(mesh, truth, done), result), **_picture(result, done, watch)}
     return figures
 
