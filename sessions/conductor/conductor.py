@@ -107,6 +107,8 @@ class Conductor:
             case UndoGrasp(reason):
                 self._undo(reason)
             case End(reason, partial):
+                if partial and not self._grasps:
+                    return Ending.OBJECT_LOST, reason
                 return Ending.PARTIAL if partial else Ending.COMPLETE, reason
             case Wait() | Pause():
                 self._cycle.idle()

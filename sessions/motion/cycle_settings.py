@@ -11,7 +11,7 @@ class TouchSettings(StrictModel):
     """How the hand touches without grasping.
 
     Attributes:
-        tap_m_s: speed of the hand coming down on the top; a stiff fingertip reaches 1.1 N at 40 mm/s.
+        tap_m_s: speed of the hand coming down on the top; a thumb, stiff in that direction, reaches 1.5 N at 35 mm/s.
         near_m: from so far above a top that is known on the hand comes down slowly.
         met_N: force on a fingertip that ends the approach.
         force_N: force that every fingertip is then brought to.
@@ -34,7 +34,7 @@ class TouchSettings(StrictModel):
             forearm lets it come no lower; from higher up it would tip objects over.
     """
 
-    tap_m_s: float = Field(default=0.035, gt=0.0)
+    tap_m_s: float = Field(default=0.025, gt=0.0)
     near_m: float = Field(default=0.02, ge=0.0)
     met_N: float = Field(default=0.20, gt=0.0)
     force_N: float = Field(default=0.35, gt=0.0)

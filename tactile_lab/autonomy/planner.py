@@ -37,7 +37,7 @@ _LEAST_BY_POLICY = 2
 
 
 _BLOCKED_FROM_ABOVE = 2
-"""Approaches from above in a row; then the hand comes from the side."""
+"""Approaches in a row; then, in space, the hand touches, or comes from the side."""
 
 HIGHEST_FROM_ABOVE_m = 0.08
 """What is taller is grasped from the side: the knuckles would come down on it."""
@@ -111,7 +111,7 @@ class Planner:
         After a grasp that the estimate had chosen and that missed the object with some fingers, one grasp follows the
         contacts alone.
         """
-        if self._standing is None and self._blocked >= _BLOCKED_FROM_ABOVE:
+        if self._standing is None and self._dimension == 3 and self._blocked >= _BLOCKED_FROM_ABOVE:
             self._standing = self._standing_planner()
         if self._standing is not None:
             return self._standing_plan(index, self._standing)

@@ -105,12 +105,12 @@ class FeltObject:
         off = np.abs(angles - np.round(angles / (np.pi / 2)) * (np.pi / 2))
         return len(off) >= _LEAST_FOR_BOX and float(off.mean()) > _ROUND_rad
 
-    def yaws(self, window_rad: tuple[float, float]) -> list[float]:
-        """Of hands that come across its sides, as far as the arm turns."""
+    def yaws(self, window_rad: tuple[float, float], askew_rad: float = 0.0) -> list[float]:
+        """Of hands that come across its sides, as far as the arm turns; so far from square where it turns less."""
         low, high = window_rad
         theta, asides = self.box.world_T_box.theta(), _ASIDE_rad if self.is_round else (0.0,)
         yaws = [theta + quarter * np.pi / 2 + aside for quarter in range(-3, 4) for aside in asides]
-        return [float(yaw) for yaw in yaws if low <= yaw <= high]
+        return [float(np.clip(yaw, low, high)) for yaw in yaws if low - askew_rad <= yaw <= high + askew_rad]
 
     def distances_m(self, places_m: Array) -> Array:
         """Of places (n, 3) to the nearest where a contact was, or was looked for in vain, shape (n,), at most 40 mm."""

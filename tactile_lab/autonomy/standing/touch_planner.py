@@ -29,6 +29,9 @@ _TAPS_APART_m, _LANES_APART_m, _HEIGHTS_APART_m = 0.04, 0.025, 0.025
 _INSIDE_m = 0.008
 """From the edges of a face to the places where it is touched."""
 
+_ASKEW_rad = np.radians(20.0)
+"""A side that the arm cannot turn to squarely is touched so much from aside: fingertips do not slip yet."""
+
 _FINGERS_APART_m = 0.023
 """In a hand whose palm is upright."""
 
@@ -101,7 +104,7 @@ class TouchPlanner:
 
     def _sides(self) -> Iterator[StandingCandidate]:
         """Every side that the arm can come to, in lanes, at heights where the object is not tipped over."""
-        for yaw_rad in self.felt.yaws(self.yaw_window_rad):
+        for yaw_rad in self.felt.yaws(self.yaw_window_rad, _ASKEW_rad):
             for side, lowest_m in zip(SIDES, self.settings.side_heights_m, strict=True):
                 yield from self._on_side(yaw_rad, sideways(COLUMN.closing, side), lowest_m)
 
@@ -110,7 +113,10 @@ class TouchPlanner:
         way = approach_of(GraspPlan(GraspFrame(0.0, 0.0, yaw_rad), name, lowest_m), self.tip)
         half_m = box.half_along_m(way)
         for lane_m in _places(box.half_along_m(across), _LANES_APART_m):
-            front = np.array([box.x_m, box.y_m]) - half_m * way + lane_m * across
+            lane = np.array([box.x_m, box.y_m]) + lane_m * across
+            if box.distances_m(np.array([*lane, box.size_m[2] / 2])) > -_INSIDE_m:
+                continue
+            front = lane - box.way_out_m(lane, -way) * way
             frame = GraspFrame(float(front[0]), float(front[1]), yaw_rad)
             for height_m in np.arange(lowest_m, max(box.size_m[2] - _INSIDE_m, lowest_m + 1e-9), _HEIGHTS_APART_m):
                 touches = _touched(front, float(height_m), box.size_m[2])
