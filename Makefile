@@ -53,7 +53,7 @@ coverage: $(READY)  ## All tests, and how much of each package they run through,
 
 lock:  ## Resolve the dependencies again, with hashes
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-config \
-		--no-emit-index-url --no-header --no-annotate --extra dev -o requirements.lock pyproject.toml
+		--no-emit-index-url --no-header --no-annotate --extra dev --override .ci/overrides.txt -o requirements.lock pyproject.toml
 
 clean:  ## Remove the environment, what was built, and caches
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis

@@ -1,1 +1,1 @@
-"""ATI Nano17 force sensors: protocols, and the wires on which their readings arrive."""
+"""ATI Nano17 force sensors: their protocols, and the wires that carry their readings."""

@@ -1,8 +1,8 @@
-"""An ATI Nano17 fingertip: one device over every way its readings can come (protocols C, F).
+"""An ATI Nano17 fingertip: one device class for all the wires that can carry its readings (protocols C, F).
 
-A Net F/T box over UDP is the usual one; :mod:`drivers.ati.wires.wire` says what a wire is, and lists nothing: the wires
-are :mod:`~drivers.ati.wires.rdt_wire`, :mod:`~drivers.ati.wires.digital_wire`,
-:mod:`~drivers.ati.wires.controller_wire`, :mod:`~drivers.ati.wires.can_wire` and :mod:`~drivers.ati.wires.gauge_volts`.
+The usual wire is UDP from a Net F/T box. :mod:`drivers.ati.wires.wire` defines what a wire is; the wires are
+:mod:`~drivers.ati.wires.rdt_wire`, :mod:`~drivers.ati.wires.digital_wire`, :mod:`~drivers.ati.wires.controller_wire`,
+:mod:`~drivers.ati.wires.can_wire` and :mod:`~drivers.ati.wires.gauge_volts`.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ _MINUTE_ns = 60 * NANOSECONDS
 
 
 class Nano17Settings(ForceTipSettings):
-    """Settings of the sensor beside those of the fingertip.
+    """Settings of the sensor, in addition to those of the fingertip.
 
     Attributes:
-        counts_per_N, counts_per_Nm: a Net F/T box's own figures (its configuration page: cfgcpf, cfgcpt).
+        counts_per_N, counts_per_Nm: scale of a Net F/T box, as its configuration page states it (cfgcpf, cfgcpt).
         silent_ms: time without any sample after which the sensor counts as silent.
-        sensor_T_tool: frame in which the readings are wanted, in the frame in which the device gives them; the
-            fingertip's ``distal_T_sensor`` then is that of the tool frame.
-        tare_minutes: age of a tare that is reported as a problem: readings wander with the temperature.
+        sensor_T_tool: pose of the frame in which the readings are wanted, in the device's own frame; the fingertip's
+            ``distal_T_sensor`` is then the pose of this tool frame.
+        tare_minutes: age at which a tare is reported as a problem, because readings drift with the temperature.
     """
 
     counts_per_N: float = Field(default=1_000_000.0, gt=0.0)
@@ -48,23 +48,23 @@ class Nano17Settings(ForceTipSettings):
 
 
 class Nano17(ForceTip):
-    """One fingertip's force sensor: decodes the stream; :class:`ForceTip` makes loads and contacts of it.
+    """Decodes the stream of one fingertip's force sensor; the base class :class:`ForceTip` computes loads and contacts.
 
-    :meth:`poll` and :meth:`receive` only decode. Whoever drives the session hands the samples to :meth:`update`, live
-    and in replay alike.
+    :meth:`poll` and :meth:`receive` only decode. The caller passes the samples to :meth:`update`, both live and in a
+    replay.
 
     Args:
-        finger: which.
-        transport: to the device.
+        finger: the finger that carries the sensor.
+        transport: the connection to the device.
         clock: the session's.
         calibration: of the fingertip.
         settings: limits and scale.
-        wire: how the readings come; a Net F/T box of the settings' scale unless given.
+        wire: how the readings arrive; by default from a Net F/T box with the scale in the settings.
 
     Attributes:
-        foreign_datagrams: messages that were none of this device.
-        silences: times the sensor was silent for longer than ``silent_ms``.
-        stamp_jumps: times a sample was stamped before the one that came before it.
+        foreign_datagrams: messages that did not come from this device.
+        silences: how often the sensor was silent for longer than ``silent_ms``.
+        stamp_jumps: how often a sample had an earlier stamp than the sample before it.
     """
 
     def __init__(
@@ -84,10 +84,12 @@ class Nano17(ForceTip):
         self._connected = False
 
     def connect(self) -> None:
-        """Open the transport, end a stream that an earlier client left running, start ours. All or nothing; repeatable.
+        """Open the transport, end a stream that an earlier client left running, and start our own.
+
+        After a failure the transport is closed again. Can be called again.
 
         Raises:
-            DeviceError: the transport cannot be opened or used, or the device is not there or not the right one.
+            DeviceError: the transport cannot be opened or used, or the device is missing or is not the expected one.
         """
         if self._connected:
             return
@@ -102,7 +104,7 @@ class Nano17(ForceTip):
 
     @property
     def identity(self) -> str:
-        """Serial number, firmware and date of calibration as far as the wire told when connecting; else empty."""
+        """Serial number, firmware and date of calibration, as read while connecting; empty where unknown."""
         told: Any = getattr(self.wire, "page", None) or getattr(self.wire, "calibration", None)
         if told is None:
             return ""
@@ -110,24 +112,24 @@ class Nano17(ForceTip):
         return ", ".join([str(told.serial), *(f"{name} {words}" for name, words in known if words)])
 
     def close(self) -> None:
-        """End the stream and close the transport; idempotent. A device that is gone already is no error."""
+        """End the stream and close the transport; idempotent. It is not an error if the device has already gone."""
         if not self._connected:
             return
         self._connected = False
-        with contextlib.suppress(DeviceError):  # the transport is given up anyway
+        with contextlib.suppress(DeviceError):  # the transport is closed in any case
             self.stop_stream()
         self._transport.close()
 
     def stop_stream(self) -> None:
-        """End the device's stream; what is on its way can still be polled. Raises DeviceError."""
+        """End the device's stream; data already sent can still be polled. Raises DeviceError."""
         self.wire.stop(self._transport)
 
     def ask(self) -> None:
-        """Ask for the next reading where the wire needs it. Raises DeviceError."""
+        """Request the next reading, if the wire needs requests. Raises DeviceError."""
         self.wire.ask(self._transport, self._clock.now_ns())
 
     def poll(self) -> list[WrenchSample]:
-        """Everything that waits on the transport, decoded, oldest first; messages of strangers are counted.
+        """All samples that wait on the transport, oldest first; messages from other devices are counted.
 
         Raises:
             DeviceError: the transport failed.
@@ -150,10 +152,10 @@ class Nano17(ForceTip):
         return found
 
     def receive(self, datagram: Datagram) -> list[WrenchSample]:
-        """Decode one message; changes nothing but the wire's own state.
+        """Decode one message; changes only the state of the wire.
 
         Raises:
-            CodecError: it is none of this device.
+            CodecError: the message is not from this device.
         """
         samples = self.wire.receive(datagram)
         if self._to_tool is None:
@@ -161,7 +163,7 @@ class Nano17(ForceTip):
         return [_in_tool_frame(sample, self._to_tool) for sample in samples]
 
     def update(self, samples: Sequence[WrenchSample]) -> None:
-        """As :meth:`ForceTip.update`; counts the silences between samples, and stamps that go back."""
+        """As :meth:`ForceTip.update`; also counts silences between samples and stamps that go backwards."""
         if samples and self.newest:
             gap_ns = samples[0].stamp_ns - self.newest.stamp_ns
             self.silences += gap_ns > self._box.silent_ms * 1e6
@@ -169,7 +171,7 @@ class Nano17(ForceTip):
         super().update(samples)
 
     def health(self) -> tuple[str, ...]:
-        """As :meth:`ForceTip.health`, and whether the device still sends, and what its wire says."""
+        """As :meth:`ForceTip.health`, and also whether the device still sends and what its wire reports."""
         problems = [*super().health(), *self.wire.health(), *link_health(self._transport)]
         now_ns = self._clock.now_ns()
         if self.newest and (silent := (now_ns - self.newest.stamp_ns) / 1e6) > self._box.silent_ms:
@@ -185,7 +187,7 @@ class Nano17(ForceTip):
         return tuple(problems)
 
     def _check_ranges(self) -> None:
-        """A sensor of another calibration than the settings' would be judged by wrong limits."""
+        """Raises DeviceError if the sensor's calibrated range differs from the settings: limits would be wrong."""
         told = self.wire.ranges_SI
         if told is not None and np.any(self._range > told * (1 + 1e-6)):
             raise DeviceError(
@@ -204,7 +206,7 @@ def _to_tool(sensor_T_tool: RigidTransform | None) -> Array | None:
 
 
 def _in_tool_frame(sample: WrenchSample, to_tool: Array) -> WrenchSample:
-    """Built anew field by field: dataclasses.replace takes four times as long, at 7 kHz."""
+    """Build the sample field by field: dataclasses.replace takes four times as long, which matters at 7 kHz."""
     wrench = to_tool @ sample.wrench
     return WrenchSample(
         sample.stamp_ns, wrench, sample.sent, sample.measured, sample.status, sample.faults, sample.remarks

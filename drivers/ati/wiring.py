@@ -1,4 +1,4 @@
-"""The ways in which a Nano17's readings arrive: what a rig file says of each."""
+"""The wires of a Nano17: the settings of each in a rig file."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ class NetBoxWiring(WireSettings):
     """A Net F/T box.
 
     Attributes:
-        host, port, http_port: its address, its RDT port and that of its pages.
-        rate_hz: records per second to set; the box divides 7000 by a whole number.
-        serial: of the sensor's calibration; left out for any.
-        counts_per_N, counts_per_Nm: its scale; the box must agree.
+        host, port, http_port: its address, its RDT port and the port of its web pages.
+        rate_hz: records per second to set; the box divides 7000 by an integer.
+        serial: of the sensor's calibration; omit to accept any.
+        counts_per_N, counts_per_Nm: the expected scale; the box must report the same.
     """
 
     wire: Literal["net-ft"]
@@ -39,9 +39,9 @@ class DigitalWiring(WireSettings):
 
     Attributes:
         port: of the adapter.
-        baud, parity: of the line; the sensor itself always has even parity.
+        baud, parity: of the line; the sensor always uses even parity.
         slot: which of its calibrations, from 1.
-        serial: of the sensor; left out for any.
+        serial: of the sensor; omit to accept any.
     """
 
     wire: Literal["digital"]
@@ -59,7 +59,7 @@ class ControllerWiring(WireSettings):
         port: of the adapter.
         baud: as set at the controller.
         mode: form of the records.
-        counts_per_N, counts_per_Nm: from the calibration papers: the controller does not tell.
+        counts_per_N, counts_per_Nm: from the calibration papers, since the controller does not report them.
     """
 
     wire: Literal["controller"]
@@ -78,7 +78,7 @@ class CanWiring(WireSettings):
         bitrate: of the bus.
         base: upper part of the board's identifiers.
         slot: which of its calibrations, from 0.
-        serial: of the sensor; left out for any.
+        serial: of the sensor; omit to accept any.
     """
 
     wire: Literal["can-oem"]
@@ -95,9 +95,10 @@ class VoltsWiring(WireSettings):
 
     Attributes:
         calibration: the sensor's .cal file, relative to the rig file.
-        serial: of the sensor on the amplifier, from its label; a file of another one is refused. Left out for any.
+        serial: of the sensor on the amplifier, from its label; the file of another sensor is refused. Omit to accept
+            any.
         host: where the program runs.
-        local_port: where it sends to on this computer.
+        local_port: the port on this computer to which it sends.
     """
 
     wire: Literal["gauge-volts"]
@@ -108,7 +109,7 @@ class VoltsWiring(WireSettings):
 
 
 def open_bus(wiring: CanWiring) -> can.BusABC:
-    """Open the bus; only this board's identifiers pass. Raises what python-can raises."""
+    """Open the bus; only this board's identifiers are received. Raises the exceptions of python-can."""
     mask = [{"can_id": wiring.base << 4, "can_mask": 0x7F0, "extended": False}]
     return can.Bus(
         interface=wiring.interface, channel=wiring.channel, bitrate=wiring.bitrate, can_filters=mask, fd=False

@@ -1,7 +1,7 @@
 """A BioTac fingertip, fed by the tactile slots of the hand's samples.
 
-It measures no force in newtons. What it gives as force is a calibrated guess from fluid pressure and squeezed
-electrodes: good enough to stop a finger and to weigh contacts, no more.
+The sensor does not measure force in newtons. The reported force is a calibrated estimate from the fluid pressure and
+the squeezed electrodes: good enough to stop a finger and to weight contacts, but no more.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ __all__ = ["BioTac", "BioTacCalibration", "BioTacSettings", "EllipsoidSkinSettin
 
 
 class TactileReading(TactileAnswers, Protocol):
-    """The same part of the hand's sample, and when it was taken."""
+    """The tactile part of one hand sample, with its stamp."""
 
     @property
     def stamp_ns(self) -> int: ...
@@ -40,13 +40,13 @@ class BioTac:
     """One BioTac (a :class:`~drivers.core.fingertip.FingertipSensor`).
 
     Args:
-        finger: where it sits.
+        finger: the finger that carries it.
         calibration: of this sensor.
-        settings: how its readings are judged.
-        normals: what was learned of its normals; those of the skin at equation 2.24's point when None.
+        settings: tolerances and times by which its readings are checked.
+        normals: learned contact normals; if None, the skin's normals at the point of equation 2.24 are used.
 
     Raises:
-        ConfigurationError: the learned normals are of another number of electrodes.
+        ConfigurationError: the normals were learned with a different number of electrodes.
     """
 
     def __init__(
@@ -78,7 +78,8 @@ class BioTac:
         self._followed_ns = 0
 
     def update(self, sample: TactileReading) -> None:
-        """Take the finger's slot of one hand sample; slots and values not marked valid leave the last ones in place.
+        """Take the finger's slot of one hand sample. Values that are not marked valid leave the previous ones
+        unchanged.
 
         Raises:
             CodecError: the tactile section has the wrong length.
@@ -101,10 +102,11 @@ class BioTac:
             self._follow(stamp_ns)
 
     def tare(self, world_R_distal: Array, *, reason: str = "") -> None:
-        """Take the newest readings as untouched. A BioTac has no weight to take off: the orientation does not matter.
+        """Take the newest readings as those without contact. A BioTac does not feel its own weight: any orientation
+        will do.
 
         Raises:
-            DeviceError: not every channel has been heard, no sensor is fitted, or the readings move too much.
+            DeviceError: some channel has not been received, no sensor is fitted, or the readings vary too much.
         """
         if complaint := self._tare_complaint():
             raise DeviceError(
@@ -118,9 +120,9 @@ class BioTac:
         self._followed_ns = self.channels.newest_ns
 
     def _follow(self, stamp_ns: int) -> None:
-        """Let the tare follow slow changes (temperature, inflation) while nothing touches for sure.
+        """Let the tare follow slow changes (temperature, inflation) while there is certainly no contact.
 
-        The gate: no reading near the touch threshold lately, and no electrode squeezed beyond its noise.
+        That means: no recent reading near the touch threshold, and no electrode squeezed beyond its noise.
         """
         elapsed_s, self._followed_ns = (stamp_ns - self._followed_ns) / NANOSECONDS, stamp_ns
         change = self.channels.newest(self._electrodes) - self._tare_electrodes
@@ -133,9 +135,9 @@ class BioTac:
         self._tare_electrodes = self._tare_electrodes + share * change
 
     def load_N(self, world_R_distal: Array) -> float:
-        """Approximate contact force: from the pressure, or from the electrodes once the skin rests on the core.
+        """Approximate contact force, N: from the pressure or, once the skin rests on the core, from the electrodes.
 
-        Zero before the first tare; infinite while no usable sensor answers, so that motion stops.
+        Zero before the first tare; infinite while no usable sensor answers, so that the motion stops.
         """
         if self._tare_pdc is None:
             return 0.0
@@ -144,18 +146,18 @@ class BioTac:
         return self._force_N(self._pdc_rise(), self.channels.newest(self._electrodes) - self._tare_electrodes)
 
     def void(self) -> str:
-        """Why the newest readings tell no force, in words; "" while they do."""
+        """Why the newest readings give no force, in plain English; "" while they do."""
         return _NOT_FITTED if self.channels.heard and not self.channels.fitted else ""
 
     def begin_capture(self) -> None:
-        """From here on readings are averaged for :meth:`contact`."""
+        """Start to average readings for :meth:`contact`."""
         self.channels.begin_capture()
 
     def contact(self, world_R_distal: Array) -> TipContact | None:
         """The contact from the channels' means since :meth:`begin_capture`.
 
-        None before a tare, when no usable sensor answers, when some channel was not heard during the capture, or
-        when the pressure does not say contact.
+        None before a tare, if no usable sensor answers, if some channel was not received during the capture, or if the
+        pressure does not show contact.
         """
         if self._tare_pdc is None or not self.channels.fitted or not self.channels.captured:
             return None
@@ -166,13 +168,13 @@ class BioTac:
         return self._contact(pdc_rise, change)
 
     def newest_contact(self) -> TipContact | None:
-        """The contact by the newest readings alone; None before a tare and where no electrode is squeezed."""
+        """The contact from the newest readings alone; None before a tare and if no electrode is squeezed."""
         if self._tare_pdc is None or not self.channels.fitted:
             return None
         return self._contact(self._pdc_rise(), self.channels.newest(self._electrodes) - self._tare_electrodes)
 
     def _contact(self, pdc_rise: float, change: Array) -> TipContact | None:
-        """Of readings above the untouched ones; None where no electrode is squeezed."""
+        """The contact from changes against the tare; None if no electrode is squeezed."""
         found = contact_from_electrodes(
             change[None],
             self._layout,
@@ -188,7 +190,7 @@ class BioTac:
         return self._in_distal_frame(found.points_m[0], normal, sigma_rad, self._force_N(pdc_rise, change))
 
     def health(self) -> tuple[str, ...]:
-        """What is wrong with the sensor, in words; empty when all is well."""
+        """What is wrong with the sensor, in plain English; empty if nothing is."""
         if not self.channels.heard:
             return ("no reading received yet",)
         if not self.channels.fitted:

@@ -1,4 +1,4 @@
-"""The newest readings of a BioTac's channels, each heard at its own time, and their means over a capture."""
+"""The newest readings of a BioTac's channels, each received at its own time, and their means over a capture."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from drivers.core.contacts import Array
 
 
 class Channels:
-    """Readings by channel. A reading outside the converter's range is no reading: it only tells that none is fitted.
+    """Readings by channel. A value outside the converter's range is not a reading: it shows that no sensor is fitted.
 
     Args:
-        channels: the channels of this model; others are left alone.
+        channels: the channels of this model; others are ignored.
         depth: how many readings of each are kept.
     """
 
@@ -30,7 +30,7 @@ class Channels:
         """The newest readings of the vibration channel (PAC), at most two, counts."""
 
     def take(self, slot: Slot, stamp_ns: int) -> None:
-        """Note what one slot says."""
+        """Store the readings of one slot."""
         self.newest_ns = stamp_ns
         self.vibration = slot.vibration or self.vibration
         for channel, value in slot.values.items():
@@ -53,16 +53,18 @@ class Channels:
 
     @property
     def fitted(self) -> bool:
-        """Whether the newest readings can come from a sensor: an empty socket shows values no converter gives."""
+        """Whether the newest readings can come from a sensor: an empty socket shows values that no converter
+        produces.
+        """
         return self.heard and not any(self._impossible.values())
 
     @property
     def captured(self) -> bool:
-        """Whether every electrode and the pressure have been heard since the capture began."""
+        """Whether every electrode and the pressure have been received since the capture began."""
         return all(channel in self._sums for channel in self._readings if channel not in (Channel.TAC, Channel.TDC))
 
     def begin_capture(self) -> None:
-        """Means begin anew."""
+        """Start new means."""
         self._sums.clear()
 
     def captured_means(self, channels: Sequence[int]) -> Array:
@@ -74,11 +76,11 @@ class Channels:
         return np.array(self._readings[channel], float)
 
     def newest(self, channels: Sequence[int]) -> Array:
-        """Newest reading of each channel, counts; each channel must have been heard."""
+        """Newest reading of each channel, counts; each channel must have been received."""
         return np.array([self._readings[channel][-1] for channel in channels], float)
 
     def older_than(self, age_ms: float) -> int:
-        """How many channels have not been heard for that long, against the newest slot's stamp."""
+        """How many channels were last received longer ago than this, relative to the newest slot's stamp."""
         limit_ns = self.newest_ns - age_ms * 1e6
         return sum(self._stamps_ns.get(channel, 0) < limit_ns for channel in self._readings)
 
@@ -86,7 +88,7 @@ class Channels:
 def core_temperature_degC(counts: Array) -> Array:
     """Temperature of the heated core from counts of the TDC channel (n,), degrees Celsius, shape (n,).
 
-    Approximate: only its changes mean something (manufacturer's manual; protocols: BioTac units).
+    Approximate: only changes are meaningful (manufacturer's manual; protocols: BioTac units).
     """
     share = np.asarray(counts, float) / LARGEST_COUNT
     with np.errstate(divide="ignore"):

@@ -1,11 +1,11 @@
-"""The text log of stand-alone BioTacs on SPI, as the maker's program for the Cheetah adapter writes it.
+"""The text log of stand-alone BioTacs on SPI, as written by the manufacturer's program for the Cheetah adapter.
 
-Header lines, an empty line and ``Begin File``, then one line a sample: time, batch, frame, channel, and value and
-parity for each sensor (protocols: BioTac on SPI). Some logs lack the header, and some programs leave the time at
-zero: the sensors sample one channel every 1/4400 s, so times are then counted from the lines.
+Header lines, an empty line and ``Begin File``, then one line per sample: time, batch, frame, channel, and the value and
+parity of each sensor (protocols: BioTac on SPI). Some logs have no header, and in some the time is always zero. Then
+the time follows from the line number, since the sensors sample one channel every 1/4400 s.
 
-Channels are the maker's: 0 PAC, 1 PDC, 2 TAC, 3 TDC, 17 to 40 electrodes 1 to 24. Electrodes 20 to 24 exist on the
-BioTac SP alone.
+Channel numbers are the manufacturer's: 0 PAC, 1 PDC, 2 TAC, 3 TDC, 17 to 40 electrodes 1 to 24. Only the BioTac SP has
+electrodes 20 to 24.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ class CheetahLog:
     """One log.
 
     Attributes:
-        header: what stands before the samples, by name.
+        header: the header's values by name.
         times_s: of the samples, shape (n,).
         frames: batch and frame of each, shape (n, 2).
-        channels: the maker's channel numbers, shape (n,).
+        channels: the manufacturer's channel numbers, shape (n,).
         values: counts, shape (n, sensors).
-        parity_errors: samples of each sensor that came with wrong parity, shape (n, sensors), boolean.
+        parity_errors: which samples of each sensor have wrong parity, shape (n, sensors), boolean.
     """
 
     header: dict[str, str]
@@ -57,11 +57,11 @@ class CheetahLog:
 
     @property
     def electrodes(self) -> int:
-        """24 when channels of a BioTac SP are there, else 19."""
+        """24 if there are channels of a BioTac SP, else 19."""
         return 24 if (self.channels >= FIRST_ELECTRODE + 19).any() else 19
 
     def slots(self, sensor: int) -> Iterator[tuple[int, Slot]]:
-        """The sensor's readings, one after the other, with their time in nanoseconds; those of wrong parity left out.
+        """The sensor's readings one after the other, with their times in nanoseconds, without those of wrong parity.
 
         :meth:`drivers.biotac.biotac.BioTac.take` takes them.
         """
@@ -77,7 +77,7 @@ def decode_log(text: str, where: str = "Cheetah log") -> CheetahLog:
     """Decode a whole log.
 
     Raises:
-        CodecError: a line that is no sample; names it.
+        CodecError: a line is not a sample; the message names it.
     """
     header, first, lines = _header(text.splitlines())
     rows: list[list[float]] = []
@@ -108,7 +108,7 @@ def encode_log(log: CheetahLog) -> str:
 
 
 def _header(lines: list[str]) -> tuple[dict[str, str], int, list[str]]:
-    """Header, number of the first line that is a sample, and the lines from there on."""
+    """The header, the number of the first line that is a sample, and the lines from there on."""
     begin = next((number for number, line in enumerate(lines) if line.strip() == BEGIN), None)
     if begin is None:
         return {}, 1, lines
@@ -151,5 +151,5 @@ def _log(header: dict[str, str], table: NDArray[np.float64]) -> CheetahLog:
 
 
 def _ours(channel: int) -> int:
-    """Channel number of the palm's slots for one of the maker's."""
+    """The channel number in the palm's slots for one of the manufacturer's."""
     return channel if channel in tuple(Channel) else electrode_channel(channel - FIRST_ELECTRODE + 1)

@@ -1,8 +1,8 @@
-"""Where a BioTac's electrodes and skin are (protocols: BioTac electrodes).
+"""The positions of a BioTac's electrodes, and the shape of its skin (protocols: BioTac electrodes).
 
 BioTac frame: x along the finger to its tip, y to the side, z to the back of the finger; the electrodes lie in -z. The
-19-electrode model has its origin in the centre of the ball that ends the finger, the 24-electrode model (BioTac SP)
-in the middle of its core.
+origin of the 19-electrode model is the centre of the sphere at the end of the finger; that of the 24-electrode model
+(BioTac SP) is the middle of its core.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ _FACET = slice(6, 10)  # E7 to E10 of the 19-electrode model sit on a flat facet
 
 
 class Skin(Protocol):
-    """The outer surface of the finger, untouched."""
+    """The outer surface of the finger when nothing touches it."""
 
     def project(self, points_m: Array) -> tuple[Array, Array]:
-        """Points (n, 3) from inside out to the skin: skin points and outward unit normals, both (n, 3)."""
+        """Project points (n, 3) outward onto the skin: skin points and outward unit normals, both (n, 3)."""
 
 
 @dataclass(frozen=True)
 class BallAndCylinder:
-    """Skin of the 19-electrode model: half a ball for x > 0, a cylinder about x for x <= 0."""
+    """Skin of the 19-electrode model: a hemisphere for x > 0, a cylinder about x for x <= 0."""
 
     radius_m: float = 0.007
 
@@ -58,7 +58,7 @@ class BallAndCylinder:
 
 @dataclass(frozen=True)
 class EllipsoidSkin:
-    """Skin as an ellipsoid with axes along the BioTac frame's.
+    """Skin as an ellipsoid whose axes are parallel to those of the BioTac frame.
 
     The defaults fit the published skin points of the BioTac SP's 24 electrodes within 0.1 mm.
     """
@@ -67,7 +67,7 @@ class EllipsoidSkin:
     centre_m: tuple[float, float, float] = (0.0, 0.0, -0.00112)
 
     def project(self, points_m: Array) -> tuple[Array, Array]:
-        """Outward along the ray from the centre."""
+        """Project along the ray from the centre."""
         axes, centre = np.array(self.semi_axes_m), np.array(self.centre_m)
         direction = points_m - centre
         direction = direction / np.linalg.norm(direction / axes, axis=1, keepdims=True)
@@ -82,7 +82,7 @@ class ElectrodeLayout:
     Attributes:
         positions_m: on the core, shape (n, 3), electrode 1 first.
         normals: outward unit normals of the core there, shape (n, 3).
-        skin: the surface that is touched.
+        skin: the surface that touches objects.
     """
 
     positions_m: Array
@@ -91,7 +91,7 @@ class ElectrodeLayout:
 
 
 def electrodes_of(serial: str) -> ElectrodeCount:
-    """How many electrodes the sensor with this serial number has (protocols: BioTac slots)."""
+    """Number of electrodes of the sensor with this serial number (protocols: BioTac slots)."""
     return 24 if serial.startswith(("BTSP", "BTTB")) else 19
 
 

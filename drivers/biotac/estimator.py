@@ -1,10 +1,10 @@
 """Contact point and normal from a BioTac's electrodes.
 
-Pressing thins the fluid over an electrode and lowers its count. Only such *squeezed* electrodes count: fluid that is
-pushed aside raises the others, which lie where nothing touches. On recordings with the contact normal measured by
-motion capture (19 electrodes, 4030 samples) the skin normal at the point of equation 2.24 errs by 8 to 10 degrees in
-the median with squeezed electrodes and plain weights, the sum of squeezed electrode normals by 9 to 10, and the sum
-over all electrodes by 21 to 27.
+Pressing thins the fluid over an electrode and lowers its count. Only these *squeezed* electrodes are used: the
+displaced fluid raises the counts of the others, where nothing touches. On recordings with the contact normal measured
+by motion capture (19 electrodes, 4030 samples) the median error of the skin normal at the point of equation 2.24 is 8
+to 10 degrees with squeezed electrodes and linear weights; it is 9 to 10 degrees for the sum of the squeezed electrodes'
+normals, and 21 to 27 degrees for the sum over all electrodes.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def squeeze_counts(change: Array, noise_counts: float) -> Array:
 def contact_from_electrodes(
     change: Array, layout: ElectrodeLayout, *, noise_counts: float = 0.0, power: float = 1.0
 ) -> ElectrodeContact:
-    """Weighted mean of the squeezed electrodes' positions, brought out to the skin (eq. 2.24).
+    """Weighted mean of the squeezed electrodes' positions, projected onto the skin (eq. 2.24).
 
     Args:
         change: electrode readings minus their tare, counts, shape (n, electrodes).
@@ -60,7 +60,7 @@ def contact_from_electrodes(
 def force_direction(change: Array, layout: ElectrodeLayout, *, noise_counts: float = 0.0) -> Array:
     """Unit vectors (n, 3) along the sum of the squeezed electrodes' normals, each weighted by its squeeze.
 
-    The direction out of the finger from which the force comes; NaN where no electrode is squeezed.
+    This is the direction, seen from the finger, from which the force acts; NaN where no electrode is squeezed.
     """
     pressed = squeeze_counts(change, noise_counts) @ layout.normals
     with np.errstate(invalid="ignore"):

@@ -1,8 +1,8 @@
-"""The contact normal as learned from presses whose normal is known, with a spread for each answer.
+"""The contact normal learned from presses with known normals, with a standard deviation for each prediction.
 
-Kernel ridge regression on the pattern of all electrodes, on top of equation 2.24: what is learned is how far the
-skin's normal at that equation's point is off. Far from everything in the recording the answer falls back to equation
-2.24 and the stated spread grows to what was seen there.
+Kernel ridge regression on the pattern of all electrodes. It learns the error of equation 2.24, that is, of the skin's
+normal at the point which this equation gives. Far from all recorded patterns the prediction falls back to equation
+2.24, and the stated standard deviation grows to the one observed there.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ PositiveFloat = Annotated[float, Field(gt=0.0)]
 
 
 class KernelSettings(StrictModel):
-    """What the regression's kernel looks like; chosen by cross-validation.
+    """Parameters of the regression's kernel; chosen by cross-validation.
 
     Attributes:
-        saturation_counts: patterns are divided by their size plus this, so that a light press looks like a hard one.
+        saturation_counts: patterns are divided by their norm plus this value, so that light and hard presses look
+            alike.
         length: of the squared exponential kernel between patterns.
         ridge: weight of the penalty, against a kernel of 1 at distance 0.
     """
@@ -42,16 +43,16 @@ class KernelSettings(StrictModel):
 
 
 class Spread(StrictModel):
-    """Standard deviation of an answer per axis, radians: ``near`` at a recorded pattern, ``far`` is added in squares.
+    """Standard deviation of a prediction per axis, radians: ``near`` at a recorded pattern, plus ``far`` in quadrature.
 
-    ``far`` counts by how little the recording says of the pattern (the regression's variance, 0 to 1).
+    The square of ``far`` is weighted by the regression's variance: 0 at recorded patterns, 1 far from all of them.
     """
 
     near_rad: PositiveFloat
     far_rad: float = Field(ge=0.0)
 
     def sigma_rad(self, variance: Array) -> Array:
-        """For each variance."""
+        """The standard deviation for each variance."""
         return np.sqrt(self.near_rad**2 + self.far_rad**2 * variance)
 
 
@@ -61,7 +62,7 @@ class Presses:
 
     Attributes:
         changes: electrode readings minus their tare, counts, shape (n, electrodes).
-        normals: the skin's outward unit normal where it touches, shape (n, 3).
+        normals: the skin's outward unit normal at the contact, shape (n, 3).
     """
 
     changes: Array
@@ -71,7 +72,7 @@ class Presses:
         return len(self.changes)
 
     def part(self, rows: slice | Array) -> Presses:
-        """Some of them."""
+        """A subset of the presses."""
         return Presses(self.changes[rows], self.normals[rows])
 
 
@@ -81,9 +82,9 @@ class LearnedNormals:
 
     Attributes:
         electrodes: 19 or 24.
-        examples: what it remembers.
-        kernel: see there.
-        spread: see there.
+        examples: the presses that it keeps.
+        kernel: parameters of the kernel.
+        spread: standard deviation of its predictions.
         noise_counts: smaller changes are noise in equation 2.24.
     """
 
@@ -123,7 +124,7 @@ class LearnedNormals:
 
 
 def patterns(changes: Array, kernel: KernelSettings) -> Array:
-    """Electrode changes as patterns of a size below one, shape as ``changes``."""
+    """Electrode changes scaled to a norm below one, shape as ``changes``."""
     return np.asarray(changes / (np.linalg.norm(changes, axis=1, keepdims=True) + kernel.saturation_counts))
 
 
@@ -139,11 +140,11 @@ def usual_normals(changes: Array, electrodes: ElectrodeCount, noise_counts: floa
     return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, otherwise)
 
 
-# --- as a file -----------------------------------------------------------------------------------------------------
+# --- file format ---------------------------------------------------------------------------------------------------
 
 
 class StoredNormals(StrictModel):
-    """A regression in a file; numbers as little-endian 32-bit floats in base 64, row by row."""
+    """A regression as stored in a file: numbers are little-endian 32-bit floats in base 64, row by row."""
 
     electrodes: ElectrodeCount
     kernel: KernelSettings
@@ -161,7 +162,7 @@ class NormalsFile(StrictModel):
 
 
 def as_stored(learned: LearnedNormals) -> StoredNormals:
-    """A regression in the form of a file."""
+    """A regression in the form that is stored."""
     return StoredNormals(
         electrodes=learned.electrodes,
         kernel=learned.kernel,
@@ -177,7 +178,7 @@ def load_normals(path: Path) -> dict[str, LearnedNormals]:
     """Read a calibration of kind ``normals``: finger to regression.
 
     Raises:
-        ConfigurationError: the file does not fit; says how.
+        ConfigurationError: the contents do not fit; the message says how.
     """
     found = load_parameters(path, NormalsFile).normals
     if unknown := sorted(set(found) - set(FINGERS)):

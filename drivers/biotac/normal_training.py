@@ -1,6 +1,6 @@
-"""Training of :mod:`drivers.biotac.learned_normal`, and how well each way to a normal does on presses it has not seen.
+"""Trains :mod:`drivers.biotac.learned_normal`, and compares methods for normals on presses not used for training.
 
-Samples next to each other in time are nearly equal, so everything is chosen by leaving out whole stretches of time.
+Neighbouring samples are nearly equal, so the cross-validation leaves out whole intervals of time.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 
 STRETCHES = 5
-"""Stretches of time left out in turn."""
+"""Number of intervals of time, each left out once."""
 
 FEWEST = 100
-"""Presses that a training needs."""
+"""Smallest number of presses for a training."""
 
 _SATURATIONS_counts = (20.0, 50.0, 150.0)
 _LENGTHS = (0.2, 0.3, 0.4, 0.6, 0.8)
@@ -44,11 +44,11 @@ class MethodErrors:
     """Angles between estimated and measured normals, for one method, on presses it was not trained on.
 
     Attributes:
-        method: in words.
-        samples: presses for which it gave a normal.
-        median_deg, ninety_deg: of the angle; half and nine tenths of the presses lie below.
-        sigma_deg: the standard deviation per axis that the method states, in the median.
-        within_68, within_95: share of angles inside what that statement makes of 68 and 95 per cent.
+        method: its name for people.
+        samples: number of presses for which it gave a normal.
+        median_deg, ninety_deg: median and 90 % quantile of the angle.
+        sigma_deg: median of the standard deviations per axis that the method states.
+        within_68, within_95: share of angles within the stated 68 and 95 per cent regions.
     """
 
     method: str
@@ -72,9 +72,9 @@ def rotation_between(source: Array, target: Array) -> Array:
 
 
 def rotation_to_sensor(presses: Presses, electrodes: ElectrodeCount, noise_counts: float) -> Array:
-    """Rotation reference_R_sensor of normals that were measured in another fixed frame than the BioTac's.
+    """Rotation reference_R_sensor for normals that were measured in a fixed frame other than the BioTac's.
 
-    The frame's orientation is the one in which the normals agree best with those of equation 2.24.
+    It is the rotation for which the normals agree best with those of equation 2.24.
     """
     found = contact_from_electrodes(presses.changes, electrode_layout(electrodes), noise_counts=noise_counts).normals
     known = np.isfinite(found).all(axis=1)
@@ -84,16 +84,16 @@ def rotation_to_sensor(presses: Presses, electrodes: ElectrodeCount, noise_count
 def train(
     presses: Presses, electrodes: ElectrodeCount, *, noise_counts: float = 15.0, most: int = 800
 ) -> LearnedNormals:
-    """Learn normals from presses in the order of time.
+    """Learn normals from presses in chronological order.
 
     Args:
         presses: at least :data:`FEWEST`.
         electrodes: 19 or 24.
         noise_counts: smaller changes are noise in equation 2.24.
-        most: examples kept, evenly spread over the recording.
+        most: largest number of examples to keep, evenly spread over the recording.
 
     Raises:
-        ConfigurationError: too few presses, or presses of another number of electrodes.
+        ConfigurationError: too few presses, or presses with a different number of electrodes.
     """
     _check(presses, electrodes)
     kept = presses.part(np.unique(np.linspace(0, len(presses) - 1, most).astype(int)))
@@ -119,9 +119,9 @@ def _check(presses: Presses, electrodes: int) -> None:
 
 
 def _predict_left_out(presses: Presses, usual: Array, kernel: KernelSettings) -> tuple[Array, Array]:
-    """Normals of each stretch as the others tell them (n, 3), and the variances of the regression (n,).
+    """Normals of each interval predicted from the others (n, 3), and the variances of the regression (n,).
 
-    In closed form from one inverse for all stretches (Rasmussen and Williams, Gaussian Processes, 5.4.2, by blocks).
+    In closed form, with one inverse for all intervals (Rasmussen and Williams, Gaussian Processes, 5.4.2, block-wise).
     """
     known = patterns(presses.changes, kernel)
     inverse = np.linalg.inv(kernel_values(known, known, kernel) + kernel.ridge * np.eye(len(known)))
@@ -154,15 +154,15 @@ def compare_methods(
     in_sensor_frame: bool = False,
     most: int = 800,
 ) -> list[MethodErrors]:
-    """Every method trained on the first half in time and judged on the second.
+    """Train every method on the first half of the recording and test it on the second.
 
     Args:
-        presses: in the order of time.
+        presses: in chronological order.
         electrodes: 19 or 24.
-        noise_counts: smaller changes are noise where squeezed electrodes count alone.
-        in_sensor_frame: normals are in the BioTac frame; otherwise each method's rotation to theirs is fitted on the
-            first half too.
-        most: examples the learned method keeps.
+        noise_counts: smaller changes are noise, for methods that use only squeezed electrodes.
+        in_sensor_frame: whether normals are in the BioTac frame; if not, a rotation is fitted for each method on the
+            first half.
+        most: largest number of examples that the learned method keeps.
 
     Raises:
         ConfigurationError: too few presses.
@@ -182,7 +182,7 @@ def compare_methods(
 
 
 def _all_electrodes(changes: Array, electrodes: ElectrodeCount, power: float) -> Array:
-    """Skin normals at the thesis's equation 2.24 as it stands: every change counts, of either sign."""
+    """Skin normals by equation 2.24 as the thesis states it: changes of either sign count."""
     weights, layout = np.abs(changes) ** power, electrode_layout(electrodes)
     with np.errstate(invalid="ignore"):
         return layout.skin.project(weights @ layout.positions_m / weights.sum(axis=1, keepdims=True))[1]

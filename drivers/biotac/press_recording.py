@@ -1,8 +1,9 @@
-"""Recordings of presses on a plate whose normal is known, to train and to judge contact normals.
+"""Recordings of presses on a plate with known normal, for training and testing contact normals.
 
-Two forms are read. A CSV table with the columns ``e1`` ... ``e19`` (or ``e24``), ``nx``, ``ny``, ``nz``, in the order
-of time: counts and the skin's outward normal; in rows without a normal nothing was touched, and their mean is the tare
-of all. Or two text files of numbers, electrodes and normals, one column a sample, with the tare already taken.
+Two forms are read. A CSV table with the columns ``e1`` ... ``e19`` (or ``e24``), ``nx``, ``ny``, ``nz``, in
+chronological order: counts and the skin's outward normal. Rows without a normal were recorded without contact, and
+their mean is the tare of all rows. The other form is two text files of numbers, electrodes and normals, one column per
+sample, with the tare already subtracted.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ _COUNTS: tuple[ElectrodeCount, ...] = get_args(ElectrodeCount)
 
 @dataclass(frozen=True, eq=False)
 class PressRecording:
-    """Presses and how many electrodes they have."""
+    """Presses and their number of electrodes."""
 
     presses: Presses
     electrodes: ElectrodeCount
@@ -37,11 +38,11 @@ def read_presses(path: Path, normals: Path | None = None) -> PressRecording:
     """Read a recording.
 
     Args:
-        path: the table, or the text file of electrodes when ``normals`` is given.
+        path: the table, or the text file of electrodes if ``normals`` is given.
         normals: the text file of normals, shape (3, n).
 
     Raises:
-        ConfigurationError: a file cannot be read or does not fit; says where.
+        ConfigurationError: a file cannot be read or its contents do not fit; the message says where.
     """
     changes, directions = _table(path) if normals is None else (_matrix(path), _matrix(normals))
     where = str(path if normals is None else normals)
@@ -64,7 +65,7 @@ def _units(directions: Array, where: str) -> Array:
 
 
 def _reason(error: Exception) -> str:
-    """What an error says, without numbers of the operating system."""
+    """The reason in an error, without the operating system's error number."""
     return str(getattr(error, "strerror", None) or error)
 
 

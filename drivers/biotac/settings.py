@@ -1,4 +1,4 @@
-"""What a BioTac's calibration file says, and how its readings are judged."""
+"""The contents of a BioTac's calibration file, and the settings for checking its readings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class BallAndCylinderSkin(StrictModel):
     radius_m: float = Field(default=0.007, gt=0.0)
 
     def surface(self) -> Skin:
-        """The skin described."""
+        """The skin with these parameters."""
         return BallAndCylinder(self.radius_m)
 
 
@@ -32,23 +32,23 @@ class EllipsoidSkinSettings(StrictModel):
     centre_m: Vector3 = (0.0, 0.0, 0.0)
 
     def surface(self) -> Skin:
-        """The skin described."""
+        """The skin with these parameters."""
         return EllipsoidSkin(self.semi_axes_m, self.centre_m)
 
 
 class BioTacCalibration(StrictModel):
-    """One BioTac: model, mounting and what its signals mean.
+    """One BioTac: its model, its mounting and the meaning of its signals.
 
     Attributes:
         electrodes: 19, or 24 for the BioTac SP.
         distal_T_sensor: BioTac frame (x to the tip, z to the back of the finger) in the distal frame.
-        skin: the touched surface; the model's own when left out.
-        N_per_pdc_count: force per count of fluid pressure while the skin does not rest on the core.
+        skin: the outer surface; by default that of the model.
+        N_per_pdc_count: force per count of fluid pressure, valid until the skin rests on the core.
         N_per_electrode_count: force per count of squeezed electrodes, for harder contacts.
         touch_pdc_counts: pressure above the tare that means contact (10 counts; protocols: BioTac contact).
         electrode_noise_counts: smaller changes of an electrode are noise.
         weight_power: exponent of equation 2.24's weights.
-        point_sigma_m: of the contact point along the skin, per axis; across it a third of that.
+        point_sigma_m: of the contact point along the skin, per axis; perpendicular to the skin it is a third of that.
         normal_sigma_rad: of the normal, per axis.
     """
 
@@ -65,14 +65,14 @@ class BioTacCalibration(StrictModel):
 
 
 class BioTacSettings(StrictModel):
-    """How readings are judged.
+    """How readings are checked.
 
     Attributes:
-        tare_samples: newest readings of each channel that a tare averages.
-        tare_pdc_spread, tare_electrode_spread: how far they may lie apart, counts, largest minus smallest.
-        touch_samples: pressure readings in a row that must mean contact before a capture counts as touched.
+        tare_samples: number of newest readings of each channel that a tare averages.
+        tare_pdc_spread, tare_electrode_spread: their largest allowed range, counts (largest minus smallest).
+        touch_samples: consecutive pressure readings above the threshold before a capture counts as a contact.
         stale_ms: age after which a channel counts as silent.
-        follow_s: while the pressure says untouched, the tare follows slow changes with this time constant; 0 never.
+        follow_s: time constant with which the tare follows slow changes while nothing is touched; 0 for never.
     """
 
     tare_samples: int = Field(default=5, ge=2)

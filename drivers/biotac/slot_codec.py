@@ -1,7 +1,7 @@
 """A BioTac's 16 bytes inside the palm's status (protocols: BioTac slots).
 
-One request gives two values: the requested one and the next in the channels' order; the vibration channel comes
-along twice. Which request a slot answers is told by the status, not by the slot.
+Each request returns two values, that of the requested channel and that of the next channel in order, plus two readings
+of the vibration channel. The status says which request a slot answers; the slot itself does not.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from drivers.core.errors import CodecError
 SLOT_BYTES = 16
 SLOTS = 5
 PALM_SLOT_BYTES = (16, 32)
-"""Room that palms give each fingertip: a 0230 twice as much, with the BioTac's data at the beginning of it."""
+"""Bytes that a palm reserves for each fingertip; a palm 0230 reserves twice as many and puts the BioTac's data
+first.
+"""
 LARGEST_COUNT = 4095
 """Every channel is read by a 12-bit converter."""
 
@@ -25,7 +27,7 @@ _PAC0, _PAC1, _FIRST, _SECOND = 1, 2, 4, 8
 
 
 class Channel(IntEnum):
-    """What a BioTac measures; electrodes n = 1 to 24 follow as 3 + n."""
+    """The channels of a BioTac; electrodes n = 1 to 24 follow as 3 + n."""
 
     PDC = 1
     TAC = 2
@@ -54,10 +56,10 @@ class Slot:
 
 
 def decode_slot(payload: bytes, request: int) -> Slot:
-    """One slot of 16 bytes, the answer to ``request``.
+    """Decode one slot of 16 bytes, the answer to ``request``.
 
-    Readings outside the converter's range are given as they are: a socket without a sensor shows such values. Answers
-    to questions beyond the channels, such as a name, hold no readings.
+    Readings outside the converter's range are returned unchanged: a socket without a sensor shows such values. Answers
+    to other requests than those for channels, such as the name, hold no readings.
 
     Raises:
         CodecError: wrong length.

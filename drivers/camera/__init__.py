@@ -1,1 +1,1 @@
-"""Cameras and printed markers: pictures, corners, poses."""
+"""Cameras and printed markers: pictures, corners and poses."""

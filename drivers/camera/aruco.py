@@ -1,11 +1,11 @@
 """The object's true pose from two markers seen through the table.
 
 The world marker, which does not move, is averaged over frames and gives the camera's pose. The object's marker lies on
-the table, so that only its place and its turn are free: the rays through its corners are cut with the plane in which
-the marker lies, and the square is laid into the four points; from there all corners are fitted together. Unlike the
-pose of a single square (both IPPE solutions are given beside it) this cannot flip. The sideways shift of rays in the
-table's glass is taken into account for both markers. What a picture cannot tell for certain it does not tell: the
-reason is given instead of a pose.
+the table, so only its position and yaw are unknown: the rays through its corners are intersected with the marker's
+plane, and the square is fitted to the four points. From this start all corners are fitted together. Unlike the pose of
+a single square (whose two IPPE solutions are also reported), this pose cannot flip. The sideways shift of rays in the
+table's glass is taken into account for both markers. Where a picture does not determine the pose, the reason is
+returned instead of a pose.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from drivers.core.poses import rotate, transform_points
 FACE_DOWN = Pose3(Rot3(np.diag([1.0, -1.0, -1.0])), np.zeros(3))
 """A marker seen from below: its z points down."""
 _SPARE = 2
-"""A square's corners are eight numbers, a pose six."""
+"""A square's corners give eight numbers; a pose has six."""
 _MEAN_FLOOR_px = 0.02
-"""What averaging does not remove from the world marker's corners."""
+"""Error of the world marker's corners that averaging does not remove."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +45,13 @@ class ObjectSighting:
 
     Attributes:
         stamp_ns: arrival of the frame.
-        world_T_object: its pose, constrained to the table unless the settings set it free.
-        covariance: of x, y (m) and yaw (rad), shape (3, 3), world axes; of a free object shape (6, 6), rotation first.
-        position_sigma_m, yaw_sigma_rad: standard deviations, the larger one in the plane and about the vertical.
-        fit_rms_m: how badly the square fits the four points on the table; large when the object is tilted or lifted.
-        ambiguous: whether the marker on its own would allow two poses.
-        unconstrained: the one or two poses of the object from its marker alone, better first.
+        world_T_object: its pose, constrained to the table unless the settings allow any pose.
+        covariance: of x, y (m) and yaw (rad), shape (3, 3), world axes; for an unconstrained object shape (6, 6),
+            rotation first.
+        position_sigma_m, yaw_sigma_rad: standard deviations: the larger one in the plane, and about the vertical.
+        fit_rms_m: misfit of the square to the four points on the table; large if the object is tilted or lifted.
+        ambiguous: whether the marker alone would allow two poses.
+        unconstrained: the one or two poses of the object from its marker alone, the better one first.
         reprojection_px: error of each of these.
         object_corners_px, world_corners_px: corners used, shape (4, 2); the world's are means over frames.
     """
@@ -70,7 +71,7 @@ class ObjectSighting:
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What came of one frame: a sighting, or the reason why there is none."""
+    """The result of one frame: a sighting, or the reason why there is none."""
 
     stamp_ns: int
     sighting: ObjectSighting | None
@@ -78,7 +79,7 @@ class Observation:
 
 
 class ObjectTracker:
-    """Object poses from frames of one standing camera."""
+    """Computes object poses from the frames of one fixed camera."""
 
     def __init__(self, camera: CameraCalibration, settings: MarkerSettings) -> None:
         self.world = WorldMarker(camera, settings)
@@ -86,12 +87,12 @@ class ObjectTracker:
         self._object_T_marker = settings.object_T_objectmarker.pose()
 
     def observe(self, frame: Frame) -> Observation:
-        """Take one frame: the world marker joins its mean, and the object is found, or the reason is told."""
+        """Process one frame: add the world marker to its mean, and locate the object or say why that fails."""
         found = detection_in(frame, self._settings.dictionary)
         return self.locate(frame.stamp_ns, found, self.take_world(found))
 
     def take_world(self, found: Detection) -> str:
-        """Let the world marker of one frame join the mean; why the frame cannot be used, or ""."""
+        """Add the world marker of one frame to the mean; returns why the frame cannot be used, or ""."""
         if problem := self._picture_problem(found):
             return problem
         world = found.markers.get(self._settings.world_id)
@@ -100,7 +101,7 @@ class ObjectTracker:
         return self._blur_problem(self._settings.world_id, world.blur_px) or self.world.add(world.corners_px)
 
     def locate(self, stamp_ns: int, found: Detection, problem: str = "") -> Observation:
-        """The object in a frame whose world marker has been taken; ``problem`` is what came of that."""
+        """Locate the object in a frame; ``problem`` is what :meth:`take_world` returned for this frame."""
         marker = found.markers.get(self._settings.object_id)
         if not problem and marker is None:
             problem = f"the object's marker {self._settings.object_id} is not visible"
@@ -111,9 +112,9 @@ class ObjectTracker:
         return self._check(self.sighting(stamp_ns, marker.corners_px), stamp_ns)
 
     def sighting(self, stamp_ns: int, corners_px: Array) -> ObjectSighting | None:
-        """The object from the corners of its marker, shape (4, 2), which lies on the table, z = 0 of the world.
+        """The object from the corners of its marker, shape (4, 2); the marker lies on the table, z = 0 of the world.
 
-        None before the world marker was seen, or when the corners cannot be on the table.
+        None before the world marker was seen, or if the corners cannot be on the table.
         """
         camera_T_world = self.world.camera_T_world()
         if camera_T_world is None:
@@ -157,7 +158,7 @@ class ObjectTracker:
         )
 
     def _on_table(self, world_T_camera: Pose3, corners_px: Array) -> Array | None:
-        """The corners on the table, shape (4, 2), world; None when a ray never comes up to it."""
+        """The corners on the table, shape (4, 2), world; None if a ray does not reach the table."""
         rays = rotate(world_T_camera, self._camera.rays(corners_px))
         origin = np.array(world_T_camera.translation())
         if origin[2] >= 0.0 or np.any(rays[:, 2] <= 0.0):
@@ -189,7 +190,7 @@ class ObjectTracker:
         )
 
     def _alone(self, camera_T_world: Pose3, corners_px: Array) -> tuple[MarkerPose, ...]:
-        """The poses the marker's corners allow by themselves, seen through the glass, better first."""
+        """The poses that the marker's corners alone allow, seen through the glass, the better one first."""
         side_m = self._settings.object_side_m * self._settings.print_scale
         poses = [found.camera_T_marker for found in marker_poses(corners_px, side_m, self._camera)]
         glass, corners = table_glass(self._settings), self._settings.object_corners_m
@@ -224,7 +225,7 @@ class ObjectTracker:
 
 
 def detection_in(frame: Frame, dictionary: str) -> Detection:
-    """What was found when the frame was taken; else what its picture shows."""
+    """The markers found when the frame was taken; otherwise those detected in its picture now."""
     if frame.detection is not None:
         return frame.detection
     if frame.image is None:
@@ -233,10 +234,10 @@ def detection_in(frame: Frame, dictionary: str) -> Detection:
 
 
 def fit_in_plane(model: Array, seen: Array) -> tuple[Array, float, float]:
-    """The turn and shift in the plane that lay ``model`` (n, 2) onto ``seen`` (n, 2), by least squares.
+    """The rotation and translation in the plane that map ``model`` (n, 2) onto ``seen`` (n, 2), by least squares.
 
     Returns:
-        Where the model's origin comes to lie (2,), its angle (rad), and the root mean square misfit.
+        The position of the model's origin (2,), its angle (rad), and the root mean square misfit.
     """
     a, b = model - model.mean(axis=0), seen - seen.mean(axis=0)
     angle = float(np.arctan2(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), np.sum(a * b)))
@@ -246,18 +247,19 @@ def fit_in_plane(model: Array, seen: Array) -> tuple[Array, float, float]:
 
 
 def is_ambiguous(poses: tuple[MarkerPose, ...], corner_sigma_px: float, sigmas: float) -> bool:
-    """Whether the corners' noise could make the wrong one of a square's two poses look the better one.
+    """Whether noise of the corners could make the wrong one of a square's two poses look better.
 
-    The logarithm of the ratio of their likelihoods is the difference of their sums of squared errors over twice the
-    corners' variance. Where the poses' corners lie d apart, the difference for the true pose is normally distributed
-    about d^2 with a standard deviation of 2 d times the corners'. So it is wrong by more than (sigmas * corners'
-    deviation)^2 at most as often as a normal variable lies ``sigmas`` deviations off, whatever d is. That holds for two
-    given poses; as both are fitted to the corners, it happens a few times as often.
+    The log likelihood ratio of the poses is the difference of their sums of squared errors, divided by twice the
+    variance of a corner. If the poses' corners are d apart, this difference is normally distributed for the true pose,
+    with mean d^2 and a standard deviation of 2 d times that of a corner. So, whatever d is, the wrong pose looks better
+    by more than (sigmas * a corner's deviation)^2 at most as often as a normal variable exceeds ``sigmas`` standard
+    deviations. That holds for two given poses; since both are fitted to the corners, it happens a few times as often.
 
     Args:
-        poses: better one first.
-        corner_sigma_px: error of a corner per axis; taken larger where the better pose leaves more over.
-        sigmas: how sure it has to be.
+        poses: the better one first.
+        corner_sigma_px: error of a corner per axis; a larger error is assumed if the residuals of the better pose are
+            larger.
+        sigmas: required confidence, in standard deviations.
     """
     if len(poses) < 2:
         return False
@@ -267,7 +269,7 @@ def is_ambiguous(poses: tuple[MarkerPose, ...], corner_sigma_px: float, sigmas: 
 
 
 def _sigmas(covariance: Array) -> tuple[float, float]:
-    """Of the position, its larger axis in the plane (m), and about the vertical (rad)."""
+    """Standard deviations of the position, along its larger axis in the plane (m), and about the vertical (rad)."""
     place = covariance[:2, :2] if len(covariance) == 3 else covariance[3:5, 3:5]
     return float(np.sqrt(np.linalg.eigvalsh(place)[-1])), float(np.sqrt(covariance[2, 2]))
 

@@ -1,4 +1,4 @@
-"""The pose of a flat board in a picture, what else its corners allow, and how well they tell it."""
+"""The pose of a flat board in a picture, the other poses that its corners allow, and its covariance."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ class BoardPose:
 def board_pose(
     points_m: Array, pixels: Array, camera: CameraCalibration, *, corner_sigma_px: float = 0.1, ratio: float = 3.0
 ) -> BoardPose | None:
-    """The pose of a flat board from at least four of its corners; None when they allow none.
+    """The pose of a flat board from at least four of its corners; None if they do not determine one.
 
-    Both poses that a flat figure allows are tried (IPPE) and refined; the better one is given. It is marked ambiguous
-    when the other's error is below ``ratio`` times its own, or times the corners' noise. The other one is left
-    unrefined: in the flat valley between both, refining would walk over to the first and hide the doubt.
+    A flat figure allows two poses (IPPE). The better one is refined and returned. It is marked ambiguous if the error
+    of the other is below ``ratio`` times its own, or ``ratio`` times the corners' noise. The other pose is not refined:
+    the error changes little between the two, so refinement could move it to the first pose and hide the ambiguity.
     """
     if len(points_m) < 4 or _in_one_line(points_m):
         return None
@@ -85,7 +85,7 @@ def _assess(pose: Pose3, points_m: Array, pixels: Array, camera: CameraCalibrati
 
 
 def _differs(pose: Pose3, best: MarkerPose) -> bool:
-    """Whether a pose is turned by more than any refinement would."""
+    """Whether two poses differ by a larger rotation than any refinement makes."""
     return rotation_angle_rad(pose.between(best.camera_T_marker)) > _SAME_TURN_rad
 
 

@@ -1,7 +1,7 @@
-"""Printed boards: single markers, grids of markers, ChArUco boards; their corners in a picture, and the board's pose.
+"""Printed boards: single markers, grids of markers and ChArUco boards, and their corners in a picture.
 
-All three share one frame: x to the right and y up on the print, z out of it, origin in the print's *middle*. OpenCV's
-own boards begin at their top left corner with y down; what it gives is turned into this frame in one place, here.
+All three share one frame: x to the right and y up on the print, z out of it, origin in the print's *middle*. The origin
+of OpenCV's boards is their top left corner, with y down; this module alone converts between the frames.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ CHECK_BAR_mm, LARGEST_SCALE_ERROR = 100.0, 0.005
 
 
 class Printed(StrictModel):
-    """What every print has.
+    """Properties common to all prints.
 
     Attributes:
         dictionary: OpenCV's name of the dictionary of its markers, or a file with one in OpenCV's form.
-        measured_bar_mm: length of the print's check bar, measured with a ruler or caliper; it should be 100 mm. None
-            while nobody has measured.
+        measured_bar_mm: length of the print's check bar, measured with a ruler or caliper; it should be 100 mm. None if
+            it was not measured.
     """
 
     dictionary: str = "DICT_4X4_50"
@@ -53,12 +53,12 @@ class Printed(StrictModel):
 
     @property
     def scale(self) -> float:
-        """True size over intended size; 1 while the bar was not measured."""
+        """True size divided by intended size; 1 if the bar was not measured."""
         return (self.measured_bar_mm or CHECK_BAR_mm) / CHECK_BAR_mm
 
     @cached_property
     def opencv_dictionary(self) -> Any:
-        """The dictionary itself."""
+        """The OpenCV dictionary object."""
         return opencv_dictionary(self.dictionary)
 
     def _check_numbers(self, largest: int) -> None:
@@ -68,7 +68,7 @@ class Printed(StrictModel):
 
 
 class SingleMarker(Printed):
-    """One marker; ``side_m`` is that of its black square as meant to be printed."""
+    """One marker; ``side_m`` is the intended side length of its black square."""
 
     kind: Literal["single"] = "single"
     number: int = Field(default=0, ge=0)
@@ -81,16 +81,16 @@ class SingleMarker(Printed):
 
     @property
     def size_m(self) -> tuple[float, float]:
-        """Width and height of the black square, as meant."""
+        """Intended width and height of the black square, metres."""
         return self.side_m, self.side_m
 
     @property
     def point_count(self) -> int:
-        """Corners of a board that is seen whole."""
+        """Number of corners of a completely visible board."""
         return 4
 
     def match_corners(self, image: Image) -> tuple[Array, Array]:
-        """Corners on the board (n, 3), metres, and in the picture (n, 2), pixels; n = 0 where it is not seen."""
+        """Corners on the board (n, 3), metres, and in the picture (n, 2), pixels; n = 0 if it is not visible."""
         found = detect(image, self.dictionary)
         if self.number not in found:
             return np.zeros((0, 3)), np.zeros((0, 2))
@@ -116,28 +116,28 @@ class GridBoard(Printed):
 
     @property
     def size_m(self) -> tuple[float, float]:
-        """Width and height from the first marker to the last, as meant."""
+        """Intended width and height from the first marker to the last, metres."""
         step = self.side_m + self.gap_m
         return self.columns * step - self.gap_m, self.rows * step - self.gap_m
 
     @property
     def point_count(self) -> int:
-        """Corners of a board that is seen whole."""
+        """Number of corners of a completely visible board."""
         return 4 * self.columns * self.rows
 
     @property
     def numbers(self) -> range:
-        """Its markers."""
+        """The numbers of its markers."""
         return range(self.first_number, self.first_number + self.columns * self.rows)
 
     def match_corners(self, image: Image) -> tuple[Array, Array]:
-        """Corners on the board (n, 3), metres, and in the picture (n, 2), pixels; n = 0 where it is not seen."""
+        """Corners on the board (n, 3), metres, and in the picture (n, 2), pixels; n = 0 if it is not visible."""
         found = {number: quad for number, quad in detect(image, self.dictionary).items() if number in self.numbers}
         points = [self.marker_corners_m(number) for number in found]
         return np.concatenate([np.zeros((0, 3)), *points]), np.concatenate([np.zeros((0, 2)), *found.values()])
 
     def marker_corners_m(self, number: int) -> Array:
-        """Corners of one of its markers, true size, shape (4, 3), board frame."""
+        """Corners of one of its markers in true size, metres, shape (4, 3), board frame."""
         row, column = divmod(number - self.first_number, self.columns)
         step, (width, height) = self.side_m + self.gap_m, self.size_m
         left, top = column * step - width / 2, height / 2 - row * step
@@ -146,12 +146,12 @@ class GridBoard(Printed):
 
 
 class CharucoBoard(Printed):
-    """A chessboard with markers in its white squares; the corners between squares are what is measured.
+    """A chessboard with markers in its white squares; the corners between squares are measured.
 
     Attributes:
         columns, rows: squares across and down.
-        square_m, marker_m: sides of a square and of a marker's black square, as meant.
-        legacy: rows are counted as OpenCV did before 4.6 (old prints with an even number of rows).
+        square_m, marker_m: intended sides of a square and of a marker's black square.
+        legacy: rows are numbered as in OpenCV before 4.6 (for old prints with an even number of rows).
     """
 
     kind: Literal["charuco"] = "charuco"
@@ -170,12 +170,12 @@ class CharucoBoard(Printed):
 
     @property
     def size_m(self) -> tuple[float, float]:
-        """Width and height of the chessboard, as meant."""
+        """Intended width and height of the chessboard, metres."""
         return self.columns * self.square_m, self.rows * self.square_m
 
     @property
     def point_count(self) -> int:
-        """Corners of a board that is seen whole."""
+        """Number of corners of a completely visible board."""
         return (self.columns - 1) * (self.rows - 1)
 
     @cached_property
@@ -187,7 +187,7 @@ class CharucoBoard(Printed):
         return board
 
     def match_corners(self, image: Image) -> tuple[Array, Array]:
-        """Corners on the board (n, 3), metres, and in the picture (n, 2), pixels; n = 0 where it is not seen."""
+        """Corners on the board (n, 3), metres, and in the picture (n, 2), pixels; n = 0 if it is not visible."""
         corners, numbers, _, _ = self._detector.detectBoard(image)
         if numbers is None or not len(numbers):
             return np.zeros((0, 3)), np.zeros((0, 2))
@@ -196,7 +196,7 @@ class CharucoBoard(Printed):
 
     @property
     def corners_m(self) -> Array:
-        """Inner corners of the chessboard in OpenCV's order, true size, shape (n, 3), board frame."""
+        """Inner corners of the chessboard in OpenCV's order, true size, metres, shape (n, 3), board frame."""
         width, height = self.size_m
         from_top_left = np.asarray(self.opencv_board.getChessboardCorners(), float)
         middle = from_top_left * [1.0, -1.0, 1.0] + [-width / 2, height / 2, 0.0]
@@ -212,11 +212,11 @@ Board: TypeAlias = Annotated[AnyBoard, Field(discriminator="kind")]
 
 
 class _BoardFile(RootModel[Board]):
-    """A board in a file: its ``kind`` says which of the three."""
+    """A board as stored in a file; its ``kind`` says which of the three it is."""
 
 
 def load_board(path: Path) -> AnyBoard:
-    """Read a board's description as ``tactile-lab markers`` wrote it. Raises ConfigurationError."""
+    """Read a board's description written by ``tactile-lab markers``. Raises ConfigurationError."""
     content = load(path)
     if not isinstance(content, dict):
         raise ConfigurationError(

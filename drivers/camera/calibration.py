@@ -1,4 +1,4 @@
-"""The lens of the camera: from our own YAML, or from the files OpenCV's calibration programs write."""
+"""The camera's lens: from our own YAML files, or from the files of OpenCV's calibration programs."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from drivers.core.errors import ConfigurationError
 
 _DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 _UNDISTORTION = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 40, 1e-9)
-"""The five rounds that OpenCV takes by itself leave half a pixel at the edge of a wide picture."""
+"""OpenCV's default of five iterations leaves an error of half a pixel at the edge of a wide picture."""
 
 
 class CameraCalibration(StrictModel):
-    """A pinhole camera with Brown's distortion, as OpenCV has it.
+    """A pinhole camera with Brown's distortion, with OpenCV's parameters.
 
     Attributes:
         focal_px: focal lengths along x and y, pixels.
         centre_px: principal point, pixels.
         distortion: k1, k2, p1, p2, k3 and so on; 0, 4, 5, 8, 12 or 14 coefficients.
-        size_px: width and height of the pictures it was made for; None where the file does not say.
+        size_px: width and height of the pictures it was made for; None if the file does not say.
     """
 
     focal_px: tuple[float, float]
@@ -61,7 +61,7 @@ class CameraCalibration(StrictModel):
         return np.array(self.distortion or (0.0,) * 4)
 
     def rays(self, pixels: Array) -> Array:
-        """Directions of pixels (n, 2), distortion undone: shape (n, 3), camera frame, z = 1."""
+        """Directions of pixels (n, 2) without distortion: shape (n, 3), camera frame, z = 1."""
         points = cv2.undistortPointsIter(
             np.asarray(pixels, float).reshape(-1, 1, 2),
             self.matrix,
@@ -80,7 +80,9 @@ class CameraCalibration(StrictModel):
         return np.asarray(pixels[:, 0], float)
 
     def projection(self, points_camera_m: Array) -> tuple[Array, Array]:
-        """Pixels (n, 2) of points (n, 3) in the camera frame, and their derivatives by the points, shape (n, 2, 3)."""
+        """Pixels (n, 2) of points (n, 3) in the camera frame, and their derivatives with respect to the points (n, 2,
+        3).
+        """
         pixels, slopes = cv2.projectPoints(
             points_camera_m, np.zeros(3), np.zeros(3), self.matrix, self.distortion_coefficients
         )
@@ -91,13 +93,13 @@ def load_camera(path: Path) -> CameraCalibration:
     """Read a camera calibration: our YAML, or OpenCV's (known by its ``%YAML:1.0`` head).
 
     Raises:
-        ConfigurationError: the file cannot be read, or is no calibration.
+        ConfigurationError: the file cannot be read, or is not a calibration.
     """
     return _opencv(path) if is_opencv(path) else load_parameters(path, CameraCalibration)
 
 
 def is_opencv(path: Path) -> bool:
-    """Whether a file has OpenCV's head, which says not whose lens it is. Raises ConfigurationError."""
+    """Whether a file has OpenCV's header; such a file does not name its camera. Raises ConfigurationError."""
     try:
         with path.open("rb") as file:
             return file.read(9) == b"%YAML:1.0"

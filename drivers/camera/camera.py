@@ -1,4 +1,4 @@
-"""The camera under the table: a trigger out, one picture with its markers back; some send markers all the time."""
+"""The camera under the table: it answers a trigger with one picture and its markers; some also stream markers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TRIGGER = b"TRIGGER"
 
 
 class CameraDeviceSettings(StrictModel):
-    """How long to wait for a picture, and how often to look."""
+    """How long to wait for a picture, and how often to check for it."""
 
     timeout_ms: float = Field(default=1000.0, gt=0.0)
     look_every_ms: float = Field(default=2.0, gt=0.0)
@@ -43,13 +43,13 @@ class Camera:
             self._transport.close()
 
     def poll(self) -> None:
-        """Take what the camera has sent by itself, so that it is recorded in time. Raises DeviceError."""
+        """Receive what the camera has streamed, so that it is recorded in time. Raises DeviceError."""
         arrived = self._transport.receive()
         if self._asked_ns is not None:
             self._arrived += arrived
 
     def ask(self) -> None:
-        """Trigger; the picture comes with :meth:`taken`. One that was still on its way from before is left out.
+        """Trigger the camera; :meth:`take_picture` returns the picture. Pictures of earlier triggers are ignored.
 
         Raises:
             DeviceError: the transport failed.
@@ -59,10 +59,10 @@ class Camera:
         self._asked_ns, self._arrived = self._clock.now_ns(), []
 
     def take_picture(self) -> Frame | None:
-        """The picture asked for, once; None while it is on its way. Never waits.
+        """The requested picture, returned once; None until it has arrived. Never waits.
 
         Raises:
-            DeviceError: nothing was asked for, no picture came within the time-out, or the transport failed.
+            DeviceError: no picture was requested, none came within the time-out, or the transport failed.
             CodecError: the picture cannot be decoded.
         """
         if self._asked_ns is None:
@@ -82,7 +82,7 @@ class Camera:
         return frame
 
     def capture(self) -> Frame:
-        """Trigger and wait for the picture, doing nothing else; see :meth:`ask` and :meth:`taken`."""
+        """Trigger the camera and wait for the picture; see :meth:`ask` and :meth:`take_picture`."""
         self.ask()
         while (frame := self.take_picture()) is None:
             self._clock.sleep_until_ns(self._clock.now_ns() + round(1e6 * self._settings.look_every_ms))
@@ -93,5 +93,5 @@ class Camera:
         return decode_packet(datagram)
 
     def health(self) -> tuple[str, ...]:
-        """What the camera's transport knows to be wrong, in words."""
+        """Problems that the camera's transport reports, in plain English."""
         return link_health(self._transport)

@@ -1,7 +1,8 @@
-"""The camera in a process of its own, seen from the session: a transport like any other.
+"""The session's side of a camera in a separate process: a transport like any other.
 
-The process finds the markers of every frame as it comes, 30 a second, whatever the session is busy with; their corners
-come as packets (see :mod:`drivers.camera.packet`), stamped where they arrived. A trigger asks for one picture beside.
+The process detects the markers in every frame, 30 per second, however busy the session is. It sends their corners as
+packets (see :mod:`drivers.camera.packet`), with the stamp of the frame's arrival in the process. A trigger requests one
+picture in addition.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ _LONGEST = 40_000_000
 
 
 class CameraProcess:
-    """A transport to a camera that another process watches.
+    """A transport to a camera that another process reads.
 
     Args:
         name: the transport's name, in the rig and in recordings.
-        settings: which camera, and what to look for.
+        settings: which camera, and which markers to look for.
     """
 
     def __init__(self, name: str, settings: CameraSourceSettings) -> None:
@@ -34,10 +35,11 @@ class CameraProcess:
         self._notes: tuple[str, ...] = ()
 
     def open(self) -> None:
-        """Start the process and wait until it has the camera; all or nothing, repeatable.
+        """Start the process and wait until it has opened the camera. Repeatable; after a failure nothing is left
+        running.
 
         Raises:
-            DeviceError: the camera cannot be opened, in its driver's own words.
+            DeviceError: the camera cannot be opened; the message is its driver's.
         """
         if self._child.started:
             return
@@ -55,13 +57,13 @@ class CameraProcess:
         self._child.close(_END_s)
 
     def send(self, payload: bytes) -> None:
-        """Ask for a picture. Raises CodecError for another message, DeviceError when the process is gone."""
+        """Request a picture. Raises CodecError for any other message, DeviceError if the process has ended."""
         if payload != TRIGGER:
             raise CodecError(f"{len(payload)} bytes that are not a trigger", where=self.name)
         self._child.give({"pictures": 1})
 
     def receive(self) -> list[Datagram]:
-        """Packets since the last call, oldest first. Raises DeviceError for what stopped the camera."""
+        """Packets since the last call, oldest first. Raises DeviceError if the camera has stopped."""
         records, self._kept = self._kept, []
         while (more := self._child.read_records()) is not None:
             records += more
@@ -70,20 +72,20 @@ class CameraProcess:
         return [Datagram(record.payload, record.stamp_ns) for record in records if record.kind is RecordKind.RECEIVED]
 
     def report(self) -> dict[str, Any]:
-        """Frames and markers seen so far, blocks the pipe did not take, and what is wrong in words.
+        """Frames and markers seen so far, writes that the pipe did not accept, and problems in plain English.
 
         Raises:
-            DeviceError: the process is gone or does not answer.
+            DeviceError: the process has ended or does not answer.
         """
         self._child.give({"report": True})
         return self._await(RecordKind.REPORT, _REPORT_s)
 
     def health(self) -> tuple[str, ...]:
-        """What the camera's driver did not do as asked, in words."""
+        """Settings that the camera's driver did not accept, in plain English."""
         return self._notes
 
     def _await(self, kind: RecordKind, patience_s: float) -> dict[str, Any]:
-        """The next record of a kind; packets are kept for :meth:`receive`. An error while waiting is raised."""
+        """Wait for the next record of a kind; packets are kept for :meth:`receive`. Raises DeviceError."""
         return self._child.await_record(kind, patience_s, self._keep)
 
     def _keep(self, record: Record) -> None:

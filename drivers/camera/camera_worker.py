@@ -1,8 +1,8 @@
-"""The camera in a process of its own: ``python -m drivers.camera.camera_worker``, started by ``CameraProcess``.
+"""The camera's own process: ``python -m drivers.camera.camera_worker``, started by ``CameraProcess``.
 
-Takes lines of JSON on standard input, first what to open, then orders. Looks for markers in every frame as it comes
-and gives a packet of each on standard output, with the picture in it when that was asked for; it never waits for the
-reader. When its standard input ends, the program that started it is gone, and the process ends.
+It reads lines of JSON on standard input: first what to open, then commands. It detects markers in every frame and
+writes a packet for each to standard output, including the picture if one was requested; it never waits for the reader.
+When standard input ends, the program that started it is gone, and the process ends too.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ _FILES = ("folder", "video")
 
 
 class CameraWorker:
-    """Watches for markers frame by frame, obeying orders.
+    """Detects markers frame by frame, and obeys commands.
 
     Args:
-        source: opened.
-        settings: what to look for.
-        pipe: where packets go.
+        source: the camera, already open.
+        settings: which markers to look for.
+        pipe: receives the packets.
     """
 
     def __init__(self, source: Source, settings: CameraSourceSettings, pipe: RecordPipe) -> None:
@@ -46,7 +46,7 @@ class CameraWorker:
         self._ended = False
 
     def run(self) -> None:
-        """Take frames until the orders end. Raises DeviceError, also when the source has ended."""
+        """Read frames until the commands end. Raises DeviceError, also when the source has ended."""
         while not self._ended:
             self._wait_for_its_time()
             picture = self._source.read()
@@ -58,7 +58,7 @@ class CameraWorker:
                 self._obey(sys.stdin.readline())
 
     def _wait_for_its_time(self) -> None:
-        """Files can be read at any speed; they come as fast as a camera would send them."""
+        """Wait so that frames from files arrive no faster than a camera would send them."""
         if self._settings.place().kind in _FILES:
             due_ns = self._began_ns + round(self._frames * NANOSECONDS / self._settings.rate_hz)
             self._clock.sleep_until_ns(due_ns)
@@ -102,7 +102,7 @@ class CameraWorker:
 
 
 def main() -> None:
-    """Open what the first line names, watch it, close it."""
+    """Open the source that the first line names, process its frames, and close it."""
     cv2.setNumThreads(1)
     clock, pipe = MonotonicClock(), RecordPipe(sys.stdout.fileno())
     try:

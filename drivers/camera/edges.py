@@ -1,9 +1,10 @@
-"""Corners of a black square from its edges, to a few hundredths of a pixel, and how blurred it is.
+"""Corners of a black square from its edges, to a few hundredths of a pixel, and the blur of each edge.
 
-OpenCV's corner refinement looks for the point all gradients around are orthogonal to. On the convex corner of a blurred
-square this point lies inside the true corner (a quarter pixel on each axis at the rig's resolution), so that squares
-look too small. Blur does not move a straight edge, so here lines are laid through the edges and cut with each other.
-Nor must the far end of the white border move it, whose own blur reaches the edge: see :mod:`drivers.camera.profiles`.
+OpenCV's corner refinement finds the point to which all gradients around it are orthogonal. At the convex corner of a
+blurred square this point lies inside the true corner (by a quarter pixel on each axis at the rig's resolution), so
+squares look too small. Blur does not move a straight edge. Therefore lines are fitted to the edges here, and
+intersected. The blurred outer end of the white border reaches the edge as well; :mod:`drivers.camera.profiles` takes
+care that it does not move the edge.
 """
 
 from __future__ import annotations
@@ -18,29 +19,30 @@ from drivers.camera.frames import Image, SeenMarker
 from drivers.camera.profiles import Profiles, fit_profiles
 from drivers.core.contacts import Array
 
-_ALONG = np.linspace(0.12, 0.88, 28)  # shares of a side where its edge is looked for; blur rounds the ends
+_ALONG = np.linspace(0.12, 0.88, 28)  # the part of a side in which its edge is measured; blur rounds the ends
 _STEPS = 25  # samples across the edge
-_INSIDE, _OUTSIDE = -1.7, 1.9  # how far across, in half modules: into the black module, and beyond the white
-_REACH_blurs = 2.5  # farther out the blurred edge has its end levels
+_INSIDE, _OUTSIDE = -1.7, 1.9  # range across the edge, in half modules: into the black module, and beyond the white
+_REACH_blurs = 2.5  # farther away the blurred edge has reached its final levels
 _SMALLEST_REACH_px, _LARGEST_REACH_px = 1.5, 6.0
 _PASSES = 2
 _FARTHEST_px = 5.0
-"""A corner that moved so far from the first guess, or by a module, has come to another edge."""
+"""A corner that moved this far from the initial guess, or by a module, belongs to another edge."""
 _SCATTER_px = 0.05
 _BOWED_px = 90.0
-"""Shorter edges bow by less than their noise in the lenses of laboratories (a tenth of barrel distortion)."""
+"""Lens distortion bends shorter edges by less than their noise (for up to a tenth of barrel distortion)."""
 
 
 def refine_square(image: Image, corners_px: Array, modules: int) -> SeenMarker:
-    """A dark square on white, from a guess at its corners (4, 2) within a few pixels, clockwise in the picture.
+    """Refine the corners (4, 2) of a dark square on white from a guess within a few pixels, clockwise in the picture.
 
-    Several passes: noise draws an edge toward where it was looked for, and only a known blur tells how far to look.
-    Where an edge cannot be found, the guess is given back, with an infinite blur.
+    This takes several passes: noise pulls an edge towards the place where it was searched, and the search range depends
+    on the blur. If an edge cannot be found, the guess is returned with an infinite blur.
 
     Args:
         image: grey levels.
         corners_px: the guess.
-        modules: of the marker's black square along a side; around it is half a module of white at least.
+        modules: number of modules along a side of the marker's black square; at least half a module of white surrounds
+            it.
     """
     lost = SeenMarker(corners_px, np.inf)
     farthest_px = min(_FARTHEST_px, float(np.ptp(corners_px, axis=0).max()) / modules)
@@ -62,10 +64,10 @@ class _Sides:
     """The four sides of a square: from each corner to the next.
 
     Attributes:
-        corners_px: where they begin, shape (4, 2).
-        along_px: their vectors, shape (4, 2).
-        outward: their unit normals, shape (4, 2).
-        half_module_px: how far outward the white border ends at their middles, shape (4,).
+        corners_px: start points, shape (4, 2).
+        along_px: vectors from start to end, shape (4, 2).
+        outward: outward unit normals, shape (4, 2).
+        half_module_px: width of the white border at the middle of each side, shape (4,).
     """
 
     corners_px: Array
@@ -75,7 +77,7 @@ class _Sides:
 
     @staticmethod
     def of(corners_px: Array, modules: int) -> _Sides:
-        """The sides of corners (4, 2); the homography that maps a square there tells where the white ends."""
+        """The sides of a square with corners (4, 2); the white border's width follows from the square's homography."""
         along_px = np.roll(corners_px, -1, axis=0) - corners_px
         outward = np.stack([along_px[:, 1], -along_px[:, 0]], axis=1)
         outward /= np.linalg.norm(outward, axis=1, keepdims=True)
@@ -93,11 +95,11 @@ class _Sides:
 
     @property
     def middles(self) -> Array:
-        """Where the edges are looked for, shape (4, places, 2)."""
+        """Points at which the edges are measured, shape (4, places, 2)."""
         return np.asarray(self.corners_px[:, None] + _ALONG[:, None] * self.along_px[:, None])
 
     def across_px(self, blur_px: Array | None) -> Array:
-        """How far outward grey levels are taken, shape (4, n); ``blur_px`` (4,) where it is known."""
+        """Distances outward at which grey levels are sampled, shape (4, n); ``blur_px`` (4,) if it is known."""
         reach = _LARGEST_REACH_px if blur_px is None else _REACH_blurs * blur_px
         reach = np.clip(reach, _SMALLEST_REACH_px, _LARGEST_REACH_px)
         inside = np.clip(_INSIDE * self.half_module_px, -reach, -_SMALLEST_REACH_px)
@@ -106,7 +108,7 @@ class _Sides:
 
 
 def _corners(sides: _Sides, profiles: Profiles, levels: Array) -> Array | None:
-    """The corners (4, 2) in which the edges cut each other; None where too little of an edge is to be seen."""
+    """The corners (4, 2) at which the edges intersect; None if too little of an edge is visible."""
     offsets_px, contrast = profiles.places(levels)
     is_edge = contrast > 0.5 * np.median(contrast, axis=1, keepdims=True)
     if np.any(is_edge.sum(axis=1) < len(_ALONG) // 2):
@@ -118,9 +120,10 @@ def _corners(sides: _Sides, profiles: Profiles, levels: Array) -> Array | None:
 
 
 def _bows(offsets_px: Array, is_edge: NDArray[np.bool_], is_long: NDArray[np.bool_]) -> Array:
-    """Parabolas through offsets along the sides, c0 + c1 u + c2 u^2 with the share u of the side, shape (4, 3).
+    """Parabolas through the offsets along the sides, c0 + c1 u + c2 u^2 with u from 0 to 1 along the side, shape (4,
+    3).
 
-    Offsets beyond three times the median are left out; c2 is zero for short sides.
+    Offsets beyond three times the median are ignored; c2 is zero for short sides.
     """
     powers = _ALONG[:, None] ** np.arange(3)
     powers = powers * np.stack([np.ones(4), np.ones(4), is_long], axis=1)[:, None]
@@ -144,7 +147,7 @@ def _tangents(bows: Array, share: float, sides: _Sides, unit: Array) -> tuple[Ar
 
 
 def _crossings(one: tuple[Array, Array], two: tuple[Array, Array]) -> Array:
-    """Where lines, given by points and directions (4, 2), cut each other, shape (4, 2)."""
+    """Intersections of lines that are given by points and directions (4, 2), shape (4, 2)."""
     (p, u), (q, v) = one, two
     along = np.linalg.solve(np.stack([u, -v], axis=2), (q - p)[..., None])[:, 0]
     return np.asarray(p + along * u)

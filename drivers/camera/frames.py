@@ -15,10 +15,10 @@ from drivers.core.errors import CodecError
 
 Image = NDArray[np.uint8]
 LARGEST_PIXELS = 40_000_000
-"""A header that promises more is damaged or hostile."""
+"""A header that states more is damaged or malicious."""
 
 _PNG_HEAD, _PNG_TAIL = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB\x60\x82"
-_CHUNK_FRAME = 12  # bytes of a chunk of a PNG besides its data: length, type, checksum
+_CHUNK_FRAME = 12  # bytes of a PNG chunk in addition to its data: length, type, checksum
 _JPEG_HEAD, _JPEG_TAIL = b"\xff\xd8", b"\xff\xd9"
 _JPEG_SIZES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
@@ -38,10 +38,10 @@ class SeenMarker:
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """The markers that were found where the picture was taken.
+    """The markers that were found in the process that took the picture.
 
     Attributes:
-        dictionary: OpenCV's name of the dictionary that was looked for.
+        dictionary: OpenCV's name of the dictionary that was searched for.
         size_px: width and height of the picture.
         markers: by number.
     """
@@ -57,10 +57,10 @@ class Frame:
 
     Attributes:
         stamp_ns: arrival at the host.
-        image: grey levels, shape (height, width), uint8; None where only the corners were kept.
+        image: grey levels, shape (height, width), uint8; None if only the corners were kept.
         counter: number of the frame since the camera was opened.
-        dropped: frames the camera took and the program did not get, since it was opened.
-        detection: the markers as they were found at once; None where nobody looked.
+        dropped: frames since it was opened that the camera took but the program did not receive.
+        detection: the markers found when the frame arrived; None if they were not searched for.
     """
 
     stamp_ns: int
@@ -74,7 +74,7 @@ def decode_image(payload: bytes, *, largest_pixels: int = LARGEST_PIXELS) -> Ima
     """Grey image of a JPEG or PNG, shape (height, width).
 
     Raises:
-        CodecError: neither format, cut short, damaged, or of more pixels than ``largest_pixels``.
+        CodecError: neither format, truncated, damaged, or with more pixels than ``largest_pixels``.
     """
     width, height = _size(payload)
     if not 0 < width * height <= largest_pixels:
@@ -89,7 +89,7 @@ def decode_image(payload: bytes, *, largest_pixels: int = LARGEST_PIXELS) -> Ima
 
 
 def _size(payload: bytes) -> tuple[int, int]:
-    """Width and height that the head promises; refuses what is no picture or lacks its end."""
+    """Width and height that the header states. Raises CodecError for bytes that are not a picture or lack its end."""
     if payload.startswith(_PNG_HEAD):
         if not payload.endswith(_PNG_TAIL) or len(payload) < 33:
             raise _error("PNG truncated")
@@ -104,7 +104,7 @@ def _size(payload: bytes) -> tuple[int, int]:
 
 
 def _check_chunks(payload: bytes) -> None:
-    """Refuse a PNG whose chunks end elsewhere than its data: OpenCV makes room first for whatever length they state."""
+    """Refuse a PNG whose chunks do not end where its data end: OpenCV allocates whatever length they state."""
     at = len(_PNG_HEAD)
     while at + _CHUNK_FRAME <= len(payload):
         (length,) = struct.unpack_from(">I", payload, at)

@@ -1,7 +1,8 @@
-"""What the table's glass does to a ray: it comes out in its old direction, moved sideways.
+"""Refraction in the table's glass: a ray leaves the plate in its old direction, but displaced sideways.
 
-The camera looks up through a plate whose upper side is the table, z = 0. Followed straight on, a ray seems to meet the
-table farther out than it does, by thickness * (tan incidence - tan refraction): 0.9 mm for 8 mm of glass at 19 degrees.
+The camera looks up through a plate whose upper side is the table, z = 0. A straight continuation of the ray meets the
+table farther out than the refracted ray does, by thickness * (tan incidence - tan refraction): 0.9 mm for 8 mm of glass
+at 19 degrees.
 """
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ from drivers.core.contacts import Array
 
 @dataclass(frozen=True)
 class Glass:
-    """A level plate; ``thickness_m`` 0 for none."""
+    """A horizontal plate; ``thickness_m`` is 0 if there is none."""
 
     thickness_m: float = 0.0
     index: float = 1.5
 
     def shift(self, slope: Array) -> Array:
-        """Where straight rays meet the table minus where the true ones do, shape (n, 2), metres.
+        """Intersection of straight rays with the table minus that of the refracted rays, shape (n, 2), metres.
 
         Args:
             slope: horizontal over vertical part of each ray's direction below the glass, shape (n, 2).
@@ -32,7 +33,7 @@ class Glass:
         return np.asarray(self.thickness_m * slope * (1.0 - 1.0 / (self.index * cosine_ratio)))
 
     def apparent(self, points_world_m: Array, camera_world_m: Array) -> Array:
-        """Where points (n, 3) on the table seem to be, shape (n, 3), for a camera below it.
+        """Apparent positions of points (n, 3) on the table for a camera below it, shape (n, 3).
 
         The slope is that of the straight line to the true point: an error of a few micrometres.
         """

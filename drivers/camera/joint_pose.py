@@ -1,8 +1,9 @@
-"""The object's pose and the camera's together, from the corners of both markers; and how well they tell it.
+"""The object's pose and the camera's, estimated together from the corners of both markers, with their covariance.
 
-One square tells the camera's tilt badly, and a tilt moves an object that lies beside the world marker. The object's own
-square knows about the tilt too. So both poses are the unknowns of one least squares problem, whose observations are all
-corners, each weighted by its noise. Its normal equations give the covariance, with the share that the camera adds.
+A single square determines the camera's tilt poorly, and an error of the tilt moves an object that lies beside the world
+marker. The object's own square also carries information about the tilt. So both poses are the unknowns of one least
+squares problem, whose observations are all corners, each weighted by its noise. Its normal equations give the
+covariance, including the contribution of the camera's pose.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from drivers.core.contacts import Array
 from drivers.core.poses import transform_points
 
 _PLANAR, _SPATIAL = (3, 4, 2), (0, 1, 2, 3, 4, 5)
-"""Which changes of the object's pose are free, of rotation about x, y, z and translation along them: x, y, yaw; all."""
+"""The free parameters of the object's pose, out of rotation about and translation along x, y, z: x, y, yaw; or all."""
 _ROUNDS, _ENOUGH = 6, 1e-7
 
 
@@ -27,8 +28,9 @@ class Corners:
     """The corners of one marker.
 
     Attributes:
-        points_m: where they are, shape (n, 3): world frame for the world marker, object frame for the object's.
-        pixels: where they were seen, shape (n, 2).
+        points_m: positions, shape (n, 3): in the world frame for the world marker, in the object frame for the
+            object's.
+        pixels: positions in the picture, shape (n, 2).
         sigma_px: error of each, per axis.
     """
 
@@ -44,7 +46,7 @@ class JointPose:
     Attributes:
         world_T_object: the pose.
         covariance: for changes along the world's axes about the object's origin: x, y (m) and yaw (rad), shape (3, 3);
-            of a free object rotation (rad), then translation (m), shape (6, 6).
+            for an unconstrained object rotation (rad), then translation (m), shape (6, 6).
     """
 
     world_T_object: Pose3
@@ -60,7 +62,7 @@ def solve_jointly(
     *,
     planar: bool,
 ) -> JointPose:
-    """Gauss-Newton from a good start: ``camera_T_world``, ``world_T_object``; a planar object keeps height and tilt."""
+    """Gauss-Newton from initial poses ``camera_T_world``, ``world_T_object``; a planar object keeps height and tilt."""
     problem = _Problem(camera, glass, world, target, _PLANAR if planar else _SPATIAL)
     camera_T_world, world_T_object = start
     for _ in range(_ROUNDS):
@@ -81,9 +83,10 @@ class _Problem:
     free: tuple[int, ...]
 
     def linearise(self, camera_T_world: Pose3, world_T_object: Pose3) -> tuple[Array, Array]:
-        """Derivatives of all errors by all unknowns, and the errors; in standard deviations.
+        """Derivatives of all errors with respect to all unknowns, and the errors, in standard deviations.
 
-        How the glass's shift changes with the poses is left out: a per cent of a slope, nothing of an error.
+        The change of the glass's shift with the poses is neglected: it is one per cent of a derivative and does not
+        bias the result.
         """
         points = np.vstack([self.world.points_m, transform_points(world_T_object, self.target.points_m)])
         apparent = self.glass.apparent(points, np.array(camera_T_world.inverse().translation()))
@@ -100,7 +103,9 @@ class _Problem:
         return (slopes / sigmas[..., None]).reshape(-1, slopes.shape[2]), (misses / sigmas).ravel()
 
     def change(self, camera_T_world: Pose3, world_T_object: Pose3, change: Array) -> tuple[Pose3, Pose3]:
-        """Both poses after a small change: the camera's six, then the object's free ones along the world's axes."""
+        """Both poses after a small change: six parameters of the camera, then the object's free ones along the world's
+        axes.
+        """
         full = np.zeros(6)
         full[list(self.free)] = change[6:]
         turned = Pose3.Expmap(np.concatenate([full[:3], np.zeros(3)])).rotation() * world_T_object.rotation()

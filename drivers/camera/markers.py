@@ -1,4 +1,4 @@
-"""ArUco markers in a picture: who, and where its corners are.
+"""ArUco markers in a picture: their numbers and corners.
 
 A marker's frame: x to the right and y up on the print, z out of it; corners in OpenCV's order, clockwise from the top
 left. Markers on the underside of the table are seen from below: their z points down.
@@ -36,23 +36,25 @@ class MarkerSettings(StrictModel):
 
     Attributes:
         dictionary: OpenCV's name of the dictionary.
-        world_id, world_side_m: marker fixed to the table; side of its black square as it was meant to be printed.
-        object_id, object_side_m: marker under the object.
-        print_scale: what the check bar of the print measures over what it should.
+        world_id, world_side_m: the marker fixed to the table, and the intended side of its black square.
+        object_id, object_side_m: the same for the marker under the object.
+        print_scale: measured length of the print's check bar divided by its nominal length.
         world_T_worldmarker: its pose in the world; z down.
-        object_T_objectmarker: pose of the other in the object's frame; z down while the object stands on the table.
+        object_T_objectmarker: pose of the object's marker in the object's frame; z down while the object stands on the
+            table.
         corner_sigma_px: error of a detected corner, per axis.
-        glass_thickness_m, glass_index: the table's plate between camera and markers.
-        table_sigma_m, table_sigma_rad: error that stays however sharp the picture is (markers are glued on by hand).
-        freedom: planar: the object stands on the table, whatever its marker alone would say; spatial: it may be
-            anywhere, and pictures that allow two poses are refused.
-        ambiguous_sigmas: how sure it has to be which of a single marker's two poses is the right one, in standard
-            deviations of the corners' noise.
-        moved_px: a world marker that far from its mean is not where it was.
-        world_marker_fixed: the world marker cannot move (it is part of the table): where it seems to, the camera
-            did, and its mean begins anew. Otherwise truth ends there, as nobody knows which of them was bumped.
-        largest_blur_px: wider edges belong to a picture that is not sharp, or of something that moved.
-        largest_misfit_m: a worse fit of the object's square on the table means that it is lifted or tilted.
+        glass_thickness_m, glass_index: the table's glass plate between camera and markers.
+        table_sigma_m, table_sigma_rad: error that even a sharp picture leaves, because markers are glued on by hand.
+        freedom: ``planar``: the object is assumed to stand on the table; ``spatial``: it may have any pose, and
+            pictures that allow two poses are refused.
+        ambiguous_sigmas: required confidence in the choice between a single marker's two poses, in standard deviations
+            of the corners' noise.
+        moved_px: distance from its mean at which the world marker counts as moved.
+        world_marker_fixed: the world marker cannot move (it is part of the table). If it seems to move, the camera has
+            moved, and a new mean is started. Otherwise the ground truth ends there, since it is unknown which of the
+            two was bumped.
+        largest_blur_px: wider edges mean that the picture is not sharp, or that something moved.
+        largest_misfit_m: a larger misfit of the object's square on the table means that the object is lifted or tilted.
     """
 
     dictionary: str = "DICT_4X4_50"
@@ -92,7 +94,7 @@ class MarkerSettings(StrictModel):
 
 
 def known_dictionary(name: str) -> str:
-    """The name, if OpenCV has a dictionary called so. Raises ValueError."""
+    """The name, if OpenCV has a dictionary of this name. Raises ValueError otherwise."""
     if name not in DICTIONARIES:
         raise ValueError(f"{name!r} is not an OpenCV dictionary")
     return name
@@ -108,7 +110,9 @@ def dictionary_or_file(name: str) -> str:
 
 @lru_cache(maxsize=16)
 def opencv_dictionary(name: str) -> Any:
-    """A dictionary by its name, or from a file in OpenCV's form. Raises ValueError for a file that is none."""
+    """A dictionary by its name, or from a file in OpenCV's format. Raises ValueError for a file without a
+    dictionary.
+    """
     if not name.endswith((".yml", ".yaml")):
         return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
     dictionary = cv2.aruco.Dictionary()
@@ -124,7 +128,7 @@ def opencv_dictionary(name: str) -> Any:
 
 @dataclass(frozen=True)
 class MarkerPose:
-    """One of the two poses a square's four corners allow.
+    """One of the two poses that a square's four corners allow.
 
     Attributes:
         camera_T_marker: the pose.
@@ -143,9 +147,9 @@ def _detector(dictionary: str) -> Any:
 
 
 def seen_markers(image: Image, dictionary: str) -> dict[int, SeenMarker]:
-    """Markers in a picture by number: corners to a few hundredths of a pixel, and how sharp each of them is.
+    """Markers in a picture by number, with their blur and with corners accurate to a few hundredths of a pixel.
 
-    A number seen more than once is left out: which of the two it is cannot be known.
+    A number that is seen more than once is left out, since the right one cannot be known.
     """
     modules = opencv_dictionary(dictionary).markerSize + 2
     found = coarse_markers(image, dictionary)
@@ -153,12 +157,12 @@ def seen_markers(image: Image, dictionary: str) -> dict[int, SeenMarker]:
 
 
 def detect(image: Image, dictionary: str) -> dict[int, Array]:
-    """The corners of :func:`seen_markers` alone, shape (4, 2), pixels."""
+    """Only the corners of :func:`seen_markers`, shape (4, 2) each, pixels."""
     return {number: marker.corners_px for number, marker in seen_markers(image, dictionary).items()}
 
 
 def coarse_markers(image: Image, dictionary: str) -> dict[int, Array]:
-    """As :func:`detect`, with corners as OpenCV refines them: good to about a quarter of a pixel."""
+    """As :func:`detect`, with corners refined by OpenCV: accurate to about a quarter of a pixel."""
     corners, numbers, _ = _detector(dictionary).detectMarkers(image)
     found = [] if numbers is None else [int(number) for number in np.ravel(numbers)]
     quads = [np.asarray(quad, float).reshape(4, 2) for quad in corners]
@@ -166,12 +170,12 @@ def coarse_markers(image: Image, dictionary: str) -> dict[int, Array]:
 
 
 def detection(image: Image, dictionary: str) -> Detection:
-    """Everything a picture says of markers, with how sharp each of them is."""
+    """All markers in a picture, with their blur."""
     return Detection(dictionary, (image.shape[1], image.shape[0]), seen_markers(image, dictionary))
 
 
 def other_dictionary(image: Image, dictionary: str) -> str | None:
-    """Another dictionary whose markers the picture shows, two at least; None when there is none."""
+    """Another dictionary of which the picture shows at least two markers; None if there is none."""
     sizes = ("4X4", "5X5", "6X6", "7X7")
     candidates = [f"DICT_{size}_1000" for size in sizes] + ["DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_36h11"]
     counts = {
@@ -187,9 +191,9 @@ def marker_corners(side_m: float) -> Array:
 
 
 def marker_poses(corners_px: Array, side_m: float, camera: CameraCalibration) -> tuple[MarkerPose, ...]:
-    """Both poses of a single square, better one first (IPPE); the second is the first's mirror image nearly.
+    """Both poses of a single square (IPPE), the better one first; the second is nearly the mirror image of the first.
 
-    Far away, small or nearly face-on squares give both almost the same error.
+    For distant, small or nearly face-on squares both have almost the same error.
     """
     _, rotations, translations, _ = cv2.solvePnPGeneric(
         marker_corners(side_m),
@@ -208,7 +212,7 @@ def marker_poses(corners_px: Array, side_m: float, camera: CameraCalibration) ->
 
 
 def refine_pose(camera_T_points: Pose3, points_m: Array, pixels: Array, camera: CameraCalibration) -> Pose3:
-    """The pose near a first guess that brings points (n, 3) nearest to their pixels (n, 2)."""
+    """The pose near an initial guess that minimizes the distances of points (n, 3) to their pixels (n, 2)."""
     rotation, translation = cv2.solvePnPRefineLM(
         np.asarray(points_m, float),
         np.asarray(pixels, float),

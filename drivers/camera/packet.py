@@ -1,14 +1,14 @@
-"""What a camera sends: the markers of every frame, pictures on request (protocols: Camera packets).
+"""The packets that a camera sends: the markers of every frame, and pictures on request (protocols: Camera packets).
 
 ::
 
     "TLCP"  version u8  dictionary u8  width u16  height u16  markers u16  counter u32  dropped u32  picture bytes u32
     for each marker: number u16, blur f32, corners 8 x f32
-    the picture as JPEG or PNG, none or one
+    optionally the picture, as JPEG or PNG
 
-All little-endian; the dictionary is its place in OpenCV's list. A bare JPEG or PNG is a packet too: nobody has looked
-for markers in it. The bytes are recorded as they are, so that truth can be recomputed from the corners with another
-lens, and from the pictures with another detector.
+All numbers are little-endian; the dictionary is given by its index in OpenCV's list. A bare JPEG or PNG is also a
+packet, in which markers have not been searched for. The bytes are recorded unchanged, so that the ground truth can be
+recomputed from the corners with another lens calibration, and from the pictures with another detector.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from drivers.core.transports import Datagram
 
 MAGIC, VERSION = b"TLCP", 1
 _HEAD = struct.Struct("<4sBBHHHIII")
-_COUNTER = 5  # among the numbers of the head
+_COUNTER = 5  # index among the numbers of the header
 _MARKER = np.dtype([("number", "<u2"), ("blur_px", "<f4"), ("corners_px", "<f4", (4, 2))])
 
 
 def encode_packet(frame: Frame, picture: bytes = b"") -> bytes:
-    """The packet of a frame with its detection, and its encoded picture where that was asked for."""
+    """Encode the detection of a frame, and its encoded picture if one was requested."""
     found = frame.detection
     if found is None:
         raise ValueError("a packet holds what was detected")
@@ -48,10 +48,11 @@ def encode_packet(frame: Frame, picture: bytes = b"") -> bytes:
 
 
 def decode_packet(datagram: Datagram, *, largest_pixels: int = LARGEST_PIXELS) -> Frame:
-    """A frame from what a camera sent.
+    """Decode a frame from what a camera sent.
 
     Raises:
-        CodecError: neither a packet nor a picture, a damaged one, or a picture of more than ``largest_pixels``.
+        CodecError: the bytes are neither a packet nor a picture, are damaged, or hold a picture of more than
+            ``largest_pixels``.
     """
     payload = datagram.payload
     if not payload.startswith(MAGIC):
@@ -66,7 +67,7 @@ def decode_packet(datagram: Datagram, *, largest_pixels: int = LARGEST_PIXELS) -
     if not (np.isfinite(rows["corners_px"]).all() and (rows["blur_px"] >= 0.0).all()):
         raise _error("corners that are not numbers")
     found = Detection(DICTIONARIES[dictionary], (width, height), {int(row["number"]): _marker(row) for row in rows})
-    promised = min(largest_pixels, width * height)  # a picture that says it is larger is not even decoded
+    promised = min(largest_pixels, width * height)  # a picture whose header states a larger size is not decoded at all
     image = decode_image(payload[rows_end:], largest_pixels=promised) if picture else None
     if image is not None and image.shape != (height, width):
         raise _error(f"a picture of {image.shape[1]} x {image.shape[0]} pixels instead of {width} x {height}")
@@ -74,14 +75,14 @@ def decode_packet(datagram: Datagram, *, largest_pixels: int = LARGEST_PIXELS) -
 
 
 def picture_of(payload: bytes) -> bytes:
-    """The encoded picture in what a camera sent; empty when it holds none."""
+    """The encoded picture in what a camera sent; empty if there is none."""
     if not payload.startswith(MAGIC):
         return payload
     return payload[len(payload) - _head(payload)[-1] :] if len(payload) >= _HEAD.size else b""
 
 
 def counter_of(payload: bytes) -> int | None:
-    """The camera's own number of the frame; None in a bare picture, or in what is no packet. Never raises."""
+    """The camera's own number of the frame; None for a bare picture or other bytes. Never raises."""
     return _head(payload)[_COUNTER] if payload.startswith(MAGIC) and len(payload) >= _HEAD.size else None
 
 

@@ -1,4 +1,4 @@
-"""What every source of pictures gives: pictures as they arrived, one after the other."""
+"""The interface of all sources of pictures: they return pictures one after the other, as they arrive."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Picture:
         counter: its number.
         dropped: frames lost so far.
         image: grey levels, shape (height, width).
-        file: name of the file it was read from; empty for a camera's.
+        file: name of the file it was read from; empty for a camera.
     """
 
     stamp_ns: int
@@ -28,21 +28,21 @@ class Picture:
 
     @property
     def name(self) -> str:
-        """What people know it by: its file, or its number."""
+        """Its name for people: its file, or its number."""
         return self.file or f"picture {self.counter}"
 
 
 class Source(Protocol):
-    """Something that gives pictures."""
+    """A source of pictures."""
 
     def open(self) -> None:
-        """Begin. Raises DeviceError, ConfigurationError."""
+        """Open the source. Raises DeviceError, ConfigurationError."""
 
     def read(self) -> Picture | None:
         """Wait for the next picture; None at the end. Raises DeviceError."""
 
     def close(self) -> None:
-        """End; idempotent."""
+        """Close the source; idempotent."""
 
     def notes(self) -> tuple[str, ...]:
-        """What could not be had as it was asked for, in words."""
+        """Settings that the source did not accept, in plain English."""

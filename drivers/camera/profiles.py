@@ -1,13 +1,13 @@
-"""Where the edge of a printed square lies in the grey levels across it, however blurred, and how blurred it is.
+"""Locates the edge of a printed square in the grey levels across it, however blurred, and measures the blur.
 
 Across a side of a marker's black square the print is, from inside to outside: inner modules, a module of black, half a
-module of white, and whatever lies beyond. A camera's blur turns the three steps into rises and falls that overlap as
-soon as the blur is not small against the half module. So all three are fitted together::
+module of white, and whatever lies beyond. Blur turns the three steps into rises and falls, which overlap unless the
+blur is much smaller than the half module. So all three are fitted together::
 
     level(x) = base + A Phi((x - e) / s) + B Phi((x - e - h) / s) + C Phi((x - e + 2 h) / s)
 
-with the cumulative normal distribution Phi, edge e, blur s, and the half module h, which the print's geometry tells.
-Wider white, as on boards, is a B of zero. Gauss-Newton for e and s, linear least squares for the levels.
+with the cumulative normal distribution Phi, edge e, blur s, and the half module h, which is known from the print's
+geometry. For wider white borders, as on boards, B is zero. Gauss-Newton finds e and s, linear least squares the levels.
 """
 
 from __future__ import annotations
@@ -24,14 +24,16 @@ _START_EDGES_px = np.linspace(-1.5, 1.5, 5)
 _START_BLURS_px = np.array([0.5, 0.7, 1.0, 1.4, 2.0, 2.8])
 SMALLEST_BLUR_px, LARGEST_BLUR_px = 0.3, 4.0
 _LEVEL_NOISE = 0.01
-"""Of a mean profile, over the edge's contrast A: what the data are weighed with against the expectations below."""
+"""Noise of a mean profile relative to the edge's contrast A; it weights the data against the priors below."""
 _EXPECTED = np.array([[0.0, 0.5, 1.0, 0.0], [0.0, 0.5, 0.0, 1.0]]) / np.array([[0.5], [0.4]])
-"""B = (-0.5 +- 0.5) A: beyond the white it is black, white or between; C = (-0.5 +- 0.4) A: the white share inside."""
+"""Priors: B = (-0.5 +- 0.5) A, as black, white or grey follows the white; C = (-0.5 +- 0.4) A, by the white share
+inside.
+"""
 _DAMPING = 0.02
 _ROUNDING = 1e-9
 _PLACE_NOISE = 0.03
 _PLACE_LEVELS = np.array([0.15, 0.15, 0.3, 0.4])
-"""How far base, A, B and C differ from place to place along a side, over A; and by how many pixels the edge does."""
+"""Variation along a side: of base, A, B and C relative to A; and of the edge, in pixels."""
 _PLACE_EDGE_px = 1.0
 
 
@@ -40,9 +42,9 @@ class Profiles:
     """Fitted profiles across k sides.
 
     Attributes:
-        across_px: where the levels were taken, outward, shape (k, n).
-        half_module_px: white around the square, shape (k,).
-        edge_px: where the edge is, shape (k,).
+        across_px: distances outward at which the levels were sampled, shape (k, n).
+        half_module_px: width of the white border, shape (k,).
+        edge_px: position of the edge, shape (k,).
         blur_px: standard deviation of the blur, shape (k,).
         levels: base, A, B and C, grey levels, shape (k, 4).
     """
@@ -54,9 +56,9 @@ class Profiles:
     levels: Array
 
     def places(self, levels: Array) -> tuple[Array, Array]:
-        """The edge (px) and its contrast at single places along the sides, both (k, m), of levels (k, m, n).
+        """The edge (px) and its contrast at single places along the sides, both (k, m), from levels (k, m, n).
 
-        One linear step from the mean profile, in which the levels may differ somewhat from place to place.
+        Takes one linear step from the mean profile; the levels may vary a little along the side.
         """
         steps, slopes, _ = _steps(self.across_px, self.edge_px, self.blur_px, self.half_module_px)
         contrast = self.levels[:, 1]
@@ -72,13 +74,13 @@ class Profiles:
 def fit_profiles(
     across_px: Array, levels: Array, half_module_px: Array, blur_px: Array | None = None
 ) -> Profiles | None:
-    """The profiles nearest to mean grey levels (k, n) taken ``across_px`` (k, n); None where a side has no rise.
+    """Fit profiles to mean grey levels (k, n) at ``across_px`` (k, n); None if a side shows no edge.
 
     Args:
-        across_px: outward from where the edge is expected.
+        across_px: distances outward from where the edge is expected.
         levels: grey levels there.
         half_module_px: width of the white border, shape (k,).
-        blur_px: about how blurred the sides are, shape (k,), and the edges are where they are expected; None: unknown.
+        blur_px: approximate blur of the sides, shape (k,), if edges are near where they are expected; None if unknown.
     """
     profiles = _first(across_px, levels, half_module_px, blur_px)
     for _ in range(_FIRST_ROUNDS if blur_px is None else _ROUNDS):
@@ -89,7 +91,7 @@ def fit_profiles(
 
 
 def _first(across_px: Array, levels: Array, half_module_px: Array, blur_px: Array | None) -> Profiles:
-    """The best of a few edges and blurs, each with the levels that fit best."""
+    """The best of a few initial edges and blurs, each with its best levels."""
     edges, blurs = np.zeros((len(levels), 1)), np.ones((len(levels), 1))
     if blur_px is None:
         some_edges, some_blurs = (grid.ravel() for grid in np.meshgrid(_START_EDGES_px, _START_BLURS_px))
@@ -104,7 +106,7 @@ def _first(across_px: Array, levels: Array, half_module_px: Array, blur_px: Arra
 
 
 def _improve(old: Profiles, levels: Array) -> Profiles:
-    """One damped step of Gauss-Newton; in one step the edge moves by at most a pixel, the blur by a third."""
+    """One damped Gauss-Newton step, which moves the edge by at most a pixel and the blur by at most a third."""
     steps, slopes, scaled = _steps(old.across_px, old.edge_px, old.blur_px, old.half_module_px)
     by_edge = -slopes @ old.levels[:, 1:, None]
     by_blur = -(slopes * scaled) @ old.levels[:, 1:, None]
@@ -122,7 +124,7 @@ def _improve(old: Profiles, levels: Array) -> Profiles:
 
 
 def _step_heights(steps: Array, levels: Array) -> tuple[Array, Array]:
-    """Base, A, B and C (..., 4) that fit levels (..., n) best, and the sum of squares they leave, shape (...)."""
+    """Base, A, B and C (..., 4) that fit levels (..., n) best, and the remaining sum of squares, shape (...)."""
     expected = _LEVEL_NOISE * np.broadcast_to(_EXPECTED, (*steps.shape[:-2], 2, 4))
     heights = _least_squares(steps, levels, expected)
     left = levels - (steps @ heights[..., None])[..., 0]
@@ -130,9 +132,10 @@ def _step_heights(steps: Array, levels: Array) -> tuple[Array, Array]:
 
 
 def _steps(across_px: Array, edge_px: Array, blur_px: Array, half_module_px: Array) -> tuple[Array, Array, Array]:
-    """One and the three blurred steps of height one, shape (..., n, 4).
+    """A constant one and the three blurred steps of height one, shape (..., n, 4).
 
-    And, both (..., n, 3), the steps' slopes per pixel, and how many blurs away from each step it is.
+    Also returns the slopes of the steps per pixel, and the distances from the steps in units of the blur, both (..., n,
+    3).
     """
     from_edge = across_px - edge_px[..., None]
     blur_px, half_module_px = blur_px[..., None, None], half_module_px[..., None]

@@ -1,4 +1,4 @@
-"""Where pictures come from, in one word, and how they should be taken."""
+"""The source of pictures, named by one word, and how pictures should be taken."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Place(NamedTuple):
 
 
 class CameraSourceSettings(StrictModel):
-    """A camera, or what stands for one.
+    """A camera, or a substitute for one.
 
     Attributes:
         source: number or device file of a V4L2 camera (``0``, ``/dev/video2``), ``gstreamer:`` and a pipeline that
@@ -31,11 +31,11 @@ class CameraSourceSettings(StrictModel):
         dictionary: markers to look for in every frame.
         size_px: width and height of the pictures.
         rate_hz: frames per second.
-        exposure_ms, gain, focus: held fixed where the driver lets them; None leaves them to the camera, but the
-            automatic focus is switched off all the same, as each of its moves changes the lens.
-        pixel_format: four letters that the camera knows; MJPG for most USB cameras above 640 x 480.
-        jpeg_quality: of the pictures handed on.
-        repeat: in a session, begin a folder or video again at its end instead of ending the session.
+        exposure_ms, gain, focus: fixed if the driver allows it; None leaves them to the camera. The automatic focus is
+            switched off in any case, because refocusing changes the lens parameters.
+        pixel_format: a four-letter code that the camera knows; MJPG for most USB cameras above 640 x 480.
+        jpeg_quality: of the pictures that are sent.
+        repeat: in a session, restart a folder or video at its end instead of ending the session.
     """
 
     source: str = "0"
@@ -55,19 +55,19 @@ class CameraSourceSettings(StrictModel):
         return known_dictionary(value)
 
     def place(self) -> Place:
-        """What ``source`` means. Raises ConfigurationError when it is nothing that is there."""
+        """The meaning of ``source``. Raises ConfigurationError if no such source exists."""
         return place_of(self.source)
 
 
 def source_beside(source: str, folder: Path) -> str:
-    """A source as a file in ``folder`` means it: relative paths of pictures begin there."""
+    """A source as written in a file in ``folder``: relative paths of pictures start there."""
     if source.isdigit() or source.partition(":")[0] in ("gstreamer", "simulated"):
         return source
     return str((folder / source).resolve())
 
 
 def place_of(source: str) -> Place:
-    """What a source's word means. Raises ConfigurationError when it is nothing that is there."""
+    """The meaning of a source's word. Raises ConfigurationError if no such source exists."""
     head, _, rest = source.partition(":")
     if head in ("gstreamer", "simulated"):
         return Place("gstreamer" if head == "gstreamer" else "simulated", rest)

@@ -1,7 +1,7 @@
 """Pictures from V4L2 and GStreamer cameras, videos and folders, one after the other, through OpenCV.
 
-Every picture is stamped when it arrived and numbered; frames that were lost on the way are found by the gap they leave
-in time and counted. A camera that changes the size of its pictures is an error: no lens calibration fits it then.
+Every picture is stamped on arrival and numbered. Lost frames are detected by the gap in time, and counted. It is an
+error if a camera changes the size of its pictures, because no lens calibration would fit.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ class OpenCvSource:
     """A camera or video behind OpenCV.
 
     Args:
-        settings: which, and how.
+        settings: which source, and how to read it.
         clock: for the stamps.
-        capture: makes OpenCV's capture from a name and a back end.
+        capture: creates OpenCV's capture object from a name and a back end.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class OpenCvSource:
         self._last_ns: int | None = None
 
     def open(self) -> None:
-        """Open the device and fix what can be fixed. Raises DeviceError."""
+        """Open the device and set exposure, gain and focus where possible. Raises DeviceError."""
         kind, name = self._settings.place()
         if kind == "gstreamer" and "GStreamer:                   YES" not in cv2.getBuildInformation():
             hint = "Install an OpenCV with GStreamer, or use the camera's device file"
@@ -59,7 +59,7 @@ class OpenCvSource:
             self._configure()
 
     def read(self) -> Picture | None:
-        """The next picture, stamped as soon as the driver has it."""
+        """The next picture, stamped as soon as the driver delivers it."""
         grabbed = self._capture.grab()
         stamp_ns = self._clock.now_ns()
         good, image = self._capture.retrieve() if grabbed else (False, None)
@@ -71,13 +71,13 @@ class OpenCvSource:
         return Picture(stamp_ns, self._counter, self._dropped, grey(image))
 
     def close(self) -> None:
-        """Let go of the device; idempotent."""
+        """Release the device; idempotent."""
         capture, self._capture = self._capture, None
         if capture is not None:
             capture.release()
 
     def notes(self) -> tuple[str, ...]:
-        """What the driver did not take."""
+        """Settings that the driver did not accept."""
         return tuple(self._notes)
 
     def _configure(self) -> None:
@@ -113,7 +113,7 @@ class OpenCvSource:
         self._size = size
 
     def _count(self, stamp_ns: int) -> None:
-        """One more frame; a gap of several periods before it tells how many were lost."""
+        """Count one more frame; a gap of several periods before it shows how many were lost."""
         self._counter += 1
         if self._settings.place().kind in ("device", "gstreamer") and self._last_ns is not None:
             periods = (stamp_ns - self._last_ns) * self._settings.rate_hz / NANOSECONDS
@@ -123,13 +123,13 @@ class OpenCvSource:
         self._last_ns = stamp_ns
 
     def _check_end(self) -> None:
-        """A video ends; a camera does not. Raises DeviceError."""
+        """Raises DeviceError if a camera delivers nothing more; only a video may end."""
         if self._settings.place().kind != "video":
             raise DeviceError("delivers no more pictures", where="camera", hint="Check its cable and power")
 
 
 class FolderSource:
-    """The pictures of a folder, in the order of their names, as fast as they can be read."""
+    """The pictures in a folder, ordered by name, as fast as they can be read."""
 
     def __init__(self, settings: CameraSourceSettings, clock: Clock) -> None:
         self._settings, self._clock = settings, clock
@@ -138,7 +138,7 @@ class FolderSource:
         self._size: tuple[int, ...] | None = None
 
     def open(self) -> None:
-        """Find the pictures. Raises ConfigurationError when there are none."""
+        """Find the pictures. Raises ConfigurationError if there are none."""
         folder = Path(self._settings.place().name)
         self._files = sorted(file for file in folder.iterdir() if file.suffix.lower() in PICTURES)
         if not self._files:
@@ -147,7 +147,7 @@ class FolderSource:
         self._next = 0
 
     def read(self) -> Picture | None:
-        """The next picture. Raises DeviceError for one that cannot be read, or of another size."""
+        """The next picture. Raises DeviceError if it cannot be read or has another size."""
         if self._next == len(self._files):
             return None
         file = self._files[self._next]
@@ -164,10 +164,10 @@ class FolderSource:
         return Picture(self._clock.now_ns(), self._counter, 0, np.asarray(image, np.uint8), file.name)
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: no device is open."""
 
     def notes(self) -> tuple[str, ...]:
-        """Nothing was asked for."""
+        """Nothing to report: a folder has no such settings."""
         return ()
 
 
@@ -175,8 +175,8 @@ def open_source(settings: CameraSourceSettings, clock: Clock) -> Source:
     """The source that the settings name, opened.
 
     Raises:
-        ConfigurationError: nothing of that name.
-        DeviceError: it cannot be opened.
+        ConfigurationError: there is no source of that name.
+        DeviceError: the source cannot be opened.
     """
     source = _source(settings, clock)
     source.open()

@@ -1,4 +1,4 @@
-"""The camera's pose from the world marker, its corners averaged for as long as it does not move."""
+"""The camera's pose from the world marker, whose corners are averaged as long as it does not move."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from drivers.core.contacts import Array
 from drivers.core.poses import transform_points
 
 _AGREEING = 3
-"""So many pictures in a row that agree with each other on another place: the marker, or the camera, was moved."""
+"""If this many consecutive pictures agree on another position, the marker or the camera was moved."""
 _WINDOW = 10
-"""Pictures whose mean is compared with that of the first ones, to see creeping."""
+"""Number of pictures whose mean is compared with that of the first ones, to detect slow drift."""
 
 
 class WorldMarker:
-    """The world marker in all pictures so far.
+    """Averages the world marker over all pictures so far.
 
-    A picture that shows it elsewhere is refused. When several in a row agree, it was bumped (or the camera was):
+    A picture that shows it elsewhere is refused. If several consecutive pictures agree, it or the camera was bumped:
     from then on every picture is refused, unless the settings say that the marker cannot move.
     """
 
@@ -35,11 +35,11 @@ class WorldMarker:
         self._recent: deque[Array] = deque(maxlen=_WINDOW)
         self._pose: Pose3 | None = None
         self.moved = ""
-        """How it was seen to move, in words; "" while it stands still."""
+        """Its observed movement, in plain English; "" while it stands still."""
 
     @property
     def frames(self) -> int:
-        """Pictures in the mean."""
+        """Number of pictures in the mean."""
         return self._count
 
     @property
@@ -48,7 +48,7 @@ class WorldMarker:
         return self._corners_px
 
     def add(self, corners_px: Array) -> str:
-        """Take the marker's corners in one more picture; gives why the picture is refused, or ""."""
+        """Take the marker's corners in one more picture; returns why the picture is refused, or ""."""
         if self.moved:
             return self.moved
         if self._corners_px is None:
@@ -64,8 +64,8 @@ class WorldMarker:
     def camera_T_world(self) -> Pose3 | None:
         """The world in the camera's frame; None before the first sight.
 
-        Of the two poses a square allows the better one is taken, then refined twice: once to know from where the
-        camera looks through the glass, once with the corners where they seem to be.
+        A square allows two poses. The better one is refined twice: first to learn from where the camera looks through
+        the glass, then with the apparent positions of the corners.
         """
         if self._corners_px is None:
             return None
@@ -86,7 +86,7 @@ class WorldMarker:
         return points_reprojection_px(pose, self.apparent_corners_m(pose), self._corners_px, self._camera)
 
     def apparent_corners_m(self, camera_T_world: Pose3) -> Array:
-        """Where the marker's corners seem to be through the glass, shape (4, 3), world frame."""
+        """Apparent positions of the marker's corners through the glass, shape (4, 3), world frame."""
         corners = transform_points(self._settings.world_T_worldmarker.pose(), self._settings.world_corners_m)
         return table_glass(self._settings).apparent(corners, np.array(camera_T_world.inverse().translation()))
 
@@ -112,7 +112,7 @@ class WorldMarker:
         return self.moved or f"the world marker is {away_px:.1f} px from its first position"
 
     def _creeping(self) -> str:
-        """Steps too small for one picture add up."""
+        """Detect drift in steps that are too small to see in one picture."""
         if self._first_px is None:
             return ""
         recent_px = np.mean(self._recent, axis=0)
@@ -129,5 +129,5 @@ class WorldMarker:
 
 
 def table_glass(settings: MarkerSettings) -> Glass:
-    """The plate the settings describe."""
+    """The glass plate that the settings describe."""
     return Glass(settings.glass_thickness_m, settings.glass_index)

@@ -139,10 +139,11 @@ def flatten_keys(content: Mapping[str, Any], above: str = "") -> Iterator[tuple[
 
 def _explain(error: ValidationError, model: type[BaseModel]) -> str:
     """Up to five problems of a document, each with its key; unknown keys first, as they often explain the others."""
-    found = sorted(error.errors(), key=lambda item: item["type"] != "extra_forbidden")
-    problems = list(dict.fromkeys(_problem(item, model) for item in found))
-    more = [f"and {len(problems) - _SHOWN} more"] if len(problems) > _SHOWN else []
-    return "; ".join(problems[:_SHOWN] + more)
+    found = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
+    different = list({(item["loc"], item["type"], item["msg"]): item for item in found}.values())
+    more = [f"and {len(different) - _SHOWN} more"] if len(different) > _SHOWN else []
+    problems = [_problem(item, model) for item in different[:_SHOWN]]  # a file may have 100 000, each slow to explain
+    return "; ".join([*dict.fromkeys(problems), *more])
 
 
 def _problem(item: ErrorDetails, model: type[BaseModel]) -> str:

@@ -1,1 +1,1 @@
-"""Far ends of real wires: devices that independent masters and clients take for the real ones."""
+"""Emulators at the far end of real wires: independent masters and clients cannot tell them from real devices."""

@@ -1,4 +1,4 @@
-"""A loop in a thread of its own, begun and ended in order, and the pace of a stream."""
+"""A loop in a separate thread that is started and ended in an orderly way, and the timing of a stream."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from drivers.emulators.closing import Closing
 
 
 class Background(Closing):
-    """Calls ``turn`` again and again until it is closed. A context manager; closing is idempotent and waits.
+    """Calls ``turn`` repeatedly until it is closed. A context manager; closing is idempotent and waits for the end.
 
     Args:
         name: of the thread.
-        turn: one turn, a few milliseconds at most.
+        turn: one iteration, which may take a few milliseconds at most.
     """
 
     def __init__(self, name: str, turn: Callable[[], None]) -> None:
@@ -33,10 +33,10 @@ class Background(Closing):
 
 
 class Pace:
-    """How many messages of a stream are due. What a busy machine has missed is made up, for a time at most.
+    """Computes how many messages of a stream are due. Delays of a busy machine are caught up, within a limit.
 
     Args:
-        longest_s: that time: what the line to the reader holds.
+        longest_s: the longest delay to catch up: what the buffer to the reader can hold.
     """
 
     def __init__(self, longest_s: float = 0.5) -> None:
@@ -57,5 +57,5 @@ class Pace:
         return max((1.0 - self._owed) / rate_hz - (time.monotonic() - self._last_s), 0.0)
 
     def rest(self) -> None:
-        """Nothing to do for a moment."""
+        """Sleep until there can be something to do."""
         time.sleep(0.001)

@@ -1,4 +1,4 @@
-"""What emulators share: they are context managers that close themselves."""
+"""The common base of emulators: context managers that close themselves."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ class Closing:
     """Closed when its context ends."""
 
     def close(self) -> None:
-        """End it; idempotent."""
+        """Close it; idempotent."""
         raise NotImplementedError
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""A serial device on a pseudo terminal: the product opens its path as it would a serial adapter's."""
+"""A serial device on a pseudo terminal, whose path can be opened like that of a serial adapter."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ _HELD_s = 0.05  # of the fastest stream; a terminal holds 4 KiB
 
 
 class PtyPort(Closing):
-    """One unit on a pseudo terminal until it is closed. A context manager.
+    """Serves one unit on a pseudo terminal until it is closed. A context manager.
 
-    A pseudo terminal has no parity and no speed of its own, but the speed that the client sets can be read: at
-    another one than the unit's, both sides hear garbage, as on a real line.
+    A pseudo terminal has no parity and no speed, but the speed that the client sets can be read. If it differs from the
+    unit's, both sides receive garbage, as on a real line.
 
     Args:
-        unit: what it is.
-        baud: its speed.
+        unit: the emulated device.
+        baud: its baud rate.
 
     Attributes:
         path: of the port to open.
-        overruns: messages that found the line full, with nobody reading.
+        overruns: messages that did not fit because nobody read the line.
     """
 
     def __init__(self, unit: Unit, baud: int) -> None:
@@ -47,7 +47,7 @@ class PtyPort(Closing):
         self._loop = Background(f"unit on {self.path}", self._turn)
 
     def close(self) -> None:
-        """Stop, and pull the port out; idempotent."""
+        """Stop, and remove the port; idempotent."""
         if not self._closed:
             self._closed = True
             self._loop.close()
@@ -81,5 +81,5 @@ class PtyPort(Closing):
 
 
 def _garbage(payload: bytes) -> bytes:
-    """What a line at another speed makes of bytes: others, and never the ones that were meant."""
+    """The bytes received at a wrong baud rate: they always differ from those that were sent."""
     return bytes(byte ^ 0xA5 | 0x80 for byte in payload)

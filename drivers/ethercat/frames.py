@@ -1,8 +1,8 @@
-"""EtherCAT frames: an Ethernet header, and telegrams that every slave reads and changes as the frame runs by.
+"""EtherCAT frames: an Ethernet header, and telegrams that every slave reads and changes while the frame passes through.
 
 Layout after the EtherCAT standard (IEC 61158-4-12; protocols: EtherCAT frames): EtherType 0x88A4, a length word with
-the type in its upper four bits, then telegrams of a ten-byte head, data and a working counter. All little-endian but
-for the Ethernet header.
+the type in its upper four bits, then telegrams, each with a ten-byte header, data and a working counter. All but the
+Ethernet header is little-endian.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ ETHERTYPE = 0x88A4
 BROADCAST = b"\xff" * 6
 SHORTEST_FRAME = 60
 LARGEST_DATA = 1486
-"""Data bytes of a frame's only telegram."""
+"""Data bytes that fit a frame with a single telegram."""
 
 _ETHERNET = struct.Struct(">6s6sH")
 _LENGTH = struct.Struct("<H")
@@ -56,11 +56,11 @@ class Telegram:
     Attributes:
         command: what to do.
         address: 32 bits; logical, or slave in the lower and register in the upper half (see :func:`physical`).
-        data: what is written, or room for what is read.
-        index: chosen by the master, comes back unchanged.
-        working_counter: what the slaves counted: 1 for a read, 1 for a write, 3 for both in one telegram.
+        data: the bytes to write, or space for the bytes that are read.
+        index: chosen by the master; returned unchanged.
+        working_counter: incremented by each slave: by 1 for a read, 1 for a write, 3 for both in one telegram.
         interrupt: event bits the slaves may set.
-        circulated: the frame has run around a broken ring once already.
+        circulated: the frame has already gone round a broken ring once.
     """
 
     command: Command
@@ -82,7 +82,7 @@ class Telegram:
         return self.address >> 16
 
     def answers(self, request: Telegram) -> bool:
-        """Whether this can be what came back of a request: slaves change position, data and counter alone."""
+        """Whether this can be the answer to a request: slaves change only position, data and counter."""
         return (
             self.command == request.command
             and self.index == request.index
@@ -97,14 +97,14 @@ def physical(slave: int, register: int) -> int:
 
 
 def encode_frame(telegrams: Sequence[Telegram], source: bytes) -> bytes:
-    """A broadcast Ethernet frame of telegrams, without its check sequence.
+    """Encode telegrams as a broadcast Ethernet frame, without its check sequence.
 
     Args:
         telegrams: at least one.
         source: six bytes of the sender's hardware address.
 
     Raises:
-        CodecError: nothing to send, a value that does not fit its field, or more than a frame holds.
+        CodecError: there is nothing to send, a value does not fit its field, or the telegrams do not fit a frame.
     """
     if not telegrams:
         raise CodecError("a frame without telegrams", where="EtherCAT frame")
@@ -129,7 +129,7 @@ def _encode(telegram: Telegram, *, more: bool) -> bytes:
 
 
 def source_of(frame: bytes) -> bytes:
-    """The six source bytes of an Ethernet frame; fewer when the frame is shorter."""
+    """The six source bytes of an Ethernet frame; fewer if the frame is shorter."""
     return frame[6:12]
 
 
@@ -137,7 +137,7 @@ def decode_frame(frame: bytes) -> tuple[Telegram, ...]:
     """The telegrams of an Ethernet frame, at least one; padding is ignored.
 
     Raises:
-        CodecError: not an EtherCAT frame of telegrams, or a damaged one.
+        CodecError: it is not an EtherCAT frame of telegrams, or it is damaged.
     """
     if len(frame) < _ETHERNET.size + _LENGTH.size:
         raise CodecError(f"a frame of {len(frame)} bytes", where="EtherCAT frame")

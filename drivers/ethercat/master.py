@@ -1,7 +1,7 @@
-"""An EtherCAT master on raw frames: telegrams there and back, and the register work on single slaves.
+"""An EtherCAT master on raw frames: exchanges telegrams, and reads and writes the registers of single slaves.
 
-Every frame carries a running number in its source address, as Shadow's master sends it, and only the frame with the
-number just sent is taken as its answer: what comes back late after a stall is counted and thrown away, never used.
+Every frame carries a sequence number in its source address, as in Shadow's master. Only a frame with the number just
+sent is accepted as the answer; frames that come back late after a stall are counted and discarded.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from drivers.ethercat.registers import AL_ERROR, DEVICE_EMULATION, AlState, AlSt
 _INDICES, _NUMBERS = 0x100, 0x10000
 _EEPROM_READ, _EEPROM_BUSY, _EEPROM_ERRORS = 0x0100, 0x8000, 0x7800
 _SETTLING_s = 0.01
-"""Shadow's master waits so long after a change of state, and between looks at a busy EEPROM."""
+"""Shadow's master waits this long after a change of state, and before it checks a busy EEPROM again."""
 
 
 class MasterSettings(StrictModel):
-    """Patience of the master.
+    """Time limits of the master.
 
     Attributes:
-        answer_s: a cyclic frame not back after this time is lost, seconds.
+        answer_s: a cyclic frame that has not come back after this time counts as lost, seconds.
         setup_answer_s: the same while the ring is set up.
-        tries: so often a frame is sent during set-up before the ring counts as silent.
-        state_tries: so often a slave is asked whether it has reached a state, 10 ms apart.
-        eeprom_tries: so often a busy EEPROM is asked again, 10 ms apart.
+        tries: how often a frame is sent during set-up before the ring counts as silent.
+        state_tries: how often a slave is asked whether it has reached a state, 10 ms apart.
+        eeprom_tries: how often a busy EEPROM is asked again, 10 ms apart.
     """
 
     answer_s: float = Field(default=0.001, gt=0.0, le=0.1)
@@ -48,10 +48,10 @@ class FrameCounts:
     """Frames since the port was opened.
 
     Attributes:
-        sent: all of them.
-        lost: not back in time.
-        stale: came back after their time, and were thrown away.
-        damaged: were no answer that can be read.
+        sent: all frames sent.
+        lost: did not come back in time.
+        stale: came back too late and were discarded.
+        damaged: came back, but could not be decoded.
     """
 
     sent: int = 0
@@ -61,12 +61,12 @@ class FrameCounts:
 
 
 class EtherCatMaster:
-    """Sends telegrams and takes their answers.
+    """Sends telegrams and receives their answers.
 
     Args:
-        port: where frames leave.
+        port: the network port.
         clock: for time-outs and waits.
-        settings: how patient.
+        settings: time limits.
     """
 
     def __init__(self, port: Port, clock: Clock, settings: MasterSettings | None = None) -> None:
@@ -92,13 +92,13 @@ class EtherCatMaster:
         self._waiting = None
 
     def wait(self, duration_s: float) -> None:
-        """Let the slaves work."""
+        """Give the slaves time."""
         self._clock.sleep_until_ns(self._clock.now_ns() + round(duration_s * NANOSECONDS))
 
     # --- frames ------------------------------------------------------------------------------------------------
 
     def start(self, telegrams: Sequence[Telegram]) -> None:
-        """Send telegrams in one frame; :meth:`finish` takes the answer."""
+        """Send telegrams in one frame; :meth:`finish` receives the answer."""
         self._number = (self._number + 1) % _NUMBERS
         self._index = (self._index + 1) % _INDICES
         numbered = tuple(Telegram(each.command, each.address, each.data, self._index) for each in telegrams)
@@ -108,7 +108,7 @@ class EtherCatMaster:
         self._port.send(encode_frame(numbered, source))
 
     def finish(self, timeout_s: float) -> tuple[Telegram, ...] | None:
-        """The answers to the last frame, in order; None when it was lost or nothing was sent."""
+        """The answers to the last frame, in order; None if it was lost or nothing was sent."""
         if self._waiting is None:
             return None
         (requests, source), self._waiting = self._waiting, None
@@ -132,7 +132,7 @@ class EtherCatMaster:
         return None
 
     def ask(self, telegram: Telegram) -> Telegram:
-        """One telegram and its answer, sent again when it is lost.
+        """Send one telegram and return its answer; sent again if it is lost.
 
         Raises:
             DeviceError: nothing comes back.
@@ -146,11 +146,11 @@ class EtherCatMaster:
     # --- registers ---------------------------------------------------------------------------------------------
 
     def count_slaves(self) -> int:
-        """How many slaves there are: each adds one to the position of a passing telegram."""
+        """Number of slaves: each adds one to the position field of a passing telegram."""
         return self.ask(Telegram(Command.APRD, physical(0, Register.INFORMATION), bytes(1))).slave
 
     def broadcast(self, register: int, data: bytes) -> int:
-        """Write the same to all slaves; how many took it."""
+        """Write the same bytes to all slaves; returns how many accepted them."""
         return self.ask(Telegram(Command.BWR, physical(0, register), data)).working_counter
 
     def read(self, slave: Slave, register: int, length: int) -> bytes:
@@ -178,7 +178,7 @@ class EtherCatMaster:
         what = f"slave {slave.position} does not answer at register 0x{telegram.register:04X}"
         raise DeviceError(what, where=self.where, hint="Switch the hand off and on, and connect again")
 
-    # --- what a slave is, and its state ------------------------------------------------------------------------
+    # --- identity and state of a slave -----------------------------------------------------------------------
 
     def read_eeprom(self, slave: Slave, word: int) -> int:
         """The 32 bits at a word address of a slave's EEPROM.
@@ -201,17 +201,17 @@ class EtherCatMaster:
         return DeviceError(f"the EEPROM of slave {slave.position} {what}", where=self.where, hint=hint)
 
     def al_status(self, slave: Slave) -> AlStatus:
-        """What a slave says of its state."""
+        """The state that a slave reports."""
         return AlStatus.decode(self.read(slave, Register.AL_STATUS, AlStatus.SIZE))
 
     def change_state(self, slave: Slave, state: AlState) -> None:
-        """Bring a slave to a state, acknowledging an error only where one is shown, as Shadow's master does.
+        """Bring a slave to a state; like Shadow's master, acknowledge an error only if the slave shows one.
 
-        A slave in device emulation copies the request into its status (protocols: Slave registers): an acknowledge
-        would look like an error from then on, and what looks like one goes with any request.
+        A slave in device emulation copies the request into its status (protocols: Slave registers). An acknowledgement
+        would look like an error from then on, and whatever looks like an error disappears with the next request.
 
         Raises:
-            DeviceError: it refuses, with its reason in words, or never gets there.
+            DeviceError: it refuses, with its reason in plain English, or does not reach the state in time.
         """
         stands = self.al_status(slave).error and not self._copies_requests(slave)
         acknowledge = AL_ERROR if stands else 0
@@ -236,7 +236,7 @@ class Slave:
 
     Attributes:
         position: 0 for the first after the master.
-        station: the address it was given; 0 while it has none and is addressed by its position.
+        station: the address assigned to it; 0 while it has none and is addressed by its position.
     """
 
     position: int
@@ -244,5 +244,5 @@ class Slave:
 
     @property
     def address(self) -> int:
-        """How telegrams name it: station address, or minus its position."""
+        """Its address in telegrams: the station address, or minus its position."""
         return self.station or -self.position

@@ -1,4 +1,4 @@
-"""What a slave controller counts of damage on its cables: by port, since power-up or since it was last cleared."""
+"""Error counters of a slave controller: damage seen on each port since power-up or since they were last cleared."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _SATURATED = 255
 
 @dataclass(frozen=True)
 class PortErrors:
-    """The counters of one slave (protocols: Slave registers); each stays at 255.
+    """The counters of one slave (protocols: Slave registers); each stops at 255.
 
     Attributes:
-        damaged: by port, frames whose check sequence was wrong when they came in, and symbols that no frame has.
-            What was damaged on an earlier cable is not among them.
-        lost_links: by port, how often the link was gone.
+        damaged: by port, frames that arrived with a wrong check sequence, and invalid symbols outside frames. Frames
+            already damaged on an earlier cable are not counted.
+        lost_links: by port, how often the link was lost.
     """
 
     damaged: tuple[int, ...]
@@ -31,7 +31,7 @@ class PortErrors:
         """Read the bytes at :attr:`~drivers.ethercat.registers.Register.ERROR_COUNTERS`.
 
         Raises:
-            CodecError: another number of bytes.
+            CodecError: wrong number of bytes.
         """
         if len(data) != cls.SIZE:
             raise CodecError(f"error counters of {len(data)} bytes", where="EtherCAT slave")
@@ -39,23 +39,25 @@ class PortErrors:
         return cls(tuple(damaged), tuple(data[_LOST : _LOST + PORTS]))
 
     def at(self, port: int) -> CableErrors:
-        """What one port has seen of its cable."""
+        """What one port has counted on its cable."""
         return CableErrors(self.damaged[port], self.lost_links[port])
 
 
 @dataclass(frozen=True)
 class CableErrors:
-    """What the ends of one cable have counted: frames damaged on it, links lost."""
+    """What the ends of one cable have counted: damaged frames and lost links."""
 
     damaged: int = 0
     lost_links: int = 0
 
     def both(self, other: CableErrors) -> CableErrors:
-        """With what the other end has counted: each end sees the frames that come in there, and both the link."""
+        """Combine with the counts of the other end: each end counts the frames that arrive there, and both see link
+        losses.
+        """
         return CableErrors(self.damaged + other.damaged, max(self.lost_links, other.lost_links))
 
     def __str__(self) -> str:
-        """In words: ``3 damaged frames, link lost 2 times``; empty where nothing was counted."""
+        """For people: ``3 damaged frames, link lost 2 times``; empty if nothing was counted."""
         words = {
             f"{self._count(self.damaged)} damaged frames": self.damaged,
             f"link lost {self._count(self.lost_links)} times": self.lost_links,

@@ -1,4 +1,4 @@
-"""Where EtherCAT frames leave and arrive: a network interface's raw socket."""
+"""Sends and receives EtherCAT frames through a raw socket of a network interface."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drivers.core.errors import DeviceError
 from drivers.ethercat.frames import ETHERTYPE
 
 LARGEST_FRAME = 1600
-"""Room for any Ethernet frame, bytes."""
+"""Size of the largest Ethernet frame, bytes."""
 
 _NEEDS_RIGHT = (
     "Grant it once with: sudo setcap cap_net_raw+ep PATH, for the python that runs this program, or run it as root"
@@ -25,25 +25,25 @@ class Port(Protocol):
 
     @property
     def hardware_address(self) -> bytes:
-        """Six bytes; zeros where there is no hardware."""
+        """Six bytes; zeros if there is no hardware."""
 
     def open(self) -> None:
-        """Make ready; repeatable, all or nothing. Raises DeviceError."""
+        """Open the port; repeatable; after a failure nothing stays open. Raises DeviceError."""
 
     def close(self) -> None:
         """Release everything; idempotent."""
 
     def send(self, frame: bytes) -> None:
-        """Send one frame. Raises DeviceError when the interface is gone."""
+        """Send one frame. Raises DeviceError if the interface is gone."""
 
     def receive(self, timeout_s: float) -> bytes | None:
-        """The next frame that has arrived, waiting at most so long; None for none. Raises DeviceError as ``send``."""
+        """The next frame, waiting at most this long; None if none arrives. Raises DeviceError as ``send``."""
 
 
 class RawPort:
-    """A network interface on a raw packet socket; Linux, with the right to use raw sockets.
+    """A network interface through a raw packet socket. Needs Linux and the permission to use raw sockets.
 
-    The socket never blocks: waiting is done with a time limit of its own, which keeps a lost frame from costing more.
+    The socket never blocks: waiting has its own time limit, so that a lost frame does not cost more than that.
     """
 
     def __init__(self, interface: str) -> None:
@@ -78,7 +78,7 @@ class RawPort:
         try:
             self._open().send(frame)
         except BlockingIOError:
-            return  # the interface's queue is full: the frame is lost as on a bad cable, and counted where it is missed
+            return  # the interface's queue is full: the frame is lost, as on a bad cable, and the receiver counts it
         except OSError as error:
             raise self._failure(error) from error
 
@@ -94,7 +94,7 @@ class RawPort:
             raise self._failure(error) from error
 
     def _next(self, raw: socket.socket) -> bytes:
-        """The frame that waits. Raises OSError."""
+        """The waiting frame. Raises OSError."""
         return raw.recv(LARGEST_FRAME)
 
     def _open(self) -> socket.socket:

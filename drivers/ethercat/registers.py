@@ -1,6 +1,6 @@
-"""Registers of an EtherCAT slave controller: addresses, states and their words, SyncManagers and FMMUs.
+"""Registers of an EtherCAT slave controller: addresses, states and their descriptions, SyncManagers and FMMUs.
 
-After Beckhoff's register description of the ET1100 and ET1200 family, the words for status codes after ETG.1020
+Addresses follow Beckhoff's register description of the ET1100 and ET1200 family, the meanings of status codes ETG.1020
 (protocols: Slave registers).
 """
 
@@ -55,10 +55,12 @@ class AlState(IntEnum):
 
 
 AL_STATE_MASK, AL_ERROR = 0x0F, 0x10
-"""In the status bit 4 reports an error; in the control it acknowledges one."""
+"""In the AL status, bit 4 reports an error; in the AL control, it acknowledges one."""
 
 DEVICE_EMULATION = 0x01
-"""Bit of :attr:`Register.ESC_CONFIGURATION`: no processor, AL control is copied into AL status, bit 4 and all."""
+"""Bit of :attr:`Register.ESC_CONFIGURATION`: there is no processor, and AL control is copied into AL status, including
+bit 4.
+"""
 
 
 class AlCode(IntEnum):
@@ -129,9 +131,9 @@ class AlStatus:
     """What a slave says of its state.
 
     Attributes:
-        state: the state word without its error bit; a sound slave shows one of :class:`AlState`.
-        error: the slave refused a request or fell back by itself.
-        code: the reason, see :class:`AlCode`; 0 when there is none.
+        state: the state word without its error bit; a healthy slave shows one of :class:`AlState`.
+        error: the slave refused a request or left a state by itself.
+        code: the reason, see :class:`AlCode`; 0 if there is none.
     """
 
     state: int
@@ -157,7 +159,7 @@ class AlStatus:
         return struct.pack("<H2xH", self.state | (AL_ERROR if self.error else 0), self.code)
 
     def __str__(self) -> str:
-        """In words: ``SAFEOP with error 0x001B, watchdog: no process data came in time``."""
+        """For people: ``SAFEOP with error 0x001B, watchdog: no process data arrived in time``."""
         state = AlState(self.state).name if self.state in set(AlState) else f"unknown state {self.state}"
         if not self.error and not self.code:
             return state
@@ -169,13 +171,13 @@ class AlStatus:
 class SyncManager:
     """A one-buffer SyncManager: guards a block of process memory between master and slave application.
 
-    The master's write is refused until the application has taken the one before; a read is refused until the
+    A write by the master is refused until the application has read the previous one; a read is refused until the
     application has written.
 
     Attributes:
         start, length: the block.
-        to_slave: the master writes it.
-        watched: a write by the master feeds the slave's process data watchdog.
+        to_slave: whether the master writes it.
+        watched: whether a write by the master resets the slave's process data watchdog.
     """
 
     start: int
@@ -184,7 +186,7 @@ class SyncManager:
     watched: bool = False
 
     def encode(self) -> bytes:
-        """The eight register bytes that switch it on, as Shadow's master writes them (status byte and all)."""
+        """The eight register bytes that enable it, as Shadow's master writes them (including the status byte)."""
         control = 0x02 | (0x24 if self.to_slave else 0x00) | (0x40 if self.watched else 0x00)
         return struct.pack("<HHBBH", self.start, self.length, control, int(self.to_slave), 1)
 
@@ -197,7 +199,7 @@ class Fmmu:
         logical: first address in the image.
         length: bytes.
         physical: first address in the slave.
-        to_slave: for what the master writes; else for what it reads.
+        to_slave: whether the master writes these bytes; otherwise it reads them.
     """
 
     logical: int
@@ -206,6 +208,6 @@ class Fmmu:
     to_slave: bool
 
     def encode(self) -> bytes:
-        """The sixteen register bytes that switch it on."""
+        """The sixteen register bytes that enable it."""
         kind = 2 if self.to_slave else 1
         return struct.pack("<IHBBHBBBxxx", self.logical, self.length, 0, 7, self.physical, 0, kind, 1)

@@ -1,1 +1,1 @@
-"""The simulated rig: one physics behind the bytes of all devices."""
+"""The simulated rig: one physics simulation behind the bytes of all devices."""

@@ -1,6 +1,6 @@
-"""What the simulated rig is really like: the calibrations that its devices are built from.
+"""The true calibration of the simulated rig, from which its devices are built.
 
-The rig that drives it normally uses the same files. Giving the rig others shows what a wrong calibration does.
+The rig that drives it normally uses the same files. With other files it shows the effect of a wrong calibration.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class SimulatedCalibration:
     Attributes:
         joints: joint sensors.
         motors: which motor pulls which joint.
-        tips: by kind of fingertip, what that kind's :meth:`FingertipKind.load` gives, by finger.
+        tips: by kind of fingertip: the result of that kind's :meth:`FingertipKind.load`, by finger.
         camera: lens.
-        markers: the markers on the table and under the object; the latter's side and place follow the object.
+        markers: the markers on the table and under the object; side and position of the latter depend on the object.
     """
 
     joints: JointCalibration
@@ -65,10 +65,10 @@ class SimulatedCalibration:
 
     @classmethod
     def with_tips(cls, kind: str, file: Path) -> SimulatedCalibration:
-        """The same hand; its fingertips as a file says where the program has none of their kind.
+        """The same hand, with fingertips from a file if the program has none of their kind.
 
         Raises:
-            ConfigurationError: no such kind, or a file that does not fit it.
+            ConfigurationError: there is no such kind, or the file does not fit it.
         """
         packaged = cls.from_package()
         if FINGERTIPS[kind].packaged:
@@ -79,7 +79,7 @@ class SimulatedCalibration:
         """The body of one fingertip.
 
         Raises:
-            ConfigurationError: no such kind; or the finger has no such tip, or its skin is not an ellipsoid.
+            ConfigurationError: there is no such kind, the finger has no such tip, or its skin is not an ellipsoid.
         """
         known = self.tips.get(kind, {})
         if finger not in known:

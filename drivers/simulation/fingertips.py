@@ -1,4 +1,4 @@
-"""The far ends of simulated fingertips, by the name of their kind; see :mod:`drivers.fingertips.kinds`."""
+"""Simulated fingertips by the name of their kind; see :mod:`drivers.fingertips.kinds`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class SimulatedLinks:
 
     Attributes:
         peers: by finger.
-        device: acts at times of its own, for all of them; None where the peers only answer.
+        device: acts for all of them at its own times; None if the peers only answer.
     """
 
     peers: Mapping[str, Peer]
@@ -34,14 +34,15 @@ class SimulatedLinks:
 Simulate: TypeAlias = Callable[
     [Any, Mapping[str, Any], SimulationSettings, np.random.Generator], "SimulatedLinks | TactileSection"
 ]
-"""Makes simulated fingertips: of the plant, their calibrations by finger, settings, and a source of chance.
+"""Creates simulated fingertips from the plant, their calibrations by finger, settings, and random numbers.
 
-The plant is a :class:`~drivers.simulation.hand_plant.TipPlant`. Linked kinds give :class:`SimulatedLinks`; kinds that
-send through the palm its tactile section, and get by with a :class:`~drivers.simulation.hand_plant.TouchedPlant`.
+The plant is a :class:`~drivers.simulation.hand_plant.TipPlant`. Kinds with their own transports return
+:class:`SimulatedLinks`. Kinds that send through the palm return its tactile section, and need only a
+:class:`~drivers.simulation.hand_plant.TouchedPlant`.
 """
 
 SIMULATED_FINGERTIPS: Registry[Simulate] = Registry("simulated fingertip kind")
-"""How the fingertips of each kind are simulated, by its name."""
+"""The simulation of each kind of fingertip, by its name."""
 
 
 def _nano17(

@@ -1,4 +1,4 @@
-"""What emulated devices need of a plant: any model with these can stand behind them."""
+"""The interfaces through which emulated devices access a plant; any model with these can be used."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from drivers.core.contacts import Array
 
 @dataclass(frozen=True)
 class TrueContact:
-    """One touch of a fingertip in the physics.
+    """One contact of a fingertip in the physics.
 
     Attributes:
-        finger: whose tip.
-        touched: what it touches.
+        finger: the finger whose tip it is.
+        touched: the thing that it touches.
         point_world_m: point, shape (3,).
-        normal_world: unit normal out of what is touched, shape (3,).
+        normal_world: unit normal that points out of the touched thing, shape (3,).
         force_on_tip_world_N: force on the fingertip, shape (3,).
     """
 
@@ -30,7 +30,7 @@ class TrueContact:
 
 
 class HandPlant(Protocol):
-    """A hand that turns when its motors are driven."""
+    """A hand whose joints move when its motors are driven."""
 
     @property
     def stamp_ns(self) -> int:
@@ -45,7 +45,7 @@ class HandPlant(Protocol):
         """Torque of each driven joint's motor, shape (20,), order of ``DRIVEN_JOINTS``."""
 
     def drive(self, duty: Array) -> None:
-        """Duty cycles -1 to 1 from now on, shape (20,), order of ``DRIVEN_JOINTS``."""
+        """Set the duty cycles, -1 to 1, shape (20,), order of ``DRIVEN_JOINTS``."""
 
 
 class CarriedPlant(Protocol):
@@ -60,11 +60,11 @@ class CarriedPlant(Protocol):
         """True positioner joints, shape (6,), metres and radians."""
 
     def move_base(self, target: Array) -> None:
-        """Targets from now on, shape (6,), metres and radians."""
+        """Set the targets, shape (6,), metres and radians."""
 
 
 class LoadedPlant(Protocol):
-    """Fingertips that feel."""
+    """Fingertips that measure their load."""
 
     @property
     def wrenches(self) -> Array:
@@ -72,17 +72,17 @@ class LoadedPlant(Protocol):
 
 
 class TouchedPlant(Protocol):
-    """Fingertips whose every touch is known."""
+    """Fingertips whose contacts are all known."""
 
     def contacts(self) -> tuple[TrueContact, ...]:
-        """Every touch of a fingertip now; one touch may be several points."""
+        """All present contacts of fingertips; one touch may give several points."""
 
     def world_T_distal(self, finger: str) -> Pose3:
         """True pose of a finger's distal frame."""
 
 
 class TipPlant(LoadedPlant, TouchedPlant, Protocol):
-    """Fingertips, all that can be known of them."""
+    """Fingertips with loads and contacts."""
 
     @property
     def stamp_ns(self) -> int:

@@ -1,4 +1,4 @@
-"""A mesh file as an object of the simulated rig: checks, and convex pieces for the physics."""
+"""Mesh files as objects of the simulated rig: checks them, and splits them into convex pieces for the physics."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size
 from drivers.simulation.object_names import LYING, STANDING, posed_path
 
 LARGEST_m, SMALLEST_m = 0.25, 0.01
-_NEARLY_CONVEX = 0.96  # share of its hull a mesh fills when the hull alone stands for it
+_NEARLY_CONVEX = 0.96  # a mesh that fills this share of its convex hull is represented by the hull
 _MOST_PIECES = 16
-_LEANING_rad = np.radians(15.0)  # a scan that leans by less was meant to stand
-_LYING_rad = np.radians(45.0)  # turned by more than this from how it stands an object lies
-_SAME_POSE_rad = np.radians(5.0)  # the facets of a curved side are one pose
+_LEANING_rad = np.radians(15.0)  # a scan that leans by less than this is meant to stand
+_LYING_rad = np.radians(45.0)  # an object turned by more than this from standing is lying
+_SAME_POSE_rad = np.radians(5.0)  # the facets of a curved side count as one pose
 
 
 def load_truth_mesh(name: str) -> trimesh.Trimesh:
-    """The mesh called ``mesh:<path>`` or ``mesh:<path>@<pose>``, metres, at rest, its origin at the centre of volume.
+    """The mesh named ``mesh:<path>`` or ``mesh:<path>@<pose>``, metres, at rest, with its origin at the centre of
+    volume.
 
-    Without a pose it stands as in the file, turned by the few degrees that make it stand firmly; one that cannot stand
-    so is laid down in its most probable resting pose. Small holes are closed and faces turned outward.
+    Without a pose it stands as in the file, rotated by a few degrees if it needs that to stand firmly. If it cannot
+    stand this way, it is laid down in its most probable resting pose. Small holes are closed and faces turned outward.
 
     Raises:
-        ConfigurationError: the file cannot be read, holds no closed surface, its size is not that of a graspable
-            object, or there is no such pose.
+        ConfigurationError: the file cannot be read, has no closed surface, is not of graspable size, or has no such
+            pose.
     """
     path, pose = posed_path(name)
     mesh = _read(path)
@@ -71,9 +72,9 @@ def _decompose(vertices: bytes, faces: bytes) -> tuple[Array, ...]:
 
 
 def _resting(mesh: trimesh.Trimesh, pose: str, where: str) -> Array:
-    """The rotation about the origin that puts the mesh on a stable foot, shape (4, 4), without a turn about z."""
+    """The rotation about the origin, shape (4, 4), that puts the mesh into a stable pose, without yaw."""
     poses, chances = trimesh.poses.compute_stable_poses(mesh, sigma=0.0, n_samples=1, threshold=0.0)
-    down = -poses[np.argsort(-chances, kind="stable"), 2, :3]  # the table in the file's axes, most probable first
+    down = -poses[np.argsort(-chances, kind="stable"), 2, :3]  # in the file's axes, most probable first
     upright = -down[:, 2]
     stands = down[upright.argmax() if upright.max() > np.cos(_LEANING_rad) else 0]
     chosen = stands if pose == STANDING else _laid(down, stands, pose, where)
@@ -84,7 +85,7 @@ def _resting(mesh: trimesh.Trimesh, pose: str, where: str) -> Array:
 
 
 def _laid(down: Array, stands: Array, pose: str, where: str) -> Array:
-    """The direction of the table, shape (3,), in a pose that is not how the object stands anyway."""
+    """The direction to the table, shape (3,), in a pose other than the standing one."""
     distinct: list[Array] = []
     for direction in down:
         if all(direction @ other < np.cos(_SAME_POSE_rad) for other in distinct):
@@ -104,7 +105,7 @@ def _read(path: Path) -> trimesh.Trimesh:
     check_size(path, LARGEST_MESH_bytes)
     try:
         mesh = trimesh.load(path, force="mesh")
-    except Exception as error:  # the readers of a dozen formats raise whatever they like
+    except Exception as error:  # the readers of a dozen formats raise all kinds of exceptions
         raise ConfigurationError(
             f"cannot be read as a mesh ({error})", where=str(path), hint="Give a PLY, STL, OBJ or GLB file"
         ) from error

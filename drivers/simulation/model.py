@@ -1,8 +1,8 @@
 """The physics model of the simulated rig: positioner, Shadow right hand, fingertips, table and object.
 
-Built in code from primitives, no mesh files. Names inside the model: links are called after their joint (``FFJ3`` is
-the link behind joint FFJ3, ``WRJ1`` the palm), fingertips ``FF tip``, sensors ``FF force`` and ``FF moment``.
-Hand links collide with table and object but not with each other.
+Built in code from primitives, without mesh files. Names inside the model: links are named after their joint (``FFJ3``
+is the link behind joint FFJ3, ``WRJ1`` the palm), fingertips ``FF tip``, sensors ``FF force`` and ``FF moment``. Hand
+links collide with table and object but not with each other.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from drivers.simulation.surfaces import GLASS, HAND, OBJECT, RUBBER, TABLE, TIP,
 
 TIMESTEP_s = 0.002
 BASE_JOINTS = ("base x", "base y", "base z", "base yaw", "base pitch", "base roll")
-"""Joints of the positioner in the order of every base vector: metres, then radians."""
+"""Joints of the positioner in the order used by every base vector: metres, then radians."""
 
 _FOREARM_QUATERNION = (0.5, 0.5, 0.5, 0.5)  # R0 = [[0, 0, 1], [1, 0, 0], [0, 1, 0]], fingers along +x at zero
 
@@ -51,7 +51,7 @@ _BASE_AXES = (
 BASE_LIMITS = np.array([[axis.lower, axis.upper] for axis in _BASE_AXES])
 """Range of each positioner joint, shape (6, 2), metres and radians."""
 
-_BASE_BANDWIDTH_rad_s = 60.0  # stiff compared with the hand: it follows a path 33 ms late
+_BASE_BANDWIDTH_rad_s = 60.0  # stiff compared with the hand: it follows a path with a delay of 33 ms
 _CARRIED_kg, _CARRIED_kg_m2 = 4.0, 0.15
 _BASE_FORCE_N, _BASE_TORQUE_Nm = 400.0, 60.0
 _TRAIL_Nm_rad, _TRAIL_Nms_rad = 0.25, 0.01  # elastic coupling of J1 to J2
@@ -66,7 +66,7 @@ def build_model(
         target: the object on the table.
         object_mass_kg: its mass, spread evenly over its volume.
         tips: the fingertip of each of the five fingers.
-        world_T_mount: where the positioner stands (zero of its six joints).
+        world_T_mount: pose of the positioner when its six joints are zero.
     """
     spec = mujoco.MjSpec()
     _set_options(spec)
@@ -96,7 +96,7 @@ def _add_table(spec: Any, *, rolling: bool) -> None:
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=[0.5, 0.5, 0.01],
         pos=[0, 0, -0.01],
-        condim=6 if rolling else 3,  # rolling friction halves the speed, so only for objects that roll
+        condim=6 if rolling else 3,  # rolling friction halves the simulation's speed, so only for objects that roll
         **surface(GLASS, TABLE, HAND | TIP | OBJECT),
     )
 
@@ -160,7 +160,7 @@ def _add_hand_link(parent: Any, joint: Joint, limits_rad: Any) -> Any:
 
 
 def _add_link(parent: Any, name: str, position_m: Any, quaternion: Any) -> Any:
-    """A body without weight of its own: the real hand's controller holds it up, and only tips weigh on the sensors."""
+    """Add a weightless body: the real hand's controller compensates its weight, and only tips load the sensors."""
     link = parent.add_body(name=name, pos=position_m, quat=quaternion)
     link.gravcomp = 1
     return link
@@ -185,13 +185,13 @@ def _geometry(shape: Shape) -> dict[str, Any]:
 
 
 def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody) -> None:
-    """The fingertip as a body of its own, welded to the distal link through the force sensor."""
+    """Add the fingertip as a separate body, welded to the distal link through the force sensor."""
     name = f"{finger} tip"
     body = distal.add_body(name=name)
     body.explicitinertial = True
     body.mass = tip.mass_kg
     body.ipos = tip.com_distal_m
-    body.inertia = [0.4 * tip.mass_kg * 0.01**2] * 3  # a ball of 10 mm: nothing depends on it
+    body.inertia = [0.4 * tip.mass_kg * 0.01**2] * 3  # inertia of a 10 mm sphere; no result depends on it
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
@@ -221,7 +221,9 @@ def _add_motors(spec: Any) -> None:
 
 
 def _add_distal_tendons(spec: Any, finger: str) -> None:
-    """The tendon of J0 pulls J1 and J2 alike; an elastic one lets J1 trail J2; a stop keeps J1 below J2."""
+    """Couple J1 and J2: J0's tendon pulls both equally, an elastic one lets J1 lag behind J2, a stop keeps J1 below
+    J2.
+    """
     drive = spec.add_tendon(name=f"{finger}J0")
     trail = spec.add_tendon(name=f"{finger} trail")
     trail.stiffness = [_TRAIL_Nm_rad, 0, 0]
@@ -244,7 +246,7 @@ def _add_object(spec: Any, target: ObjectModel, mass_kg: float) -> None:
 
 
 def _set_inertia(body: Any, target: ObjectModel, mass_kg: float) -> None:
-    """Mass and inertia of the truth mesh, filled evenly: its pieces may overlap."""
+    """Set mass and inertia from the truth mesh with uniform density, because the pieces may overlap."""
     inertia = np.array(target.mesh.moment_inertia) * mass_kg / target.mesh.volume
     body.explicitinertial = True
     body.mass = mass_kg

@@ -1,6 +1,6 @@
-"""How objects of the simulated rig are named: meshes by their file, and by the pose they rest in.
+"""Names of the objects of the simulated rig: meshes are named by their file and resting pose.
 
-Nothing is loaded for it: the command line needs the names, the meshes' libraries only where there is a mesh.
+This module loads no mesh library: the command line needs only the names.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ _POSED = re.compile(rf"^(?P<path>.+)@(?P<pose>{STANDING}|{LYING}|[0-9]+)$")
 
 
 def in_pose(name: str, pose: str) -> str:
-    """The name of a mesh's object that rests in a pose: ``mesh:<path>@<pose>``.
+    """The name of a mesh object in a given resting pose: ``mesh:<path>@<pose>``.
 
     Args:
         name: ``mesh:<path>``.
         pose: ``standing``, ``lying``, or a number from 1, the most probable resting pose.
 
     Raises:
-        ConfigurationError: there is no such pose, or the object is no mesh.
+        ConfigurationError: there is no such pose, or the object is not a mesh.
     """
     if not name.startswith(MESH_PREFIX):
         raise ConfigurationError(
@@ -37,7 +37,7 @@ def in_pose(name: str, pose: str) -> str:
 
 
 def posed_path(name: str) -> tuple[Path, str]:
-    """The file of the mesh called ``mesh:<path>`` or ``mesh:<path>@<pose>``, and its pose."""
+    """The file and the pose of the mesh named ``mesh:<path>`` or ``mesh:<path>@<pose>``."""
     found = _POSED.match(name)
     path = Path((found["path"] if found else name).removeprefix(MESH_PREFIX))
     return path, found["pose"] if found else STANDING

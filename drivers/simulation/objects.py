@@ -1,7 +1,7 @@
-"""The objects of the simulated rig: what the physics collides with and what the evaluation takes as truth.
+"""The objects of the simulated rig: collision shapes for the physics, and true surfaces for the evaluation.
 
-Object frame of every object: origin at the centre of volume, z up in the resting pose, axes as the shape's own
-builder states. It is the frame of the physics body, so ``world_T_object`` of the truth channel refers to it.
+The object frame has its origin at the centre of volume and z up in the resting pose; each builder states the other
+axes. It is the frame of the physics body, and ``world_T_object`` of the truth channel refers to it.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from drivers.simulation.object_names import MESH_PREFIX
 
 _CURVE_SEGMENTS = 64  # chord error 0.06 mm on the largest curve
 _SPHERE_SUBDIVISIONS = 4  # 0.03 mm on a 35 mm sphere
-_FOOT_LAYER_m = 0.003  # vertices this close above the lowest one belong to a scanned object's foot
+_FOOT_LAYER_m = 0.003  # vertices this close above the lowest one belong to a scanned object's underside
 MARKER_SIDE_m = 0.035
-"""Side of the object marker where the foot is large enough."""
+"""Side of the object marker if the underside is large enough."""
 
 QUIET_ZONE = 7 / 6
-"""Printed square over black square: half a module of white on every side."""
+"""Ratio of the printed square to the black one: half a module of white on every side."""
 
 _SMALLEST_MARKER_m = 0.012
 
 
 @dataclass(frozen=True)
 class Solid:
-    """A convex piece with a shape of its own in the physics engine.
+    """A convex piece that is a primitive of the physics engine.
 
     Attributes:
         kind: ``box`` (half sizes), ``cylinder`` (radius, half height) or ``sphere`` (radius).
@@ -49,7 +49,7 @@ class Solid:
 
 @dataclass(frozen=True)
 class Hull:
-    """A convex piece given as the hull of points, shape (n, 3), object frame, metres."""
+    """A convex piece as the hull of points, shape (n, 3), object frame, metres."""
 
     vertices_object_m: Array
 
@@ -59,7 +59,7 @@ Piece: TypeAlias = Solid | Hull
 
 @dataclass(frozen=True)
 class UndersideMarker:
-    """Where the ArUco marker sits on the underside.
+    """The position of the ArUco marker on the underside.
 
     Attributes:
         side_m: side of the black square.
@@ -79,10 +79,10 @@ class ObjectModel:
         name: name in the catalogue, or ``mesh:<path>``.
         pieces: convex pieces whose union the physics collides with.
         mesh: watertight truth surface in the object frame, metres.
-        foot_object_m: polygon of the underside, shape (n, 2), what the camera sees dark on the table.
+        foot_object_m: polygon of the underside, shape (n, 2), which the camera sees as a dark area.
         marker: the marker on the underside.
-        rolls: the object can roll, so the contact model needs rolling friction.
-        scanned: its underside is as uneven as the scan, so that it must find its resting pose by itself.
+        rolls: whether the object can roll, so that the contact model needs rolling friction.
+        scanned: whether the underside is as uneven as a scan, so that the physics must settle it into its resting pose.
     """
 
     name: str
@@ -105,12 +105,12 @@ class ObjectModel:
 
 
 def object_model(name: str) -> ObjectModel:
-    """The object called ``name``: one of :data:`CATALOGUE`, or ``mesh:<path>`` for a watertight mesh in metres.
+    """The object named ``name``: one of :data:`CATALOGUE`, or ``mesh:<path>`` for a watertight mesh in metres.
 
-    A mesh rests in another pose where its name ends with that (:func:`drivers.simulation.object_names.in_pose`).
+    The name of a mesh may end with a resting pose (:func:`drivers.simulation.object_names.in_pose`).
 
     Raises:
-        ConfigurationError: no such object, or the mesh file cannot be used.
+        ConfigurationError: there is no such object, or the mesh file cannot be used.
     """
     if name.startswith(MESH_PREFIX):
         return _scan(name)
@@ -119,7 +119,7 @@ def object_model(name: str) -> ObjectModel:
 
 
 def check_object(name: str) -> None:
-    """Whether there is an object of this name, and its mesh can be used. Raises ConfigurationError."""
+    """Raises ConfigurationError unless there is an object of this name whose mesh, if any, can be used."""
     if name.startswith(MESH_PREFIX):
         load_truth_mesh(name)
     elif name not in CATALOGUE:
@@ -179,7 +179,7 @@ def _l_block(name: str) -> ObjectModel:
         Solid("box", (0.050, 0.020, 0.025), (*long_leg, 0.0)),
         Solid("box", (0.020, 0.020, 0.025), (*short_leg, 0.0)),
     )
-    marker_xy = tuple(np.array([-0.0295, -0.0145]) - centroid)  # in the corner of the legs, where the foot is widest
+    marker_xy = tuple(np.array([-0.0295, -0.0145]) - centroid)  # in the legs' corner, where the foot is widest
     return _prism(name, corners - centroid, 0.050, pieces, (float(marker_xy[0]), float(marker_xy[1])))
 
 
@@ -192,7 +192,9 @@ def _cylinder(name: str) -> ObjectModel:
 
 
 def _sphere(name: str) -> ObjectModel:
-    """Radius 35 mm. Its marker is a 20 mm square on a small flat at the lowest point, seen until the sphere rolls."""
+    """Radius 35 mm. Its marker is a 20 mm square on a small flat at the lowest point, visible until the sphere
+    rolls.
+    """
     radius = 0.035
     mesh = trimesh.creation.icosphere(subdivisions=_SPHERE_SUBDIVISIONS, radius=radius)
     foot = _ring(0.4 * radius, 0.4 * radius, _CURVE_SEGMENTS)
@@ -201,7 +203,9 @@ def _sphere(name: str) -> ObjectModel:
 
 
 def _scan(name: str) -> ObjectModel:
-    """A mesh from a file: origin at the centre of volume, axes as in the file but for the turn that makes it stand."""
+    """A mesh from a file: origin at the centre of volume; axes as in the file, except for the rotation that makes it
+    stand.
+    """
     mesh = load_truth_mesh(name)
     pieces = tuple(Hull(vertices) for vertices in convex_pieces(mesh))
     lowest = mesh.bounds[0, 2]
@@ -216,7 +220,7 @@ def _convex_outline(points_m: Array) -> Array:
 
 
 def _largest_marker(foot_m: Array, height_m: float) -> UndersideMarker:
-    """The marker at the centre of the foot's largest inscribed circle, no larger than fits there with its border."""
+    """The largest marker that fits, with its border, into the underside's largest inscribed circle, at its centre."""
     sides = np.asarray(ConvexHull(foot_m).equations)  # inside: normal . x + offset <= 0
     constraints = np.column_stack([sides[:, :2], np.ones(len(sides))])
     best = linprog([0, 0, -1], A_ub=constraints, b_ub=-sides[:, 2], bounds=[(None, None), (None, None), (0, None)])
@@ -236,5 +240,6 @@ CATALOGUE: Mapping[str, Callable[[str], ObjectModel]] = {
     "cylinder": _cylinder,
     "sphere": _sphere,
 }
-"""Names of the built-in objects and what builds them. Prisms: first corner of the triangle on +y, of the hexagon and
-the ellipse (major axis) on +x."""
+"""Names of the built-in objects and their builders. The first corner of the triangular prism is on +y; that of the
+hexagonal prism and the major axis of the ellipse are on +x.
+"""

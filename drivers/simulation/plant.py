@@ -1,4 +1,6 @@
-"""The moving part of the simulated rig: steps the physics, takes duties and base targets, gives true quantities."""
+"""The moving part of the simulated rig: steps the physics, takes duty cycles and base targets, returns true
+quantities.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +20,10 @@ from drivers.simulation.model import BASE_JOINTS, BASE_LIMITS, TIMESTEP_s
 
 STEP_ns = round(TIMESTEP_s * NANOSECONDS)
 START_BASE = np.array([-0.32, 0.0, 0.36, 0.0, 0.0, 0.0])
-"""Where the positioner starts: the hand open, flat and well above the middle of the table."""
+"""Initial position of the positioner: the hand is open, flat and well above the middle of the table."""
 
 _BASE_LOWEST, _BASE_HIGHEST = BASE_LIMITS.T
-_START_HAND_rad = {"THJ5": 0.9, "THJ4": 1.0}  # thumb turned to the palm's side, fingers straight
+_START_HAND_rad = {"THJ5": 0.9, "THJ4": 1.0}  # thumb turned to the side of the palm, fingers straight
 
 
 class Plant:
@@ -29,7 +31,7 @@ class Plant:
 
     Args:
         model: from :func:`drivers.simulation.model.build_model`.
-        start: where the object lies at the beginning: position of its frame's origin and its turn on the table.
+        start: initial pose of the object: position of its frame's origin and its rotation on the table.
     """
 
     def __init__(self, model: mujoco.MjModel, start: Pose2) -> None:
@@ -55,7 +57,7 @@ class Plant:
         self.pose_hand(joint_vector(_START_HAND_rad))
 
     def pose_hand(self, joints_rad: Array) -> None:
-        """Put the hand into a posture at once, shape (24,), without moving time."""
+        """Put the hand into a posture at once, shape (24,), without advancing time."""
         self._data.qpos[self._joints] = joints_rad
         mujoco.mj_forward(self._model, self._data)
 
@@ -69,7 +71,7 @@ class Plant:
         mujoco.mj_step(self._model, self._data, round(duration_s / TIMESTEP_s))
 
     def advance(self, steps: int) -> None:
-        """Move time on by a number of physics steps with the present duties and targets."""
+        """Advance time by a number of physics steps with the present duties and targets."""
         if steps:
             mujoco.mj_step(self._model, self._data, steps)
             self._steps += steps
@@ -94,14 +96,15 @@ class Plant:
 
     @property
     def motor_torque_Nm(self) -> Array:
-        """Torque each motor passes on to its joint, shape (20,), order of :data:`DRIVEN_JOINTS`."""
+        """Torque that each motor exerts on its joint, shape (20,), order of :data:`DRIVEN_JOINTS`."""
         return np.asarray(self._data.actuator_force[self._motors])
 
     @property
     def wrenches(self) -> Array:
         """Load on the five fingertips, shape (5, 6): force and moment about the sensor's origin, sensor frames.
 
-        Includes the tip's own weight and inertia. The engine reports what the tip does to the link, up to its sign.
+        Includes the tip's own weight and inertia. The engine reports the load of the tip on the link with the opposite
+        sign.
         """
         return np.asarray(-self._data.sensordata[self._wrench])
 
@@ -122,7 +125,7 @@ class Plant:
         return Pose3(Rot3(rotation), self._data.xpos[self._object])
 
     def contacts(self) -> tuple[TrueContact, ...]:
-        """Every touch of a fingertip now. One touch may be several of the engine's contact points."""
+        """All present contacts of fingertips. One touch may give several of the engine's contact points."""
         found = [self._contact(index) for index in range(self._data.ncon)]
         return tuple(contact for contact in found if contact is not None)
 

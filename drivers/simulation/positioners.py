@@ -1,4 +1,4 @@
-"""The far ends of simulated positioners, by the name of their kind; see :mod:`drivers.positioner.kinds`."""
+"""Simulated positioners by the name of their kind; see :mod:`drivers.positioner.kinds`."""
 
 from __future__ import annotations
 
@@ -10,6 +10,6 @@ from drivers.simulation.devices.positioner_emulator import PositionerEmulator
 from drivers.simulation.hand_plant import CarriedPlant
 
 SIMULATED_POSITIONERS: Registry[Callable[[CarriedPlant], Peer]] = Registry("simulated positioner")
-"""The far end of each kind's transport, over a plant that it moves."""
+"""Creates the far end of each kind's transport, for a plant that it moves."""
 
 SIMULATED_POSITIONERS.register("six-axis", PositionerEmulator)

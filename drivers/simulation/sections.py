@@ -1,4 +1,4 @@
-"""What a simulated device is to the world it is part of."""
+"""The interfaces of simulated devices to their world."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 
 class TimedDevice(Protocol):
-    """A device that acts by itself at certain times."""
+    """A device that acts on its own at certain times."""
 
     @property
     def next_event_ns(self) -> int | None:
-        """When it acts next; None while nothing is due."""
+        """When it acts next; None if nothing is due."""
 
     def tick(self) -> None:
         """Act."""
@@ -27,7 +27,7 @@ class TactileSection(Protocol):
 
 
 class NoTactile:
-    """Fingertips that have no connection to the palm: nothing is ever valid."""
+    """Fingertips without a connection to the palm: all answers are invalid."""
 
     def answer(self, data_type: int) -> tuple[int, NDArray[np.uint8]]:
         return 0, np.zeros((5, 16), np.uint8)

@@ -1,4 +1,4 @@
-"""Settings of the simulated rig: the object, the fingertips, and how imperfect the devices are."""
+"""Settings of the simulated rig: the object, the fingertips, and the errors of the devices."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drivers.core.fingertip import RigidTransform
 
 
 class ObjectStart(StrictModel):
-    """Where the object lies at the beginning: position on the table in the world frame, turn about the vertical."""
+    """Initial pose of the object: position on the table in the world frame, rotation about the vertical."""
 
     x_m: float
     y_m: float
@@ -24,9 +24,9 @@ class JointSensorSettings(StrictModel):
     """Errors of the hand's joint sensors, one standard deviation.
 
     Attributes:
-        bias_rad: constant through a session, drawn for each joint of the fingers.
-        wrist_bias_rad: the same for the wrist; none unless given, as the forearm-to-world calibration is taken with the
-            wrist held and takes its bias in.
+        bias_rad: constant during a session, drawn for each joint of the fingers.
+        wrist_bias_rad: the same for the wrist. Zero by default: the forearm-to-world calibration is made with the wrist
+            held fixed, and absorbs its bias.
         noise_rad: from reading to reading.
     """
 
@@ -42,8 +42,8 @@ class ForceSensorSettings(StrictModel):
         rate_hz: records per second (the box's comrdtrate).
         counts_per_N, counts_per_Nm: the box's scale (cfgcpf, cfgcpt).
         offset_N, offset_Nm: untared reading of a session, one standard deviation per axis.
-        drift_N, drift_Nm: wandering about it, one standard deviation per axis.
-        drift_time_s: time after which the wandering has forgotten where it was.
+        drift_N, drift_Nm: drift about it, one standard deviation per axis.
+        drift_time_s: correlation time of the drift.
         noise_lsb: noise of one reading in steps of the sensor's resolution.
     """
 
@@ -63,7 +63,7 @@ class BiotacSettings(StrictModel):
 
     Attributes:
         noise_counts: noise of an electrode reading.
-        response_length_m: how far from a contact an electrode still feels it.
+        response_length_m: distance from a contact within which an electrode responds.
     """
 
     noise_counts: float = Field(default=4.0, ge=0.0)
@@ -71,7 +71,7 @@ class BiotacSettings(StrictModel):
 
 
 class HandBoard(StrictModel):
-    """A board that the simulated hand carries for calibrating: its markers, and where it is glued to the palm."""
+    """A board that the simulated hand carries for calibration: its markers, and its pose on the palm."""
 
     board: GridBoard
     palm_T_board: RigidTransform
@@ -83,12 +83,13 @@ class SimulationSettings(StrictModel):
     Attributes:
         object: name in the catalogue (:mod:`drivers.simulation.objects`) or ``mesh:<path>``.
         object_mass_kg: its mass.
-        start: where it lies at the beginning; drawn from the seed when not given.
-        start_sigma_m: spread of the drawn position per axis, about the middle of the table. Any turn is as likely.
+        start: its initial pose; drawn from the seed if not given.
+        start_sigma_m: standard deviation of the drawn position per axis, about the middle of the table. The rotation is
+            uniform.
         fingertips: the kind on all five fingers.
         positioner: the kind that carries the hand.
-        hand_board: what the hand carries for the camera; nothing when None.
-        world_T_mount: where the positioner really stands; a rig's forearm-to-world calibration may be off from it.
+        hand_board: the board that the hand carries for the camera; None for no board.
+        world_T_mount: true pose of the positioner; a rig's forearm-to-world calibration may differ from it.
     """
 
     object: str = "box-10x6x4"

@@ -1,4 +1,4 @@
-"""How the surfaces of the simulated rig touch: friction, softness, and which kinds collide."""
+"""Contact properties of the simulated rig's surfaces: friction, stiffness, and which kinds collide."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Surface(NamedTuple):
     priority: int = 0
 
 
-RUBBER = Surface((0.9, 0.003, 1e-4), (0.010, 1.0), (0.50, 0.90, 0.002, 0.5, 2.0), priority=2)  # harder ones chatter
+RUBBER = Surface((0.9, 0.003, 1e-4), (0.010, 1.0), (0.50, 0.90, 0.002, 0.5, 2.0), priority=2)  # stiffer ones chatter
 GLASS = Surface((0.35, 0.005, 0.002), (0.006, 1.0), (0.95, 0.99, 0.0005, 0.5, 2.0), priority=1)
 WOOD = Surface((0.5, 0.003, 1e-4), (0.004, 1.0), (0.95, 0.99, 0.0005, 0.5, 2.0))
 

@@ -1,8 +1,8 @@
 """The simulated rig: one physics, one clock, and the far ends of all transports.
 
-Waiting on the clock is what moves the world: the physics steps on, and every device acts at its own times in between
-(force sensors sample, motors halt for want of demands). Everything random comes from one seed, so that the same
-commands give the same bytes again.
+Waiting on the clock moves the world: the physics advances, and every device acts at its own times in between (force
+sensors sample, motors halt for lack of demands). All random numbers come from one seed, so that the same commands give
+the same bytes again.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ _RANDOM_PARTS = ("object", "joints", "motors", "palm", "forces", "tactile", "cam
 
 @dataclass(frozen=True)
 class TruthSample:
-    """What really is: for the truth channel, which only evaluation reads.
+    """The true state, for the truth channel, which only the evaluation reads.
 
     Attributes:
         stamp_ns: time of the sample.
         world_T_object: pose of the object frame.
-        contacts: where fingertips touch the object; one finger may touch at several points.
+        contacts: contacts of fingertips with the object; one finger may touch at several points.
         fingers_on_table: fingers whose tip touches the table.
     """
 
@@ -56,7 +56,7 @@ class TruthSample:
 
 
 class _Plug:
-    """A peer whose cable can be pulled: messages vanish both ways until it is in again."""
+    """A peer whose cable can be unplugged: messages in both directions are lost until it is plugged in again."""
 
     def __init__(self, peer: Peer) -> None:
         self.peer, self.plugged = peer, True
@@ -86,13 +86,13 @@ class SimulatedWorld:
     """The simulated rig.
 
     Args:
-        settings: object, fingertips and how imperfect the devices are.
-        seed: of everything random.
-        calibration: what the rig is really like; the packaged simulated hand unless given.
+        settings: object, fingertips and errors of the devices.
+        seed: for all random numbers.
+        calibration: the true calibration of the rig; by default that of the packaged simulated hand.
 
     Raises:
-        ConfigurationError: unknown object, or a calibration that does not fit the settings.
-        ShapeError: an object mesh that cannot be used.
+        ConfigurationError: the object is unknown, or the calibration does not fit the settings.
+        ShapeError: an object mesh cannot be used.
     """
 
     def __init__(
@@ -117,29 +117,31 @@ class SimulatedWorld:
         self.clock = SimulatedClock(self)
 
     def transports(self) -> dict[str, Transport]:
-        """Transports by device name: ``hand``, ``base``, ``camera``, and ``ft/FF`` to ``ft/TH`` of linked tips."""
+        """Transports by device name: ``hand``, ``base``, ``camera``, and ``ft/FF`` to ``ft/TH`` for fingertips with
+        their own transports.
+        """
         return {name: MemoryTransport(name, plug) for name, plug in self._plugs.items()}
 
     def unplug(self, name: str) -> None:
-        """Pull a device's cable: from now on nothing passes either way."""
+        """Unplug a device's cable: from now on nothing passes in either direction."""
         self._plugs[name].plugged = False
 
     def plug_in(self, name: str) -> None:
-        """Put a device's cable in again; what was sent meanwhile is lost."""
+        """Plug in a device's cable again; what was sent meanwhile is lost."""
         self._plugs[name].plugged = True
 
     @property
     def plant(self) -> Plant:
-        """The physics itself, for whoever steps it in another way than by the clock."""
+        """The physics itself, for callers that advance it other than by the clock."""
         return self._plant
 
     @property
     def marker_settings(self) -> MarkerSettings:
-        """The markers of this rig with this object: a small foot carries a smaller marker, some carry it off-centre."""
+        """The markers of this rig with this object: a small underside has a smaller marker, sometimes off-centre."""
         return marker_settings(self.object_model, self.calibration.markers)
 
     def advance_to(self, deadline_ns: int) -> None:
-        """Move the world on to a time of the clock, device by device as their times come."""
+        """Advance the world to a time of the clock, with every device acting at its times."""
         last = deadline_ns // STEP_ns
         while True:
             due_ns = self._next_event_ns()
@@ -203,13 +205,13 @@ class SimulatedWorld:
             self._devices += [] if tips.device is None else [tips.device]
 
     def _simulate_fingertips(self) -> SimulatedLinks | TactileSection:
-        """Force sensors and tactile sections draw from sources of their own, so that neither depends on the other."""
+        """Force sensors and tactile sections have their own random numbers, so that neither depends on the other."""
         kind = self.settings.fingertips
         rng = self._random["forces" if isinstance(FINGERTIPS[kind], LinkedKind) else "tactile"]
         return SIMULATED_FINGERTIPS[kind](self._plant, self.calibration.tips[kind], self.settings, rng)
 
     def build_camera(self, plant: SeenPlant, carried: Callable[[], tuple[Placed, ...]] = tuple) -> CameraEmulator:
-        """This rig's camera over a plant, which sees what is carried too."""
+        """This rig's camera for a plant; it also sees what the hand carries."""
         markers = self.marker_settings
         camera = TableCamera(self.calibration.camera, self.settings.camera, self._random["camera"])
         table = PrintedMarker(markers.dictionary, markers.world_id, markers.world_side_m)
@@ -225,7 +227,7 @@ class SimulatedWorld:
         )
 
     def _markers_on_hand(self) -> tuple[Placed, ...]:
-        """The markers of the board on the palm, where they are now."""
+        """The markers of the board on the palm, at their present poses."""
         held = self.settings.hand_board
         if held is None:
             return ()

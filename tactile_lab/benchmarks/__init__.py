@@ -1,1 +1,1 @@
-"""Speed and memory, beside the obvious alternative."""
+"""Benchmarks of speed and memory, compared with the obvious alternatives."""

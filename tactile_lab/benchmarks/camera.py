@@ -1,4 +1,4 @@
-"""How fast the marker camera is: one frame's work on one core, and frames a second kept up in its own process."""
+"""Speed of the marker camera: the time for one frame on one core, and the frame rate that its own process sustains."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RATE_hz = 30.0
 
 
 def camera_table(clock: Clock | None = None, *, seconds: float = 10.0, repeats: int = 30) -> TimingTable:
-    """Detection and encoding of a frame, and the rate that the process keeps at 1280 x 720.
+    """Times of detecting and encoding a frame, and the rate that the process sustains at 1280 x 720.
 
     Raises:
         DeviceError: the process does not answer.
@@ -51,7 +51,7 @@ def _frame_timings(clock: Clock, size: tuple[int, int], repeats: int) -> list[Ti
 
 
 def _kept_rate(clock: Clock, seconds: float) -> Timing:
-    """Mean time between the packets of a 30 Hz camera in its process; 33.3 ms when it keeps up."""
+    """Mean time between the packets of a 30 Hz camera in its process; 33.3 ms if it keeps up."""
     transport = CameraProcess("camera", CameraSourceSettings(source="simulated", size_px=SIZES[-1], rate_hz=RATE_hz))
     transport.open()
     try:

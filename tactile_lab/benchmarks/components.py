@@ -1,6 +1,6 @@
-"""How long the costly parts of a step take, beside the obvious alternative and the thesis's own figure.
+"""Times of the costly parts of a step, compared with the obvious alternative and with the thesis's own figure.
 
-All numbers of one table are measured in one run on one machine; only the thesis's are quoted.
+All numbers of a table are measured in one run on one machine; only the thesis's are quoted.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ GRASP_CONTACTS = 5
 THESIS_WEIGHTING_ms = 6000.0
 """The thesis gives 6 seconds on average for 20 000 particles (section 3.4)."""
 SHAPE_SIZES = ((2, 80), (2, 320), (3, 80), (3, 160))
-"""Dimension and number of contacts."""
+"""Dimensions and numbers of contacts."""
 QUERIES = 10_000
 LARGE_MAP, FIELD_NODES, VARIANCE_STEP = 500, 64, 3
 """Contacts of the largest map, nodes along each axis of its field, nodes from one variance to the next."""
@@ -48,10 +48,10 @@ class Timing:
 
     Attributes:
         name: what was timed.
-        ms: median duration in milliseconds.
-        repeats: number of runs behind the median; 0 for a quoted figure.
-        peak_MB: largest additional memory in megabytes, or None where it was not measured.
-        note: what was done, with sizes.
+        ms: median duration, milliseconds.
+        repeats: number of runs; 0 for a quoted figure.
+        peak_MB: largest additional memory, megabytes; None if not measured.
+        note: what was computed, with sizes.
     """
 
     name: str
@@ -89,13 +89,13 @@ class TimingTable:
 
 
 def run_benchmarks(clock: Clock | None = None) -> list[TimingTable]:
-    """All benchmarks. Raises ConfigurationError, see :func:`weighting_table`."""
+    """Run all benchmarks. Raises ConfigurationError, see :func:`weighting_table`."""
     return [weighting_table(clock), shape_table(clock)]
 
 
 @dataclass(frozen=True)
 class WeightingCase:
-    """Particles, a grasp and a map, the same for every contestant."""
+    """Particles, a grasp and a map, the same for all methods compared."""
 
     rows: Array
     grasp: ContactSet
@@ -105,7 +105,7 @@ class WeightingCase:
 
 
 def weighting_table(clock: Clock | None = None, *, particles: int = PARTICLES, repeats: int = 5) -> TimingTable:
-    """Weighting of particles with five contacts against a map of a hundred.
+    """Time the weighting of particles with five contacts against a map of a hundred.
 
     Raises:
         ConfigurationError: scikit-learn, which is only needed here, is not installed.
@@ -140,7 +140,7 @@ def _grid_note(grid: FieldGrid) -> str:
 
 
 def weighting_case(particles: int = PARTICLES) -> WeightingCase:
-    """An ellipse touched a hundred times, and particles spread by the motion noise around the truth."""
+    """An ellipse with a hundred contacts, and particles spread around the true pose by the motion noise."""
     rng = np.random.default_rng(0)
     contacts = ellipse_contacts(MAP_CONTACTS, rng)
     grasp, previous = ellipse_contacts(GRASP_CONTACTS, rng), ellipse_contacts(GRASP_CONTACTS, rng)
@@ -191,7 +191,7 @@ def _label(contacts: ContactSet, distance_m: float = 0.010) -> tuple[Array, Arra
 
 
 def shape_table(clock: Clock | None = None, *, repeats: int = 5) -> TimingTable:
-    """Fit and query of the shape model as it grows, planar and spatial, with its memory."""
+    """Time fitting and querying the shape model as it grows, in the plane and in space, with its memory."""
     watch = _Stopwatch(clock or MonotonicClock(), repeats)
     timings = [line for size in SHAPE_SIZES for line in _shape_timings(watch, *size)]
     timings += _large_timings(watch, _Stopwatch(clock or MonotonicClock(), 1))
@@ -214,7 +214,7 @@ def _shape_timings(watch: _Stopwatch, dimension: int, count: int) -> tuple[Timin
 
 
 def _large_timings(watch: _Stopwatch, once: _Stopwatch) -> list[Timing]:
-    """A map of very many contacts in space: one grasp more, and the whole field around it."""
+    """Times with a map of very many contacts in space: adding a grasp, and evaluating the whole field around it."""
     contacts = ball_contacts(LARGE_MAP, 3)
     is_last = np.arange(LARGE_MAP) >= LARGE_MAP - GRASP_CONTACTS
     field, grasp = _fit(contacts.select(~is_last)), contacts.select(is_last)
@@ -246,7 +246,7 @@ def _size(field: Gpis) -> int:
 
 
 def ball_contacts(count: int, dimension: int) -> ContactSet:
-    """Contacts all over a ball (disc) of 4 cm radius, object frame."""
+    """Contacts all over a sphere (disc) of 4 cm radius, object frame."""
     normals = np.random.default_rng(2).normal(size=(count, dimension))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     sigma = np.full(count, _POINT_SIGMA_m)
@@ -254,7 +254,7 @@ def ball_contacts(count: int, dimension: int) -> ContactSet:
 
 
 class _Stopwatch:
-    """Median duration of repeated runs, and the memory of one more run."""
+    """Measures the median duration of repeated runs, and the memory of one more run."""
 
     def __init__(self, clock: Clock, repeats: int) -> None:
         self._clock, self._repeats = clock, repeats

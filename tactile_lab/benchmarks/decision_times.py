@@ -1,4 +1,4 @@
-"""How long one decision takes: 72 candidates on a box known by 300 contacts, with 5000 particles."""
+"""Time of one decision: 72 candidates on a box with 300 contacts, with 5000 particles."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ _REPEATS, _MESH_m = 5, 0.007
 
 
 def decision_table(contacts: int = CONTACTS, policies: tuple[str, ...] = tuple(POLICIES)) -> TimingTable:
-    """Median time of one decision of each policy, the surfaces drawn anew each time; compiled loops are warm."""
+    """Median time of one decision of each policy. Surfaces are sampled anew each time; loops are compiled
+    beforehand.
+    """
     belief, candidates = box_belief(contacts), box_candidates()
     what = f"{len(candidates)} candidates, {contacts} contacts, {len(belief.particles)} particles"
     lines = [
@@ -37,7 +39,7 @@ def decision_table(contacts: int = CONTACTS, policies: tuple[str, ...] = tuple(P
 
 
 def box_belief(contacts: int) -> Belief:
-    """A box of 12 x 6 x 6 cm that has been touched so often, its pose known to some millimetres and degrees."""
+    """A box of 12 x 6 x 6 cm with this many contacts, its pose known to some millimetres and degrees."""
     points, normals = sample_mesh_with_normals(solid("box-12x6x6").mesh, contacts, seed=0)
     rng = np.random.default_rng(0)
     field = Gpis.fit(points + rng.normal(0.0, 0.001, points.shape), normals)

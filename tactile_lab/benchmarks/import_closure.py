@@ -1,7 +1,7 @@
-"""How much code a module rests on: the modules of a package that it imports, directly or by way of others.
+"""How much code a module depends on: the modules of a package that it imports, directly or indirectly.
 
-``python -m tactile_lab.benchmarks.import_closure [MODULE ...]`` says how many files and lines, without names those of
-method "joint".
+``python -m tactile_lab.benchmarks.import_closure [MODULE ...]`` prints the number of files and lines; without
+arguments, those of method "joint".
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ JOINT = (
     "tactile_lab.slam.shape.selection.planar_choice",
     "tactile_lab.slam.result",
 )
-"""What the default method is made of, without the methods and shape models it is compared with, and the loops."""
+"""Modules of the default method, without loops, and without the methods and shape models it is compared with."""
 
 ALL = ("tactile_lab.slam.tactile_slam",)
-"""What one class offers: every method, every shape model, and the loops."""
+"""Modules behind the one public class: every method, every shape model, and the loops."""
 
 
 @dataclass(frozen=True)
 class Closure:
-    """Modules that others rest on, with these.
+    """Modules with all modules that they depend on.
 
     Attributes:
         files: of modules with content.
-        lines: of all of them, blank ones and comments included.
+        lines: their total number of lines, including blank ones and comments.
     """
 
     files: tuple[Path, ...]
@@ -43,15 +43,15 @@ class Closure:
 
 
 def closure(modules: Sequence[str], inside: str = INSIDE, root: Path = ROOT) -> Closure:
-    """The modules of a package that some of them import, wherever in their text.
+    """The modules of a package that some modules import, at any place in their text.
 
     Args:
-        modules: to begin with, dotted names.
+        modules: dotted names of the modules to start from.
         inside: only modules of this package are followed and counted.
-        root: folder that the names begin in.
+        root: folder that contains the packages.
 
     Raises:
-        ModuleNotFoundError: one of the modules is not there.
+        ModuleNotFoundError: one of the modules does not exist.
     """
     if missing := [name for name in modules if _file(name, root) is None]:
         raise ModuleNotFoundError(f"no module {missing[0]} in {root}")
@@ -85,7 +85,7 @@ def _file(name: str, root: Path) -> Path | None:
 
 
 def report(modules: Sequence[str]) -> str:
-    """Files and lines in words."""
+    """Files and lines as text."""
     found = closure(modules)
     return f"{len(found.files)} files, {found.lines} lines"
 

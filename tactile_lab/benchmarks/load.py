@@ -1,7 +1,7 @@
-"""Five force sensors at 7 kHz and the hand at 1 kHz in one run: losses, processor time and memory.
+"""Measures losses, processor time and memory with five force sensors at 7 kHz and the hand at 1 kHz in one run.
 
-The boxes, the hand's slaves and the hand's own cycle each have a process; the sensors are read here. What the boxes
-say they have sent is set against what has arrived. Run it when the machine is quiet.
+The boxes, the hand's slaves and the hand's own cycle each have a process; the sensors are read here. The number of
+records that the boxes report as sent is compared with the number received. Run it on an idle machine.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ _WARM_UP_share = 0.2
 
 @dataclass(frozen=True)
 class LoadRow:
-    """One device's account.
+    """Messages of one device.
 
     Attributes:
         device: finger or hand.
-        sent, received, lost: messages; for the hand cycles, statuses and lost cycles.
-        detail: more of it, in words.
+        sent, received, lost: messages; for the hand: cycles, statuses and lost cycles.
+        detail: further information for people.
     """
 
     device: str
@@ -60,15 +60,15 @@ class LoadRow:
 
 @dataclass(frozen=True)
 class LoadResult:
-    """Everything of one run.
+    """The results of one run.
 
     Attributes:
-        seconds: how long.
-        rows: by device.
-        reader_share, boxes_share: processor time over time, one core being 1, of this process and of the boxes'.
+        seconds: duration.
+        rows: one per device.
+        reader_share, boxes_share: processor load of this process and of the boxes' process, 1 being one core.
         memory_MB: resident memory of this process at the end.
         memory_slope_MB_per_min: its growth over the run after warming up, by least squares.
-        hand: the hand's punctuality in words; "" without one.
+        hand: the hand's punctuality as text; "" without a hand.
     """
 
     seconds: float
@@ -81,14 +81,14 @@ class LoadResult:
 
 
 def measure_load(seconds: float, *, with_hand: bool = True) -> LoadResult:
-    """Run all at once.
+    """Run all devices at the same time.
 
     Args:
-        seconds: how long.
-        with_hand: also the hand; without it no virtual cable is needed.
+        seconds: duration.
+        with_hand: whether to include the hand, which needs a virtual cable.
 
     Raises:
-        DeviceError: an address is taken, or no virtual cable can be made; says what to do.
+        DeviceError: an address is in use, or no virtual cable can be created; the message says what to do.
     """
     clock = MonotonicClock()
     if not with_hand:
@@ -126,7 +126,7 @@ def _measure(seconds: float, clock: Clock, hand: HandProcess | None) -> LoadResu
         try:
             for number, sensor in enumerate(sensors):
                 sensor.connect()
-                for streaming in sensors[: number + 1]:  # what waits must not overflow while the others connect
+                for streaming in sensors[: number + 1]:  # empty the buffers while the others connect
                     _take(streaming)
             began, boxes_began = _own_seconds(), _seconds_of(boxes.process_id)
             memory = _run(seconds, clock, sensors, hand)
@@ -165,7 +165,7 @@ def _sensor(finger: str, host: str, http_port: int, clock: Clock) -> Nano17:
 def _run(
     seconds: float, clock: Clock, sensors: Sequence[Nano17], hand: HandProcess | None
 ) -> list[tuple[float, float]]:
-    """Read everything for so long; times in seconds and resident memory in megabytes, once a second."""
+    """Read all devices for this time; returns times in seconds and resident memory in megabytes, once a second."""
     began_ns = looked_ns = clock.now_ns()
     memory: list[tuple[float, float]] = []
     while (now_ns := clock.now_ns()) - began_ns < seconds * NANOSECONDS:
@@ -185,7 +185,7 @@ def _take(sensor: Nano17) -> None:
 
 
 def _stop(sensors: Sequence[Nano17]) -> None:
-    """End the streams, and take what was still on its way: so that what arrived can be set against what was sent."""
+    """End the streams and receive what is still in transit, so that received and sent records can be compared."""
     for sensor in sensors:
         sensor.stop_stream()
     until_ns = time.monotonic_ns() + round(_LAST_s * NANOSECONDS)

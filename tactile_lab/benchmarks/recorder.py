@@ -1,4 +1,4 @@
-"""Full load on the recorder for a while: what it drops, how its memory grows, what it costs."""
+"""Measures the recorder under full load: dropped messages, growth of memory, and processor time."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 @dataclass(frozen=True)
 class RecorderLoad:
-    """What a full load was like.
+    """Results of a run under full load.
 
     Attributes:
-        seconds: of load.
-        messages: recorded from the transports.
-        dropped, gaps, missing: messages the recorder dropped; numbers of devices that never came; messages that the
-            file does not have.
-        memory_MB: resident at the end.
+        seconds: duration of the load.
+        messages: number recorded from the transports.
+        dropped, gaps, missing: messages that the recorder dropped; missing sequence numbers of devices; messages that
+            are not in the file.
+        memory_MB: resident memory at the end.
         memory_MB_per_hour: slope of a straight line through the second half.
-        cpu_percent: of one core, of the load with its recorder.
-        recorder_cpu_percent: of it the recorder's, by comparison with a load that records nothing.
+        cpu_percent: processor time of the load and its recorder, per cent of one core.
+        recorder_cpu_percent: the recorder's part of it, by comparison with a load that records nothing.
         file_MB: size of the recording.
-        longest_write_ms: longest time a message took to be handed over.
-        late_ticks: milliseconds of load begun more than 5 ms late: how busy the machine was.
+        longest_write_ms: longest time for passing a message to the recorder.
+        late_ticks: milliseconds of load that started more than 5 ms late, a measure of how busy the machine was.
     """
 
     seconds: float
@@ -56,11 +56,11 @@ class RecorderLoad:
 
 
 def measure_recorder(seconds: float, waiting: Callable[[float], None] = lambda share: None) -> RecorderLoad:
-    """Run the load in a process of its own.
+    """Run the load in a separate process.
 
     Args:
-        seconds: how long; memory means something from a few minutes on.
-        waiting: is told the share that is done, about once a second.
+        seconds: duration; the memory figures are meaningful from a few minutes on.
+        waiting: called about once a second with the share that is done.
 
     Raises:
         SessionError: the load could not be recorded.
@@ -93,7 +93,7 @@ def measure_recorder(seconds: float, waiting: Callable[[float], None] = lambda s
 def _run(
     folder: Path, settings: LoadSettings, waiting: Callable[[float], None]
 ) -> tuple[float, list[tuple[float, float]]]:
-    """CPU seconds of the load itself, and its memory over time: seconds and megabytes."""
+    """Processor seconds of the load itself, and its memory over time: seconds and megabytes."""
     words = (str(folder), str(folder / "status"), json.dumps(asdict(settings)))
     command = child_command("tactile_lab.experiments.data.recorder_load", *words)
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=child_environment())

@@ -1,7 +1,7 @@
-"""How long a step of the default method takes, grasp by grasp, and how that grows with the session.
+"""Times of a step of the default method, grasp by grasp, and their growth during a session.
 
-Beside it what follows a step where somebody asks: the trajectory in the light of flat faces, by which planner and page
-go.
+Also timed is the computation that follows a step on request: the trajectory with flat faces, which the planner and the
+web page use.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ _SEED = 0
 
 
 def step_table(*, long_session: int = LONG_SESSION, planar_grasps: int = PLANAR_GRASPS) -> TimingTable:
-    """Median and 95 % of the steps in the plane, in space, and of the last tenth of a long session.
+    """Median and 95 % quantile of steps in the plane, in space, and in the last tenth of a long session.
 
-    Compiled loops are warm: a short session runs first.
+    A short session runs first, so that loops are compiled.
 
     Args:
         long_session: grasps of the long session.
@@ -53,7 +53,7 @@ def step_table(*, long_session: int = LONG_SESSION, planar_grasps: int = PLANAR_
 
 
 def _session(data: SimulatedGrasps, dimension: int) -> Array:
-    """Of each step but the first: its computing time, and how long the trajectory takes after it; ms, shape (n, 2)."""
+    """Times of each step but the first, and of the trajectory after it; ms, shape (n, 2)."""
     slam = TactileSlam(SlamSettings.model_validate({"dimension": dimension}), _SEED)
     return np.array([_measure_step(slam, grasp) for grasp in data.grasps][1:])
 

@@ -1,7 +1,7 @@
-"""Both EtherCAT masters on the emulated two-slave hand, over a virtual cable: punctuality, losses, and recoveries.
+"""Measures both EtherCAT masters on the emulated two-slave hand, over a virtual cable: punctuality, losses, recovery.
 
-Losses are set against what the emulator itself counts, and punctuality against a loop of the same priority that does
-nothing but wait: what that leaves out, nobody on this machine could have kept. Run it when the machine is quiet.
+Losses are compared with the emulator's own counts, and punctuality with a loop of the same priority that only waits: a
+cycle that this loop misses, no program could have kept on this machine. Run it on an idle machine.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ class WireRow:
 
     Attributes:
         master: ours, pysoem, or none.
-        what: was done.
-        noticed_ms: until the hand told of it; None where there is nothing to tell.
-        back_ms: until the hand was in operation again, or for the first time.
-        detail: figures and words.
+        what: the test.
+        noticed_ms: time until the hand reported the fault; None if there was none.
+        back_ms: time until the hand was in operation again, or for the first time.
+        detail: further figures, for people.
     """
 
     master: str
@@ -58,13 +58,13 @@ class WireRow:
 
 
 def measure_ethercat(seconds: float) -> list[WireRow]:
-    """All measurements of both masters; of ours alone where SOEM is not installed, which a row says.
+    """Run all measurements of both masters; only of ours if SOEM is not installed, which a row then says.
 
     Args:
-        seconds: how long each holds its cycle of 1 kHz.
+        seconds: how long each runs its 1 kHz cycle.
 
     Raises:
-        DeviceError: no virtual cable can be made, or no raw socket opened; says what to do.
+        DeviceError: no virtual cable can be created, or no raw socket opened; the message says what to do.
     """
     near, far = f"tlb{os.getpid()}", f"tlc{os.getpid()}"
     rows = [_nothing_but_waiting(seconds)]
@@ -83,8 +83,8 @@ class Trial:
     """One master on one cable.
 
     Args:
-        near, far: the cable's ends.
-        master: whose.
+        near, far: the ends of the cable.
+        master: name of the master.
     """
 
     def __init__(self, near: str, far: str, master: Master) -> None:
@@ -92,7 +92,7 @@ class Trial:
         self._clock = MonotonicClock()
 
     def steady(self, seconds: float) -> list[WireRow]:
-        """Hold 1 kHz in a process of its own, with zero demands; and what a cycle costs."""
+        """Run at 1 kHz in a separate process, with zero demands, and measure the processor time of a cycle."""
         with self._emulator("mapped") as emulator:
             process = HandProcess(self._setup(CYCLE_s))
             began_ns = self._clock.now_ns()
@@ -110,7 +110,7 @@ class Trial:
         ]
 
     def losses(self) -> WireRow:
-        """Lose one frame in a hundred, and count."""
+        """Lose one frame in a hundred, and count losses."""
         with self._emulator("mapped") as emulator, self._hand() as (hand, _):
             before, counted = emulator.order(cable={"drop_share": LOSS_SHARE}), hand.counters
             longest_ns = fresh_ns = began_ns = self._clock.now_ns()
@@ -128,7 +128,7 @@ class Trial:
         return WireRow(self._master, f"{LOSS_SHARE:.0%} of frames lost", None, back_ms, detail)
 
     def kill(self) -> WireRow:
-        """Kill the slaves' process, start it again, and reconnect."""
+        """Kill the slaves' process, restart it, and reconnect."""
         emulator = EmulatedHandProcess(self._far, CALIBRATION / "joints.yaml", ChainSettings(eeprom="mapped"))
         emulator.start()
         try:
@@ -142,7 +142,7 @@ class Trial:
         return WireRow(self._master, "slaves killed and restarted", noticed_ms, back_ms, words)
 
     def watchdog(self) -> WireRow:
-        """Let the palm's watchdog trip: by a pause where the master sets it, else the palm falls as if it had."""
+        """Trip the palm's watchdog: by a pause if the master enables it, otherwise by an order to the palm."""
         own = self._master == "own"
         with self._emulator("mapped") as emulator, self._hand(watchdog_s=WATCHDOG_s if own else None) as (hand, wire):
             if own:
@@ -155,7 +155,7 @@ class Trial:
         return WireRow(self._master, "watchdog of the palm", noticed_ms, back_ms, words)
 
     def bare(self) -> WireRow:
-        """Bring up a hand whose EEPROM holds its identity alone."""
+        """Bring up a hand whose EEPROM holds only its identity."""
         began_ns = self._clock.now_ns()
         with self._emulator("bare"):
             began_ns = self._clock.now_ns()
@@ -183,7 +183,7 @@ class Trial:
 
     @contextmanager
     def _hand(self, **settings: Any) -> Iterator[tuple[ShadowHand, Any]]:
-        """A connected hand in this process, closed afterwards whatever has become of its slaves."""
+        """A connected hand in this process; closed afterwards, even if its slaves are gone."""
         setup = self._setup(0.002, **settings)
         transport = setup.transport(self._clock)
         hand = setup.device(transport, self._clock)
@@ -199,7 +199,7 @@ class Trial:
         return fresh
 
     def _time_to_notice(self, hand: ShadowHand) -> tuple[float, str]:
-        """Cycle until the hand stops itself: how long that took, milliseconds, and its words."""
+        """Cycle until the hand stops itself; returns the time, milliseconds, and its message."""
         began_ns = self._clock.now_ns()
         while self._since_ms(began_ns) < 1000 * _PATIENCE_s:
             try:
@@ -209,7 +209,7 @@ class Trial:
         raise DeviceError("the hand did not notice", where=self._master)
 
     def _back(self, hand: ShadowHand) -> float:
-        """Reconnect, and see that the hand keeps answering; milliseconds."""
+        """Reconnect and check that the hand keeps answering; returns the time, milliseconds."""
         began_ns = self._clock.now_ns()
         hand.reconnect()
         self._until(lambda: self._cycle(hand))
@@ -237,7 +237,7 @@ class Trial:
 
 
 def _nothing_but_waiting(seconds: float) -> WireRow:
-    """How well this machine keeps a cycle of 1 kHz for a program with nothing to do in it."""
+    """Punctuality of a program on this machine that does nothing in its 1 kHz cycle."""
     clock, statistics = MonotonicClock(), CycleStatistics()
     with prefer(PRIORITY):
         pace, until_ns = CyclePace(clock, round(CYCLE_s * NANOSECONDS)), clock.now_ns() + round(seconds * NANOSECONDS)
@@ -247,7 +247,7 @@ def _nothing_but_waiting(seconds: float) -> WireRow:
 
 
 def _close(hand: ShadowHand) -> None:
-    """Close it; a hand that is gone already, as these trials make it, is no error."""
+    """Close the hand; it is not an error if these trials have made it disappear."""
     try:
         hand.close()
     except DeviceError:
@@ -264,6 +264,6 @@ def _steady(report: Mapping[str, Any], before: Mapping[str, Any], after: Mapping
 
 
 def _processor(first: Mapping[str, Any], last: Mapping[str, Any]) -> str:
-    """Processor time of the hand's process for each cycle between two reports."""
+    """Processor time of the hand's process per cycle, between two reports."""
     cycles = last["punctuality"]["cycles"] - first["punctuality"]["cycles"]
     return f"{1000.0 * (last['processor_s'] - first['processor_s']) / max(cycles, 1):.3f} ms in the hand's process"

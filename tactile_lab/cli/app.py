@@ -12,7 +12,7 @@ from tactile_lab.cli import bench, experiment, markers, rig
 from tactile_lab.cli.calibrate import calibrate
 from tactile_lab.cli.commands import COMMANDS, Commands
 from tactile_lab.cli.running import run, sweep
-from tactile_lab.cli.sessions import evaluate, reconstruct, report, session, view
+from tactile_lab.cli.sessions import evaluate, model, reconstruct, report, session, view
 
 app = typer.Typer(
     cls=Commands,
@@ -34,6 +34,7 @@ COMMANDS.register("bench", bench.bench)
 COMMANDS.register("experiment", experiment.experiment)
 COMMANDS.register("calibrate", calibrate.app)
 COMMANDS.register("session", session.app)
+COMMANDS.register("model", model.app)
 COMMANDS.register("rig", rig.app)
 
 

@@ -23,6 +23,7 @@ class Part(StrEnum):
     ETHERCAT = "ethercat"
     LOAD = "load"
     RECORDER = "recorder"
+    START = "start"
 
 
 Table: TypeAlias = tuple[str, Sequence[str], Sequence[Sequence[str]]]
@@ -36,6 +37,7 @@ _PAGES = {
     ),
     Part.LOAD: ("full-load", "Five force sensors at 7 kHz and the hand at 1 kHz at the same time."),
     Part.RECORDER: ("recorder", "Recording at full load: dropped messages and processor time."),
+    Part.START: ("start", "Time until the program has started, as ratios to a Python that does nothing."),
 }
 """Name and description of each benchmark's stored result."""
 
@@ -44,7 +46,8 @@ def bench(
     only: Annotated[
         Part,
         typer.Option(
-            help="paths: the expensive parts of a step; camera: marker detection in its own process; "
+            help="paths: the expensive parts of a step; start: --help and the first cycle of a session; "
+            "camera: marker detection in its own process; "
             "ethercat: both masters on the emulated hand, and how they recover; "
             "load: five force sensors at 7 kHz and the hand at 1 kHz; "
             "recorder: recording the hand and five force sensors at 1 kHz, and 30 images per second."
@@ -78,12 +81,13 @@ def bench(
             tables = _load(seconds, with_hand, as_json)
         case Part.RECORDER:
             tables = _recorder(seconds, as_json)
+        case Part.START:
+            tables = _start(as_json)
         case Part.PATHS:
             tables = _paths(as_json)
     if store:
-        command = (
-            "tactile-lab bench" if only is Part.PATHS else f"tactile-lab bench --only {only} --seconds {seconds:g}"
-        )
+        timed = "" if only in (Part.PATHS, Part.START) else f" --seconds {seconds:g}"
+        command = "tactile-lab bench" if only is Part.PATHS else f"tactile-lab bench --only {only}{timed}"
         _store(docs, only, command, tables)
 
 
@@ -106,9 +110,16 @@ def _store(docs: Path, part: Part, command: str, tables: list[Table]) -> None:
 def _paths(as_json: bool) -> list[Table]:
     from tactile_lab.benchmarks.components import run_benchmarks
     from tactile_lab.benchmarks.decision_times import decision_table
+    from tactile_lab.benchmarks.start_times import start_table
     from tactile_lab.benchmarks.step_times import step_table
 
-    return _tell_tables([*run_benchmarks(), step_table(), decision_table()], as_json)
+    return _tell_tables([start_table(), *run_benchmarks(), step_table(), decision_table()], as_json)
+
+
+def _start(as_json: bool) -> list[Table]:
+    from tactile_lab.benchmarks.start_times import start_table
+
+    return _tell_tables([start_table()], as_json)
 
 
 def _camera(seconds: float, as_json: bool) -> list[Table]:

@@ -1,4 +1,4 @@
-"""The page of the ablation, and its column in the map of the estimator, from the file of finished runs.
+"""Writes the page of the ablation, and its column on the estimator's page, from the file of finished runs.
 
 ``python -m tactile_lab.experiments.ablation_page RUNS.jsonl`` writes docs/results/ablation.md and the column "worth" of
 docs/estimator.md.
@@ -26,7 +26,7 @@ _SHOWN = (
 )
 _TIMES = (("steps", "step_ms"), ("end", "finish_ms"))
 _NEGLIGIBLE = 0.005
-"""Smaller mean differences are shown as none, in the unit of the figure."""
+"""Smaller mean differences are shown as zero, in the unit of the figure."""
 
 _INTRODUCTION = """# What each mechanism of the default method is worth
 
@@ -71,7 +71,7 @@ def worth(rows: Sequence[Row], name: str) -> str:
 
 
 def with_worth(page: str, rows: Sequence[Row]) -> str:
-    """A page whose table's lines that begin with the name of a mechanism end with what it is worth."""
+    """A page in which table lines that begin with the name of a mechanism end with what it is worth."""
     known = {row.cell[LEFT_OUT] for row in rows}
     lines = page.split("\n")
     for number, line in enumerate(lines):
@@ -122,7 +122,7 @@ def _bold(interval: Interval | None, digits: int, *, with_interval: bool = True)
 
 
 def _ratio(group: Group, groups: Sequence[Group], key: str) -> str:
-    """Total processor time over that of the same runs with all mechanisms, of the runs that were made again."""
+    """Total processor time relative to the same runs with all mechanisms, for the runs that were made again."""
     made = {(row.cell["shape"], row.cell.seed) for row in group.rows if (row.figures or {}).get("rerun")}
     full = next(other for other in groups if other[LEFT_OUT] == NOTHING)
     totals = [

@@ -43,7 +43,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
 
 
 def experiment(name: str) -> Experiment:
-    """The experiment called ``name``. Raises ConfigurationError if there is none."""
+    """The experiment named ``name``. Raises ConfigurationError if there is none."""
     if name not in EXPERIMENTS:
         hint = f"Available experiments: {', '.join(EXPERIMENTS)}"
         raise ConfigurationError(f"there is no experiment {name!r}", where="experiment", hint=hint)

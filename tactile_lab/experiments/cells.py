@@ -1,4 +1,4 @@
-"""One run of an experiment and what came of it, as plain data that a file can keep."""
+"""One run of an experiment and its outcome, as plain data that can be stored in a file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Cell:
     """One run.
 
     Attributes:
-        setting: names and values of what is varied, in the order of the table's columns.
+        setting: names and values of the varied settings, in the order of the table's columns.
         seed: of the data and of the method.
     """
 
@@ -36,18 +36,18 @@ class Cell:
         return json.dumps([self.setting, self.seed])
 
     def words(self) -> str:
-        """The run in one line, for people."""
+        """The run in one line of text, for people."""
         return ", ".join([*(str(value) for _, value in self.setting), f"seed {self.seed}"])
 
 
 @dataclass(frozen=True)
 class Row:
-    """What came of one run.
+    """The outcome of one run.
 
     Attributes:
         cell: the run.
-        figures: numbers by name, a word or a list here and there; None when the run ended in an error.
-        problem: that error, "" otherwise.
+        figures: numbers by name, and some texts and lists; None if the run ended in an error.
+        problem: the message of that error, "" otherwise.
     """
 
     cell: Cell
@@ -67,7 +67,7 @@ class Row:
         return "no shape" if self.figures.get("hausdorff_mm", 0.0) is None else ""
 
     def as_json(self) -> dict[str, Any]:
-        """All of it as plain data; the inverse is :meth:`from_json`."""
+        """As plain data; the inverse is :meth:`from_json`."""
         return {
             "setting": dict(self.cell.setting),
             "seed": self.cell.seed,
@@ -83,7 +83,7 @@ class Row:
 
 
 Work: TypeAlias = Callable[[Cell], Mapping[str, Any]]
-"""Runs a cell and gives its figures; a function of a module, so that other processes can find it."""
+"""Runs a cell and returns its figures; a function at module level, so that other processes can import it."""
 
 
 def grid(**values: Sequence[Value]) -> list[Setting]:
@@ -92,5 +92,5 @@ def grid(**values: Sequence[Value]) -> list[Setting]:
 
 
 def planned_cells(settings: Sequence[Setting], seeds: Sequence[int]) -> list[Cell]:
-    """Every setting with every seed, seeds slowest: an experiment that is broken off has something of everything."""
+    """Every setting with every seed, seed by seed, so that an interrupted experiment has runs of every setting."""
     return [Cell(setting, seed) for seed in seeds for setting in settings]

@@ -1,8 +1,9 @@
-"""When is a contour explored? The two definitions that the exploration experiments report.
+"""The two definitions of an explored contour that the exploration experiments report.
 
-A: the estimated contour passes within 3 mm, and its variance there is below the one that a single contact leaves 3 mm
-(or 5 mm, where the object moves) beside it. B: it passes within 3 mm, and a contact lies within 4.5 mm. The field is
-always the same: Matern, 14 mm amplitude, 40 mm length, normals observed.
+A point of the true contour is explored by definition A if the estimated contour passes within 3 mm of it, with a
+variance below that of a field with one contact at a distance of 3 mm (5 mm if the object moves) along the surface. By
+definition B it is explored if the estimated contour passes within 3 mm, and a contact lies within 4.5 mm. The field is
+always the same: Matern kernel, 14 mm amplitude, 40 mm length, normals observed.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ class ExploredMap:
 
     Attributes:
         field: in the contacts' frame.
-        surface: the outline; None where the contacts enclose nothing.
-        dense_m: the outline every millimetre, shape (n, 2); empty without one.
+        surface: the outline; None if the contacts enclose nothing.
+        dense_m: points on the outline every millimetre, shape (n, 2); empty if there is none.
     """
 
     field: Gpis
@@ -50,7 +51,7 @@ class ExploredMap:
 
     @classmethod
     def of(cls, points_m: Array, normals: Array) -> ExploredMap:
-        """From contacts of shape (n, 2). Raises ShapeError for contacts that no field goes through."""
+        """The map of contacts of shape (n, 2). Raises ShapeError for contacts that no field fits."""
         field = Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad, FIELD)
         try:
             contour = extract_contour(field, resolution_m=_CONTOUR_GRID_m)
@@ -62,7 +63,7 @@ class ExploredMap:
         """Which points of the true contour, in the contacts' frame, are explored; shape (n,).
 
         Args:
-            definition: by which of the definitions.
+            definition: the definition to use.
             true_points_m: shape (n, 2).
         """
         known = self.dense_m

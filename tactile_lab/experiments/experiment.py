@@ -1,6 +1,6 @@
-"""One experiment: what is varied, what one run does, and how the outcome is shown.
+"""One experiment: the varied settings, the work of one run, and the presentation of the outcome.
 
-Seeds: those reported are 1000 to 1029, those for development 0 to 99; nothing is ever tuned on the former.
+Reported seeds are 1000 to 1029; seeds for development are 0 to 99. Nothing is ever tuned on the reported seeds.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ class Experiment:
     """One experiment.
 
     Attributes:
-        name: on the command line.
+        name: its name on the command line.
         sentence: what it shows.
-        settings: what is varied; grasps is the number of grasps asked for.
+        settings: the varied settings; takes the requested number of grasps.
         work: runs one cell.
-        columns: figures of the tables.
-        plot: what the plot of all rows shows.
+        columns: the figures in the tables.
+        plot: makes the plot from all rows.
         pooled: settings over which a second table takes all runs together.
-        kind: of the run, where another table takes all runs of a kind together.
-        grasps: number of grasps of a run; None where there are none.
-        left_out: what cannot be run on this machine and why, "" if nothing.
+        kind: returns the kind of a run, for another table that combines all runs of a kind.
+        grasps: number of grasps of a run; None if it has none.
+        left_out: says what cannot be run on this machine, and why; "" if nothing.
     """
 
     name: str
@@ -58,11 +58,11 @@ class Experiment:
 
         Args:
             seeds: of every setting.
-            only: values, as texts, that some of the settings are limited to.
+            only: limits some of the settings to these values, given as texts.
             grasps: number of grasps instead of the experiment's own.
 
         Raises:
-            ConfigurationError: no such setting, or nothing is left.
+            ConfigurationError: there is no such setting, or nothing is left.
         """
         settings = self.settings(grasps or self.grasps or 0)
         for name, values in (only or {}).items():

@@ -1,4 +1,4 @@
-"""What a plot of an experiment shows, as plain numbers: a stored result keeps them, and a page is drawn from them."""
+"""The contents of a plot as plain numbers, kept in a stored result; the picture on the page is drawn from them."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class Series:
 
     Attributes:
         name: in the legend.
-        x: where, ascending.
-        median, p90: as many, infinite where too many runs have no figure.
+        x: positions, ascending.
+        median, p90: values at these positions; infinite if too many runs have no figure.
     """
 
     name: str
@@ -34,12 +34,12 @@ class Series:
 
 @dataclass(frozen=True)
 class Range:
-    """A dot with a line to its right; infinite where too many runs have no figure.
+    """A dot with a line to its right; values are infinite if too many runs have no figure.
 
     Attributes:
-        name: on its left.
+        name: text on its left.
         median, p90, largest: of all runs.
-        note: a word on its right, as how many failed.
+        note: text on its right, such as the share of failures.
     """
 
     name: str
@@ -60,10 +60,10 @@ class CurvePanel:
     """One chart of curves, with a logarithmic vertical axis.
 
     Attributes:
-        title: above it.
+        title: text above it.
         x_label, y_label: of the axes.
         lines: the curves.
-        log_x: the horizontal axis is logarithmic too.
+        log_x: whether the horizontal axis is logarithmic too.
     """
 
     title: str
@@ -78,10 +78,10 @@ class RangePanel:
     """One chart of spreads.
 
     Attributes:
-        title: above it.
+        title: text above it.
         label: of the horizontal, logarithmic axis.
-        lines: from the top.
-        asked: what is asked of the dots: a dashed upright line.
+        lines: from top to bottom.
+        asked: the limit for the dots, shown as a dashed vertical line.
     """
 
     title: str
@@ -96,9 +96,9 @@ class Plot:
 
     Attributes:
         panels: all of one kind.
-        columns: how many stand in a row.
-        key: what the marks mean, "" for the usual meaning.
-        width: of the sheet in pixels.
+        columns: number of panels in a row.
+        key: explanation of the marks, "" for the usual one.
+        width: width of the sheet, pixels.
     """
 
     panels: tuple[CurvePanel | RangePanel, ...]
@@ -135,7 +135,7 @@ _panel_of: Mapping[str, Any] = {"curves": _curve_panel, "ranges": _range_panel}
 
 
 def panel_json(panel: CurvePanel | RangePanel) -> dict[str, Any]:
-    """A panel as plain data: four digits a number, and infinite ones in words, as JSON has no number for them."""
+    """A panel as plain data: numbers with four digits, infinity as a text, because JSON cannot represent it."""
     return {field.name: _plain(getattr(panel, field.name)) for field in fields(panel)}
 
 

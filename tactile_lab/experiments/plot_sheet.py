@@ -1,4 +1,4 @@
-"""The sheet that charts stand on: title, legend, rows of charts, what the marks mean; and how each line looks."""
+"""The sheet with the charts: title, legend, rows of charts, explanation of marks; and the look of each line."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from html import escape
 from tactile_lab.report.svg import Chart
 
 LETTER_px = 7.2
-"""Width of a letter, about."""
+"""Approximate width of a letter, pixels."""
 EARLIER = " *"
-"""Behind the name of a line that an earlier version of the program made."""
+"""Suffix to the name of a line that an earlier version of the program made."""
 _GAP, _TITLE_HEIGHT, _LEGEND_HEIGHT, _PANEL_TITLE, _KEY_HEIGHT = 18.0, 30.0, 24.0, 20.0, 20.0
 _COLOURS = {
     "joint": 0,
@@ -29,7 +29,7 @@ _COLOURS = {
     "known poses": 6,
     "as in the thesis": 1,
 }
-"""Names that have the same colour in every plot; the others take those that are left."""
+"""Names that have the same colour in every plot; other names get the remaining colours."""
 _MARKS = (
     "M-4 0A4 4 0 1 0 4 0A4 4 0 1 0 -4 0Z",
     "M-3.6-3.6H3.6V3.6H-3.6Z",
@@ -60,8 +60,8 @@ class Look:
     """Colour, mark and dashes of each line, by its name.
 
     Args:
-        names: of all lines, in the order of the legend; repetitions do not count.
-        distinct: names without a colour of their own get different ones; otherwise all the same.
+        names: names of all lines, in the order of the legend; duplicates are ignored.
+        distinct: whether names without a fixed colour get different colours; otherwise all get the same.
     """
 
     def __init__(self, names: Iterable[str], *, distinct: bool = True) -> None:
@@ -78,12 +78,12 @@ class Look:
         return f"var(--s{_COLOURS[own] if own in _COLOURS else left[others.index(own) % len(left)]})"
 
     def dash(self, name: str) -> str:
-        """As an attribute of an SVG path, "" for a whole line."""
+        """As an attribute of an SVG path; "" for a solid line."""
         dash = _DASHES[self.names.index(name) % len(_DASHES)]
         return f' stroke-dasharray="{dash}"' if dash else ""
 
     def mark(self, x: float, y: float, name: str, tip: str = "") -> str:
-        """The mark at a place in pixels, with a text that shows under the pointer."""
+        """The mark at a position in pixels, with a text that appears under the pointer."""
         shape, title = _MARKS[self.names.index(name) % len(_MARKS)], f"<title>{escape(tip)}</title>"
         place = f'transform="translate({x:.2f} {y:.2f})" style="fill:{self.colour(name)}"'
         return f'<path class="dot" {place} d="{shape}">{title}</path>'
@@ -94,10 +94,10 @@ class Sheet:
     """A sheet of charts.
 
     Attributes:
-        title: of the sheet.
-        width: in pixels.
-        columns: charts in a row.
-        titles: one a chart.
+        title: title of the sheet.
+        width: width in pixels.
+        columns: number of charts in a row.
+        titles: one per chart.
     """
 
     title: str
@@ -111,7 +111,7 @@ class Sheet:
         return (self.width - _GAP * (self.columns + 1)) / self.columns
 
     def svg(self, charts: Sequence[Chart], key: str, legend: Look | None = None) -> str:
-        """All charts row by row, between the legend and what the marks mean."""
+        """All charts row by row, between the legend and the explanation of marks."""
         places = self._legend_places(legend.names) if legend else []
         parts = [f'<text class="title" x="{_GAP}" y="22">{escape(self.title)}</text>']
         parts += [_entry(legend, name, *place) for name, place in places] if legend else []
@@ -150,7 +150,7 @@ class Sheet:
 
 
 def _entry(legend: Look, name: str, left: float, line: int) -> str:
-    """A name of the legend with a piece of its line."""
+    """A name in the legend, with a sample of its line."""
     y = _TITLE_HEIGHT + 12 + line * _LEGEND_HEIGHT
     piece = f'<path class="line" stroke="{legend.colour(name)}"{legend.dash(name)} d="M{left:.0f} {y - 4:.0f}h24"/>'
     text = f'<text class="name" x="{left + 30:.0f}" y="{y:.0f}">{escape(name)}</text>'

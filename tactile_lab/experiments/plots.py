@@ -1,7 +1,7 @@
-"""Plots of experiments: error against something, and spreads of methods side by side; one SVG file each.
+"""Plots of experiments: curves of an error, and spreads of methods side by side; one SVG file each.
 
-The file carries its own style, for light and dark pages, and a line that says what its marks mean. Curves differ in
-their marks and dashes as well as in colour, so that a print in grey can be read.
+A file contains its own style, for light and dark pages, and a line that explains its marks. Curves differ in marks and
+dashes as well as in colour, so that a grey print remains readable.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from tactile_lab.report.svg import Chart, Frame, tick_label
 
 _BESIDE = 9.0
 _LEAST_SPAN = 0.9
-"""Decades that an axis shows at least."""
+"""Smallest number of decades on an axis."""
 _FINE_SPAN = 1.2
 """An axis with fewer decades has finer ticks."""
 
 
 def draw(title: str, plot: Plot) -> str:
-    """The plot as an SVG file."""
+    """Draw the plot as an SVG file."""
     curves = [panel for panel in plot.panels if isinstance(panel, CurvePanel)]
     ranges = [panel for panel in plot.panels if isinstance(panel, RangePanel)]
     sheet = Sheet(title, plot.width, min(plot.columns, len(plot.panels)), [panel.title for panel in plot.panels])
@@ -34,7 +34,7 @@ def draw(title: str, plot: Plot) -> str:
 
 
 def _curves_svg(sheet: Sheet, panels: Sequence[CurvePanel], key: str) -> str:
-    """One legend, and the same vertical axis."""
+    """Charts with one legend and the same vertical axis."""
     look = Look([series.name for panel in panels for series in panel.lines])
     limits = _log_limits(value for panel in panels for series in panel.lines for value in (*series.median, *series.p90))
     charts = [_curves(panel, look, limits, sheet.panel_width) for panel in panels]
@@ -42,7 +42,7 @@ def _curves_svg(sheet: Sheet, panels: Sequence[CurvePanel], key: str) -> str:
 
 
 def _ranges_svg(sheet: Sheet, panels: Sequence[RangePanel], key: str) -> str:
-    """The same axis in all of them."""
+    """Charts with the same horizontal axis."""
     look = Look([line.name for panel in panels for line in panel.lines], distinct=False)
     shown = [value for panel in panels for line in panel.lines for value in (line.median, line.largest)]
     limits = _log_limits([*shown, *(panel.asked for panel in panels if panel.asked)])
@@ -53,7 +53,7 @@ def _ranges_svg(sheet: Sheet, panels: Sequence[RangePanel], key: str) -> str:
 
 
 def _log_limits(values: Iterable[float]) -> tuple[float, float]:
-    """Decimal logarithms of the ends of an axis that shows the values, what is infinite at its end."""
+    """Decimal logarithms of the ends of an axis for these values; infinite values are drawn at its end."""
     finite = [min(max(value, 0.01), 30_000.0) for value in values if 0.0 < value < math.inf] or [1.0, 10.0]
     low, high = math.log10(min(finite)), math.log10(max(finite))
     missing = max(0.0, _LEAST_SPAN - (high - low)) / 2
@@ -138,7 +138,7 @@ def _range(chart: Chart, place: int, line: Range, colour: str) -> None:
     tip = f"{line.name}: {' / '.join(number(value, 2) for value in values.tolist())}"
     if line.median > 0.0:
         chart.dot((median, place), "dot", radius=5, tip=tip, style=f"fill:{colour}")
-    else:  # the axis has no place for it
+    else:  # it lies outside the axis
         chart.label(chart.x.low, place, "0", "name", "start", dx=4, dy=4)
     chart.label(chart.x.high, place, line.note, "tick", "start", dx=_BESIDE, dy=4)
 

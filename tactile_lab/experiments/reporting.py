@@ -1,4 +1,4 @@
-"""The outcome of an experiment: as files of a run's folder, and as a part of a stored result."""
+"""The outcome of an experiment: as files in the folder of a run, and as a part of a stored result."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ JSON_FILE, TABLE_FILE, PLOT_FILE, LINES_FILE = "results.json", "results.md", "pl
 
 
 def document(study: Experiment, rows: Sequence[Row], jobs: int) -> dict[str, Any]:
-    """Everything as plain data: where it was made, groups with their spreads, and every run."""
+    """The whole outcome as plain data: its origin, groups with their spreads, and every run."""
     return {
         "format": FORMAT,
         "experiment": study.name,
@@ -52,8 +52,8 @@ def part_of(study: Experiment, rows: Sequence[Row], jobs: int, command: str, gra
     Args:
         study: the experiment.
         rows: the runs, at least one.
-        jobs: runs side by side.
-        command: that made them.
+        jobs: number of parallel processes.
+        command: the command that made them.
         grasps: number of grasps instead of the experiment's own.
     """
     names = _shown_settings(study, grasps)
@@ -75,7 +75,7 @@ def pooled_groups(study: Experiment, rows: Sequence[Row]) -> list[Group]:
 
 
 def seeds_of(rows: Sequence[Row]) -> list[int]:
-    """All seeds, in order."""
+    """All seeds in ascending order."""
     return sorted({row.cell.seed for row in rows})
 
 
@@ -106,7 +106,9 @@ def _table(study: Experiment, groups: Sequence[Group], names: Sequence[str], tit
 
 
 def _shown_settings(study: Experiment, grasps: int | None) -> list[str]:
-    """Settings that the experiment varies, also where the runs at hand do not: their tables have the same columns."""
+    """Settings that the experiment varies, even if the present runs do not, so that all tables have the same
+    columns.
+    """
     cells = study.cells([0], None, grasps)
     names = [name for name, _ in cells[0].setting]
     return [name for name in names if len({dict(cell.setting).get(name) for cell in cells}) > 1] or names
@@ -120,7 +122,7 @@ def _about(study: Experiment, rows: Sequence[Row]) -> str:
 
 
 def _ranges(seeds: Sequence[int]) -> str:
-    """Numbers with neighbours joined: 1-3, 7."""
+    """Numbers as text, with consecutive ones joined: 1-3, 7."""
     parts: list[list[int]] = []
     for seed in seeds:
         if parts and seed == parts[-1][-1] + 1:

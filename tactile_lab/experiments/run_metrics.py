@@ -1,8 +1,8 @@
-"""Figures of merit of one run: how good the shape, the tracking and the stated uncertainty are, and how long it took.
+"""Figures of one run: quality of the shape, the tracking and the stated uncertainty, and computing time.
 
-Shape: Hausdorff and mean distance (appendix C) after the best rigid alignment. Tracking: registration error; turns of a
-solid about its own axis that no contact can tell do not count. Uncertainty: share of the surface whose true error is
-within two stated standard deviations.
+Shape: Hausdorff and mean distance (appendix C) after the best rigid alignment. Tracking: registration error; rotations
+    of a solid about its axis of symmetry, which no contact can distinguish, are ignored. Uncertainty: share of the
+    surface whose true error is within two stated standard deviations.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ NO_SHAPE: dict[str, Any] = {"hausdorff_mm": None, "mean_mm": None, "iou": None, 
 
 
 def contour_figures(contour: Contour | None, outline_m: Array) -> dict[str, Any]:
-    """Of an estimated outline against the true one, shape (n, 2)."""
+    """Figures of an estimated outline compared with the true one, shape (n, 2)."""
     if contour is None:
         return dict(NO_SHAPE)
     fit = align_contours(contour.points_m, outline_m)
@@ -40,7 +40,9 @@ def contour_figures(contour: Contour | None, outline_m: Array) -> dict[str, Any]
 
 
 def mesh_figures(mesh: SurfaceMesh | None, truth: trimesh.Trimesh, *, upright: bool = True) -> dict[str, Any]:
-    """Of an estimated surface against the true one; upright turns about the vertical only to find the best fit."""
+    """Figures of an estimated surface compared with the true one; ``upright`` restricts the best fit to rotations about
+    the vertical.
+    """
     if mesh is None:
         return dict(NO_SHAPE)
     fit = align_meshes(mesh, truth, upright=upright)
@@ -49,7 +51,7 @@ def mesh_figures(mesh: SurfaceMesh | None, truth: trimesh.Trimesh, *, upright: b
 
 
 def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
-    """Of a whole run."""
+    """Figures of a whole run."""
     if isinstance(data, PlanarGrasps):
         shape = contour_figures(result.contour, data.outline_m)
     elif isinstance(data, SpatialGrasps):
@@ -65,7 +67,7 @@ def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
 
 
 def registration_mm(data: SimulatedGrasps, estimate: Poses, dimension: int) -> float | None:
-    """Of a trajectory; turns of a solid about its own axis that no contact can tell do not count."""
+    """Registration error of a trajectory; rotations that no contact can distinguish are ignored."""
     turns = symmetry_turns(data.mesh) if isinstance(data, SpatialGrasps) else None
     poses = modulo_symmetry(estimate, data.world_T_body, turns)
     contacts = [grasp.points_world_m for grasp in data.grasps]

@@ -1,9 +1,9 @@
-"""Runs the cells of an experiment in worker processes and keeps every result as soon as it is there.
+"""Runs the cells of an experiment in worker processes and stores every result as soon as it is finished.
 
-The file has one line of JSON for each finished run, behind a first line that says which experiment and which
-version of the program wrote it. An experiment that was broken off goes on where it stopped; results of another
-version are not mixed in unless that is asked for. A run that ends in an error becomes a failed run with its
-reason. Results depend on the cells alone, not on the number of processes; times do.
+The file starts with a line that names the experiment and the version of the program; one line of JSON for each finished
+run follows. An interrupted experiment resumes where it stopped; results of another version are mixed in only on
+request. A run that ends in an error becomes a failed run with its reason. Results depend only on the cells, not on the
+number of processes; times do.
 """
 
 from __future__ import annotations
@@ -32,32 +32,32 @@ from tactile_lab.experiments.cells import Cell, Row, Work
 
 FORMAT = "tactile-experiment/1"
 SEVERAL = "several versions"
-"""What a file says whose results are not all of one version: no version takes them for its own again."""
+"""Version in a file with results of several versions, so that no version takes them for its own."""
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-"""What keeps the libraries of a worker to one thread: small matrices are faster so, and sums come out the same."""
+"""Limits the libraries of a worker to one thread: small matrices are faster this way, and sums are reproducible."""
 
 _LOOK_s = 0.5
-"""A wait is never longer: a Ctrl+C that comes just before it would be heard when the next run is done."""
+"""Longest wait: a Ctrl+C just before a wait would otherwise be noticed only when the next run is finished."""
 _ASKED = 25
-"""So often a process that has died is asked, within as long, how it ended."""
+"""Number and total time of attempts to read the exit code of a process that has died."""
 _ROOT = Path(__file__).resolve().parents[2]
 _PLOTS = ("plots", "plot_data", "plot_sheet")
 _PARTS = ("tactile_lab", "calibration", "drivers", "sessions")
 _WITHOUT = ("cli", "workflow", "view", "report", "experiments/results", *(f"experiments/{name}.py" for name in _PLOTS))
-"""Parts of tactile_lab that show results or take orders, and compute none; but for:"""
+"""Parts of tactile_lab that only present results or read commands, except for these modules:"""
 _WITH = tuple(f"workflow/{name}.py" for name in ("attending", "calibrating_forearm", "finishing", "running"))
 
 Finished = Callable[[Row, int, int], None]
-"""Told about each finished run, the number of those done, and of all."""
+"""Called with each finished run, the number of finished runs, and the total."""
 
 
 @dataclass(frozen=True)
 class RunnerSettings:
-    """How an experiment is run.
+    """Settings for running an experiment.
 
     Attributes:
-        jobs: number of processes; one runs everything in this process.
-        keep: take over the results of another version of the program.
+        jobs: number of processes; with 1 all runs are made in this process.
+        keep: whether to keep the results of another version of the program.
     """
 
     jobs: int = 1
@@ -72,15 +72,15 @@ def run_cells(
     settings: RunnerSettings | None = None,
     finished: Finished = lambda row, done, total: None,
 ) -> list[Row]:
-    """Run what is not yet in the file, and give one row for each cell, in the order of the cells.
+    """Run the cells that are not yet in the file; returns one row per cell, in the order of the cells.
 
     Args:
-        name: of the experiment.
-        cells: what to run.
-        work: runs one cell; picklable where there is more than one process.
-        file: results, made if there is none.
-        settings: see there.
-        finished: told about progress.
+        name: name of the experiment.
+        cells: the runs to make.
+        work: runs one cell; must be picklable if there is more than one process.
+        file: file of results, created if missing.
+        settings: number of processes, and which results to keep.
+        finished: called after each run.
 
     Raises:
         SessionError: the file belongs to another experiment, cannot be read, or a process died.
@@ -101,12 +101,12 @@ def run_cells(
 
 
 def execute(cell: Cell, work: Work) -> Row:
-    """Run one cell; whatever goes wrong in it is the result of this run and not the end of the others."""
+    """Run one cell; any error becomes the result of this run, and the others continue."""
     try:
         return Row(cell, work(cell))
     except TactileLabError as error:
         return Row(cell, None, str(error))
-    except Exception as error:  # a defect shows as a failed run with its name in the table
+    except Exception as error:  # a defect appears in the table as a failed run with its name
         return Row(cell, None, f"{type(error).__name__}: {error}")
 
 
@@ -118,7 +118,7 @@ def _execute(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
 
 @contextmanager
 def _inherited() -> Iterator[None]:
-    """Workers that start here have one thread each, and import nothing from the current folder."""
+    """Set the environment of workers: one thread each, and no imports from the current folder."""
     wanted = {**ONE_THREAD, "PYTHONSAFEPATH": "1"}
     own = {name: os.environ.get(name) for name in wanted}
     os.environ.update(wanted)
@@ -132,7 +132,7 @@ def _inherited() -> Iterator[None]:
 
 
 def _in_processes(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
-    """Rows as they are finished; the processes end with this generator, however it ends."""
+    """Yields rows as they are finished; the processes end with this generator, however it ends."""
     context = multiprocessing.get_context("spawn")
     watch = _WorkerWatch(context.SimpleQueue(), cells)
     pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare_worker, initargs=(watch.begun,))
@@ -152,17 +152,17 @@ def _in_processes(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]
 
 
 def _end(pool: ProcessPoolExecutor) -> None:
-    """End the workers at once: a run may take a minute, and nobody waits for it any more."""
+    """End the workers at once: a run may take a minute, and its result is no longer needed."""
     for process in multiprocessing.active_children():
         process.terminate()
     pool.shutdown(wait=True, cancel_futures=True)
 
 
 class _WorkerWatch:
-    """Which run each worker is at, so that a death can be told with it.
+    """Tracks the current run of each worker, so that the report of a dead worker can name it.
 
     Args:
-        begun: where workers say their process id and the key of the run that they begin.
+        begun: queue to which workers write their process id and the key of the run that they start.
         cells: all runs.
     """
 
@@ -173,7 +173,7 @@ class _WorkerWatch:
         self._processes: dict[int, BaseProcess] = {}
 
     def look(self, pool: ProcessPoolExecutor) -> None:
-        """Take note of the workers there are, and of what they have begun."""
+        """Update the list of workers and of the runs that they have started."""
         self._processes.update(pool._processes or {})
         self._hear()
 
@@ -183,7 +183,7 @@ class _WorkerWatch:
             self._at[process_id] = key
 
     def deaths(self) -> str:
-        """Which worker died of what, and at which run; the pool ends the others by SIGTERM."""
+        """Describe which workers died, why, and in which run; the pool ends the others by SIGTERM."""
         self._hear()
         codes = {number: _exit_code(process) for number, process in self._processes.items()}
         ended = {number: code for number, code in codes.items() if code}
@@ -197,7 +197,9 @@ class _WorkerWatch:
 
 
 def _exit_code(process: BaseProcess) -> int | None:
-    """How a process ended. Its pipe closes a moment before, and the pool's own thread may be asking just now."""
+    """The exit code of a process. It may come late: the pipe closes earlier, and the pool's own thread may be reading
+    it.
+    """
     for _ in range(_ASKED):
         if process.exitcode is not None:
             break
@@ -212,7 +214,7 @@ def _cause(code: int) -> str:
 
 
 _begun: SimpleQueue[tuple[int, str]] | None = None
-"""In a worker: where it says what it begins."""
+"""In a worker: the queue to which it reports each run that it starts."""
 
 
 def _execute_in_worker(cell: Cell, work: Work) -> Row:
@@ -222,7 +224,7 @@ def _execute_in_worker(cell: Cell, work: Work) -> Row:
 
 
 def _prepare_worker(begun: SimpleQueue[tuple[int, str]]) -> None:
-    """Ctrl+C reaches every process of a terminal: only the parent answers. Extensions are known here as well."""
+    """Ignore Ctrl+C, which reaches every process of a terminal but is handled by the parent; load extensions."""
     global _begun
     _begun = begun
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -235,7 +237,7 @@ def kept_rows(name: str, file: Path) -> list[Row]:
 
 
 def _known_rows(name: str, file: Path, keep: bool) -> tuple[dict[str, Row], str]:
-    """Results in the file, by the key of their cell, and which version made them."""
+    """Results in the file by the key of their cell, and the version that made them."""
     if not file.is_file():
         return {}, version()
     try:
@@ -256,12 +258,12 @@ def _known_rows(name: str, file: Path, keep: bool) -> tuple[dict[str, Row], str]
 
 
 def _whole(lines: list[str]) -> list[str]:
-    """Without a last line that was being written when the program was killed."""
+    """The text without an incomplete last line, left when the program was killed."""
     return lines[:-1] if lines and not lines[-1].endswith("}") else lines
 
 
 def _appending(name: str, file: Path, by: str, rows: list[Row]) -> IO[str]:
-    """The file opened behind its head and the rows that stay."""
+    """Open the file for appending, after its header and the rows to keep."""
     head = {"format": FORMAT, "experiment": name, "version": by}
     lines = "".join(map(_line, [head, *(row.as_json() for row in rows)]))
     write_whole(file, lines, "Choose another folder with --out")

@@ -1,7 +1,7 @@
-"""Runs in groups: spreads over seeds and shapes, failures with their reasons, and the table that shows them.
+"""Groups of runs: spreads over seeds and shapes, failures with their reasons, and tables.
 
-A run without the figure (no shape came of it) counts as infinitely wrong: leaving it out would make a method
-better by failing.
+A run without a figure (for example because it gave no shape) counts as infinitely wrong; otherwise a method would
+improve by failing.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ from tactile_lab.experiments.cells import Row, Setting, Value
 
 REFERENCE_METHOD = "known-pose"
 LEFT_OUT, NOTHING = "without", "nothing"
-"""The setting that names what a run does without, and its value for the runs that paired differences are taken to."""
+"""The setting that names what a run leaves out, and its value for the reference runs of paired differences."""
 
 UNKNOWN = "–"
 LEAST_PAIRS, _DRAWS = 20, 2000
-"""Pairs of runs from which on a ratio has an interval, and how often they are drawn for it (bootstrap)."""
+"""Smallest number of pairs for the interval of a ratio, and the number of bootstrap samples."""
 
 Kind: TypeAlias = Literal["spread", "mean", "estimate", "median", "pooled", "percent", "sum", "correlation", "paired"]
 
 
 @dataclass(frozen=True)
 class Column:
-    """A figure of the table.
+    """A column of the table.
 
     Attributes:
         title: heading, with the unit.
         key: name of the figure in a row.
-        digits: behind the point.
+        digits: number of decimals.
         kind: "spread" gives median / p90 / maximum, "median" the median, "mean" the mean, "pooled" median / p95 of all
             numbers in the lists of all runs, "percent" the mean of shares or flags, "sum" the total, "estimate" the
             mean with its standard error, "correlation" Pearson's of all pairs in the lists of all runs, "paired" the
-            mean difference to the same runs with nothing left out, with its 95 % interval by the bootstrap.
-        versus: add the ratio of the medians to the reference method's.
-        most: larger values count as this one in differences, so that one hopeless run does not hide all others.
+            mean difference to the same runs with nothing left out, with its bootstrap 95 % interval.
+        versus: the reference method, whose median is used for the ratio to add.
+        most: larger values are clipped to this in differences, so that one hopeless run does not hide all others.
     """
 
     title: str
@@ -74,16 +74,16 @@ class Group:
 
     @property
     def failed_share(self) -> float:
-        """Failed runs over all."""
+        """Share of failed runs."""
         return len(self.failures) / len(self.rows)
 
     def values(self, key: str) -> list[float]:
-        """One number a run, infinite where it has none."""
+        """One number per run; infinite if it has none."""
         found = [(row.figures or {}).get(key) for row in self.rows]
         return [math.inf if value is None else float(value) for value in found]
 
     def spread(self, key: str) -> Spread:
-        """Over all runs."""
+        """The spread over all runs."""
         return Spread.of(self.values(key))
 
     def pairs(self, key: str) -> list[list[float]]:
@@ -96,7 +96,7 @@ class Group:
 
 
 def group_runs(rows: Sequence[Row], *, over: Sequence[str] = ()) -> list[Group]:
-    """Runs of equal settings together, in order of appearance, settings named in ``over`` and seeds mixed."""
+    """Group runs of equal settings, in order of appearance; seeds and the settings named in ``over`` are ignored."""
     groups: dict[Setting, list[Row]] = {}
     for row in rows:
         setting = tuple(pair for pair in row.cell.setting if pair[0] not in over)
@@ -105,7 +105,7 @@ def group_runs(rows: Sequence[Row], *, over: Sequence[str] = ()) -> list[Group]:
 
 
 def varying_settings(groups: Sequence[Group]) -> list[str]:
-    """Names of the settings that are not the same in all groups; of all if there is one group only."""
+    """Names of the settings that differ between groups; of all settings if there is only one group."""
     names = [name for name, _ in groups[0].setting]
     return [name for name in names if len({group[name] for group in groups}) > 1] or names
 
@@ -113,13 +113,13 @@ def varying_settings(groups: Sequence[Group]) -> list[str]:
 def table(
     groups: Sequence[Group], columns: Sequence[Column], units: Mapping[str, str], names: Sequence[str] | None = None
 ) -> list[list[str]]:
-    """Head and body of the table as texts.
+    """Header and body of the table as texts.
 
     Args:
-        groups: one a row.
-        columns: figures.
-        units: of settings, by their names.
-        names: settings that are shown; None for those that differ.
+        groups: one per row of the table.
+        columns: figures to show.
+        units: units of settings, by their names.
+        names: settings to show; None for those that differ.
     """
     names = varying_settings(groups) if names is None else names
     head = [f"{name}, {units[name]}" if name in units else name for name in names]
@@ -133,7 +133,7 @@ def table(
 
 
 def short_table(groups: Sequence[Group], columns: Sequence[Column]) -> list[list[str]]:
-    """Head and body of a table that fits a terminal: the settings that differ, the first two figures, failures."""
+    """Header and body of a table that fits a terminal: settings that differ, the first two figures, and failures."""
     names, shown = varying_settings(groups), columns[:2]
     body = [[str(group[name]) for name in names] for group in groups]
     for line, group in zip(body, groups, strict=True):
@@ -174,7 +174,9 @@ def _texts(group: Group, column: Column, reference: Group | None, groups: Sequen
 
 
 def _bootstrap_interval(group: Group, reference: Group, key: str) -> str:
-    """95 % of the ratios of medians over drawn pairs of runs that differ in the method alone; "" for few pairs."""
+    """Bootstrap 95 % interval of the ratio of medians, over pairs of runs that differ only in the method; "" for few
+    pairs.
+    """
     others = {_without_method(row): value for row, value in zip(reference.rows, reference.values(key), strict=True)}
     own = [(value, _without_method(row)) for row, value in zip(group.rows, group.values(key), strict=True)]
     pairs = np.array([(value, others[run]) for value, run in own if run in others])
@@ -191,7 +193,7 @@ def _without_method(row: Row) -> tuple[Setting, int]:
 
 
 def paired(group: Group, column: Column, groups: Sequence[Group]) -> Interval | None:
-    """Mean difference of a figure to the same runs with nothing left out; None for those themselves."""
+    """Mean difference of a figure to the same runs with nothing left out; None for the reference runs themselves."""
     if dict(group.setting).get(LEFT_OUT, NOTHING) == NOTHING:
         return None
     full = {_same_run(row): row for other in groups if other[LEFT_OUT] == NOTHING for row in other.rows}
@@ -200,7 +202,7 @@ def paired(group: Group, column: Column, groups: Sequence[Group]) -> Interval | 
 
 
 def _same_run(row: Row) -> tuple[Setting, int]:
-    """What a run has in common with the one that leaves nothing out."""
+    """The settings that a run shares with its reference run."""
     return tuple(pair for pair in row.cell.setting if pair[0] != LEFT_OUT), row.cell.seed
 
 
@@ -230,7 +232,7 @@ def _estimate(group: Group, column: Column) -> str:
 
 
 def correlation(pairs: Sequence[Sequence[float]]) -> float | None:
-    """Pearson's correlation of pairs of numbers; None where there are too few or one of them never changes."""
+    """Pearson's correlation of pairs of numbers; None if there are too few or one of them is constant."""
     if len(pairs) < 3:
         return None
     means = [sum(pair[side] for pair in pairs) / len(pairs) for side in (0, 1)]
@@ -269,7 +271,7 @@ _SHOWN: Mapping[Kind, Callable[[Group, Column], str]] = {
 
 
 def markdown(rows: Sequence[Sequence[str]]) -> str:
-    """Head and body as a Markdown table; the last column is text, the others numbers or names."""
+    """Header and body as a Markdown table; the last column is text, the others are numbers or names."""
     head, *body = rows
     lines = [head, ["---", *["---:"] * (len(head) - 2), "---"], *body]
     return "".join(

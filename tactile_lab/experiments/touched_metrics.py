@@ -1,7 +1,7 @@
-"""Figures of merit over what was touched: a surface is judged within reach of the contacts, nowhere else.
+"""Figures over the touched part of a surface: it is evaluated only near the contacts.
 
-A place counts if a contact lies within :data:`REACH_m` of it that does not face the other way, as the outside of a cup
-does for its inside. What faces the table does not count: no finger comes there.
+A point counts if there is a contact within :data:`REACH_m` that does not face the opposite way (so the outside of a cup
+does not count for its inside). What faces the table does not count, since no finger can reach it.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ class TouchedObject:
 
 
 def touched_figures(data: Touched, result: SlamResult) -> dict[str, Any]:
-    """Of a run on the table: Hausdorff and mean distance after the best fit of the touched parts, and what of the
-    estimate's touched part is within two sigma; the share of the true surface that was touched.
+    """Figures of a run on the table: Hausdorff and mean distance after the best fit of the touched parts, the share of
+    the estimate's touched part within two sigma, and the share of the true surface that was touched.
     """
     estimate, field = result.mesh, result.surface
     if estimate is None or field is None:
@@ -85,27 +85,27 @@ def touched_figures(data: Touched, result: SlamResult) -> dict[str, Any]:
 
 
 class _Contacts:
-    """Contacts in a surface's frame: places and outward normals, each of shape (n, 3)."""
+    """Contacts in a surface's frame: points and outward normals, each of shape (n, 3)."""
 
     def __init__(self, points_m: Array, normals: Array) -> None:
         self._points_m, self._normals = points_m, normals
         self._tree = cKDTree(points_m)
 
     def near(self, points_m: Array, normals: Array) -> NDArray[np.bool_]:
-        """Whether places with outward normals, shapes (q, 3), count."""
+        """Whether points with outward normals, shapes (q, 3), count."""
         found = self._tree.query_ball_point(points_m, REACH_m)
         pairs = zip(found, normals, strict=True)
         faced = [bool(rows) and (self._normals[rows] @ way).max() > _FACING_AWAY for rows, way in pairs]
         return np.array(faced, dtype=bool) & (normals[:, 2] > _UNDERSIDE)
 
     def part_of(self, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-        """The triangles of a mesh that count, by their middles."""
+        """The triangles of a mesh that count, judged by their centres."""
         kept = self.near(mesh.triangles_center, mesh.face_normals)
         return trimesh.Trimesh(mesh.vertices, mesh.faces[kept], process=False)
 
 
 def _true_contacts(data: Touched) -> _Contacts:
-    """Where the contacts were measured, by the true poses."""
+    """The measured contacts, placed by the true poses."""
     pairs = [(pose.inverse(), grasp) for pose, grasp in zip(data.world_T_body, data.grasps, strict=True)]
     pairs = [(pose, grasp) for pose, grasp in pairs if grasp.contacts]
     points = [transform_points(pose, grasp.points_world_m) for pose, grasp in pairs]
@@ -114,7 +114,7 @@ def _true_contacts(data: Touched) -> _Contacts:
 
 
 def _divided(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """The same surface in triangles small enough to be judged by their middles."""
+    """The same surface in triangles small enough to be judged by their centres."""
     vertices, faces = trimesh.remesh.subdivide_to_size(  # type: ignore[no-untyped-call]
         mesh.vertices, mesh.faces, _LARGEST_EDGE_m, max_iter=12
     )

@@ -10,11 +10,10 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from drivers.core.contacts import Array
-from drivers.core.errors import ShapeError
 from drivers.core.poses import spatial, transform_points
 from sessions.recording.manifest import Manifest
 from sessions.recording.session import Session
-from tactile_lab.evaluation.files.mesh_io import read_mesh
+from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 from tactile_lab.evaluation.files.plain import read_json_object
 from tactile_lab.evaluation.files.results import Results, read_results
 from tactile_lab.evaluation.files.tables import read_contour
@@ -98,14 +97,7 @@ def read_surface(path: Path) -> Surface:
     Raises:
         ShapeError: not a mesh written by this program.
     """
-    mesh = read_mesh(path)
-    written = mesh.metadata["_ply_raw"]["vertex"]["data"]  # reading merges equal vertices and drops their properties
-    if "sigma_m" not in (written.dtype.names or ()):
-        raise ShapeError(
-            "contains no standard deviations", where=str(path), hint="Replay the session to renew its results"
-        )
-    _, nearest = cKDTree(np.column_stack([written[axis] for axis in "xyz"])).query(mesh.vertices)
-    sigma_m = np.asarray(written["sigma_m"], dtype=float)[nearest]
+    mesh, sigma_m = read_estimated_mesh(path)
     return Surface(np.asarray(mesh.vertices), np.asarray(mesh.faces), sigma_m, np.asarray(mesh.vertex_normals))
 
 

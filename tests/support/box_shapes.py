@@ -1,4 +1,4 @@
-"""A box of 10 x 6 cm as a session knows it when it has been touched all around: as a contour, and as a solid."""
+"""A box of 10 x 6 cm as a session knows it after contacts all around: as a contour, and as a solid."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def solid_contacts(
 
 
 def solid_box(height_m: float = 0.04, half_x_m: float = 0.05, half_y_m: float = 0.03) -> KnownShape:
-    """Touched there, as its field has it."""
+    """The solid shape of the box from these contacts."""
     field = Gpis.fit(*solid_contacts(height_m, half_x_m, half_y_m), 0.001, 0.05)
     return known_shape(field, 3, 0.0, ExplorationSettings())
 

@@ -1,4 +1,4 @@
-"""A headless Chromium, driven through its DevTools protocol: what a person sees and presses in a page."""
+"""A headless Chromium controlled through its DevTools protocol, to read and press what a person sees in a page."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _SWITCHES = (
 
 
 def chromium() -> str | None:
-    """The browser's path; None where there is none."""
+    """Path of the browser; None if there is none."""
     return next((path for name in PROGRAMS if (path := shutil.which(name))), None)
 
 
 def until(true: Callable[[], Any], what: str, patience_s: float = PATIENCE_s) -> Any:
-    """Wait until something is true, and give it. Raises AssertionError when it stays away."""
+    """Wait until something is true, and return it. Raises AssertionError after too long a time."""
     give_up = time.monotonic() + patience_s
     while not (found := true()):
         assert time.monotonic() < give_up, f"waited in vain for {what}"
@@ -46,7 +46,7 @@ class Browser:
 
     Args:
         program: see :func:`chromium`.
-        url: of the page.
+        url: address of the page.
         profile: an empty folder.
     """
 
@@ -79,7 +79,7 @@ class Browser:
         self._process.wait(PATIENCE_s)
 
     def do(self, method: str, **parameters: Any) -> Any:
-        """One order of the protocol; gives its result. Raises AssertionError when the browser refuses it."""
+        """Send one command of the protocol; returns its result. Raises AssertionError if the browser refuses it."""
         assert self._socket is not None
         self._number += 1
         self._socket.send(json.dumps({"id": self._number, "method": method, "params": parameters}))
@@ -90,20 +90,20 @@ class Browser:
                 return answer["result"]
 
     def evaluate(self, script: str) -> Any:
-        """The value of a script in the page."""
+        """The value of a script that is run in the page."""
         return self.do("Runtime.evaluate", expression=script, returnByValue=True)["result"].get("value")
 
     def press(self, label: str) -> None:
-        """Press the button with this label, once it is there."""
+        """Press the button with this label, as soon as it exists."""
         find = f"[...document.querySelectorAll('button')].find(one => one.innerText.trim() === {json.dumps(label)})"
         until(lambda: self.evaluate(f"!!{find}"), f"the button {label}")
         self.evaluate(f"{find}.click()")
 
     def write(self, text: str) -> None:
-        """Write into the page's empty field for text, as from a keyboard, and stop for as long as a hand takes.
+        """Type into the page's empty text field, as from a keyboard, and pause as long as a person would.
 
-        The page sends what is written or pressed at most every 50 ms, and of several only the last. Its own clock
-        tells when that is past, however busy the computer is.
+        The page sends input at most every 50 ms, and only the last of several. Its own clock tells when this time is
+        over, however busy the computer is.
         """
         find = "[...document.querySelectorAll('input:not([type])')].find(one => !one.value && !one.readOnly)"
         self.evaluate(f"{find}.focus()")

@@ -1,6 +1,6 @@
-"""A world without physics for the conductor: a disc on the table, fingers that are where they are told to be.
+"""A world without physics for the conductor: a disc on the table, and fingers that reach their targets at once.
 
-Tips touch by penetration: 500 N/m. A held disc goes with the palm, a released one stays.
+Contact forces follow from penetration: 500 N/m. A held disc moves with the palm; a released one stays.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ HIGH_ABOVE = np.array([-0.35, 0.0, 0.45, 0.0, 0.0, 0.0])
 
 @dataclass
 class Disc:
-    """An upright disc: centre on the table (2,), radius, height, and its turn as it was carried."""
+    """An upright disc: centre on the table (2,), radius, height, and its rotation while carried."""
 
     centre_m: Array
     radius_m: float = 0.035
@@ -56,14 +56,14 @@ class BaseState:
 
 
 class DiscTip:
-    """A fingertip that feels the disc."""
+    """A fingertip that measures the contact with the disc."""
 
     def __init__(self, finger: str, world: DiscWorld) -> None:
         self.finger, self._world = finger, world
         self.tares = 0
 
     def update(self, samples: object) -> None:
-        """The world knows already."""
+        """Do nothing: the world already has the state."""
 
     def tare(self, world_R_distal: Array, *, reason: str = "") -> None:
         self.tares += 1
@@ -75,7 +75,7 @@ class DiscTip:
         return ""
 
     def begin_capture(self) -> None:
-        """Nothing is gathered."""
+        """Do nothing: no samples are averaged."""
 
     def contact(self, world_R_distal: Array) -> TipContact | None:
         load_N = self._world.load_N(self.finger)
@@ -91,7 +91,7 @@ class DiscTip:
 
 
 class Mover:
-    """The hand or the positioner: takes targets, counts stops and what takes them back."""
+    """The hand or the positioner: takes targets, and counts stops and resumes."""
 
     def __init__(self, take: Callable[[object], None]) -> None:
         self._take, self.stops, self.resumes = take, 0, 0
@@ -110,7 +110,7 @@ class Mover:
 
 
 class DiscWorld:
-    """Looks like a rig runtime to the conductor.
+    """Has the interface of a rig runtime, for the conductor.
 
     Args:
         disc: the object; None for an empty table.
@@ -137,7 +137,7 @@ class DiscWorld:
         )
         self.cycle()
 
-    # --- what moves --------------------------------------------------------------------------------------------
+    # --- motion --------------------------------------------------------------------------------------------
 
     def _move_fingers(self, targets_rad: object) -> None:
         assert isinstance(targets_rad, dict)
@@ -170,13 +170,13 @@ class DiscWorld:
         self.disc.centre_m = np.asarray(motion.transformFrom(np.array([*self.disc.centre_m, 0.0])))[:2]
         self._held_from = palm
 
-    # --- what touches ------------------------------------------------------------------------------------------
+    # --- contact ------------------------------------------------------------------------------------------
 
     def _tip_m(self, finger: str) -> Array:
         return np.asarray(self.perception.world_T_distal[finger].transformFrom(TIP_CENTRE_m))
 
     def outward(self, finger: str) -> Array:
-        """Out of the disc toward a tip, world frame, shape (3,)."""
+        """Direction out of the disc toward a tip, world frame, shape (3,)."""
         assert self.disc is not None
         aside_m, above_m = self._depths_m(finger)
         if above_m < aside_m:
@@ -191,13 +191,14 @@ class DiscWorld:
         return STIFFNESS_N_m * max(0.0, min(self._depths_m(finger)))
 
     def _depths_m(self, finger: str) -> tuple[float, float]:
-        """How deep a tip is in the disc: from its side, and from its top."""
+        """Penetration of a tip into the disc: from the side, and from the top."""
         assert self.disc is not None
         tip_m = self._tip_m(finger)
         aside_m = self.disc.radius_m + TIP_RADIUS_m - float(np.linalg.norm(tip_m[:2] - self.disc.centre_m))
         return aside_m, self.disc.height_m + TIP_RADIUS_m - float(tip_m[2])
 
-    # --- marks -------------------------------------------------------------------------------------------------
+    # --- session events
+    # -------------------------------------------------------------------------------------------------
 
     def _mark(self, kind: EventKind, fingers: tuple[str, ...] = FINGERS) -> object:
         self.session_events.append(kind)
@@ -258,5 +259,5 @@ class DiscWorld:
 
     @property
     def event_counts(self) -> Counter[EventKind]:
-        """How often each kind of mark was set."""
+        """How often each kind of session event was recorded."""
         return Counter(self.session_events)

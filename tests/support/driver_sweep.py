@@ -1,13 +1,13 @@
-"""Every fault of a wire against a driver: a new driver gets these tests by subclassing :class:`DriverSweep`.
+"""Runs every wire fault against a driver; a new driver gets these tests by subclassing :class:`DriverSweep`.
 
     class TestTheBoxDriver(DriverSweep):
         layout = MessageLayout(...)
         def rig runtime(self) -> SweptBench: ...
 
-Each fault is injected into an otherwise healthy stream. The driver must count it (its health gains words), or stop in
-order (an error of ours that names the transport and says what to do), and it must be connectable again afterwards.
-Faults that a protocol cannot show are named in ``blind`` with the reason, those that must do no harm at all in
-``harmless``, and those by which the driver may end in ``stops``.
+Each fault is injected into an otherwise healthy stream. The driver must either report it in its health, or stop with a
+proper error that names the transport and says what to do. Afterwards it must be possible to connect it again. Faults
+that a protocol cannot reveal are listed in ``blind`` with the reason, harmless ones in ``harmless``, and those that may
+stop the driver in ``stops``.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ STEP_ns = 10_000_000
 
 
 class SweptDriver(Protocol):
-    """What the sweep needs of a driver."""
+    """The driver interface that the sweep needs."""
 
     def connect(self) -> None: ...
     def close(self) -> None: ...
@@ -36,20 +36,20 @@ class SweptDriver(Protocol):
 
 
 def _nothing() -> None:
-    """Nothing to repair."""
+    """Do nothing: there is nothing to repair."""
 
 
 @dataclass
 class SweptBench:
-    """One driver on one in-memory device.
+    """One driver with one device in memory.
 
     Attributes:
         transport: to the device, without faults.
-        clock: of both.
+        clock: clock of both.
         build: makes the driver on a transport.
-        step: lets the device send its next message, or do whatever it does in one cycle.
-        use: lets the driver take what has arrived and gives what it made of it.
-        repair: makes the device whole again after a fault of its own.
+        step: lets the device send its next message, or do the work of one cycle.
+        use: lets the driver process what has arrived, and returns the result.
+        repair: repairs the device after one of its own faults.
     """
 
     transport: Transport
@@ -62,7 +62,9 @@ class SweptBench:
 
 @dataclass
 class Outcome:
-    """What came of one run: the health's words, by what they are without figures; why it ended; samples taken."""
+    """The outcome of one run: messages of its health, by their text without numbers; why it ended; number of
+    samples.
+    """
 
     words: dict[str, str]
     stopped: TactileLabError | None
@@ -89,7 +91,7 @@ def run(runtime: SweptBench, driver: SweptDriver) -> Outcome:
 
 
 class DriverSweep:
-    """Base of the sweep tests of one driver."""
+    """Base class of the sweep tests of one driver."""
 
     layout: ClassVar[MessageLayout]
     blind: ClassVar[dict[str, str]] = {}
@@ -119,18 +121,18 @@ class DriverSweep:
         return sorted([*standard_faults(cls.layout), *cls.far_end])
 
     def runtime(self) -> SweptBench:
-        """A fresh driver's rig runtime."""
+        """A new driver with its device."""
         raise NotImplementedError
 
     def fault(self, name: str, transport: Transport) -> tuple[Fault, When]:
-        """A fresh fault and when it strikes."""
+        """A new fault, and when it strikes."""
         if name not in self.far_end:
             return standard_faults(self.layout)[name]
         assert isinstance(transport, Injectable)
         return FarEnd(name, transport), When()
 
     def sweep(self, fault_name: str, record_property: Callable[[str, object], None]) -> None:
-        """Inject one fault and judge what the driver made of it."""
+        """Inject one fault and check the driver's reaction."""
         runtime = self.runtime()
         healthy = runtime.build(runtime.transport)
         healthy.connect()
@@ -158,7 +160,7 @@ class DriverSweep:
         self._works_again(runtime, driver)
 
     def connect_under(self, fault_name: str) -> None:
-        """Inject one fault from the first message on: the driver connects all the same, or says why not."""
+        """Inject one fault from the first message on: the driver must connect nevertheless, or say why it cannot."""
         runtime = self.runtime()
         fault, when = self.fault(fault_name, runtime.transport)
         transport = FaultyTransport(runtime.transport, fault, replace(when, first=0))
@@ -188,7 +190,7 @@ class DriverSweep:
 
     @staticmethod
     def _works_again(runtime: SweptBench, driver: SweptDriver) -> None:
-        """After closing, and with the wire plugged in again, the same driver connects and takes samples."""
+        """Check that after closing, with the wire plugged in again, the same driver connects and receives samples."""
         driver.connect()
         runtime.clock.sleep_until_ns(runtime.clock.now_ns() + STEP_ns)
         for _ in range(20):

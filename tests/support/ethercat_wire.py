@@ -20,7 +20,7 @@ JOINTS = Path(rigs.__file__).parent / "calibrations" / "simulated-hand" / "joint
 
 @contextmanager
 def cable(tag: str = "") -> Iterator[tuple[str, str]]:
-    """Names of the two ends; the test skips, with the reason, where none can be made."""
+    """Names of the two ends; the test is skipped, with the reason, if no cable can be created."""
     if shutil.which("ip") is None:
         pytest.skip("no ip command to make virtual interfaces with")
     ends = f"tlm{tag}{os.getpid()}", f"tls{tag}{os.getpid()}"

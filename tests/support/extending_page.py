@@ -1,4 +1,4 @@
-"""The code and the rig keys of ``docs/extending.md``, as they stand there."""
+"""The code and the rig keys of ``docs/extending.md``, read from the page."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
 
 
 def code(file: str) -> str:
-    """The page's block of code that begins with the name of this file."""
+    """The page's block of code that starts with the name of this file."""
     blocks = re.findall(r"^```python\n(# (\S+)\n.*?)^```$", PAGE.read_text(), re.MULTILINE | re.DOTALL)
     return next(text for text, name in blocks if name == file)
 

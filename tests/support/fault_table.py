@@ -1,4 +1,4 @@
-"""The sweep of all faults over all drivers, as a table of injected against counted.
+"""The sweep of all faults over all drivers, as a table of injected faults and the drivers' reactions.
 
 python -m tests.support.fault_table --store
 """
@@ -35,12 +35,12 @@ def sweeps() -> Iterator[type[DriverSweep]]:
 
 
 def driver(sweep: type[DriverSweep]) -> str:
-    """Name of the driver that is swept."""
+    """Name of the tested driver."""
     return sweep.__name__.removeprefix("Test")
 
 
 def rows(sweep: type[DriverSweep]) -> Iterator[tuple[Key, tuple[str, str]]]:
-    """Driver and fault, with how often it was injected and what the driver made of it."""
+    """Driver and fault, how often it was injected, and the driver's reaction."""
     for name in sweep.fault_names():
         noted: dict[str, object] = {}
         sweep().sweep(name, noted.__setitem__)
@@ -50,7 +50,7 @@ def rows(sweep: type[DriverSweep]) -> Iterator[tuple[Key, tuple[str, str]]]:
 
 
 def main() -> None:
-    """Print the table, and store it row by row where that is asked for."""
+    """Print the table, and store it row by row if requested."""
     chosen, swept = parser(__doc__).parse_args(), list(sweeps())
     order = [(driver(sweep), name) for sweep in swept for name in sweep.fault_names()]
     table = GrowingTable(chosen.docs, OUTLINE, order)

@@ -1,8 +1,8 @@
-"""One wrong byte anywhere in a recording: what is lost, and whether it is told truly.
+"""Changes one byte anywhere in a recording: what is lost, and is the loss reported correctly?
 
     python -m tests.support.flipped_bytes --places 2000
 
-Prints a line of figures. The recording has several chunks, topics, an attachment, and comes whole or torn.
+Prints a line of figures. The recording has several chunks and topics and an attachment, and is whole or truncated.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ _STEP_ns = 3_000_000
 
 @dataclass(frozen=True)
 class Recording:
-    """A recording, and the truth about it.
+    """A recording with its true contents.
 
     Attributes:
         content: its bytes.
         topics: of each message, by its number.
         chunks: the chunk of each message.
-        spans: where each chunk stands, with its indices.
+        spans: position of each chunk, including its indices.
     """
 
     content: bytes
@@ -47,12 +47,12 @@ class Recording:
     spans: list[tuple[int, int]]
 
     def chunk_at(self, place: int) -> int | None:
-        """The chunk that a byte belongs to."""
+        """The chunk to which a byte belongs."""
         return next((number for number, (start, end) in enumerate(self.spans) if start <= place < end), None)
 
 
 def make_recording(folder: Path, count: int = 400, *, whole: bool = True) -> Recording:
-    """Numbered messages on three topics, in chunks of 80 ms; torn in the last of them unless ``whole``."""
+    """Numbered messages on three topics, in chunks of 80 ms; truncated in the last chunk unless ``whole``."""
     path, random = folder / "made.mcap", np.random.default_rng(1)
     attached = (Attached("calibration/joints.yaml", "application/yaml", b"a: 1\n" * 20),)
     writer = TrafficWriter(path, {"session": "s"}, attachments=attached, settings=TrafficSettings(tell_streams=False))
@@ -87,12 +87,12 @@ def read_flipped(made: Recording, place: int, by: int, path: Path) -> tuple[set[
     """Flip a byte, read, and compare.
 
     Args:
-        place: of the byte.
-        by: its bits that change.
-        path: of a file to use.
+        place: position of the byte.
+        by: its bits to change.
+        path: path of a file to use.
 
     Returns:
-        the numbers of the messages lost, and what was told wrongly; "" when all was true.
+        The numbers of the lost messages, and what was reported wrongly; "" if all was correct.
     """
     changed = bytearray(made.content)
     changed[place] ^= by
@@ -115,7 +115,7 @@ def read_flipped(made: Recording, place: int, by: int, path: Path) -> tuple[set[
 
 
 def main() -> None:
-    """Flip bytes at random places of a whole and of a torn recording."""
+    """Change bytes at random places of a whole and of a truncated recording."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--places", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)

@@ -3,7 +3,7 @@
     python -m tests.support.fuzz --count 1000000 --seed 1 --store
 
 Half of the inputs are random, every other one of these as long as a valid message; half are valid messages with bytes
-changed, cut, added or repeated. A codec is added by a line in :data:`CODECS`.
+changed, cut, added or repeated. To add a codec, add a line to :data:`CODECS`.
 """
 
 from __future__ import annotations

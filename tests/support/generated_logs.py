@@ -1,4 +1,4 @@
-"""Contact logs that nobody would record but that fit the form: few or doubled contacts, far origins, wild motions."""
+"""Unusual but valid contact logs: few or duplicated contacts, distant origins, large motions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _offsets = st.sampled_from([0.0, 1e-12, 0.01, -0.05, 0.3])
 
 @st.composite
 def _motion(draw: st.DrawFn, centre_m: tuple[float, float]) -> list[list[float]]:
-    """A motion that turns about a centre, and shifts."""
+    """A motion with a rotation about a centre, and a translation."""
     turn = draw(_angles)
     c, s = np.cos(turn), np.sin(turn)
     x, y = centre_m
@@ -37,7 +37,7 @@ def _motion(draw: st.DrawFn, centre_m: tuple[float, float]) -> list[list[float]]
 
 @st.composite
 def _grasp(draw: st.DrawFn, dimension: int, origin_m: tuple[float, float]) -> dict[str, Any]:
-    """A sound grasp with some of its contacts left out, doubled, moved or turned."""
+    """A normal grasp with some of its contacts left out, duplicated, moved or rotated."""
     contacts = []
     source = draw(st.sampled_from(_SOUND.grasps))
     chosen = draw(st.lists(st.sampled_from(source.contacts), max_size=5))
@@ -75,7 +75,7 @@ def _grasp(draw: st.DrawFn, dimension: int, origin_m: tuple[float, float]) -> di
 
 @st.composite
 def logs(draw: st.DrawFn) -> dict[str, Any]:
-    """Documents of the form ``tactile-contacts/1`` that pass its checks, most of them."""
+    """Documents of the form ``tactile-contacts/1``, most of which pass its checks."""
     dimension = draw(st.sampled_from([2, 2, 3]))
     origin_m = draw(st.sampled_from([(0.0, 0.0), (0.0, 0.0), (99.0, -98.0)]))
     outline = draw(st.sampled_from([None, _SOUND.outline_m.tolist(), [[0, 0], [0.01, 0], [0.01, 1e-4]]]))

@@ -1,4 +1,4 @@
-"""``tactile-lab`` with a cable that a test can pull: while the file named first exists, one fingertip is unplugged."""
+"""``tactile-lab`` with a cable that a test can unplug: while the file given first exists, a fingertip is unplugged."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LINK = "ft/MF"
 
 
 class PullableWorld(SimulatedWorld):
-    """A simulated world that looks at the file before it moves on."""
+    """A simulated world that checks for the file before it advances."""
 
     cable = Path()
 

@@ -1,4 +1,4 @@
-"""Every fault of a hand in motion, as a table: how soon its demands are gone, how soon it is still, what is told.
+"""All faults of a moving hand, as a table: time until demands are zero and joints are still, and the hand's message.
 
 python -m tests.support.hand_fault_table --store
 """
@@ -21,7 +21,7 @@ OUTLINE = Outline(
 
 
 def main() -> None:
-    """Print the table, and store it row by row where that is asked for."""
+    """Print the table, and store it row by row if requested."""
     chosen = parser(__doc__).parse_args()
     table = GrowingTable(chosen.docs, OUTLINE, [(name,) for name in FAULTS])
     for name, fault in FAULTS.items():

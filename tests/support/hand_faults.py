@@ -1,4 +1,4 @@
-"""Faults of a hand in motion, injected one by one: how soon its demands are gone, how soon it is still, what is told.
+"""Injects faults into a moving hand: time until demands are zero and joints are still, and the hand's message.
 
 The emulated hand and both its slaves are in this process, on virtual time.
 """
@@ -37,7 +37,7 @@ _LASTS_s = 3.5
 
 
 class DrivenHand:
-    """A hand whose every joint is on its way, with all its parts in reach."""
+    """A hand with all joints in motion, and with access to all its parts."""
 
     def __init__(self) -> None:
         self.clock = VirtualClock()
@@ -53,7 +53,7 @@ class DrivenHand:
         self._angle, self._direction = 0.0, 1
 
     def cycle(self) -> None:
-        """One cycle on the way to and fro: slower than the joints can, so that there is always a demand."""
+        """One cycle of a motion back and forth, slower than the joints could move, so that there is always a demand."""
         self.clock.sleep_until_ns(self.clock.now_ns() + round(CYCLE_s * NANOSECONDS))
         self.far.ring.work()
         self._angle += 0.008 * self._direction
@@ -64,7 +64,7 @@ class DrivenHand:
 
     @property
     def pushed_s(self) -> float:
-        """How long FFJ3 has been told at least the demand with which it has to move, seconds."""
+        """How long FFJ3 has had at least the demand at which it must move, seconds."""
         return (self.clock.now_ns() - self._eased_ns) / NANOSECONDS
 
     def _note(self, payload: bytes) -> None:
@@ -76,13 +76,13 @@ class DrivenHand:
 
 @dataclass(frozen=True)
 class HandFault:
-    """Something that goes wrong.
+    """A fault.
 
     Attributes:
-        inject: lets it happen.
-        seen: whether the hand can know of it by now: from what it has heard, and the seconds since.
-        told: what the hand says then; "" where it goes on.
-        lasts_s: how long, where it ends.
+        inject: causes it.
+        seen: whether the hand can know of it by now, given the received statuses and the seconds since the fault.
+        told: the hand's message then; "" if it goes on.
+        lasts_s: its duration, if it ends.
         repair: ends it.
     """
 
@@ -95,14 +95,14 @@ class HandFault:
 
 @dataclass
 class FaultOutcome:
-    """What came of one.
+    """The outcome of a fault.
 
     Attributes:
-        seen_s: when the hand could know of it, after it happened.
+        seen_s: time from the fault until the hand could know of it.
         driven_cycles: cycles with any demand above zero after that.
-        still_cycles: cycles until the last joint stood still after that.
-        told: the hand's words; "" where it has none.
-        goes_on: it moved again by itself when the fault was over.
+        still_cycles: cycles after that until the last joint stood still.
+        told: the hand's message; "" if there is none.
+        goes_on: whether it moved again by itself after the fault.
     """
 
     seen_s: float = 0.0
@@ -191,7 +191,7 @@ FAULTS: dict[str, HandFault] = {
 
 
 def run_fault(fault: HandFault) -> FaultOutcome:
-    """Let a fault happen to a moving hand, and see what comes of it until it is over, or within some seconds."""
+    """Inject a fault into a moving hand, and observe it until the fault is over, or for some seconds."""
     hand, outcome = DrivenHand(), FaultOutcome()
     for _ in range(_WARM_UP):
         hand.cycle()

@@ -1,4 +1,4 @@
-"""Programs that heed Ctrl+C although the tests themselves were started in the background.
+"""Programs that react to Ctrl+C even if the tests themselves were started in the background.
 
 A shell without job control lets its background jobs ignore the signal, and everything they start inherits that.
 """
@@ -11,5 +11,5 @@ _HEED = "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); o
 
 
 def interruptible(words: list[str]) -> list[str]:
-    """The words of a command, its program by its full path, that ends when it is interrupted."""
+    """The words of a command that ends when it is interrupted; its program must be given by its full path."""
     return [sys.executable, "-c", _HEED, *words]

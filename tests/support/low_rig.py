@@ -1,4 +1,4 @@
-"""The shipped simulated rig for sessions of tests on low objects: without the search for the object's top."""
+"""The packaged simulated rig for test sessions on low objects, without the search for the object's top."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ SHIPPED = Path(rigs.__file__).parent
 
 
 def low_rig(folder: Path, *keys: dict[str, Any]) -> Path:
-    """A rig file in ``folder``, with further keys; lists and mappings are joined.
+    """Write a rig file into ``folder``, with further keys; lists and mappings are merged.
 
-    A session begins with its first grasp, as on a rig that knows its objects to be low.
+    A session starts with its first grasp, as on a rig whose objects are known to be low.
     """
     content = yaml.safe_load((SHIPPED / "sim.yaml").read_text())
     content["calibration"] = {role: str(SHIPPED / file) for role, file in content["calibration"].items()}

@@ -12,7 +12,7 @@ class Ring(Protocol):
     """Slaves that a frame runs through."""
 
     def process(self, frame: bytes) -> list[bytes]:
-        """What comes back when a frame is sent: usually that frame, nothing when it got lost."""
+        """The frames that come back when one is sent: usually just that frame, none if it was lost."""
 
 
 class MemoryPort:

@@ -20,11 +20,11 @@ OUTLINE = Outline(
     ("Package", "Files", "Lines", "Lines run, %", "Branches", "Branches run, %"),
 )
 PARTED = "tactile_lab"
-"""This package is told by its parts."""
+"""This package is shown by its parts."""
 
 
 def package_of(path: str) -> str:
-    """The package that a file counts to."""
+    """The package to which a file belongs."""
     first, *rest = Path(path).parts
     return f"{first}.{rest[0]}" if first == PARTED and len(rest) > 1 else first
 
@@ -50,7 +50,7 @@ def _share(part: int, whole: int) -> str:
 
 
 def main() -> None:
-    """Print the table, and store it where that is asked for."""
+    """Print the table, and store it if requested."""
     options = parser(__doc__)
     options.add_argument("report", type=Path)
     chosen = options.parse_args()

@@ -8,7 +8,7 @@ from pathlib import Path
 import grimp
 
 PACKAGES = ("tactile_lab", "sessions", "calibration", "drivers")
-"""From the top: each imports only those below it."""
+"""From top to bottom: each imports only those below it."""
 REPOSITORY = Path(__file__).resolve().parents[2]
 PICTURE = REPOSITORY / "docs" / "pictures" / "packages.svg"
 
@@ -16,7 +16,7 @@ _WIDTH, _MARGIN, _BOX, _CHIP, _ARROWS = 920, 20, 150, (122, 34), 250
 
 
 def import_counts() -> Counter[tuple[str, str]]:
-    """How many files of one package import files of another, by (importer, imported)."""
+    """Number of imports from one package to another, by (importer, imported)."""
     graph = grimp.build_graph(*PACKAGES, cache_dir=None)
     found = ((module, other) for module in graph.modules for other in graph.find_modules_directly_imported_by(module))
     packages = ((module.partition(".")[0], other.partition(".")[0]) for module, other in found)
@@ -24,13 +24,13 @@ def import_counts() -> Counter[tuple[str, str]]:
 
 
 def folders(package: str) -> list[tuple[str, int]]:
-    """Folders of a package with the number of files in and below each."""
+    """Folders of a package, with the number of files in and below each."""
     inside = sorted(path for path in (REPOSITORY / package).iterdir() if (path / "__init__.py").is_file())
     return [(path.name, sum(1 for _ in path.rglob("*.py"))) for path in inside]
 
 
 def svg() -> str:
-    """The picture: a box a package, a chip a folder, and beside them how many imports go from box to box."""
+    """The picture: a box per package, a chip per folder, and arrows with the number of imports between packages."""
     counts = import_counts()
     boxes = "".join(_box(index, package) for index, package in enumerate(PACKAGES))
     arrows = "".join(_arrow(number, pair, counts[pair]) for number, pair in enumerate(sorted(counts, key=_order)))

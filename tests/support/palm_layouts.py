@@ -1,4 +1,4 @@
-"""Layouts of the 0220 palm's process image as the vendor's header declares them, apart from the codec's own."""
+"""Layouts of the 0220 palm's process image as the vendor's header declares them, independent of the codec's own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Questions to a session's service that tests ask; its own process finds them here by name."""
+"""Requests of tests to a session's estimator service, whose process imports them from here by name."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ from tactile_lab.slam.tactile_slam import TactileSlam
 
 @dataclass
 class Counting:
-    """Stands in for a service: it counts what it was asked."""
+    """Replaces a service: it counts its requests."""
 
     slam: TactileSlam
     asked: int = 0
 
 
 def counted(service: Counting, after_s: float = 0.0) -> int:
-    """How many such questions there have been, answered after a while."""
+    """The number of such requests so far, answered after a while."""
     time.sleep(after_s)
     service.asked += 1
     return service.asked
 
 
 def stumbled(service: SlamService) -> None:
-    """Fails for a reason nobody foresaw."""
+    """Fails for an unforeseen reason."""
     raise ZeroDivisionError("a bug")
 
 
 def refused(service: SlamService) -> None:
-    """Fails as the program says it may."""
+    """Fails with one of the program's own errors."""
     raise ShapeError("it has a hole", where="mesh", hint="Mend it")
 
 
 def algebra_threads(service: SlamService) -> list[int]:
-    """Of the libraries of linear algebra."""
+    """Numbers of threads of the linear algebra libraries."""
     return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
 
 
 class StumblingSlam(TactileSlam):
-    """Fails in its second step."""
+    """An estimator that fails in its second step."""
 
     def add_grasp(self, grasp: Grasp) -> SlamStep:
         if self.step_count == 1:

@@ -1,4 +1,4 @@
-"""A rectangle of 10 x 6 cm touched all over, or on a part of it, and candidates around it."""
+"""A rectangle of 10 x 6 cm with contacts all over or on a part of it, and candidates around it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OUTLINE_m = OUTLINES_m["rectangle"]
 
 
 def contacts_every(step_m: float) -> tuple[Array, Array]:
-    """Points and normals all along the outline, corners left out."""
+    """Points and normals all along the outline, without the corners."""
     points = sample_polygon(OUTLINE_m, step_m)
     points = points[np.linalg.norm(points[:, None] - OUTLINE_m, axis=-1).min(axis=1) > 0.004]
     middles = (OUTLINE_m + np.roll(OUTLINE_m, -1, axis=0)) / 2
@@ -30,21 +30,21 @@ def contacts_every(step_m: float) -> tuple[Array, Array]:
 
 
 def belief_of_right_end_unknown(world_T_object: Pose2 | None = None, step_m: float = 0.008) -> Belief:
-    """Contacts on all sides but the right end (x > 20 mm), which only one contact far out tells of."""
+    """Contacts on all sides but the right end (x > 20 mm), where there is only one contact far out."""
     points, normals = contacts_every(step_m)
     known = (points[:, 0] < 0.02) | ((points[:, 0] > 0.049) & (np.abs(points[:, 1]) < 0.005))
     return belief_of(points[known], normals[known], world_T_object)
 
 
 def belief_of(points: Array, normals: Array, world_T_object: Pose2 | None = None) -> Belief:
-    """A belief about contacts in the object frame; those furthest to the left are the latest grasp's."""
+    """A belief with contacts in the object frame; the leftmost ones belong to the latest grasp."""
     known = ExploredMap.of(points, normals)
     indices = (points[:, 0] < -0.045).astype(np.int64)
     return Belief(known.field, known.surface, points, normals, indices, world_T_object or Pose2())
 
 
 def uncertain(belief: Belief, sigmas: Array, count: int = 400) -> Belief:
-    """The same with particles spread about the pose."""
+    """The same belief with particles spread about the pose."""
     rng = np.random.default_rng(3)
     pose = belief.world_T_object
     rows = np.array([pose.x(), pose.y(), pose.theta()]) + rng.normal(size=(count, 3)) * sigmas
@@ -57,5 +57,5 @@ def ten(world_T_object: Pose2 | None = None) -> tuple[Candidate, ...]:
 
 
 def modelled(belief: Belief) -> ModelledObject:
-    """The object of a belief, as a single candidate's contacts are predicted on it."""
+    """The model of a belief's object, on which a candidate's contacts are predicted."""
     return ModelledObject(belief.field, belief.dimension, belief.world_T_object, belief.origin_height_m)

@@ -1,4 +1,4 @@
-"""Sessions of all rigs and objects of the catalogue, replayed: the same samples, the same results, and how fast.
+"""Replays sessions of all rigs and objects of the catalogue: are samples and results the same, and how fast is it?
 
 python -m tests.support.replay_table --store
 python -m tests.support.replay_table --store --rigs sim-wire --objects cylinder,sphere --grasps 1
@@ -36,7 +36,7 @@ from tests.support.stored_table import GrowingTable, Outline, parser
 Listener = Callable[[str, Any], None]
 
 _UNTRACKED = 1000
-"""Samples after which the garbage collector is told to leave alone what there is."""
+"""Number of samples after which existing objects are exempted from garbage collection."""
 RIGS = "sim,sim-biotac,sim-wire,sim-wire-biotac"
 OUTLINE = Outline(
     "replays",
@@ -54,7 +54,7 @@ OUTLINE = Outline(
 
 
 def bits(value: Any) -> bytes:
-    """Everything in a sample, as bytes."""
+    """All data in a sample, as bytes."""
     if isinstance(value, np.ndarray):
         return value.tobytes()
     if is_dataclass(value):
@@ -65,39 +65,41 @@ def bits(value: Any) -> bytes:
 
 
 class Digest:
-    """Number and digest of samples, by the order in which they were understood."""
+    """Number and digest of samples, in the order of their decoding."""
 
     def __init__(self) -> None:
         self.count, self._digest = 0, sha256()
 
     def take(self, transport: str, sample: Any) -> None:
-        """One sample of a transport."""
+        """Take one sample of a transport."""
         self.count += 1
         self._digest.update(transport.encode() + bits(sample))
 
     @property
     def value(self) -> tuple[int, str]:
-        """What two equal sequences of samples have in common."""
+        """A value that is the same for equal sequences of samples."""
         return self.count, self._digest.hexdigest()
 
 
 class Kept:
-    """The samples of a running session, digested when it is over: a session on wires has no time to spare for it.
+    """Keeps the samples of a running session and digests them at its end, since a session on wires has no time to
+    spare.
 
-    A replay's samples are digested one by one, so that a sample which changed after it was given shows as a difference.
+    A replay's samples are digested one by one, so that a sample that changed after it was returned shows as a
+    difference.
     """
 
     def __init__(self) -> None:
         self._samples: list[tuple[str, Any]] = []
 
     def take(self, transport: str, sample: Any) -> None:
-        """One sample of a transport."""
+        """Take one sample of a transport."""
         self._samples.append((transport, sample))
         if len(self._samples) % _UNTRACKED == 0:
-            gc.freeze()  # or the collector would go through all of them again and again, in the middle of a cycle
+            gc.freeze()  # otherwise the collector would visit all of them again and again, in the middle of a cycle
 
     def digested(self) -> Digest:
-        """The digest of all of them, which are let go."""
+        """The digest of all samples, which are then released."""
         gc.unfreeze()
         digest, samples, self._samples = Digest(), self._samples, []
         for transport, sample in samples:
@@ -107,7 +109,7 @@ class Kept:
 
 @contextmanager
 def listening(module: Any, take: Listener) -> Iterator[None]:
-    """Hear all samples of the interpreters that a module builds meanwhile."""
+    """Receive all samples of interpreters that a module builds within this context."""
     make = module.build_interpreter
 
     def heard(*arguments: Any) -> Interpreter:
@@ -153,7 +155,7 @@ def compare(rig: str, object_name: str, grasps: int, root: Path) -> Replayed:
 
 
 def _builder(rig: str) -> Any:
-    """The module that builds the interpreter of a running session."""
+    """The module that builds the interpreter for a running session."""
     return wired_runtime if load_rig(rig).description.wires is not None else build
 
 
@@ -170,7 +172,7 @@ def run(table: GrowingTable, rigs: list[str], objects: list[str], grasps: int) -
 
 
 def main() -> None:
-    """Print the table, and store it row by row where that is asked for."""
+    """Print the table, and store it row by row if requested."""
     options = parser(__doc__)
     options.add_argument("--rigs", default=RIGS)
     options.add_argument("--objects", default=",".join(CATALOGUE))

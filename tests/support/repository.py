@@ -1,4 +1,4 @@
-"""Where the repository lies, and its shipped rigs in it, wherever a test stands."""
+"""The path of the repository and of its packaged rigs, independent of a test's location."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A rig of fakes with protocols of its own: eight-byte floats, and fingertips that average what they are given."""
+"""A rig of fakes with a simple protocol of eight-byte floats, and fingertips that average their samples."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class CameraFakeDecoder:
 
 
 class FakeTip:
-    """Its contact lies where the mean of its samples says; it refuses a tare without samples."""
+    """Its contact is at the mean of its samples; it refuses a tare without samples."""
 
     def __init__(self, finger, force_N=0.7, fault=""):
         self.finger, self.force_N, self.fault = finger, force_N, fault
@@ -135,7 +135,7 @@ def make_interpreter(perception=None):
 
 
 class FakePeer:
-    """Answers nothing, one or two messages to a read: noise around a mean, now and then a damaged one."""
+    """Returns zero, one or two messages per read: noise around a mean, and now and then a damaged message."""
 
     def __init__(self, clock, mean, seed, *, damage=0.0, unsteady=True):
         self._clock, self.mean, self._random = clock, np.asarray(mean, dtype=float), np.random.default_rng(seed)
@@ -156,7 +156,9 @@ class FakePeer:
 
 @dataclass
 class FakeDevice:
-    """A live device: it sends, and decodes for itself what comes back; ``calls`` is shared to see the order."""
+    """A live device that sends, and decodes what comes back; ``calls`` is shared between devices to record the
+    order.
+    """
 
     name: str
     transport: object
@@ -247,7 +249,7 @@ def make_rig(recorder=None, *, seed=0, damage=0.0, unsteady=True, start_ns=0, tr
 
 
 def play_session(rig, grasps=3):
-    """Connect, tare, grasp a few times with holds and moves between, take pictures; gives the grasps."""
+    """Connect, tare, grasp a few times with holds and moves in between, take pictures; returns the grasps."""
     runtime, made = rig.runtime, []
     runtime.connect()
     runtime.run(100_000_000)
@@ -267,7 +269,7 @@ def play_session(rig, grasps=3):
 
 
 def same_grasp(one, other):
-    """Bit-equal."""
+    """Whether two grasps are equal bit by bit."""
     if (one.index, one.stamp_ns, len(one.contacts)) != (other.index, other.stamp_ns, len(other.contacts)):
         return False
     poses = [(g.world_T_palm.matrix().tobytes(), g.hand_motion_world.matrix().tobytes()) for g in (one, other)]

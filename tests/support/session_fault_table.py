@@ -1,4 +1,4 @@
-"""Every fault of a wire in the middle of a session, as a table.
+"""All wire faults in the middle of a session, as a table.
 
 python -m tests.support.session_fault_table --store
 python -m tests.support.session_fault_table --store --missing
@@ -40,7 +40,7 @@ OUTLINE = Outline(
 
 
 def cells(rig: str, transport: str, fault: str, swept: Swept) -> tuple[str, ...]:
-    """One line of the table, behind its transport and fault."""
+    """One line of the table, without its transport and fault."""
     went = f"ends after {swept.after_s:.2f} s: {swept.ended}" if swept.ended else "goes on"
     unseen = "as it ended" if swept.ended else BLIND[rig][transport].get(fault, "harmless")
     told = "; ".join(swept.told) or unseen
@@ -48,7 +48,7 @@ def cells(rig: str, transport: str, fault: str, swept: Swept) -> tuple[str, ...]
 
 
 def run(table: GrowingTable, keys: Sequence[Key]) -> None:
-    """Run sessions. Raises AssertionError for one that hung, or that left what cannot be read."""
+    """Run sessions. Raises AssertionError if one hangs, or if its recording cannot be read."""
     for rig, transport, fault in keys:
         with tempfile.TemporaryDirectory() as root:
             swept = run_with(rig, {transport: fault}, Path(root))
@@ -57,7 +57,7 @@ def run(table: GrowingTable, keys: Sequence[Key]) -> None:
 
 
 def main() -> None:
-    """Print the table, and store it row by row where that is asked for."""
+    """Print the table, and store it row by row if requested."""
     options = parser(__doc__)
     options.add_argument("--rigs", default=",".join(LAYOUTS))
     options.add_argument("--only", default="", help="Part of the link's or the fault's name.")

@@ -1,8 +1,9 @@
-"""Every fault of a wire in the middle of a session: does it end in order, or go on with the fault told and stored?
+"""Wire faults in the middle of a session: does it end properly, or go on with the fault reported and stored?
 
-A session of one grasp runs on a simulated rig, on virtual time. From the middle of the closing on, one of its
-transports has one fault (:mod:`tests.support.faults`, with the message layouts of the drivers' own sweeps). Anything
-but an error of ours is a traceback and ends the sweep; a transport that is asked too often is a session that hangs.
+A session of one grasp runs on a simulated rig, in virtual time. From the middle of the closing on, one of its
+transports has one fault (:mod:`tests.support.faults`, with the message layouts of the drivers' own sweeps). Any
+exception other than the program's own errors ends the sweep. A transport that is read too often means that the session
+hangs.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ LAYOUTS: dict[str, dict[str, MessageLayout]] = {
         "camera": TestCamera.layout,
     },
 }
-"""Rigs, their transports, and what the faults must know of the messages."""
+"""Rigs, their transports, and the message layouts that faults need."""
 
 BLIND: dict[str, dict[str, dict[str, str]]] = {
     "sim": {
@@ -62,35 +63,36 @@ BLIND: dict[str, dict[str, dict[str, str]]] = {
         "camera": TestCamera.blind,
     },
 }
-"""What the devices cannot see, and why, by rig and transport."""
+"""Faults that devices cannot detect, and why, by rig and transport."""
 
 STRIKES_AT_s = 7.0
 """When the faults strike: in a session of one grasp the fingers are closing then."""
 
 LONGEST_s = {"hand": 3.0, "base": 0.5, "ft/MF": 0.5, "camera": 1.5}
-"""From the fault to the session's end, where it ends: 2 s in which a hand may come back, ten lost cycles of the
-positioner, 0.2 s without a fingertip, a second for a picture, and the cycles that stop the hand. A finger whose angle
-seems to stand still is stopped by force."""
+"""Longest time from the fault to the session's end, if it ends: 2 s in which a hand may come back, ten lost cycles of
+the positioner, 0.2 s without a fingertip, a second for a picture, plus the cycles that stop the hand. A finger whose
+angle seems constant is stopped by its force limit.
+"""
 
 UNTIL_IT_MOVES_s = {("base", "stuck value"): 5.0}
-"""The same for what cannot be seen before the device is to move."""
+"""The same for faults that cannot be detected before the device has to move."""
 
 HANGS_AFTER = 60_000
-"""Readings of one transport; a session of one grasp needs some thousand."""
+"""Limit for the readings of one transport; a session of one grasp needs some thousand."""
 
 
 class TimedFault(FaultyTransport):
     """A fault that strikes at a time, not at a number of messages.
 
     Attributes:
-        struck_ns: when it first did.
+        struck_ns: when it first struck.
     """
 
     def __init__(self, transport: Transport, clock: Clock, fault: Fault, when: When, at_s: float) -> None:
         super().__init__(transport, fault, replace(when, first=0))
         self._clock, self._readings, self._at_ns = clock, 0, at_s * NANOSECONDS
         self.struck_ns: int | None = None
-        self.armed = isinstance(fault, CounterWrap)  # its counters run wrong from the first message on
+        self.armed = isinstance(fault, CounterWrap)  # its counters are changed from the first message on
 
     def receive(self) -> list[Datagram]:
         self._readings += 1
@@ -105,15 +107,15 @@ class TimedFault(FaultyTransport):
 
 @dataclass
 class Swept:
-    """What became of a session.
+    """The outcome of a session.
 
     Attributes:
         struck: how often the fault struck.
-        ended: why it ended, when it ended because of the fault.
-        after_s: how long after the first strike.
-        told: what its events and its record say that those of a sound session do not.
-        lost: what its record counts as lost.
-        replay: what a replay of the recording gave.
+        ended: why it ended, if it ended because of the fault.
+        after_s: time from the first strike to the end.
+        told: reports in its events and manifest that a healthy session does not have.
+        lost: losses in its manifest.
+        replay: result of replaying the recording.
     """
 
     struck: int
@@ -124,7 +126,7 @@ class Swept:
     lost: dict[str, int] = field(default_factory=dict)
 
     def check(self, transport: str, fault: str) -> None:
-        """Raises AssertionError for a session that took longer to end than its time-outs say."""
+        """Raises AssertionError if the session took longer to end than its time-outs allow."""
         assert self.struck > 0, "the fault never struck"
         longest_s = UNTIL_IT_MOVES_s.get((transport, fault), LONGEST_s[transport])
         assert not self.ended or (self.after_s is not None and self.after_s <= longest_s), self
@@ -138,17 +140,17 @@ def faults(rig: str) -> Iterator[tuple[str, str]]:
 
 
 def run_with(rig: str, faulty: dict[str, str], root: Path, at_s: float = STRIKES_AT_s) -> Swept:
-    """Run a session in which transports have faults, by name, from a time on, and look at all it left.
+    """Run a session in which transports have faults, by name, from a given time on, and check everything it recorded.
 
     Raises:
-        AssertionError: it hung, or what it left cannot be read or replayed.
+        AssertionError: it hung, or its recording cannot be read or replayed.
     """
     transports: dict[str, TimedFault] = {}
     with _faulty_world(rig, faulty, transports, at_s):
         try:
             finished = run_session(SessionRequest(rig, "box-10x6x4", root, seed=1, grasps=1), NullProgress())
             folder, outcome, error = finished.folder, finished.outcome, None
-        except TactileLabError as stopped:  # while connecting or closing: the folder says so
+        except TactileLabError as stopped:  # while connecting or closing; the folder tells
             folder, outcome, error = max(root.iterdir()), None, stopped
     session = Session.open(folder)
     assert session.manifest.status in ("closed", "failed"), session.manifest.status
@@ -170,7 +172,7 @@ def run_with(rig: str, faulty: dict[str, str], root: Path, at_s: float = STRIKES
 
 @contextmanager
 def _faulty_world(rig: str, faulty: dict[str, str], transports: dict[str, TimedFault], at_s: float) -> Iterator[None]:
-    """The simulated rigs of this program have faulty transports meanwhile."""
+    """Give the simulated rigs of this process faulty transports within this context."""
     build = laboratory.simulated_world
 
     def world_with_faults(*arguments: object) -> SimulatedWorld:
@@ -187,7 +189,7 @@ def _faulty_world(rig: str, faulty: dict[str, str], transports: dict[str, TimedF
 
 
 def _events(session: Session) -> Iterator[tuple[int, int, str]]:
-    """Stamp, level and words of a session's events."""
+    """Stamp, level and text of a session's events."""
     for message in session.traffic().messages():
         if message.topic == LOG_TOPIC:
             content = json.loads(message.data)
@@ -195,13 +197,13 @@ def _events(session: Session) -> Iterator[tuple[int, int, str]]:
 
 
 def _stopped_after_s(session: Session, struck_ns: int) -> float | None:
-    """From the fault to the conductor's word that it stopped; None when nothing stopped it."""
+    """Time from the fault to the conductor's message that it stopped; None if nothing stopped it."""
     stamps = [stamp_ns for stamp_ns, _, words in _events(session) if words.startswith("safety: stopped")]
     return (stamps[0] - struck_ns) / NANOSECONDS if stamps else None
 
 
 def _told(session: Session) -> Iterator[str]:
-    """Warnings of the devices with their last figures, and what the record counts as lost beside them."""
+    """Warnings of the devices with their last figures, and further losses in the manifest."""
     for _, level, words in _events(session):
         if level > 2 and "total: " in words:
             yield words.replace("total: ", "")
@@ -217,7 +219,7 @@ def _told(session: Session) -> Iterator[str]:
 
 
 def _replayed(session: Session) -> str:
-    """Understand the recording again: all of it must be readable, and results must be the same."""
+    """Replay the recording: all of it must be readable, and results must be the same."""
     if not has_results(session):
         replay = Replay(session, build_interpreter(rig_of_session(session)))
         outcomes = sum(1 for _ in replay.outcomes())

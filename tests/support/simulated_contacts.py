@@ -1,4 +1,4 @@
-"""Simulated grasps as tests of the estimation need them: placed by their true poses, and judged against them."""
+"""Simulated grasps for tests of the estimation: placed by their true poses, and compared with them."""
 
 from __future__ import annotations
 

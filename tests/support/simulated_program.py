@@ -27,7 +27,7 @@ MOTORS = MotorMap.load()
 
 
 class Program:
-    """The host's side, no cleverer than a test needs."""
+    """A minimal host for the simulated rig's transports."""
 
     def __init__(self, settings: SimulationSettings = PERFECT, seed: int = 0) -> None:
         self.world = SimulatedWorld(settings, seed)
@@ -35,25 +35,25 @@ class Program:
         for transport in self.transports.values():
             transport.open()
         self.sequence = 0
-        self.plant = self.world._plant  # what no program can see
+        self.plant = self.world._plant  # not visible to a real program
 
     def wait(self, duration_ns: int = CYCLE_ns) -> None:
         self.world.clock.sleep_until_ns(self.world.clock.now_ns() + duration_ns)
 
     def ask(self, **changes: Any) -> Datagram:
-        """One command to the palm; gives what came back with it."""
+        """Send one command to the palm; returns what came back with it."""
         command = PalmCommand(**{"edc_command": EdcCommand.SENSOR_DATA, **changes})
         self.transports["hand"].send(palm_codec.encode_command(command))
         (datagram,) = self.transports["hand"].receive()
         return datagram
 
     def status(self, **changes: Any) -> PalmStatus:
-        """The status that answers a command: it comes back with the next one."""
+        """The status that answers a command; it comes back with the next command."""
         self.ask(**changes)
         return decode_palm(self.ask(**changes).payload)
 
     def drive(self, duty: dict[str, int], cycles: int) -> PalmStatus:
-        """PWM demands for a number of cycles, others zero."""
+        """Apply PWM demands for a number of cycles; all others are zero."""
         words = np.zeros(20, int)
         for joint, value in duty.items():
             words[MOTORS.numbers[joint]] = value

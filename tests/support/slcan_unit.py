@@ -12,12 +12,12 @@ _DONE, _REFUSED = b"\r", b"\a"
 
 
 def encode_line(frame: CanFrame) -> bytes:
-    """A frame with an 11-bit identifier as the adapter writes it."""
+    """Encode a frame with an 11-bit identifier as the adapter does."""
     return f"t{frame.identifier:03X}{len(frame.data)}{frame.data.hex().upper()}\r".encode("ascii")
 
 
 def decode_line(line: bytes) -> CanFrame:
-    """A line without its end as a frame. Raises CodecError when it is none."""
+    """Decode a line without its line end. Raises CodecError if it is not a frame."""
     try:
         text = line.decode("ascii")
         frame = CanFrame(int(text[1:4], 16), bytes.fromhex(text[5:]))
@@ -32,11 +32,11 @@ class SlcanUnit:
     """One adapter; put it on a pseudo terminal.
 
     Args:
-        device: what hangs on its bus.
+        device: the device on its bus.
 
     Attributes:
-        damage: what the serial line makes of each line the adapter writes.
-        refused: lines that it did not understand.
+        damage: changes each line that the adapter writes, like a faulty serial line.
+        refused: number of lines that it did not understand.
     """
 
     def __init__(self, device: Unit) -> None:
@@ -50,12 +50,12 @@ class SlcanUnit:
         return self._device.rate_hz
 
     def handle(self, payload: bytes) -> list[bytes]:
-        """Take text; the answers of adapter and device."""
+        """Process text; returns the answers of adapter and device."""
         *lines, self._buffer = (self._buffer + payload).split(b"\r")
         return [answer for line in lines for answer in self._answers(line)]
 
     def tick(self) -> bytes | None:
-        """What the device sends by itself."""
+        """Messages that the device sends by itself."""
         message = self._device.tick()
         return None if message is None or not self._open else self.damage(encode_line(decode_frame(message)))
 

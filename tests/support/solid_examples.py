@@ -1,4 +1,4 @@
-"""Contacts on known solids standing on a table, as a hand reaches them: not under the foot."""
+"""Contacts on known solids that stand on a table, where a hand can reach: not on the underside."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m, noisy
 
 
 def box_mesh() -> trimesh.Trimesh:
-    """120 x 60 x 60 mm, its foot at height 0."""
+    """120 x 60 x 60 mm, with its underside at height 0."""
     return _on_table(trimesh.creation.box((0.12, 0.06, 0.06)))
 
 
@@ -36,7 +36,7 @@ def cylinder_mesh() -> trimesh.Trimesh:
 
 
 def contacts_on(mesh: trimesh.Trimesh, count: int, seed: int, *, noise: bool = True) -> tuple[Array, Array]:
-    """Contacts spread by area over all but the foot."""
+    """Contacts spread by area over all but the underside."""
     points, normals = sample_mesh_with_normals(mesh, 4 * count, seed)
     order = np.random.default_rng(seed).permutation(4 * count)
     chosen = [k for k in order if normals[k, 2] > -0.9][:count]

@@ -1,4 +1,4 @@
-"""A stored result of one table that a command fills row by row."""
+"""A stored result with one table that a command fills row by row."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from tactile_lab.experiments.results.stored_result import Part, Table
 from tactile_lab.experiments.results.storing import store
 
 Key = tuple[str, ...]
-"""First cells of a row."""
+"""First cells of a row, which identify it."""
 
 
 @dataclass(frozen=True)
 class Outline:
-    """What a table is about.
+    """Description of a table.
 
     Attributes:
         name: of the stored result.
@@ -26,7 +26,7 @@ class Outline:
         commands: that make it.
         about: how it was made.
         head: titles of the columns.
-        keys: how many of the first cells tell which row it is.
+        keys: number of first cells that identify a row.
     """
 
     name: str
@@ -38,12 +38,12 @@ class Outline:
 
 
 class GrowingTable:
-    """A table that is stored row by row, so that a run that is broken off or does a part leaves the rest as it was.
+    """A table that is stored row by row, so that an interrupted or partial run leaves the other rows unchanged.
 
     Args:
         docs: folder of the documents; None only prints.
         outline: of the table.
-        order: keys of all rows, in their order.
+        order: keys of all rows in order.
     """
 
     def __init__(self, docs: Path | None, outline: Outline, order: Sequence[Key]) -> None:
@@ -52,11 +52,11 @@ class GrowingTable:
 
     @property
     def missing(self) -> tuple[Key, ...]:
-        """Rows that this version of the program has not made."""
+        """Rows that this version of the program has not made yet."""
         return tuple(key for key in self._order if key not in self._rows)
 
     def put(self, key: Key, cells: Sequence[str]) -> None:
-        """A new row; shown, and stored."""
+        """Add a new row: show and store it."""
         self._rows[key] = tuple(" ".join(cell.split()) for cell in (*key, *cells))
         print(" | ".join(self._rows[key]), flush=True)
         if self._docs is not None:
@@ -67,7 +67,7 @@ class GrowingTable:
             store(self._docs, outline.name, outline.sentence, part)
 
     def publish(self) -> None:
-        """Write the pages, where there are documents."""
+        """Write the pages, if there is a folder of documents."""
         if self._docs is not None:
             publish(self._docs)
 
@@ -79,7 +79,7 @@ class GrowingTable:
 
 
 def parser(description: str | None) -> argparse.ArgumentParser:
-    """Options that all these commands have: ``docs`` is None where nothing is stored."""
+    """Options that all these commands have; ``docs`` is None if nothing is stored."""
     options = argparse.ArgumentParser(description=description)
     options.add_argument("--store", dest="docs", action="store_const", const=Path("docs"), help="keep it in docs/")
     return options

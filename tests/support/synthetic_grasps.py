@@ -1,4 +1,4 @@
-"""Grasps of a box on the table with known truth: five contacts each, the hand's motion exact up to noise."""
+"""Grasps of a box on the table with known truth: five contacts each, and the hand's motion with noise."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def box_grasps(count: int, seed: int = 0, motion_noise: float = 0.2) -> Recorded
 
 @cache
 def result_of(dimension: Literal[2, 3], *, count: int = 5, seed: int = 1, motion_noise: float = 0.1) -> SlamResult:
-    """What the default method makes of :func:`box_grasps`; once for all tests that look at it."""
+    """The default method's result for :func:`box_grasps`, computed once for all tests."""
     slam = TactileSlam(SlamSettings(dimension=dimension), seed=3)
     for grasp in box_grasps(count, seed, motion_noise).grasps:
         slam.step(grasp)

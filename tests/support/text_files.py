@@ -1,4 +1,4 @@
-"""Text files as the repository wants them: UTF-8, lines that end plainly, one newline at the end, data that parse.
+"""Checks text files of the repository: UTF-8, plain line ends, one newline at the end, valid data formats.
 
 python -m tests.support.text_files FILE...    # mends line ends; ends with 1 where anything was wrong
 """
@@ -25,13 +25,13 @@ _PARSERS: dict[str, Callable[[str], object]] = {
 
 
 def mended(text: str) -> str:
-    """The text with plain line ends, no blanks before them, and one newline at the end; an empty one stays empty."""
+    """The text with plain line ends, no trailing blanks, and one newline at the end; an empty text stays empty."""
     lines = [line.rstrip(" \t\r") for line in text.split("\n")]
     return "\n".join(lines).rstrip("\n") + "\n" if text.strip() else ""
 
 
 def complaint(text: str, suffix: str) -> str:
-    """What is wrong with a text that nobody but its author can mend; empty for nothing."""
+    """A problem of a text that only its author can fix; empty if there is none."""
     if _CONFLICT.search(text):
         return "marks of a conflict"
     try:
@@ -42,7 +42,7 @@ def complaint(text: str, suffix: str) -> str:
 
 
 def check(path: Path) -> str:
-    """Mend one file; what was wrong with it, empty for nothing."""
+    """Fix one file; returns what was wrong with it, empty if nothing."""
     try:
         text = path.read_bytes().decode("utf-8")
     except UnicodeDecodeError:
@@ -56,7 +56,7 @@ def check(path: Path) -> str:
 
 
 def main(names: list[str]) -> int:
-    """Check files; 1 where anything was wrong."""
+    """Check files; returns 1 if anything was wrong."""
     wrong = {name: words for name in names if (words := check(Path(name)))}
     for name, words in wrong.items():
         print(f"{name}: {words}")

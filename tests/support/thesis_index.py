@@ -1,4 +1,4 @@
-"""Where the code cites the thesis, and the lines that the index in ``docs/thesis.md`` links to.
+"""Finds where the code cites the thesis, and updates the links of the index in ``docs/thesis.md``.
 
 python -m tests.support.thesis_index            # brings the index's line numbers up to date
 python -m tests.support.thesis_index --list     # every citation in the code
@@ -37,7 +37,7 @@ class Citation:
         item: what is cited, such as ``equation 3.9``.
         path: file, from the root of the repository.
         line: number of the line, from 1.
-        weight: how likely the line is the one that does it: 2 a comment beside the statement, 1 the first line of a
+        weight: how likely the line implements the item: 2 for a comment beside a statement, 1 for the first line of a
             docstring, 0 elsewhere.
     """
 
@@ -99,8 +99,8 @@ class Row:
 
     Attributes:
         place: line of the page, from 0.
-        items: what it is about, such as ``equation 3.17`` and ``equation 3.18``.
-        links: files that it names, with the line each link leads to (0 where it has none).
+        items: the items of the row, such as ``equation 3.17`` and ``equation 3.18``.
+        links: files that it names, with the line to which each link leads (0 if it has none).
     """
 
     place: int
@@ -109,7 +109,7 @@ class Row:
 
 
 def rows(page: str) -> Iterator[Row]:
-    """The rows of all tables of the page whose first column is headed by a kind of item, such as ``Equation``."""
+    """The rows of all tables of the page whose first column has a kind of item as its title, such as ``Equation``."""
     kind = ""
     for place, line in enumerate(page.splitlines()):
         first = line.strip("| ").split("|")[0].strip() if line.startswith("|") else ""
@@ -121,13 +121,13 @@ def rows(page: str) -> Iterator[Row]:
 
 
 def best_line(row: Row, path: str, cited: list[Citation]) -> int | None:
-    """The line of a file that a row's link has to lead to; None where the file cites none of the row's items."""
+    """The line of a file to which a row's link must lead; None if the file cites none of the row's items."""
     places = [each for each in cited if each.path == path and each.item in row.items]
     return min(places, key=lambda each: (-each.weight, each.line)).line if places else None
 
 
 def refreshed(page: str, cited: list[Citation]) -> str:
-    """The page with its links at the right lines."""
+    """The page with links to the right lines."""
     lines = page.splitlines()
     for row in rows(page):
         for path, _ in row.links:

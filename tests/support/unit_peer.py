@@ -10,14 +10,14 @@ from drivers.emulators.ati.unit import Unit
 
 
 class UnitPeer:
-    """A unit without a wire; whoever drives the clock calls :meth:`tick`."""
+    """A unit without a wire; the code that advances the clock calls :meth:`tick`."""
 
     def __init__(self, unit: Unit, clock: Clock) -> None:
         self.unit, self._clock = unit, clock
         self._waiting: deque[Datagram] = deque(maxlen=100_000)
 
     def write(self, payload: bytes) -> None:
-        """Take one message from the program."""
+        """Process one message from the program."""
         self._waiting += (Datagram(answer, self._clock.now_ns()) for answer in self.unit.handle(payload))
 
     def tick(self) -> None:

@@ -1,8 +1,8 @@
-"""``tactile-lab`` kept warm: one process that has loaded everything, and a copy of it for each call.
+"""``tactile-lab`` preloaded: one process that has imported everything, and a fork of it for each call.
 
-Takes lines of JSON, ``{streams, folder, words}``: a copy of the process becomes the program in that folder, with those
-files for its standard streams: three times one terminal, or ends of pipes. Answers the copy's process id once it has
-them and, in the end, how it ended.
+It reads lines of JSON, ``{streams, folder, words}``. For each, a fork of the process becomes the program in that
+folder, with these files as its standard streams: three times the same terminal, or ends of pipes. The answers are the
+fork's process id once it has opened them, and finally its exit code.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tactile_lab.cli.main import main
 
 
 def load() -> None:
-    """What wizards and sessions load when they are called."""
+    """Import what wizards and sessions import when they are called."""
     import rich.progress  # noqa: F401
 
     import tactile_lab.cli.app
@@ -29,7 +29,7 @@ def load() -> None:
 
 
 def serve() -> None:
-    """Call after call, until the orders end."""
+    """Serve call after call, until the orders end."""
     orders = os.fdopen(os.dup(0), encoding="utf-8")
     for line in orders:
         order = json.loads(line)
@@ -44,9 +44,9 @@ def serve() -> None:
 
 
 def become(order: dict[str, Any], streams: list[int]) -> None:
-    """The program, as the leader of a session. Never returns."""
+    """Become the program, as the leader of a process session. Never returns."""
     os.setsid()
-    os.close(os.open(order["streams"][0], os.O_RDWR))  # the first terminal that the leader opens becomes its own
+    os.close(os.open(order["streams"][0], os.O_RDWR))  # becomes the controlling terminal
     for descriptor, stream in enumerate(streams):
         os.dup2(stream, descriptor)
         os.close(stream)

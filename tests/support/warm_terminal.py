@@ -1,4 +1,4 @@
-"""``tactile-lab`` on a terminal of its own or behind pipes, call after call, without loading it anew for each."""
+"""Runs ``tactile-lab`` on its own terminal or with pipes, call after call, without importing it anew for each."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ENVIRONMENT = {
 
 
 class WarmProgram:
-    """A context with the loaded program; :meth:`terminal` and :meth:`pipes` call it. One call at a time."""
+    """A context with the preloaded program; :meth:`terminal` and :meth:`pipes` call it. One call at a time."""
 
     def __enter__(self) -> Self:
         self._process = subprocess.Popen(
@@ -39,11 +39,11 @@ class WarmProgram:
 
     def __exit__(self, *error: object) -> None:
         if self._call is not None:
-            self._call.hang_up()  # what a failed test has left waits for an answer that never comes
+            self._call.hang_up()  # a call left by a failed test waits for an answer that never comes
         self._process.communicate(timeout=PATIENCE_s)
 
     def terminal(self, folder: Path, *words: object) -> Terminal:
-        """``tactile-lab`` with some words, in a folder, on a new terminal."""
+        """Call ``tactile-lab`` with some words, in a folder, on a new terminal."""
         ours, its = os.openpty()
         terminal = Terminal(self, self._begin([os.ttyname(its)] * 3, folder, words), ours)
         os.close(its)
@@ -51,7 +51,7 @@ class WarmProgram:
         return terminal
 
     def pipes(self, folder: Path, *words: object) -> Piped:
-        """``tactile-lab`` with some words, in a folder, as another program would call it."""
+        """Call ``tactile-lab`` with some words, in a folder, with pipes, as another program would."""
         (out, its_out), (err, its_err) = os.pipe(), os.pipe()
         streams = ["/dev/null", *(f"/proc/{os.getpid()}/fd/{its}" for its in (its_out, its_err))]
         piped = Piped(self, self._begin(streams, folder, words), out, err)
@@ -61,9 +61,9 @@ class WarmProgram:
         return piped
 
     def _begin(self, streams: Sequence[str], folder: Path, words: Sequence[object]) -> int:
-        """A new call; gives its process id."""
+        """Start a new call; returns its process id."""
         if self._call is not None and not self._call.gone:
-            self._call.hang_up()  # a failed test has left it, and nobody would ever answer
+            self._call.hang_up()  # left by a failed test, and nobody would ever answer
             self.answer()
         order = {"streams": list(streams), "folder": str(folder), "words": [str(word) for word in words]}
         assert self._process.stdin is not None
@@ -83,31 +83,31 @@ class Call:
     def __init__(self, program: WarmProgram, process_id: int) -> None:
         self._program, self._process_id = program, process_id
         self.gone = False
-        """Whether the call has ended and its exit code was taken."""
+        """Whether the call has ended and its exit code was read."""
 
     def send_signal(self, number: signal.Signals) -> None:
-        """As ``kill`` does."""
+        """Send a signal, as ``kill`` does."""
         os.kill(self._process_id, number)
 
     def exit_code(self) -> int:
-        """How it ended, as soon as it has; minus the signal that has killed it."""
+        """Its exit code, after waiting for its end; minus the signal number if it was killed."""
         code = int(self._program.answer())
         self.gone = True
         return code
 
     def hang_up(self) -> None:
-        """Leave it, and see that it ends."""
+        """Disconnect from it, and make sure that it ends."""
         raise NotImplementedError
 
 
 class Terminal(Call):
-    """A call on a terminal, as the person before it."""
+    """A call on a terminal, with the test in the role of the user."""
 
     def __init__(self, program: WarmProgram, process_id: int, descriptor: int) -> None:
         super().__init__(program, process_id)
         self._child = fdpexpect.fdspawn(descriptor, timeout=PATIENCE_s, encoding="utf-8")
         self.told = ""
-        """What it has said, up to the last text that was waited for."""
+        """Its output up to the last text that was waited for."""
 
     def until(self, text: str, then: str = "") -> None:
         """Wait for a text, then type something."""
@@ -120,14 +120,14 @@ class Terminal(Call):
         self._child.send(text)
 
     def hang_up(self) -> None:
-        """The terminal goes, and with it what runs on it."""
+        """Close the terminal, which ends what runs on it."""
         self._child.close()
 
     def ended(self, code: int) -> str:
-        """Everything it said, once it ended with that exit code. A traceback fails the test."""
+        """Its whole output, once it has ended with this exit code. A traceback fails the test."""
         self._child.expect(pexpect.EOF)
         told = self.told + str(self._child.before)
-        ended = self.exit_code()  # before the terminal goes: a program that is still ending would be hung up
+        ended = self.exit_code()  # before closing the terminal, which would hang up a program that is still ending
         self._child.close()
         assert ended == code, told
         assert "Traceback" not in told, told
@@ -135,15 +135,15 @@ class Terminal(Call):
 
 
 class Piped(Call):
-    """A call behind pipes, as the program that has made it."""
+    """A call with pipes, with the test in the role of the calling program."""
 
     def __init__(self, program: WarmProgram, process_id: int, out: int, err: int) -> None:
         super().__init__(program, process_id)
         self._out, self._err = os.fdopen(out), os.fdopen(err)
         self.told = ""
-        """What it has said on standard error, up to the last line that was waited for."""
+        """Its standard error up to the last line that was waited for."""
         self.answered = ""
-        """What it has said on standard output, once it ended."""
+        """Its standard output, once it has ended."""
 
     def until(self, pattern: str) -> None:
         """Wait for a line on standard error."""
@@ -154,14 +154,14 @@ class Piped(Call):
         raise AssertionError(self.told)
 
     def hang_up(self) -> None:
-        """Nobody reads on, and it is killed."""
+        """Close the pipes and kill it."""
         self._out.close()
         self._err.close()
         if not self.gone:
             self.send_signal(signal.SIGKILL)
 
     def ended(self) -> int:
-        """Exit code, once it ended and all was read. A traceback fails the test."""
+        """Its exit code, once it has ended and all output was read. A traceback fails the test."""
         self.told += self._err.read()
         self.answered, code = self._out.read(), self.exit_code()
         self.hang_up()

@@ -1,4 +1,4 @@
-"""The shipped sim-wire rig with a cable, addresses and patience of its own, so that tests can run beside others."""
+"""The packaged sim-wire rig with its own cable, addresses and time limits, so that tests can run in parallel."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ SHIPPED = Path(rigs.__file__).parent
 
 
 def wire_rig(folder: Path, **changes: Any) -> Path:
-    """A rig file in ``folder``: calm enough for a busy machine, without the check of the motor map.
+    """Write a rig file into ``folder``: with long time limits for a busy machine, and without the check of the motor
+    map.
 
     Args:
-        folder: where the file is written.
+        folder: the folder of the file.
         changes: keys of the rig file to replace.
     """
     content = yaml.safe_load((SHIPPED / "sim-wire.yaml").read_text())

@@ -1,1 +1,1 @@
-"""Codecs of ATI electronics: pure functions between bytes and samples."""
+"""Codecs of ATI electronics: pure functions that convert between bytes and samples."""

@@ -1,7 +1,7 @@
-"""ATI calibration files: from gauge readings to force and torque (protocols: ATI calibration files).
+"""ATI calibration files, which convert gauge readings to force and torque (protocols: ATI calibration files).
 
-Two families: ``.cal`` files of DAQ sensors, version 1.0 (internal ``Axis`` rows and a transform) or 1.1 (``UserAxis``
-rows as well), and the XML of a Net F/T box.
+There are two families: the ``.cal`` files of DAQ sensors, in version 1.0 (internal ``Axis`` rows and a transform) or
+1.1 (``UserAxis`` rows as well), and the XML file of a Net F/T box.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class TemperatureTerms:
     thermistor_V: float
 
     def correct(self, volts: Array, thermistor_V: Array) -> Array:
-        """Gauge volts (..., 6) as they would be at the calibration's temperature; ``thermistor_V`` (...,)."""
+        """Gauge volts (..., 6), corrected to the temperature of the calibration; ``thermistor_V`` (...,)."""
         off = (thermistor_V - self.thermistor_V)[..., None]
         return np.asarray((volts + self.bias_slopes * off) / (1.0 - self.gain_slopes * off))
 
@@ -57,15 +57,15 @@ class AtiCalibration:
     """One sensor's calibration.
 
     Attributes:
-        serial, part_number, family: as the file names them.
-        force_unit, torque_unit: of ``matrix``, as the file names them.
+        serial, part_number, family: as written in the file.
+        force_unit, torque_unit: units of ``matrix``, as written in the file.
         matrix: working matrix, shape (6, 6): readings of the six gauges to force and torque, in the file's units. The
             reading is volts for a DAQ sensor and counts for a Net F/T box.
         user_rows: the file's own working matrix (version 1.1), or None.
         ranges: calibrated range of each axis, file's units, shape (6,).
-        output_range_V: span of the amplifier's output, so that +-10 V is 20; None for a Net F/T box.
-        temperature: how the gauges follow the temperature, or None where the file does not say.
-        calibrated: the date, in the file's own words.
+        output_range_V: span of the amplifier's output: 20 for +-10 V; None for a Net F/T box.
+        temperature: how the gauges depend on the temperature; None if the file does not say.
+        calibrated: the date, as written in the file.
     """
 
     serial: str
@@ -82,7 +82,7 @@ class AtiCalibration:
 
     @property
     def working_matrix(self) -> Array:
-        """Gauge readings to newtons and newton metres, shape (6, 6); the file's own rows where it has them."""
+        """Matrix from gauge readings to newtons and newton metres, shape (6, 6); from ``UserAxis`` rows if present."""
         rows = self.matrix if self.user_rows is None else self.user_rows
         return np.asarray(rows * self._si[:, None])
 
@@ -100,8 +100,8 @@ def load(path: Path) -> AtiCalibration:
     """Read a calibration file of either family and version.
 
     Raises:
-        ConfigurationError: the file cannot be read, is no calibration, carries a document type or entities, or lacks
-            something.
+        ConfigurationError: the file cannot be read, is not a calibration, contains a document type or entities, or is
+            incomplete.
     """
     root = _parse(path)
     try:
@@ -154,7 +154,7 @@ def _daq_sensor(root: ET.Element) -> AtiCalibration:
 
 
 def _temperature_terms(calibration: ET.Element) -> TemperatureTerms | None:
-    """The terms where the file carries them, as most files of sensors with compensation in hardware do not."""
+    """The terms in the file, if any: most files of sensors that compensate in hardware have none."""
     bias, gain, thermistor = (calibration.find(tag) for tag in ("BiasSlope", "GainSlope", "Thermistor"))
     if bias is None or gain is None or thermistor is None:
         return None
@@ -185,9 +185,9 @@ def _net_box(root: ET.Element) -> AtiCalibration:
 
 
 def tool_transform(displacement: Array, rotation_rad: Array) -> Array:
-    """Matrix (6, 6) that moves a wrench to a tool frame: first displaced, then rotated.
+    """Matrix (6, 6) that transforms a wrench into a tool frame: first the displacement, then the rotation.
 
-    As in ATI's own files (protocols: ATI calibration files).
+    This is the order of ATI's own files (protocols: ATI calibration files).
 
     Args:
         displacement: tool origin in the sensor frame, shape (3,), in torque unit per force unit.
@@ -207,7 +207,7 @@ def tool_transform(displacement: Array, rotation_rad: Array) -> Array:
 
 
 def _length_ratio(force_unit: str, torque_unit: str, length_unit: str) -> float:
-    """How many (torque unit / force unit) one length unit is: 1 for N, N mm and mm."""
+    """One length unit in (torque unit / force unit): 1 for N, N mm and mm."""
     if length_unit not in LENGTH_UNITS_m:
         raise ValueError(f"unknown length unit {length_unit!r}")
     return LENGTH_UNITS_m[length_unit] * FORCE_UNITS_N[force_unit] / TORQUE_UNITS_Nm[torque_unit]

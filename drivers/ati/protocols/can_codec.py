@@ -12,7 +12,7 @@ DEFAULT_BASE = 0x20
 
 
 class Op(IntEnum):
-    """The low four bits of an identifier: what is asked or answered."""
+    """The low four bits of an identifier: the kind of request or answer."""
 
     GAUGES = 0
     GAUGES_SECOND = 1
@@ -49,7 +49,7 @@ _FIRST, _SECOND, _FLOATS, _COUNTS = (struct.Struct(form) for form in (">H3h", ">
 
 
 def identifier(op: Op, base: int = DEFAULT_BASE) -> int:
-    """The identifier of requests and answers of one kind."""
+    """The identifier that requests and answers of one kind share."""
     return base << 4 | op
 
 
@@ -62,12 +62,12 @@ def split_identifier(word: int) -> tuple[int, Op]:
 
 
 def request(op: Op, data: bytes = b"", base: int = DEFAULT_BASE) -> CanFrame:
-    """A question."""
+    """A request."""
     return CanFrame(identifier(op, base), data)
 
 
 def encode_gauges(status: int, gauges: tuple[int, ...], base: int = DEFAULT_BASE) -> tuple[CanFrame, CanFrame]:
-    """A reading of gauges 0 to 5 as its two frames, for emulators. Raises CodecError when a word does not fit."""
+    """A reading of gauges 0 to 5 as two frames, for emulators. Raises CodecError if a word does not fit."""
     try:
         first = _FIRST.pack(status, *gauges[0::2])
         second = _SECOND.pack(*gauges[1::2])
@@ -77,13 +77,13 @@ def encode_gauges(status: int, gauges: tuple[int, ...], base: int = DEFAULT_BASE
 
 
 def decode_first(data: bytes) -> tuple[int, tuple[int, int, int]]:
-    """Status, and gauges 0, 2, 4. Raises CodecError for another length."""
+    """Status, and gauges 0, 2, 4. Raises CodecError for a wrong length."""
     status, *gauges = _unpack(_FIRST, data)
     return status, (gauges[0], gauges[1], gauges[2])
 
 
 def decode_second(data: bytes) -> tuple[int, int, int]:
-    """Gauges 1, 3, 5. Raises CodecError for another length."""
+    """Gauges 1, 3, 5. Raises CodecError for a wrong length."""
     gauges = _unpack(_SECOND, data)
     return gauges[0], gauges[1], gauges[2]
 
@@ -94,7 +94,7 @@ def encode_pair(first: float, second: float) -> bytes:
 
 
 def decode_pair(data: bytes) -> tuple[float, float]:
-    """Two elements of the matrix. Raises CodecError for another length."""
+    """Two elements of the matrix. Raises CodecError for a wrong length."""
     first, second = _unpack(_FLOATS, data)
     return first, second
 
@@ -105,13 +105,13 @@ def encode_counts(per_force: int, per_torque: int) -> bytes:
 
 
 def decode_counts(data: bytes) -> tuple[int, int]:
-    """Counts per force and per torque unit. Raises CodecError for another length."""
+    """Counts per force and per torque unit. Raises CodecError for a wrong length."""
     per_force, per_torque = _unpack(_COUNTS, data)
     return per_force, per_torque
 
 
 def describe_status(status: int) -> tuple[str, ...]:
-    """A status word in words; empty when healthy."""
+    """A status word in plain English; empty if healthy."""
     words = [text for bit, text in STATUS_BITS.items() if status >> bit & 1]
     if unnamed := status & ~_ANY & ~sum(1 << bit for bit in STATUS_BITS):
         words.append(f"undocumented status bits 0x{unnamed:04x}")

@@ -10,7 +10,7 @@ from drivers.core.errors import CodecError
 
 PROMPT = b">"
 TERMINATOR = b"\x06\r\n>"
-"""What ends an answer in binary mode."""
+"""The prompt that ends an answer in binary mode."""
 
 _BINARY = struct.Struct(">B6h")
 _ASCII = re.compile(rb"\s*(\d{1,3})" + rb"\s*,\s*(-?\d{1,6})" * 6 + rb"\s*")
@@ -20,7 +20,7 @@ _LONGEST = 4096
 
 @dataclass(frozen=True)
 class Record:
-    """One resolved record: force x, y, z, torque x, y, z in counts; ``error`` is 0 when it is good."""
+    """One resolved record: force x, y, z, torque x, y, z in counts; ``error`` is 0 if the record is valid."""
 
     error: int
     counts: tuple[int, ...]
@@ -35,7 +35,7 @@ def encode_binary(record: Record) -> bytes:
 
 
 def decode_binary(payload: bytes) -> Record:
-    """A record of 13 bytes. Raises CodecError for another length."""
+    """Decode a record of 13 bytes. Raises CodecError for another length."""
     if len(payload) != _BINARY.size:
         raise CodecError(f"{len(payload)} bytes instead of the {_BINARY.size} of a record", where="F/T controller")
     error, *counts = _BINARY.unpack(payload)
@@ -43,14 +43,14 @@ def decode_binary(payload: bytes) -> Record:
 
 
 def encode_ascii(record: Record) -> bytes:
-    """A record as a line, with its end. Raises CodecError unless there are six counts."""
+    """A record as a line with its line end. Raises CodecError unless there are six counts."""
     if len(record.counts) != 6:
         raise CodecError(f"{len(record.counts)} counts instead of six", where="F/T controller")
     return (f"{record.error}," + ",".join(f"{count:6d}" for count in record.counts) + "\r\n").encode("ascii")
 
 
 def decode_ascii(line: bytes) -> Record:
-    """A line without its end. Raises CodecError when it is no record."""
+    """Decode a line without its line end. Raises CodecError if it is not a record."""
     if (match := _ASCII.fullmatch(line)) is None:
         raise CodecError(f"{line[:60]!r} is not a record", where="F/T controller")
     error, *counts = (int(word) for word in match.groups())
@@ -58,14 +58,14 @@ def decode_ascii(line: bytes) -> Record:
 
 
 class AsciiLines:
-    """Cuts what arrives into records; prompts and echoes are passed over, damaged lines counted."""
+    """Splits received bytes into records. Prompts and echoes are skipped; damaged lines are counted."""
 
     def __init__(self) -> None:
         self.damaged = 0
         self._buffer = b""
 
     def feed(self, piece: bytes) -> list[Record]:
-        """The records that are complete now, oldest first."""
+        """The records that are now complete, oldest first."""
         *lines, self._buffer = (self._buffer + piece).split(b"\n")
         self._buffer = self._buffer[-_LONGEST:]
         return [record for line in lines if (record := self._record(line.strip(b"\r> "))) is not None]
@@ -79,21 +79,21 @@ class AsciiLines:
 
 
 class BinaryAnswers:
-    """Cuts what arrives into the records between prompts; a record that does not fit its frame is counted."""
+    """Splits received bytes into the records between prompts; records of a wrong length are counted."""
 
     def __init__(self) -> None:
         self.damaged = 0
         self._buffer = b""
 
     def feed(self, piece: bytes) -> list[Record]:
-        """The records that are complete now, oldest first."""
+        """The records that are now complete, oldest first."""
         *answers, self._buffer = (self._buffer + piece).split(TERMINATOR)
         self._buffer = self._buffer[-_LONGEST:]
         return [record for answer in answers if (record := self._record(answer)) is not None]
 
     def _record(self, answer: bytes) -> Record | None:
         echo, payload = answer[: -_BINARY.size], answer[-_BINARY.size :]
-        if len(payload) == _BINARY.size and echo.rpartition(PROMPT)[2] in _ECHOES:  # prompts of the set-up before it
+        if len(payload) == _BINARY.size and echo.rpartition(PROMPT)[2] in _ECHOES:  # prompts left over from the set-up
             return decode_binary(payload)
         self.damaged += answer.startswith((b"Q", b"\0"))
         return None

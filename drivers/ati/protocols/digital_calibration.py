@@ -1,4 +1,4 @@
-"""The calibration that a Digital F/T sensor carries in its holding registers (protocols: Digital F/T)."""
+"""The calibration that a Digital F/T sensor stores in its holding registers (protocols: Digital F/T)."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ BLOCK = struct.Struct(">8s32s4s20s36fBB6fii6H6H6B6B6H16s16s")
 
 FORCE_UNITS = ("lbf", "N", "klbf", "kN", "kg", "g")
 TORQUE_UNITS = ("lbf-in", "lbf-ft", "Nm", "Nmm", "kg-cm", "kN-m")
-"""By their code, from 1."""
+"""Units by their code; codes start at 1."""
 
 
 @dataclass(frozen=True)
 class DigitalCalibration:
-    """What turns gauge counts into a wrench.
+    """Converts gauge counts into a wrench.
 
     Attributes:
         serial, part_number: of the sensor.
-        matrix: gauge counts 0 to 5 to counts of force and torque, shape (6, 6).
+        matrix: from counts of gauges 0 to 5 to counts of force and torque, shape (6, 6).
         force_unit, torque_unit: of the counts per unit.
         counts_per_force, counts_per_torque: scale.
         ratings: calibrated range of each axis, in those units, shape (6,).
-        calibrated: the date, in the sensor's own words.
+        calibrated: the date, as the sensor states it.
     """
 
     serial: str
@@ -45,7 +45,7 @@ class DigitalCalibration:
 
     @property
     def working_matrix(self) -> Array:
-        """Gauge counts to newtons and newton metres, shape (6, 6)."""
+        """Matrix from gauge counts to newtons and newton metres, shape (6, 6)."""
         scale = np.repeat(
             [
                 FORCE_UNITS_N[self.force_unit] / self.counts_per_force,
@@ -63,14 +63,14 @@ class DigitalCalibration:
 
 
 def unit_names(force_code: int, torque_code: int) -> tuple[str, str]:
-    """Names of the unit codes. Raises CodecError for a code that is none."""
+    """Names of the unit codes. Raises CodecError for an unknown code."""
     if not (1 <= force_code <= len(FORCE_UNITS) and 1 <= torque_code <= len(TORQUE_UNITS)):
         raise CodecError(f"unknown unit codes {force_code} and {torque_code}", where="ATI calibration")
     return FORCE_UNITS[force_code - 1], TORQUE_UNITS[torque_code - 1]
 
 
 def check_matrix(matrix: Array, counts_per_force: float, counts_per_torque: float, where: str) -> None:
-    """Refuse what can be no calibration. Raises CodecError."""
+    """Raises CodecError if these values cannot be a calibration."""
     if not np.isfinite(matrix).all() or not np.abs(matrix).sum(axis=1).all():
         raise CodecError("the calibration matrix is empty or not finite", where=where, hint="Choose another slot")
     if min(counts_per_force, counts_per_torque) <= 0:
@@ -78,10 +78,10 @@ def check_matrix(matrix: Array, counts_per_force: float, counts_per_torque: floa
 
 
 def decode_block(block: bytes) -> DigitalCalibration:
-    """A calibration block.
+    """Decode a calibration block.
 
     Raises:
-        CodecError: wrong length, or it can be no calibration (an empty slot, for example).
+        CodecError: the length is wrong, or the block cannot be a calibration (an empty slot, for example).
     """
     if len(block) != BLOCK.size:
         raise CodecError(f"{len(block)} bytes instead of {BLOCK.size}", where="ATI calibration block")

@@ -1,4 +1,4 @@
-"""The raw stream of a Digital F/T sensor: 13 bytes a sample, unframed, a seven-bit sum (protocols: Digital F/T)."""
+"""The raw stream of a Digital F/T sensor: 13 bytes a sample, no framing, a 7-bit checksum (protocols: Digital F/T)."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from drivers.core.errors import CodecError
 
 SIZE = 13
 WIRE_ORDER = (0, 2, 4, 1, 3, 5)
-"""Which gauge each of the six words of a sample is."""
+"""The gauge of each of the six words of a sample."""
 
 _GAUGE_PLACE = np.argsort(WIRE_ORDER)
 _STATUS_ERROR = 0x80
-_SURE = 6  # samples in a row that must hold before a new alignment is believed
+_SURE = 6  # valid samples in a row before a new alignment is accepted
 _RUNS = np.arange(SIZE + 1)[:, None] + SIZE * np.arange(_SURE)  # where the samples of each alignment would begin
 
 
@@ -30,11 +30,11 @@ def encode_sample(gauges: tuple[int, ...], status_error: bool = False) -> bytes:
 
 
 class GaugeStream:
-    """Cuts a stream into samples, and finds its feet again when bytes are lost or wrong.
+    """Splits a stream into samples, and realigns after bytes were lost or damaged.
 
     Attributes:
         skipped_bytes: bytes that belonged to no valid sample.
-        resyncs: times the alignment had to be looked for.
+        resyncs: how often the stream had to be realigned.
     """
 
     def __init__(self) -> None:
@@ -44,11 +44,11 @@ class GaugeStream:
         self._before: Array | None = None
 
     def feed(self, piece: bytes) -> tuple[Array, NDArray[np.bool_], int]:
-        """Take what arrived.
+        """Take received bytes.
 
         Returns:
-            Gauges 0 to 5 of the whole samples, shape (n, 6); whether each carries the status error flag, shape (n,);
-            how many samples were lost among them, as far as the bytes tell.
+            Gauges 0 to 5 of the complete samples, shape (n, 6); whether the status error flag of each is set, shape
+            (n,); how many samples were lost between them, judged by the number of bytes.
         """
         self._buffer += piece
         taken: list[NDArray[Any]] = []
@@ -79,10 +79,10 @@ class GaugeStream:
         self.skipped_bytes += count
 
     def _find(self) -> int | None:
-        """Where the next run of valid samples begins; None while the bytes do not suffice.
+        """Where the next run of valid samples begins; None until there are enough bytes.
 
-        A steady signal can be valid at a wrong alignment for ever: of several the one that goes on from the last good
-        sample is taken.
+        A steady signal can stay valid at a wrong alignment. If several alignments are valid, the one closest to the
+        last good sample is taken.
         """
         needed = (_SURE + 1) * SIZE
         while len(self._buffer) >= needed + SIZE:
@@ -109,7 +109,7 @@ def _valid(rows: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 def _sample_at(window: bytes) -> NDArray[np.bool_]:
-    """Whether a sample could begin at each byte, as far as the check byte tells; shape (bytes - 12,)."""
+    """Whether a sample could begin at each byte, judged by the check byte; shape (bytes - 12,)."""
     values = np.frombuffer(window, np.uint8)
     totals = np.concatenate(([0], np.cumsum(values, dtype=np.int64)))
     sums = totals[SIZE - 1 : -1] - totals[:-SIZE]

@@ -1,4 +1,4 @@
-"""Modbus RTU as ATI's Digital F/T sensor speaks it: frames with a check word, one request and one reply at a time."""
+"""Modbus RTU as used by ATI's Digital F/T sensor: frames with a checksum, one request and one reply at a time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EXCEPTIONS = {1: "unknown function", 2: "no such register", 3: "value refused", 
 
 @dataclass(frozen=True)
 class Frame:
-    """One request or reply without its check word."""
+    """One request or reply, without its checksum."""
 
     slave: int
     function: int
@@ -33,7 +33,7 @@ class Frame:
 
     @property
     def exception(self) -> str:
-        """What a reply refuses, in words; empty for an ordinary one."""
+        """Why the device refused the request, in plain English; empty for an ordinary reply."""
         if not self.function & _EXCEPTION:
             return ""
         code = self.data[0] if self.data else 0
@@ -41,7 +41,7 @@ class Frame:
 
 
 def crc16(payload: bytes) -> int:
-    """The check word (polynomial 0xA001, from 0xFFFF); sent low byte first."""
+    """The checksum (polynomial 0xA001, initial value 0xFFFF); sent low byte first."""
     crc = 0xFFFF
     for byte in payload:
         crc = crc >> 8 ^ _TABLE[(crc ^ byte) & 0xFF]
@@ -49,7 +49,7 @@ def crc16(payload: bytes) -> int:
 
 
 def encode(frame: Frame) -> bytes:
-    """A frame as bytes. Raises CodecError when it is too long for the line."""
+    """A frame as bytes. Raises CodecError if it is longer than Modbus allows."""
     if len(frame.data) > 252:
         raise CodecError(f"{len(frame.data)} data bytes, at most 252 fit", where="Modbus")
     body = bytes((frame.slave, frame.function)) + frame.data
@@ -57,7 +57,7 @@ def encode(frame: Frame) -> bytes:
 
 
 def decode(payload: bytes) -> Frame:
-    """One whole frame. Raises CodecError when it is too short or its check word is wrong."""
+    """Decode one whole frame. Raises CodecError if it is too short or its checksum is wrong."""
     if len(payload) < 4:
         raise CodecError(f"{len(payload)} bytes, a frame has at least 4", where="Modbus")
     if crc16(payload[:-2]) != int.from_bytes(payload[-2:], "little"):
@@ -66,16 +66,16 @@ def decode(payload: bytes) -> Frame:
 
 
 def read_request(first: int, count: int, slave: int = SLAVE) -> Frame:
-    """Ask for ``count`` holding registers. Raises CodecError for more than a reply can hold."""
+    """A request for ``count`` holding registers. Raises CodecError if a reply cannot hold that many."""
     if not (0 <= first < 1 << 16 and 1 <= count <= _LARGEST_READ):
         raise CodecError(f"{count} registers from {first}", where="Modbus")
     return Frame(slave, READ_HOLDING, first.to_bytes(2, "big") + count.to_bytes(2, "big"))
 
 
 def take_reply(buffer: bytearray, slave: int = SLAVE) -> Frame | None:
-    """Take the first whole reply out of received bytes, with everything before it; None when there is none yet.
+    """Remove the first whole reply, and everything before it, from received bytes; None if there is none yet.
 
-    Bytes that begin no valid reply are passed over, so that remains of an earlier stream do no harm.
+    Bytes that cannot begin a valid reply are skipped, so that the remains of an earlier stream do no harm.
     """
     for start in range(len(buffer)):
         length = _reply_length(buffer[start : start + 3], slave)
@@ -90,7 +90,7 @@ def take_reply(buffer: bytearray, slave: int = SLAVE) -> Frame | None:
 
 
 def _reply_length(head: bytearray, slave: int) -> int | None:
-    """How long a reply that begins so is; None when none begins so."""
+    """Length of the reply that begins with these bytes; None if no reply begins like this."""
     if head[0] != slave:
         return None
     if len(head) < 3:

@@ -1,7 +1,7 @@
 """RDT, the real-time protocol of ATI's Net F/T box: UDP port 49152, big-endian, one client at a time.
 
-A request is 8 bytes; each record is 36 bytes, one or more to a datagram (protocols: Net F/T). Counts become newtons
-and newton metres by the box's own counts per force and counts per torque.
+A request has 8 bytes and a record 36; a datagram holds one or more records (protocols: Net F/T). Counts become newtons
+and newton metres by the box's counts per force and counts per torque.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _SUMMARY = 1 << 31
 
 
 class Command(IntEnum):
-    """What the box can be asked."""
+    """The requests that the box understands."""
 
     STOP = 0
     START = 2
@@ -41,7 +41,7 @@ class Command(IntEnum):
 
 @dataclass(frozen=True)
 class Request:
-    """A decoded request; ``count`` is the number of records wanted, 0 without end."""
+    """A decoded request; ``count`` is the number of records wanted, 0 for an endless stream."""
 
     command: Command
     count: int
@@ -57,7 +57,7 @@ class Severity(IntEnum):
 
 @dataclass(frozen=True)
 class StatusReport:
-    """A status word in words."""
+    """A decoded status word."""
 
     severity: Severity
     messages: tuple[str, ...]
@@ -108,7 +108,7 @@ def encode_request(command: Command, count: int = 0) -> bytes:
 
 
 def decode_request(payload: bytes) -> Request:
-    """What a client asked; for emulators.
+    """Decode a client's request; for emulators.
 
     Raises:
         CodecError: wrong length, header or command.
@@ -125,9 +125,9 @@ def decode_request(payload: bytes) -> Request:
 
 
 def records(payload: bytes) -> Iterator[tuple[int, ...]]:
-    """The records of one datagram in plain numbers: RDT sequence, FT sequence, status and six counts of each.
+    """The records of one datagram as Python integers: RDT sequence, FT sequence, status and six counts each.
 
-    For datagrams of a few records this takes a fraction of the time that an array of :data:`RECORD` does.
+    For datagrams with few records this is several times faster than an array of :data:`RECORD`.
 
     Raises:
         CodecError: the length is not a whole number of records.
@@ -137,7 +137,7 @@ def records(payload: bytes) -> Iterator[tuple[int, ...]]:
 
 
 def holds_records(payload: bytes) -> bool:
-    """Whether a datagram's length is that of whole records."""
+    """Whether a datagram has the length of one or more whole records."""
     return bool(payload) and not len(payload) % RECORD.itemsize
 
 
@@ -165,7 +165,7 @@ def encode_record(rdt_sequence: int, ft_sequence: int, status: int, counts: Sequ
 def encode_records(
     rdt_sequence: NDArray[Any], ft_sequence: NDArray[Any], status: NDArray[Any], counts: NDArray[Any]
 ) -> bytes:
-    """Records as bytes, for emulators. Sequences and status have shape (n,), counts (n, 6); sequences wrap at 2^32.
+    """Encode records, for emulators. Sequences and status have shape (n,), counts (n, 6); sequences wrap at 2^32.
 
     Raises:
         CodecError: the shapes do not agree, or a count does not fit 32 bits.
@@ -183,13 +183,13 @@ def encode_records(
 
 
 def judge_status(status: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """A status word as faults, which make a reading void, and remarks, which do not; both in words."""
+    """The faults in a status word, which invalidate a reading, and the warnings, which do not; in plain English."""
     report = describe_status(status)
     return (report.messages, ()) if report.severity is Severity.FAULT else ((), report.messages)
 
 
 def describe_status(status: int) -> StatusReport:
-    """A status word in plain English, most severe severity first; 0 is healthy."""
+    """A status word in plain English, most severe problem first; 0 is healthy."""
     known = [meaning for bit, meaning in _MEANING.items() if status >> bit & 1]
     messages = [text for _, text in sorted(known, key=lambda item: -item[0])]
     severity = max((level for level, _ in known), default=Severity.OK)

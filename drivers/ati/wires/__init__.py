@@ -1,1 +1,1 @@
-"""The ways in which the readings of a Nano17 reach the computer."""
+"""The wires on which the readings of a Nano17 reach the computer."""

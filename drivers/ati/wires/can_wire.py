@@ -1,4 +1,4 @@
-"""A Nano17 on a Net CAN OEM board: its calibration is read once, its gauges whenever asked (protocols: Net CAN OEM)."""
+"""A Nano17 on a Net CAN OEM board: calibration is read once, gauges on each request (protocols: Net CAN OEM)."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class _Lesson:
         self.counts: tuple[int, int] | None = None
 
     def row_part(self, op: Op, pair: tuple[float, float]) -> None:
-        """Take a third of a row; a part that is out of its place spoils the lesson."""
+        """Take a third of a row; a part that arrives out of order invalidates the transfer."""
         expected = (Op.MATRIX, Op.MATRIX_SECOND, Op.MATRIX_THIRD)[len(self.elements) // 2 % 3]
         self.in_order = self.in_order and op == expected
         self.elements += pair
 
     def finish(self, units: bytes) -> DigitalCalibration | None:
-        """The calibration; None when an answer is missing. Raises CodecError when it can be none."""
+        """The calibration; None if an answer is missing. Raises CodecError if the values cannot be a calibration."""
         if not self.in_order or len(self.elements) != GAUGES * 6 or self.counts is None or len(units) != 2:
             return None
         matrix = np.array(self.elements).reshape(6, GAUGES)
@@ -44,7 +44,7 @@ class _Lesson:
 
 
 class CanWire:
-    """The messages of one board.
+    """The CAN messages of one board.
 
     Args:
         base: upper part of its identifiers.
@@ -52,8 +52,8 @@ class CanWire:
         serial: of the sensor; "" for any.
 
     Attributes:
-        calibration: what the board told; None before.
-        lost: readings of which one of the two frames is missing.
+        calibration: as read from the board; None until then.
+        lost: readings with one of their two frames missing.
     """
 
     stuck_after = 100
@@ -90,15 +90,15 @@ class CanWire:
         raise DeviceError(f"calibration {self._slot} of the board is not usable", where=talk.name, hint="Check the bus")
 
     def ask(self, transport: Transport, now_ns: int) -> None:
-        """Ask for the next reading, once the one before has come. Raises DeviceError."""
+        """Request the next reading, once the previous one has arrived. Raises DeviceError."""
         if self._turn.mine(now_ns):
             transport.send(self._question(Op.GAUGES))
 
     def stop(self, transport: Transport) -> None:
-        """Nothing to stop: the board sends only when asked."""
+        """Do nothing: the board sends only on request."""
 
     def receive(self, datagram: Datagram) -> list[WrenchSample]:
-        """Decode one frame; the second of a reading gives its sample.
+        """Decode one frame; the second frame of a reading completes its sample.
 
         Raises:
             CodecError: a frame of another board, or of no board.
@@ -117,7 +117,7 @@ class CanWire:
         return []
 
     def health(self) -> tuple[str, ...]:
-        """Lost halves and questions without an answer, in words."""
+        """Lost frames and unanswered requests, in plain English."""
         halves = (f"{self.lost} readings lost one of their two frames",) if self.lost else ()
         return (*halves, *self._turn.health())
 
@@ -144,7 +144,7 @@ class CanWire:
         self._samples.skip(1)
 
     def _learn(self, op: Op, data: bytes) -> None:
-        """Take an answer about the calibration. The serial number opens a lesson, the units close it."""
+        """Take an answer about the calibration. A transfer begins with the serial number and ends with the units."""
         if op == Op.SERIAL:
             self._lesson = _Lesson(data.split(b"\0", 1)[0].decode("ascii", "replace").strip())
         elif self._lesson is None:
@@ -158,7 +158,7 @@ class CanWire:
             self.calibration = lesson.finish(data) or self.calibration
 
     def _learn_all(self, talk: Conversation) -> bool:
-        """Ask for everything once; whether the board answered at all."""
+        """Request the whole calibration once; returns whether the board answered at all."""
         answered = self._ask(talk, Op.SELECT_CALIBRATION, bytes([self._slot]), Op.SELECT_CALIBRATION)
         answered |= self._ask(talk, Op.SERIAL, b"", Op.SERIAL)
         if not answered:
@@ -170,7 +170,7 @@ class CanWire:
         return True
 
     def _ask(self, talk: Conversation, op: Op, data: bytes, last: Op) -> bool:
-        """Ask, and wait for the last frame of the answer; whether it came."""
+        """Send a request and wait for the last frame of the answer; returns whether it came."""
         before = self._answers.get(last, 0)
         talk.send(self._question(op, data))
         return talk.until(lambda: self._answers.get(last, 0) > before or None, _ANSWER_s) is not None

@@ -1,4 +1,4 @@
-"""A Nano17 behind an F/T controller on RS-232: plain letters ask, counts answer (protocols: F/T controller)."""
+"""A Nano17 behind an F/T controller on RS-232: letters as commands, counts as answers (protocols: F/T controller)."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _ANSWER_s, _QUIET_s = 0.5, 0.2
 
 
 class ControllerWire:
-    """The RS-232 line of one controller. In ASCII it streams, in binary it answers one question after the other.
+    """The RS-232 line of one controller. In ASCII mode it streams; in binary mode each request gets a record.
 
-    A resolved reading of a still sensor can repeat for long, so that equal readings are no sign of a stuck sensor.
+    Resolved readings of a sensor at rest can stay equal for long, so equal readings do not prove that it is stuck.
 
     Args:
         mode: form of the records.
@@ -41,10 +41,10 @@ class ControllerWire:
         self._heard = b""
 
     def start(self, talk: Conversation) -> None:
-        """Stop an old stream, set form and axes, and start.
+        """Stop an old stream, set the form of records and the axes, and start.
 
         Raises:
-            DeviceError: no controller answers, or it does so in another baud rate.
+            DeviceError: no controller answers, or its baud rate differs.
         """
         self._turn.restart()
         talk.send(b"\r")
@@ -56,7 +56,7 @@ class ControllerWire:
             talk.send(b"QS\r")
 
     def ask(self, transport: Transport, now_ns: int) -> None:
-        """In binary, ask for the next record. Raises DeviceError."""
+        """Request the next record, in binary mode. Raises DeviceError."""
         if self._mode == "binary" and self._turn.mine(now_ns):
             transport.send(b"QR\r")
 
@@ -65,7 +65,7 @@ class ControllerWire:
         transport.send(b"\r")
 
     def receive(self, datagram: Datagram) -> list[WrenchSample]:
-        """Decode one piece of the line."""
+        """Decode one chunk of received bytes."""
         self._heard = (self._heard + datagram.payload)[-256:]
         before = self._records.damaged
         records = self._records.feed(datagram.payload)
@@ -74,7 +74,7 @@ class ControllerWire:
         return [self._sample(record, datagram.stamp_ns) for record in records]
 
     def health(self) -> tuple[str, ...]:
-        """Damaged records and questions without an answer, in words."""
+        """Damaged records and unanswered requests, in plain English."""
         damaged = self._records.damaged
         return (*((f"{damaged} damaged records",) if damaged else ()), *self._turn.health())
 

@@ -1,4 +1,4 @@
-"""Asking a device something and waiting for its answer, over any transport and on any clock."""
+"""Sends a request to a device and waits for its answer, over any transport and on any clock."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Conversation:
     Args:
         transport: open.
         clock: the session's clock.
-        listen: gets every received message, as it would later.
+        listen: receives every message, exactly as it does later during the session.
     """
 
     def __init__(self, transport: Transport, clock: Clock, listen: Callable[[Datagram], object]) -> None:
@@ -33,7 +33,7 @@ class Conversation:
         self._transport.send(payload)
 
     def wait(self, seconds: float) -> int:
-        """Listen for a time; the number of bytes that came. Raises DeviceError."""
+        """Listen for a time; returns the number of bytes received. Raises DeviceError."""
         heard, end_ns = 0, self._clock.now_ns() + round(seconds * NANOSECONDS)
         while True:
             heard += self._hear()
@@ -42,7 +42,7 @@ class Conversation:
             self._clock.sleep_until_ns(min(end_ns, now_ns + _STEP_ns))
 
     def until(self, look: Callable[[], Answer | None], seconds: float) -> Answer | None:
-        """Listen until ``look`` gives something; None when it has not in time. Raises DeviceError."""
+        """Listen until ``look`` returns a value; None if the time runs out first. Raises DeviceError."""
         patience = Patience(seconds, self._clock.now_ns())
         while True:
             self._hear()
@@ -59,5 +59,5 @@ class Conversation:
             try:
                 self._listen(datagram)
             except CodecError:
-                continue  # remains of what the device did before we asked
+                continue  # left over from before our request
         return heard

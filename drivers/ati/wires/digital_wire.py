@@ -22,7 +22,7 @@ from drivers.force.force_fingertip import WrenchSample
 BAUD_RATES = (1_250_000, 115_200, 19_200)
 STATUS_REGISTER = 0x001D
 JAM = b"\x00" * 16
-"""Any 14 bytes or more end a stream."""
+"""Any 14 or more bytes end a stream."""
 
 STATUS_BITS = {
     1: "watchdog",
@@ -42,12 +42,12 @@ STATUS_BITS = {
 """What the bits of the status word mean, by their value."""
 
 _ANSWER_s, _QUIET_s = 0.25, 0.05
-_FIRST_READ = 96  # registers; a block does not fit one read, and the two parts are told apart by their lengths
+_FIRST_READ = 96  # registers; a block needs two reads, whose lengths differ so that their replies can be told apart
 _PIECE_ns = 50_000_000
 
 
 def describe_status(status: int) -> tuple[str, ...]:
-    """A status word in words; empty when healthy."""
+    """A status word in plain English; empty if healthy."""
     unnamed = status & ~sum(STATUS_BITS)
     words = [text for bit, text in STATUS_BITS.items() if status & bit]
     return (*words, f"undocumented status bits 0x{unnamed:04x}") if unnamed else tuple(words)
@@ -61,7 +61,7 @@ class DigitalWire:
         serial: of the sensor; "" for any.
 
     Attributes:
-        calibration: what the sensor told; None before.
+        calibration: as read from the sensor; None until then.
     """
 
     stuck_after = 100
@@ -83,7 +83,7 @@ class DigitalWire:
         """End an old stream, read status and calibration, and start the stream.
 
         Raises:
-            DeviceError: no answer, a faulty or another sensor, or one that does not stream.
+            DeviceError: the sensor does not answer, is faulty, is not the expected one, or does not stream.
         """
         self._restart()
         talk.send(JAM)
@@ -101,17 +101,17 @@ class DigitalWire:
             raise DeviceError("the sensor refuses to stream", where=talk.name, hint="Switch it off and on")
 
     def ask(self, transport: Transport, now_ns: int) -> None:
-        """Nothing to ask: the sensor streams."""
+        """Do nothing: the sensor streams."""
 
     def stop(self, transport: Transport) -> None:
         """End the stream. Raises DeviceError."""
         transport.send(JAM)
 
     def receive(self, datagram: Datagram) -> list[WrenchSample]:
-        """Decode one piece of the line: replies while the sensor is set up, samples once it streams.
+        """Decode one chunk of received bytes: replies during set-up, samples once the sensor streams.
 
         Raises:
-            CodecError: a calibration that can be none.
+            CodecError: the received values cannot be a calibration.
         """
         piece = datagram.payload
         if not self._streaming:
@@ -119,7 +119,7 @@ class DigitalWire:
         return self._decode(piece, datagram.stamp_ns) if self._streaming else []
 
     def health(self) -> tuple[str, ...]:
-        """Lost bytes, in words."""
+        """Lost bytes, in plain English."""
         stream = self._stream
         if not stream.skipped_bytes:
             return ()
@@ -132,7 +132,7 @@ class DigitalWire:
         self._arrived_ns: int | None = None
 
     def _take_replies(self, piece: bytes) -> bytes:
-        """Take replies out of what arrived; what follows the reply that starts the stream belongs to the stream."""
+        """Remove replies from the received bytes; what follows the reply to the start request belongs to the stream."""
         self._buffer += piece
         while (reply := modbus.take_reply(self._buffer)) is not None:
             self._replies = [reply]
@@ -144,7 +144,7 @@ class DigitalWire:
         return b""
 
     def _learn(self, reply: Frame) -> None:
-        """Put the two parts of the calibration together."""
+        """Combine the two parts of the calibration."""
         if reply.function != modbus.READ_HOLDING:
             return
         data = reply.data[1:]
@@ -159,7 +159,7 @@ class DigitalWire:
         stamps_ns = spread_stamps(self._arrived_ns, stamp_ns, len(gauges), _PIECE_ns)
         self._arrived_ns = stamp_ns
         if self.calibration is None:
-            raise CodecError("a stream without the sensor's calibration before it", where="digital sensor")
+            raise CodecError("the stream began before the sensor's calibration was read", where="digital sensor")
         faults = ["the sensor reports a status error" if error else "" for error in errors]
         return self._samples.make(gauges, self.calibration.working_matrix, stamps_ns, faults)
 

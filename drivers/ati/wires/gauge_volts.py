@@ -1,7 +1,7 @@
 """A Nano17 on a plain amplifier: gauge volts, and ATI's .cal file (protocols: Gauge volts; ATI calibration files).
 
-The program that owns the acquisition card sends one message a reading: a 32-bit counter, then the volts of gauges 0
-to 5 as 64-bit floats and, where a thermistor is read, its volts; all little-endian.
+The program that reads the acquisition card sends one message per reading: a 32-bit counter, the volts of gauges 0 to 5
+as 64-bit floats and, if there is a thermistor, its volts; all little-endian.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def encode_volts(counter: int, volts: tuple[float, ...]) -> bytes:
 
 
 def decode_volts(payload: bytes) -> tuple[int, Array]:
-    """Counter and volts, shape (6,) or (7,). Raises CodecError for another length or values that are not finite."""
+    """Counter and volts, shape (6,) or (7,). Raises CodecError for a wrong length or values that are not finite."""
     form = {PLAIN.size: PLAIN, WITH_THERMISTOR.size: WITH_THERMISTOR}.get(len(payload))
     if form is None:
         raise CodecError(f"{len(payload)} bytes instead of {PLAIN.size} or {WITH_THERMISTOR.size}", where="volts")
@@ -44,7 +44,7 @@ def decode_volts(payload: bytes) -> tuple[int, Array]:
 
 
 class GaugeVoltsWire:
-    """Volts through a calibration file.
+    """Converts volts by a calibration file.
 
     Args:
         calibration: of the sensor on the amplifier.
@@ -66,11 +66,11 @@ class GaugeVoltsWire:
         self.counter: int | None = None
         self.ranges_SI: Array | None = calibration.ranges_SI
         self._calibration = calibration
-        self._changes, self._measured = 0, 0  # the counter of the message in which the readings last changed
+        self._changes, self._measured = 0, 0  # counter of the last message whose readings differed from those before
         self._samples = GaugeSamples(limit=_SATURATED_SHARE * calibration.output_range_V / 2.0)
 
     def start(self, talk: Conversation) -> None:
-        """See that readings arrive. Raises DeviceError when none does."""
+        """Check that readings arrive. Raises DeviceError if none does."""
         self.counter = None
         if talk.until(lambda: self.counter, _FIRST_READING_s) is None:
             raise DeviceError(
@@ -78,13 +78,13 @@ class GaugeVoltsWire:
             )
 
     def ask(self, transport: Transport, now_ns: int) -> None:
-        """Nothing to ask: the acquisition program sends."""
+        """Do nothing: the acquisition program sends by itself."""
 
     def stop(self, transport: Transport) -> None:
-        """Nothing to stop: the acquisition program goes on."""
+        """Do nothing: the acquisition program keeps running."""
 
     def receive(self, datagram: Datagram) -> list[WrenchSample]:
-        """Decode one reading. Raises CodecError for bytes that are none."""
+        """Decode one reading. Raises CodecError if the bytes are not a reading."""
         counter, volts = decode_volts(datagram.payload)
         gauges, terms = volts[None, :GAUGES], self._calibration.temperature
         corrected = terms.correct(gauges, volts[GAUGES:]) if terms is not None and len(volts) > GAUGES else gauges
@@ -97,5 +97,5 @@ class GaugeVoltsWire:
         return [replace(sample, sent=counter, measured=measured)]
 
     def health(self) -> tuple[str, ...]:
-        """The messages carry a counter, which says all."""
+        """No problems of the wire itself: lost messages show in the counter of the samples."""
         return ()

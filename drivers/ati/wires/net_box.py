@@ -1,4 +1,4 @@
-"""The web pages of a Net F/T box: what it is, how it is set, and setting its rate (protocols: Net F/T)."""
+"""The web pages of a Net F/T box: reads its identity and settings, and sets its rate (protocols: Net F/T)."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _HINT = "Is the box switched on and in the same network? Open its address in a b
 
 @dataclass(frozen=True)
 class NetBoxPage:
-    """What a box says of itself.
+    """What a box reports about itself.
 
     Attributes:
-        product, firmware: for people.
+        product, firmware: for display only.
         serial: of the calibration in use (``cfgcalsn``), as ``FT12345``.
-        counts_per_N, counts_per_Nm: its scale in SI, whatever unit it is set to.
+        counts_per_N, counts_per_Nm: its scale in SI units, whichever unit the box is set to.
         rate_hz: records per second of its real-time stream.
-        rdt_enabled: whether it streams at all.
+        rdt_enabled: whether its stream is enabled.
         status: its status word.
         tool: the six values of its tool transform.
     """
@@ -41,7 +41,7 @@ class NetBoxPage:
 
 
 def achievable_rate(wanted_hz: int) -> int:
-    """What the box makes of a wanted rate: its 7 kHz divided by a whole number, rounded."""
+    """The rate that the box sets for a requested one: 7 kHz divided by an integer, rounded."""
     return round(INTERNAL_RATE_Hz / max(1, round(INTERNAL_RATE_Hz / wanted_hz)))
 
 
@@ -49,7 +49,7 @@ def parse_page(content: bytes) -> NetBoxPage:
     """Read ``netftapi2.xml``.
 
     Raises:
-        CodecError: it is no such page, or lacks something.
+        CodecError: the text is not such a page, or is incomplete.
     """
     try:
         root = parse_xml(content)
@@ -70,19 +70,19 @@ def parse_page(content: bytes) -> NetBoxPage:
 
 
 def fetch_page(host: str, port: int, timeout_s: float = 2.0) -> NetBoxPage:
-    """Ask a box what it is.
+    """Read the page of a box.
 
     Raises:
-        DeviceError: nobody answers; CodecError: something else than a box answers.
+        DeviceError: nothing answers; CodecError: the answer is not from a Net F/T box.
     """
     return parse_page(_get(host, port, PAGE, timeout_s))
 
 
 def set_rate(host: str, port: int, rate_hz: int, timeout_s: float = 2.0) -> NetBoxPage:
-    """Set the rate of the real-time stream and read back what the box made of it.
+    """Set the rate of the real-time stream and read back the rate that the box chose.
 
     Raises:
-        DeviceError: as :func:`fetch_page`, or the box has kept another rate.
+        DeviceError: as :func:`fetch_page`, or the box did not accept the rate.
     """
     _get(host, port, f"/comm.cgi?comrdtrate={rate_hz}", timeout_s)
     page = fetch_page(host, port, timeout_s)

@@ -1,4 +1,4 @@
-"""Waiting for a device, on a computer that may put the waiting program aside."""
+"""Waits for a device, on a computer that may suspend the waiting program."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ _LOOKS = 5
 
 
 class Patience:
-    """Time that a device was waited for.
+    """Measures how long a device has been waited for.
 
-    A program that is put aside does not wait: its device may have answered long ago, and that is seen at the next look
-    only. So no more than a fifth of the patience counts between two looks.
+    While the program is suspended it cannot see an answer, and the device may have answered long ago. So at most a
+    fifth of the waiting time is counted between two checks.
 
     Args:
         seconds: how long to wait.
@@ -23,7 +23,7 @@ class Patience:
         self._longest_ns, self._looked_ns = max(self._left_ns // _LOOKS, 1), now_ns
 
     def over(self, now_ns: int) -> bool:
-        """Whether it is used up; every call counts as a look."""
+        """Whether the waiting time is over; every call counts as a check."""
         self._left_ns -= min(now_ns - self._looked_ns, self._longest_ns)
         self._looked_ns = now_ns
         return self._left_ns <= 0

@@ -24,7 +24,7 @@ _OLD_STREAM_s = 0.05
 
 @dataclass(frozen=True)
 class BoxPages:
-    """Where a box's web pages are, and what they must say.
+    """The address of a box's web pages, and what they must report.
 
     Attributes:
         host, port: of its web server.
@@ -42,11 +42,11 @@ class RdtWire:
     """An RDT stream.
 
     Args:
-        counts_per_N, counts_per_Nm: the box's scale; where it has pages they must agree.
-        pages: the box's web pages; None for a box without any, whose stream is then started unseen.
+        counts_per_N, counts_per_Nm: the box's scale; the web pages, if any, must agree.
+        pages: the box's web pages; None for a box without pages, whose stream is then started without a check.
 
     Attributes:
-        page: what the box said when the stream was started.
+        page: what the box reported when the stream was started.
     """
 
     stuck_after = STUCK_AFTER
@@ -60,10 +60,10 @@ class RdtWire:
         self.step = round(INTERNAL_RATE_Hz / net_box.achievable_rate(pages.rate_hz)) if pages else 0
 
     def start(self, talk: Conversation) -> None:
-        """Stop an old stream, look at the box, set its rate, start ours and see that it comes.
+        """Stop an old stream, check the box, set its rate, start our stream and check that it arrives.
 
         Raises:
-            DeviceError: the box does not answer, or is another, set otherwise, or does not stream.
+            DeviceError: the box does not answer, is not the expected one, has other settings, or does not stream.
         """
         talk.send(rdt_codec.encode_request(Command.STOP))
         if self._pages is not None:
@@ -81,7 +81,7 @@ class RdtWire:
                 )
 
     def ask(self, transport: Transport, now_ns: int) -> None:
-        """Nothing to ask: the box streams."""
+        """Do nothing: the box streams."""
 
     def stop(self, transport: Transport) -> None:
         """End the stream. Raises DeviceError."""
@@ -97,7 +97,7 @@ class RdtWire:
         return samples
 
     def receive_many(self, datagrams: list[Datagram]) -> tuple[list[WrenchSample], int]:
-        """As :meth:`receive` for many datagrams at once, in a fraction of the time; and how many held no records."""
+        """As :meth:`receive` for many datagrams at once, but faster; also returns how many held no records."""
         sound = [datagram for datagram in datagrams if rdt_codec.holds_records(datagram.payload)]
         table = np.frombuffer(b"".join(datagram.payload for datagram in sound), rdt_codec.RECORD)
         wrenches = table["counts"].astype(float) / self._scale
@@ -108,7 +108,7 @@ class RdtWire:
         return [*map(_interpret_status, map(WrenchSample, stamps_ns, wrenches, *words))], len(datagrams) - len(sound)
 
     def health(self) -> tuple[str, ...]:
-        """A stream has no faults of its own beside those of its records."""
+        """No problems of the wire itself: all faults show in the records."""
         return ()
 
     def _look_at_box(self, where: str, pages: BoxPages) -> None:
@@ -136,7 +136,7 @@ def _wrong(where: str, what: str) -> DeviceError:
 
 
 def _interpret_status(sample: WrenchSample) -> WrenchSample:
-    """A sample with what its status word means; a healthy one, the usual case, as it is."""
+    """The sample with the faults and warnings of its status word; a healthy one is returned unchanged."""
     if not sample.status:
         return sample
     faults, remarks = rdt_codec.judge_status(sample.status)

@@ -1,8 +1,8 @@
-"""The ways a Nano17's readings reach the computer: what each of them gives the one device class.
+"""The interface between the device class and the wires that carry a Nano17's readings.
 
-A wire sets its device up, decodes what it sends and knows what can be wrong with it. Its decoding depends on nothing
-but its settings and the messages received so far, answers to set-up questions included: so a replay, which has the
-messages alone, decodes what the session did.
+A wire sets up its device, decodes what the device sends, and reports what is wrong with the connection. Decoding
+depends only on the settings and on the messages received so far, including the answers during set-up. So a replay,
+which has only the messages, decodes the same samples as the session.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class ForceWire(Protocol):
 
     Attributes:
         stuck_after: equal readings in a row after which the sensor counts as stuck.
-        step: how far the measuring counter moves from sample to sample; 0 when that is not known.
+        step: how far the sensor's counter advances from sample to sample; 0 if unknown.
     """
 
     stuck_after: int
@@ -33,17 +33,17 @@ class ForceWire(Protocol):
 
     @property
     def ranges_SI(self) -> Array | None:
-        """Calibrated range of each axis, N and N m, shape (6,); None when the device has not told."""
+        """Calibrated range of each axis, N and N m, shape (6,); None if the device has not reported it."""
 
     def start(self, talk: Conversation) -> None:
-        """Set the device up from whatever state it is in, and start its stream.
+        """Set up the device, whatever state it is in, and start its stream.
 
         Raises:
-            DeviceError: it does not answer, or is not the device it should be; says why.
+            DeviceError: it does not answer, or is not the expected device; the message says why.
         """
 
     def ask(self, transport: Transport, now_ns: int) -> None:
-        """Ask for the next reading where the device sends only when asked. Raises DeviceError."""
+        """Request the next reading, if the device sends only on request. Raises DeviceError."""
 
     def stop(self, transport: Transport) -> None:
         """End the stream. Raises DeviceError."""
@@ -52,21 +52,21 @@ class ForceWire(Protocol):
         """Decode one message. Raises CodecError for bytes of another protocol."""
 
     def health(self) -> tuple[str, ...]:
-        """What is wrong with the wire, in words."""
+        """What is wrong with the wire, in plain English."""
 
 
 @runtime_checkable
 class FastWire(Protocol):
-    """A wire that decodes many messages faster together than one by one."""
+    """A wire that decodes many messages faster in one call than one by one."""
 
     def receive_many(self, datagrams: list[Datagram]) -> tuple[list[WrenchSample], int]:
-        """The samples of all messages, oldest first, and how many messages were none of this protocol."""
+        """The samples of all messages, oldest first, and how many messages did not belong to this protocol."""
 
 
 class GaugeSamples:
-    """Makes samples of gauge readings: the checks that come before the matrix, and counters for a wire without any.
+    """Turns gauge readings into samples: checks them, applies the matrix, and numbers them if the wire does not.
 
-    A reading with a gauge at its limit is void as a whole, and so is one that the device itself calls faulty: its
+    A reading with a gauge at its limit is invalid as a whole, and so is one that the device reports as faulty: its
     wrench is NaN and its faults say why.
 
     Args:
@@ -79,7 +79,7 @@ class GaugeSamples:
         self._before: bytes | None = None
 
     def skip(self, lost: int) -> None:
-        """Note samples that were sent and are lost."""
+        """Count samples that were sent but lost."""
         self._count += lost
 
     def make(
@@ -90,14 +90,14 @@ class GaugeSamples:
         faults: list[str],
         corrected: Array | None = None,
     ) -> list[WrenchSample]:
-        """Samples of readings, oldest first.
+        """Turn readings into samples, oldest first.
 
         Args:
             readings: gauges 0 to 5, shape (n, 6).
             matrix: from readings to N and N m, shape (6, 6).
             stamps_ns: arrival of each.
-            faults: what the device says is wrong with each, "" for nothing.
-            corrected: what to multiply with the matrix, where that is not the readings themselves, shape (n, 6).
+            faults: the fault that the device reports for each, "" for none.
+            corrected: the values to multiply by the matrix if they differ from the readings, shape (n, 6).
         """
         saturated = np.abs(readings) >= self._limit
         wrenches = (readings if corrected is None else corrected) @ matrix.T
@@ -122,13 +122,13 @@ def _objections(saturated: Array, fault: str) -> tuple[str, ...]:
 
 
 def spread_stamps(previous_ns: int | None, arrived_ns: int, count: int, longest_ns: int) -> list[int]:
-    """Stamps of samples that arrived together in one piece of a steady stream, spread back to the piece before.
+    """Spread the stamps of samples that arrived in one chunk of a steady stream back to the chunk before.
 
     Args:
-        previous_ns: arrival of the piece before; None for the first.
-        arrived_ns: arrival of this piece, the stamp of its last sample.
+        previous_ns: arrival of the chunk before; None for the first.
+        arrived_ns: arrival of this chunk, which is the stamp of its last sample.
         count: samples in it.
-        longest_ns: never spread over more than this.
+        longest_ns: the longest time to spread the stamps over.
     """
     if count == 0:
         return []
@@ -137,13 +137,13 @@ def spread_stamps(previous_ns: int | None, arrived_ns: int, count: int, longest_
 
 
 class Turn:
-    """Whose turn it is on a wire of question and answer: ask again when the answer has come, or will not any more.
+    """Decides when to send the next request: after the answer to the last one, or when that answer is overdue.
 
     Args:
         patience_s: how long to wait for an answer.
 
     Attributes:
-        unanswered: questions given up.
+        unanswered: requests that got no answer in time.
     """
 
     def __init__(self, patience_s: float) -> None:
@@ -152,15 +152,15 @@ class Turn:
         self._waiting: Patience | None = None
 
     def restart(self) -> None:
-        """Nothing is asked, as after connecting."""
+        """Forget the open request, as after connecting."""
         self._waiting = None
 
     def on_answer(self) -> None:
-        """An answer has come."""
+        """Note that an answer has arrived."""
         self._waiting = None
 
     def mine(self, now_ns: int) -> bool:
-        """Whether to ask now; then the question counts as asked."""
+        """Whether to send a request now; if so, it counts as sent."""
         if self._waiting is not None and not self._waiting.over(now_ns):
             return False
         self.unanswered += self._waiting is not None
@@ -168,5 +168,5 @@ class Turn:
         return True
 
     def health(self) -> tuple[str, ...]:
-        """Questions without an answer, in words."""
+        """Unanswered requests, in plain English."""
         return (f"{self.unanswered} requests without an answer",) if self.unanswered else ()

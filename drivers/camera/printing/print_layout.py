@@ -1,6 +1,6 @@
-"""What a sheet of markers looks like, in millimetres: black areas, thin lines and words, whatever writes them.
+"""The layout of a sheet of markers in millimetres: black areas, thin lines and text, independent of the file format.
 
-A sheet's x goes right and its y down from the top left corner of the paper. Black modules that touch are one area with
+On a sheet x points right and y down, from the top left corner of the paper. Black modules that touch form one area with
 one outline, so that no viewer shows hairlines between them.
 """
 
@@ -21,19 +21,19 @@ PAPERS_mm = {"A4": (210.0, 297.0), "A3": (297.0, 420.0), "A2": (420.0, 594.0), "
 _MARGIN_mm, _FOOT_mm, _BETWEEN_mm = 10.0, 30.0, 12.0
 _WORDS_mm = 3.2
 WHITE_MODULES = 0.5
-"""White around a marker's black square that belongs to it: on a dark table or object nothing is found without."""
+"""White border around a marker's black square: on a dark table or object the marker is not found without it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Area:
-    """A black area: closed outlines, each shape (n, 2), millimetres; a place inside an odd number of them is black."""
+    """A black area: closed outlines, each shape (n, 2), millimetres; a point inside an odd number of them is black."""
 
     outlines: tuple[Array, ...]
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line along an edge of the paper from one place to another, millimetres; grey lines are to cut along."""
+    """A line parallel to an edge of the paper, from one point to another, millimetres; grey lines are for cutting."""
 
     start: tuple[float, float]
     end: tuple[float, float]
@@ -42,7 +42,7 @@ class Line:
 
     @property
     def area_mm(self) -> tuple[float, float, float, float]:
-        """What it covers, as it ends where it ends: left, top, width and height, millimetres."""
+        """The rectangle that it covers, without rounded ends: left, top, width and height, millimetres."""
         (left, right), (top, bottom) = (sorted(ends) for ends in zip(self.start, self.end, strict=True))
         half = self.width_mm / 2
         if left == right:
@@ -52,7 +52,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Words:
-    """Words beginning at a place (their base line), millimetres."""
+    """Text that starts at a point on its base line, millimetres."""
 
     place: tuple[float, float]
     text: str
@@ -71,7 +71,9 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """One thing to place on a sheet: its size with its white border, and how it is drawn from its top left corner."""
+    """One print to place on a sheet: its size including its white border, and how to draw it from its top left
+    corner.
+    """
 
     width_mm: float
     height_mm: float
@@ -81,15 +83,15 @@ class _Piece:
 
 
 def sheet_of(prints: Sequence[AnyBoard], paper: str = "A4", places: Sequence[str] = ()) -> Sheet:
-    """A sheet with the prints one below or beside another, a check bar and their names.
+    """A sheet with the prints below or beside each other, their names, and a check bar.
 
     Args:
-        prints: what is printed.
+        prints: what to print.
         paper: its format.
-        places: where each is to be glued, for its caption; none where anybody may use it anywhere.
+        places: where to glue each of them, for the captions; empty if that is up to the user.
 
     Raises:
-        ConfigurationError: no such paper, or the prints do not fit on it.
+        ConfigurationError: the paper format is unknown, or the prints do not fit on it.
     """
     if paper not in PAPERS_mm:
         hint = f"Choose one of {', '.join(PAPERS_mm)}"
@@ -112,7 +114,7 @@ def sheet_of(prints: Sequence[AnyBoard], paper: str = "A4", places: Sequence[str
 
 
 def _places(pieces: Sequence[_Piece], size: tuple[float, float]) -> list[tuple[float, float]] | None:
-    """Top left corners, in lines from left to right; None when there is no room."""
+    """Top left corners, row by row from left to right; None if there is not enough room."""
     right, bottom = size[0] - _MARGIN_mm, size[1] - _MARGIN_mm - _FOOT_mm
     x = y = _MARGIN_mm
     line_mm, places = 0.0, []
@@ -203,15 +205,15 @@ def _marker(print_: AnyBoard, number: int, corner: tuple[float, float], side: fl
 
 
 def _modules(print_: AnyBoard) -> int:
-    """Modules across a marker, its black frame included."""
+    """Number of modules across a marker, including its black frame."""
     return int(print_.opencv_dictionary.markerSize) + 2
 
 
 def outlines(black: NDArray[np.bool_]) -> list[Array]:
     """Outlines of the black cells of a grid, each shape (n, 2) as column and row of cell corners.
 
-    Every cell has its edges around it; an edge between two black cells is there twice, in opposite directions, and
-    cancels. What is left is chained to loops.
+    Every black cell contributes its four edges. An edge between two black cells occurs twice, in opposite directions,
+    and cancels. The remaining edges are joined to loops.
     """
     edges: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for start, end in _outer_edges(black):

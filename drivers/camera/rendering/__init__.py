@@ -1,1 +1,1 @@
-"""Pictures of markers and boards as a camera would take them, drawn without a physics engine."""
+"""Rendered pictures of markers and boards, as a camera would take them, without a physics engine."""

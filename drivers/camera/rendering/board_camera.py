@@ -1,7 +1,7 @@
-"""A simulated camera without a physics engine: a printed board held before it, or the two markers of the table.
+"""A simulated camera without a physics engine. It sees a printed board held in front of it, or the two table markers.
 
-Every pixel is followed through the lens to the board's plane, four rays a pixel; blur and noise come last. Given as a
-source of pictures like a real camera's, in real time.
+Four rays per pixel are traced through the lens to the board's plane; blur and noise are added last. The result is a
+source of pictures in real time, like a real camera.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.poses import transform_points
 
-_RAYS = 2  # a pixel and direction
-_MARGIN = 0.06  # white around the board, over its width
+_RAYS = 2  # rays per pixel and direction
+_MARGIN = 0.06  # white border around the board, relative to its width
 _TEXELS_PER_m = 12_000
 _PICTURES = 5
 _GREY, _BLACK, _WHITE = 120.0, 22.0, 232.0
@@ -36,7 +36,7 @@ BOARD_VIEWS = 40
 
 @dataclass(frozen=True, eq=False)
 class BoardView:
-    """What stands between a board and its picture: sharpness (px) and noise (levels of 255)."""
+    """Imperfections of a picture of a board: blur (px) and noise (levels of 255)."""
 
     blur_px: float = 0.7
     noise_levels: float = 2.5
@@ -49,7 +49,9 @@ def draw_board(
     rng: np.random.Generator,
     view: BoardView | None = None,
 ) -> Image:
-    """A picture of a board of true size, shape (height, width). Raises ConfigurationError: the lens states no size."""
+    """Draw a picture of a board of true size, shape (height, width). Raises ConfigurationError if the lens states no
+    size.
+    """
     if lens.size_px is None:
         raise ConfigurationError("the picture size is missing", where="simulated camera", hint="Set size_px")
     view, texture = view or BoardView(), board_texture(board)
@@ -70,7 +72,7 @@ def draw_board(
 
 @lru_cache(maxsize=4)
 def board_texture(board: AnyBoard) -> Array:
-    """The print with its white margin, grey levels, so fine that a module has many texels."""
+    """The print with its white margin as grey levels, with many texels per module."""
     width_m, height_m = board.size_m
     size = (round(width_m * _TEXELS_PER_m), round(height_m * _TEXELS_PER_m))
     if isinstance(board, CharucoBoard):
@@ -108,7 +110,7 @@ def _rays(lens: CameraCalibration) -> Array:
 
 
 def board_poses(board: AnyBoard, lens: CameraCalibration, count: int, rng: np.random.Generator) -> list[Pose3]:
-    """Where a person would hold the board for a calibration: all over the picture, tilted, near and far."""
+    """Poses in which a person would hold the board for a calibration: all over the picture, tilted, near and far."""
     assert lens.size_px is not None
     facing, size_m = Rot3(np.diag([1.0, -1.0, -1.0])), max(board.size_m)
     poses: list[Pose3] = []
@@ -144,10 +146,10 @@ def simulated_lens(size_px: tuple[int, int]) -> CameraCalibration:
 
 
 class SimulatedSource:
-    """``simulated``: the two markers on the table, again and again; ``simulated:board``: a ChArUco board held up.
+    """``simulated``: the two markers on the table, without end; ``simulated:board``: a ChArUco board held up.
 
-    Pictures are drawn beforehand, as drawing takes longer than looking, and given at the camera's rate. The board's
-    ends after :data:`BOARD_VIEWS` pictures, which come as fast as they can be drawn.
+    Pictures are drawn beforehand, because drawing takes longer than detection, and returned at the camera's rate. The
+    board source ends after :data:`BOARD_VIEWS` pictures, which are returned as fast as they can be drawn.
     """
 
     def __init__(self, settings: CameraSourceSettings, clock: Clock) -> None:
@@ -158,7 +160,7 @@ class SimulatedSource:
         self._poses: list[Pose3] = []
 
     def open(self) -> None:
-        """Draw. Raises ConfigurationError for an unknown scene."""
+        """Draw the pictures. Raises ConfigurationError for an unknown scene."""
         scene = self._settings.place().name or "table"
         if scene == "table":
             self._pictures = table_pictures(self._settings, _PICTURES, self._rng)
@@ -186,7 +188,7 @@ class SimulatedSource:
         self._pictures = []
 
     def notes(self) -> tuple[str, ...]:
-        """Everything is as asked."""
+        """Nothing to report: all settings are accepted."""
         return ()
 
     @property
@@ -199,7 +201,9 @@ class SimulatedSource:
 
 
 def table_pictures(settings: CameraSourceSettings, count: int, rng: np.random.Generator) -> list[Image]:
-    """The world marker and an object's, turned from picture to picture, as the camera under the table sees them."""
+    """Pictures of the world marker and of an object's, which turns from one to the next, as seen from under the
+    table.
+    """
     markers = MarkerSettings(dictionary=settings.dictionary)
     camera = TableCamera(simulated_lens(settings.size_px), CameraSettings(), rng)
     world = PrintedMarker(settings.dictionary, markers.world_id, markers.world_side_m)

@@ -1,4 +1,4 @@
-"""A camera that is drawn rather than real: where it stands, and how imperfect its pictures are."""
+"""Settings of a rendered camera: its pose and the imperfections of its pictures."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from drivers.core.fingertip import RigidTransform
 
 
 class CameraSettings(StrictModel):
-    """The camera under the table beyond its lens.
+    """The camera under the table, without its lens.
 
     Attributes:
-        world_T_camera: its pose, z along the view (up), x along the picture's rows.
-        glass_thickness_m, glass_index: the table's plate.
+        world_T_camera: its pose: z along the viewing direction (up), x along the rows of the picture.
+        glass_thickness_m, glass_index: the table's glass plate.
         blur_px: sharpness, one standard deviation.
         noise_levels: noise of a pixel of 255.
         jpeg_quality: of the pictures it sends.
-        stream_hz: frames a second whose markers it sends by itself; None for a camera that waits for triggers.
-        late_ms: how long after it was taken a frame arrives, and is stamped.
+        stream_hz: frames per second whose markers it streams; None for a camera that waits for triggers.
+        late_ms: delay between taking a frame and its arrival, when it is stamped.
     """
 
     world_T_camera: RigidTransform = RigidTransform(translation_m=(-0.005, -0.04, -0.58), rpy_rad=(-0.07, 0.05, 0.0))

@@ -1,9 +1,9 @@
-"""Pictures of the markers as the camera under the table would take them, without any graphics library.
+"""Renders the markers as seen by the camera under the table, without a graphics library.
 
-Every pixel near a marker is followed as rays through the lens, the glass plate and into the marker's plane (nine rays a
-pixel); the rest of the picture is background and the dark underside of the object. Blur and noise come last.
-The table's glass lies between z = -thickness and z = 0; above it a ray runs on in its old direction, moved sideways by
-``thickness * (tan incidence - tan refraction)``.
+For every pixel near a marker, nine rays are traced through the lens and the glass plate to the marker's plane. The rest
+of the picture is background and the dark underside of the object. Blur and noise are added last. The table's glass lies
+between z = -thickness and z = 0; above it a ray continues in its old direction, displaced sideways by ``thickness *
+(tan incidence - tan refraction)``.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _Picture = NDArray[np.float32]
 
 _RAYS = 3  # rays per pixel and direction
 _MARGIN_px = 3
-_MARKER_MODULES = 6  # 4 x 4 bits and a black frame
+_MARKER_MODULES = 6  # modules: 4 x 4 bits and a black frame
 _BACKGROUND, _FOOT, _WHITE, _BLACK = 150.0, 70.0, 235.0, 20.0
 _VIGNETTING = 0.18
 
@@ -60,10 +60,10 @@ class TableCamera:
     Args:
         lens: its optics; the picture's size must be stated.
         settings: where it stands, glass, sharpness and noise.
-        rng: where the noise comes from.
+        rng: random numbers for the noise.
 
     Raises:
-        ConfigurationError: the lens does not say how large its pictures are.
+        ConfigurationError: the lens calibration does not state the picture size.
     """
 
     def __init__(self, lens: CameraCalibration, settings: CameraSettings, rng: np.random.Generator) -> None:
@@ -74,11 +74,11 @@ class TableCamera:
         self._pose = settings.world_T_camera.pose()
 
     def render(self, markers: tuple[Placed, ...], foot_world_m: Array) -> Image:
-        """One picture, shape (height, width).
+        """Draw one picture, shape (height, width).
 
         Args:
-            markers: those on the table and under the object; one that faces up is not seen.
-            foot_world_m: corners of the object's underside, shape (n, 3); drawn dark, under the markers.
+            markers: those on the table and under the object; a marker that faces up is invisible.
+            foot_world_m: corners of the object's underside, shape (n, 3); drawn dark, behind the markers.
         """
         width, height = self._size_px
         picture = np.full((height, width), _BACKGROUND, np.float32)
@@ -93,7 +93,7 @@ class TableCamera:
     def project(self, points_world_m: Array) -> Array:
         """Pixel positions, shape (n, 2), of points on or above the table, shape (n, 3).
 
-        The sideways shift in the glass is that of the straight ray; the error is a few micrometres.
+        The sideways shift in the glass is computed for the straight ray; the error is a few micrometres.
         """
         seen = points_world_m - self._pose.translation()
         across = np.linalg.norm(seen[:, :2], axis=1)
@@ -127,7 +127,7 @@ class TableCamera:
         picture[rows, columns] = picture[rows, columns] * (1 - covered) + ink
 
     def _window(self, marker: PrintedMarker, pose: Pose3) -> tuple[slice, slice] | None:
-        """Rows and columns that hold the marker; None when it faces away or lies outside the picture."""
+        """Rows and columns that contain the marker; None if it faces away or lies outside the picture."""
         facing = (pose.translation() - self._pose.translation()) @ pose.rotation().matrix()[:, 2]
         if facing >= 0:
             return None
@@ -147,9 +147,9 @@ class TableCamera:
 
     @cached_property
     def _rays(self) -> tuple[Array, Array]:
-        """Each pixel's ray above the table: where it passes z = 0, and its direction per metre of height.
+        """Each pixel's ray above the table: its point at z = 0, and its direction per metre of height.
 
-        Both of shape (height, width, 3), world frame.
+        Both have shape (height, width, 3), world frame.
         """
         width, height = self._size_px
         pixels = np.stack(np.meshgrid(np.arange(float(width)), np.arange(float(height))), axis=-1).reshape(-1, 2)
@@ -163,9 +163,10 @@ class TableCamera:
         return np.hstack([ground_m, 0 * up]).reshape(height, width, 3), np.hstack([slope, up]).reshape(height, width, 3)
 
     def _hits(self, world_T_marker: Pose3, window: tuple[slice, slice]) -> tuple[Array, Array]:
-        """Where the rays of a window meet the marker's plane: marker x and y, metres, for every ray of every pixel.
+        """Intersections of a window's rays with the marker's plane: marker x and y, metres, for every ray of every
+        pixel.
 
-        The crossing is found for the pixels' centres and interpolated between them: it changes smoothly.
+        The intersection is computed at pixel centres and interpolated between them, since it changes smoothly.
         """
         rotation = world_T_marker.rotation().matrix()
         ground_m, slopes = self._rays
@@ -178,7 +179,7 @@ class TableCamera:
 
 
 def _half_modules(marker: PrintedMarker) -> tuple[_Picture, int]:
-    """Shades of the print in half modules, white border included, and how many there are across."""
+    """Grey levels of the print in half modules, including the white border, and their number across."""
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, marker.dictionary))
     bits = cv2.aruco.generateImageMarker(dictionary, marker.number, 2 * _MARKER_MODULES)
     print_ = np.pad(bits, 1, constant_values=255)

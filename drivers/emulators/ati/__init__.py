@@ -1,1 +1,1 @@
-"""ATI electronics as their clients meet them."""
+"""Emulated ATI electronics, as seen by their clients."""

@@ -1,4 +1,4 @@
-"""A CAN device on any bus that python-can knows."""
+"""An emulated CAN device on any bus that python-can supports."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _POLL_s = 0.01
 
 
 class CanServer(Closing):
-    """One unit on a bus until it is closed; the bus is closed with it. A context manager."""
+    """Serves one unit on a bus until it is closed, and closes the bus with it. A context manager."""
 
     def __init__(self, unit: Unit, bus: can.BusABC) -> None:
         self.unit, self._bus = unit, bus

@@ -1,4 +1,4 @@
-"""A Net CAN OEM board without its bus (protocols: Net CAN OEM)."""
+"""An emulated Net CAN OEM board, without its bus (protocols: Net CAN OEM)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from drivers.hardware.can_bus import CanFrame, decode_frame, encode_frame
 
 
 class CanUnit:
-    """One board; sends only when asked.
+    """One board; it sends only on request.
 
     Args:
-        sensor: what it measures.
+        sensor: the transducer behind it.
         base: upper part of its identifiers.
 
     Attributes:
@@ -30,7 +30,7 @@ class CanUnit:
         self._base, self._slot = base, 0
 
     def handle(self, payload: bytes) -> list[bytes]:
-        """Take one frame; frames for others and unknown ones have no answer."""
+        """Process one frame; frames for other boards and unknown ones get no answer."""
         try:
             frame = decode_frame(payload)
             base, op = can_codec.split_identifier(frame.identifier)
@@ -39,7 +39,7 @@ class CanUnit:
         return [encode_frame(answer) for answer in self._answers(op, frame.data)] if base == self._base else []
 
     def tick(self) -> bytes | None:
-        """A board does not stream."""
+        """None: a board does not stream."""
         return None
 
     def _answers(self, op: Op, data: bytes) -> list[CanFrame]:

@@ -1,4 +1,4 @@
-"""A stand-alone F/T controller without its line: letters in, records out (protocols: F/T controller)."""
+"""An emulated stand-alone F/T controller, without its line: letters in, records out (protocols: F/T controller)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ class ControllerUnit:
     """One controller.
 
     Args:
-        sensor: what it measures.
+        sensor: the transducer behind it.
         rate_hz: records per second while it streams.
 
     Attributes:
         error: first number of its records.
         sent: records sent.
-        unknown: commands it did not know.
+        unknown: number of unknown commands received.
     """
 
     def __init__(self, sensor: EmulatedSensor | None = None, rate_hz: float = 60.0) -> None:
@@ -32,7 +32,7 @@ class ControllerUnit:
         self._line = b""
 
     def handle(self, payload: bytes) -> list[bytes]:
-        """Take letters: each is echoed, a carriage return ends a command and any stream."""
+        """Process letters: each is echoed; a carriage return ends a command and any stream."""
         answers = []
         for letter in payload:
             if letter != 0x0D:

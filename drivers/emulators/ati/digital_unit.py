@@ -1,4 +1,4 @@
-"""A Digital F/T sensor without its line: Modbus registers and the raw stream (protocols: Digital F/T)."""
+"""An emulated Digital F/T sensor, without its line: Modbus registers and the raw stream (protocols: Digital F/T)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class DigitalUnit:
     """One sensor.
 
     Args:
-        sensor: what it measures.
+        sensor: the transducer behind it.
         rate_hz: samples per second while it streams.
 
     Attributes:
@@ -36,7 +36,7 @@ class DigitalUnit:
         self._buffer = b""
 
     def handle(self, payload: bytes) -> list[bytes]:
-        """Take bytes of the line: while streaming 14 of them end the stream, otherwise they are requests."""
+        """Process received bytes: during a stream 14 of them end it, otherwise they are requests."""
         if self.streaming:
             self._jammed += len(payload)
             if self._jammed >= _JAM:
@@ -59,7 +59,7 @@ class DigitalUnit:
         return answers
 
     def _next_request(self) -> Frame | None:
-        """The first valid request in what has arrived; what comes before it is thrown away."""
+        """The first valid request in the received bytes; bytes before it are discarded."""
         for start in range(len(self._buffer) - 4):
             length = _REQUESTS.get(self._buffer[start + 1], 8)
             try:
@@ -82,7 +82,7 @@ class DigitalUnit:
         return Frame(modbus.SLAVE, request.function, b"\x01")
 
     def _read(self, first: int, count: int) -> Frame:
-        """Registers; those nobody knows read as zero, those beyond the sensor's memory are refused."""
+        """Registers: unknown ones read as zero, addresses beyond the sensor's memory are refused."""
         if not 1 <= count <= 125 or first + count > 0x1000:
             return Frame(modbus.SLAVE, modbus.READ_HOLDING | 0x80, b"\x02")
         memory = bytearray(2 * 0x1000)

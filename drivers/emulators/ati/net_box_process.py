@@ -1,7 +1,7 @@
-"""Emulated Net F/T boxes in a process of their own: ``python -m drivers.emulators.ati.net_box_process``.
+"""Emulated Net F/T boxes in a separate process: ``python -m drivers.emulators.ati.net_box_process``.
 
-Takes one line of JSON on standard input, the boxes' hosts and their rate, answers with one line, and serves until its
-standard input ends. Then it says how many records each box has sent.
+It reads one line of JSON on standard input with the boxes' hosts and their rate, answers with one line, and serves
+until standard input ends. Then it reports how many records each box has sent.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _START_s, _END_s = 30.0, 10.0
 
 
 def main() -> None:
-    """Serve."""
+    """Serve until standard input ends."""
     with errors_said(), ExitStack() as running:
         start = json.loads(sys.stdin.readline())
         boxes = [
@@ -38,15 +38,15 @@ def main() -> None:
 
 
 class NetBoxProcess:
-    """The other process, from where it is started. A context manager.
+    """Starts and ends that process. A context manager.
 
     Args:
         hosts: loopback addresses to serve on, one box each.
-        rate_hz: of every stream.
+        rate_hz: records per second of every stream.
         port: of all boxes.
 
     Attributes:
-        http_ports: of the boxes' pages.
+        http_ports: ports of the boxes' web pages.
         sent: records each box has sent since its last start; known after :meth:`close`.
     """
 
@@ -70,7 +70,7 @@ class NetBoxProcess:
 
     @property
     def process_id(self) -> int:
-        """Of the running process."""
+        """Id of the running process."""
         return self._child.process_id
 
     def close(self) -> None:

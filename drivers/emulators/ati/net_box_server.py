@@ -1,4 +1,4 @@
-"""A Net F/T box on real sockets: RDT over UDP, the pages over http, loopback unless told otherwise."""
+"""An emulated Net F/T box on real sockets: RDT over UDP, web pages over HTTP, by default on loopback."""
 
 from __future__ import annotations
 
@@ -16,21 +16,22 @@ from drivers.emulators.background import Background, Pace
 from drivers.emulators.closing import Closing
 
 _SHORTEST_s, _LONGEST_s = 0.001, 0.02
-"""Between looks at the socket: records of fast streams go out a few at a time, and closing is seen in time."""
+"""Interval between checks of the socket: short enough to send fast streams in small batches and to close promptly."""
 
 
 class NetBoxServer(Closing):
-    """One box that serves until it is closed. A context manager.
+    """Serves one box until it is closed. A context manager.
 
     Args:
-        unit: what it is.
-        host: address to serve on; one loopback address for each box keeps the fixed port (127.0.0.1, 127.0.0.2, ...).
-        port, http_port: 0 for any free one.
+        unit: the emulated box.
+        host: address to serve on; with one loopback address per box (127.0.0.1, 127.0.0.2, ...) all can use the fixed
+            port.
+        port, http_port: ports to serve on; 0 for any free one.
 
     Attributes:
-        port, http_port: those it serves on.
-        lose: told the number of each record, says whether the network loses it.
-        lost: records lost so.
+        port, http_port: the ports that it serves on.
+        lose: decides by the number of each record whether the network loses it.
+        lost: records lost in this way.
     """
 
     def __init__(
@@ -66,7 +67,7 @@ class NetBoxServer(Closing):
         self._socket.close()
 
     def page(self, target: str) -> bytes | None:
-        """A page of the box; None where there is none."""
+        """A web page of the box; None if there is no such page."""
         with self._lock:
             return self.unit.page(target)
 
@@ -78,7 +79,7 @@ class NetBoxServer(Closing):
             self._send(due)
 
     def _answer(self) -> None:
-        """Take every request that waits."""
+        """Process all waiting requests."""
         with contextlib.suppress(BlockingIOError, ConnectionError):
             while True:
                 self._take(*self._socket.recvfrom(100))
@@ -91,7 +92,7 @@ class NetBoxServer(Closing):
                 self._client = client  # a later request redirects the stream
 
     def _send(self, due: int) -> None:
-        """Send the records that are due, a few milliseconds' worth with one look at the sensor."""
+        """Send the records that are due: a few milliseconds of them, with one reading of the sensor."""
         with self._lock:
             records, last, client = self.unit.ticks(due), self.unit.sent, self._client
         if client is None:
@@ -100,12 +101,12 @@ class NetBoxServer(Closing):
             if self.lose(number):
                 self.lost += 1
                 continue
-            with contextlib.suppress(BlockingIOError, ConnectionError):  # a box does not care who listens
+            with contextlib.suppress(BlockingIOError, ConnectionError):  # as a real box does
                 self._socket.sendto(record, client)
 
 
 class _Pages(BaseHTTPRequestHandler):
-    timeout = 1.0  # a client that says nothing must not hold the server
+    timeout = 1.0  # a silent client must not block it
 
     def __init__(self, server: NetBoxServer, *args: object) -> None:
         self._box = server
@@ -119,4 +120,4 @@ class _Pages(BaseHTTPRequestHandler):
         self.wfile.write(page or b"")
 
     def log_message(self, *words: object) -> None:
-        """A box keeps no log."""
+        """Do nothing: a box keeps no log."""

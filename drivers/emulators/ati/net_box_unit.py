@@ -1,4 +1,4 @@
-"""A Net F/T box without its sockets: RDT requests and records, and the web pages (protocols: Net F/T)."""
+"""An emulated Net F/T box, without its sockets: RDT requests and records, and web pages (protocols: Net F/T)."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class NetBoxUnit:
     """One box.
 
     Args:
-        sensor: what it measures.
-        rate_hz: of its real-time stream as it was left by its last user.
+        sensor: the transducer behind it.
+        rate_hz: records per second of its real-time stream at power-up.
 
     Attributes:
         sent: records sent since the last start.
-        refused: requests that were none.
+        refused: number of invalid requests.
         status: status word of the records.
-        rate_locked: the box ignores a new rate, as some do.
+        rate_locked: whether the box ignores a new rate, as some do.
     """
 
     def __init__(self, sensor: EmulatedSensor | None = None, rate_hz: int = 7000) -> None:
@@ -48,11 +48,11 @@ class NetBoxUnit:
 
     @property
     def streaming(self) -> bool:
-        """Whether a client wants records."""
+        """Whether a client has started a stream."""
         return self._left != 0
 
     def handle(self, payload: bytes) -> list[bytes]:
-        """Take a request; a box answers none, and ignores what is none."""
+        """Process a request; a box sends no reply, and ignores invalid requests."""
         try:
             request = rdt_codec.decode_request(payload)
         except CodecError:
@@ -67,7 +67,7 @@ class NetBoxUnit:
         return []
 
     def tick(self) -> bytes | None:
-        """The next record; the measuring counter runs whether anybody listens or not."""
+        """The next record; the sample counter advances whether or not a client listens."""
         self._measured += self._step
         if not self.streaming:
             return None
@@ -77,7 +77,7 @@ class NetBoxUnit:
         return rdt_codec.encode_record(self.sent, self._measured, self.status, counts)
 
     def ticks(self, count: int) -> list[bytes]:
-        """As many records as are due, as :meth:`tick` gives them one by one; what is felt is read once for all."""
+        """The next ``count`` records, as from :meth:`tick`, but with one reading of the load for all of them."""
         first = self.tick() if count else None
         if first is None:
             self._measured += (count - 1) * self._step if count else 0
@@ -87,7 +87,7 @@ class NetBoxUnit:
         return [first, *(head + counts for head in heads if head)]
 
     def _next_head(self) -> bytes:
-        """The record's beginning; empty when no client wants more."""
+        """The header of the next record; empty if no client wants more."""
         self._measured += self._step
         if not self.streaming:
             return b""
@@ -100,7 +100,7 @@ class NetBoxUnit:
         return round(net_box.INTERNAL_RATE_Hz / self._rate_hz)
 
     def page(self, target: str) -> bytes | None:
-        """What the web server gives for a path with its query; None for a page that does not exist."""
+        """The web server's answer to a path with its query; None for a page that does not exist."""
         parts = urlsplit(target)
         if parts.path == "/comm.cgi":
             wanted = dict(parse_qsl(parts.query)).get("comrdtrate", "")

@@ -1,4 +1,6 @@
-"""The transducer behind every emulated ATI unit: a wrench that a test or a simulated plant sets, seen by six gauges."""
+"""The transducer behind every emulated ATI unit: six gauges that measure a wrench set by a test or a simulated
+plant.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +31,12 @@ def emulated_calibration(serial: str = "FT00001") -> DigitalCalibration:
 
 
 class EmulatedSensor:
-    """A sensor that feels what it is told, with noise.
+    """A sensor that measures the wrench it is given, with noise.
 
     Args:
-        calibration: its gauges; :func:`emulated_calibration` unless given.
+        calibration: the calibration of its gauges; by default :func:`emulated_calibration`.
         noise_counts: noise of a gauge, one standard deviation.
-        seed: of the noise.
+        seed: for the noise.
     """
 
     def __init__(self, calibration: DigitalCalibration | None = None, noise_counts: float = 2.0, seed: int = 0) -> None:
@@ -46,21 +48,21 @@ class EmulatedSensor:
         self._ahead: list[tuple[tuple[int, ...], Array]] = []
 
     def press(self, wrench: Array) -> None:
-        """Feel this from now on: N and N m, shape (6,), sensor frame. May be called from another thread."""
+        """Set the wrench to measure: N and N m, shape (6,), sensor frame. May be called from another thread."""
         with self._lock:
             self._wrench = np.array(wrench, dtype=np.float64)
             self._ahead.clear()
 
     def gauges(self) -> tuple[int, ...]:
-        """A reading of gauges 0 to 5 in counts, limited as 16-bit converters are."""
+        """A reading of gauges 0 to 5 in counts, limited to 16 bits like the converters."""
         return self._next()[0]
 
     def wrench(self) -> Array:
-        """A reading as a unit that resolves its gauges gives it: N and N m, shape (6,)."""
+        """A reading as force and torque: N and N m, shape (6,)."""
         return self._next()[1]
 
     def _next(self) -> tuple[tuple[int, ...], Array]:
-        """One reading; many are made at a time, so that a stream of 7 kHz costs little."""
+        """One reading; many are computed at a time, so that a stream of 7 kHz costs little."""
         with self._lock:
             if not self._ahead:
                 exact = self._to_gauges @ self._wrench

@@ -1,4 +1,4 @@
-"""What an emulated device is: bytes in, bytes out, and a stream; on which wire, it does not know."""
+"""The interface of an emulated device: bytes in, bytes out, and a stream. It does not know its wire."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ class Unit(Protocol):
     """One emulated device."""
 
     def handle(self, payload: bytes) -> list[bytes]:
-        """Take what the program sent; the answers."""
+        """Process what the program sent; returns the answers."""
 
     def tick(self) -> bytes | None:
-        """The next message of the stream; None while there is none."""
+        """The next message of the stream; None if there is none."""
 
     @property
     def rate_hz(self) -> float:

@@ -1,1 +1,1 @@
-"""The hand's EtherCAT slaves as a master meets them."""
+"""The hand's emulated EtherCAT slaves, as seen by a master."""

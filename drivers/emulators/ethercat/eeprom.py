@@ -17,7 +17,7 @@ _STRINGS, _GENERAL, _FMMUS, _SYNC_MANAGERS, _INPUTS, _OUTPUTS = 10, 30, 40, 41, 
 
 @dataclass(frozen=True)
 class SlaveIdentity:
-    """Who a slave is: the 32-bit words that a master reads first."""
+    """The identity of a slave: the 32-bit words that a master reads first."""
 
     vendor: int
     product: int
@@ -26,7 +26,7 @@ class SlaveIdentity:
 
 
 def bare_eeprom(identity: SlaveIdentity, kilobits: int = 16) -> bytes:
-    """An EEPROM that holds the identity and nothing else: a master has to know the slave's process image itself."""
+    """An EEPROM that holds only the identity, so that a master must already know the slave's process image."""
     return _fill(_header(identity, kilobits) + _END, kilobits)
 
 
@@ -56,7 +56,7 @@ def _header(identity: SlaveIdentity, kilobits: int) -> bytes:
 
 
 def _checksum(data: bytes | bytearray) -> int:
-    """CRC-8 of the first seven words: polynomial 0x07, start 0xFF."""
+    """CRC-8 of the first seven words: polynomial 0x07, initial value 0xFF."""
     crc = 0xFF
     for byte in data:
         crc ^= byte
@@ -80,7 +80,7 @@ def _sync_manager(manager: SyncManager) -> bytes:
 
 
 def _process_data(place: int, manager: SyncManager) -> bytes:
-    """One process data object that fills a SyncManager, cut into entries of whole bytes."""
+    """One process data object that fills a SyncManager, split into entries of whole bytes."""
     sizes = [min(_LARGEST_ENTRY_BYTES, manager.length - at) for at in range(0, manager.length, _LARGEST_ENTRY_BYTES)]
     index = (0x1600 if manager.to_slave else 0x1A00) + place
     head = struct.pack("<HBBBBH", index, len(sizes), place, 0, 0, 0)
@@ -94,11 +94,11 @@ def _fill(content: bytes, kilobits: int) -> bytes:
 
 
 class EepromInterface:
-    """The registers through which a master reads the EEPROM, four bytes at a time. It cannot be written.
+    """The registers through which a master reads the EEPROM, four bytes at a time. Writing is not supported.
 
     Args:
         content: the EEPROM's bytes.
-        busy: so many looks see it busy after each request.
+        busy: how often a read of the register shows it busy after each request.
     """
 
     def __init__(self, content: bytes, busy: int) -> None:
@@ -106,11 +106,11 @@ class EepromInterface:
         self._busy_left = 0
 
     def request(self) -> None:
-        """The master has written the control register."""
+        """Handle a write of the master to the control register."""
         self._busy_left = self.busy
 
     def look(self, memory: bytearray) -> None:
-        """The master is about to read the control register in a slave's memory: bring it up to date."""
+        """Update the control register in a slave's memory before the master reads it."""
         control, word = struct.unpack_from("<HI", memory, Register.EEPROM_CONTROL)
         struct.pack_into("<H", memory, Register.EEPROM_CONTROL, self._state(control))
         if not self._busy_left and control & _READ:

@@ -16,18 +16,18 @@ from drivers.simulation.hand_plant import TrueContact
 FULL_SPEED_rad_s = 4.0
 """Speed of every joint at full duty cycle (assumed)."""
 
-_LOOK_ns = 100_000  # looks closer together, those of one cycle of the palm, see the same posture
+_LOOK_ns = 100_000  # readings closer together, within one cycle of the palm, see the same posture
 _LOWEST_rad, _HIGHEST_rad = (np.ascontiguousarray(limits_rad) for limits_rad in JOINT_LIMITS_rad.T)
 
 
 class FreeHand:
     """Joints that follow their motors on a clock's time; at a limit the motor pushes with its stall torque.
 
-    It is moved when someone looks, and nobody may look before the motors halt for want of a demand: so the halt is kept
-    here as well.
+    The joints are updated only when they are read, which may be after the motors have halted for lack of demands. So
+    the halt is computed here as well.
 
     Args:
-        clock: whose time passes.
+        clock: the clock that the joints follow.
     """
 
     def __init__(self, clock: Clock) -> None:
@@ -54,7 +54,7 @@ class FreeHand:
 
     @property
     def motor_torque_Nm(self) -> Array:
-        """Torque of each driven joint's motor, shape (20,): none unless it pushes against a limit."""
+        """Torque of each driven joint's motor, shape (20,): zero unless it pushes against a limit."""
         self._look()
         if self._resting:
             return np.zeros(len(DRIVEN_JOINTS))
@@ -63,7 +63,7 @@ class FreeHand:
         return np.asarray(self._push_Nm * pushing)
 
     def contacts(self) -> tuple[TrueContact, ...]:
-        """Its fingertips touch nothing."""
+        """None: the fingertips touch nothing."""
         return ()
 
     def world_T_distal(self, finger: str) -> Pose3:
@@ -71,7 +71,7 @@ class FreeHand:
         return palm_T_distal(self.joints_rad)[finger]
 
     def drive(self, duty: Array) -> None:
-        """Duty cycles -1 to 1 from now on, shape (20,), order of ``DRIVEN_JOINTS``."""
+        """Set the duty cycles, -1 to 1, shape (20,), order of ``DRIVEN_JOINTS``."""
         self._move(self._clock.now_ns())
         self._driven_ns, self._resting = self._moved_ns, not duty.any()
         self._falling, self._rising = duty < 0, duty > 0
@@ -91,7 +91,7 @@ class FreeHand:
 
 
 def _shares_of_motors() -> Array:
-    """Share of each driven joint's motion that every joint takes, shape (24, 20); a coupled pair shares evenly."""
+    """Share of each driven joint's motion in the motion of every joint, shape (24, 20); coupled pairs share evenly."""
     shares = np.zeros((len(JOINTS), len(DRIVEN_JOINTS)))
     for column, name in enumerate(DRIVEN_JOINTS):
         joints = angles_of_driven(name)

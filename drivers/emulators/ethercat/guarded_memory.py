@@ -1,4 +1,4 @@
-"""A slave's process memory, parts of which SyncManagers guard: blocks that are full or empty, never half of both."""
+"""A slave's process memory, parts of which are guarded by SyncManagers: their blocks are either full or empty."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RAM_START, RAM_END = int(Register.PROCESS_RAM), Register.PROCESS_RAM + 1024 * RA
 
 @dataclass
 class Block:
-    """Memory guarded by an active SyncManager; ``full`` while the other side has not taken it."""
+    """Memory guarded by an active SyncManager; ``full`` until the other side has read it."""
 
     number: int
     start: int
@@ -28,12 +28,12 @@ class Block:
 
 
 class GuardedMemory:
-    """Process memory from the master's side, and the blocks' contents from the slave's.
+    """Process memory as the master accesses it, and the blocks' contents as the slave accesses them.
 
     Args:
-        memory: of the whole slave, registers and all; shared with its controller.
-        counts: what becomes of the first block each way.
-        filled: is told of a block that the master has filled.
+        memory: the memory of the whole slave, including registers; shared with its controller.
+        counts: statistics of the first block in each direction.
+        filled: called with each block that the master has filled.
     """
 
     def __init__(self, memory: bytearray, counts: SlaveCounts, filled: Callable[[Block], None]) -> None:
@@ -42,7 +42,7 @@ class GuardedMemory:
         self.load()
 
     def load(self) -> None:
-        """Read the SyncManagers' registers; a block that stays what it was stays full."""
+        """Read the SyncManagers' registers; an unchanged block stays full."""
         full = {(block.number, block.start, block.end) for block in self._blocks if block.full}
         blocks = (self._block(number) for number in range(SYNC_MANAGERS))
         self._blocks = [block for block in blocks if block is not None]
@@ -54,7 +54,7 @@ class GuardedMemory:
         self._cuts: dict[tuple[int, int], list[tuple[int, int, Block | None]]] = {}
 
     def _block(self, number: int) -> Block | None:
-        """What a SyncManager guards; None when it is off."""
+        """The block that a SyncManager guards; None if it is off."""
         at = Register.SYNC_MANAGER + SYNC_MANAGER_BYTES * number
         start, length, control, _, active = struct.unpack_from("<HHBBB", self._memory, at)
         if not (active & 1 and length):
@@ -63,11 +63,13 @@ class GuardedMemory:
 
     @property
     def watched(self) -> bool:
-        """Whether a block feeds the watchdog."""
+        """Whether a block resets the watchdog."""
         return any(block.watched for block in self._blocks)
 
     def missing(self, wanted: Iterable[SyncManager]) -> bool | None:
-        """The first of these that guards no block of one buffer: True one to the slave, False one from it, or None."""
+        """The first required SyncManager without a one-buffer block: True for one to the slave, False for one from it,
+        or None.
+        """
         there = {(block.start, block.end - block.start, block.to_slave) for block in self._blocks if block.one_buffer}
         ways = (each.to_slave for each in wanted if (each.start, each.length, each.to_slave) not in there)
         return next(ways, None)
@@ -75,7 +77,7 @@ class GuardedMemory:
     # --- from the master's side --------------------------------------------------------------------------------
 
     def read(self, address: int, end: int) -> bytes | None:
-        """What unguarded memory and full blocks hold; a block gives itself away with its last byte."""
+        """Read unguarded memory and full blocks; reading its last byte empties a block."""
         found, data = False, bytearray(end - address)
         for low, high, block in self._segments(address, end):
             if block is not None and (block.to_slave or not block.full):
@@ -89,7 +91,7 @@ class GuardedMemory:
         return bytes(data) if found else None
 
     def write(self, address: int, data: bytes) -> bool:
-        """Fill unguarded memory and empty blocks; whether any of it was taken."""
+        """Fill unguarded memory and empty blocks; returns whether anything was accepted."""
         taken = False
         for low, high, block in self._segments(address, address + len(data)):
             if block is not None and (not block.to_slave or block.full):
@@ -103,7 +105,7 @@ class GuardedMemory:
         return taken
 
     def _segments(self, address: int, end: int) -> list[tuple[int, int, Block | None]]:
-        """An address range cut at the borders of the guarded blocks; kept, as every cycle asks for the same."""
+        """An address range split at the borders of the guarded blocks; cached, because every cycle needs the same."""
         if (known := self._cuts.get((address, end))) is None:
             borders = {address, end}
             borders |= {edge for block in self._blocks for edge in (block.start, block.end) if address < edge < end}
@@ -116,16 +118,16 @@ class GuardedMemory:
     # --- from the slave's side ---------------------------------------------------------------------------------
 
     def contents(self) -> tuple[bytes, ...]:
-        """What the master has written, block by block."""
+        """The bytes that the master has written, block by block."""
         return tuple(bytes(self._memory[block.start : block.end]) for block in self._inward)
 
     def release(self) -> None:
-        """What the master has written is taken: it may write again."""
+        """Empty the blocks that the master has written, so that it may write again."""
         for block in self._inward:
             block.full = False
 
     def publish(self, contents: tuple[bytes, ...]) -> None:
-        """Show the master something, in every block that it has emptied."""
+        """Write new bytes into every block that the master has emptied."""
         for block, content in zip(self._outward, contents, strict=True):
             if not block.full:
                 self._memory[block.start : block.end] = content

@@ -1,7 +1,7 @@
-"""The motors' CAN buses as the palm's bridge reaches them: bootloaders that answer for their version.
+"""The motors' CAN buses as seen through the palm's bridge: bootloaders that report their version.
 
-What the palm itself exchanges with its motors on these buses was never published, so nothing but the bootloader is
-here: a frame to it is acknowledged, a version query answered (protocols: Motor CAN buses).
+The messages that the palm itself exchanges with its motors were never published, so only the bootloader is emulated: it
+acknowledges frames and answers a version query (protocols: Motor CAN buses).
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from drivers.shadow.protocol.motor_can import BootCommand, Direction, MotorIdent
 from drivers.shadow.protocol.palm_codec import CanFrame
 
 VERSION = bytes((0x40, 0x41, 0x42, 0x43))
-"""What every bootloader answers for its version."""
+"""The version that every bootloader reports."""
 
 
 class MotorCanBuses:
     """Two buses of ten motors each, all in their bootloaders.
 
     Args:
-        missing: motors of the hand, 0 to 19, that are not there.
+        missing: motors of the hand, 0 to 19, that are missing.
     """
 
     def __init__(self, missing: frozenset[int] = frozenset()) -> None:
@@ -29,14 +29,14 @@ class MotorCanBuses:
         self.heard: list[CanFrame] = []
 
     def transfer(self, frame: CanFrame) -> CanFrame:
-        """Send a frame; one that waits for the palm, an empty one for none."""
+        """Send a frame; returns a frame that waits for the palm, or an empty one."""
         if frame.bus:
             self.heard.append(frame)
             self._answer(frame)
         return self._waiting.popleft() if self._waiting else CanFrame()
 
     def announce(self, frame: CanFrame) -> None:
-        """A motor speaks unasked."""
+        """Let a motor send a frame without a request."""
         self._waiting.append(frame)
 
     def _answer(self, frame: CanFrame) -> None:
@@ -44,7 +44,7 @@ class MotorCanBuses:
             asked = MotorIdentifier.of(frame.identifier)
             motor = asked.motor(frame.bus)
         except CodecError:
-            return  # nobody on the bus feels addressed
+            return  # not addressed to anyone on the bus
         known = asked.kind in set(BootCommand)
         if asked.direction is not Direction.BOOTLOADER or not known or asked.acknowledged or motor in self._missing:
             return

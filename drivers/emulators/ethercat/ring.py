@@ -1,4 +1,4 @@
-"""A ring of emulated slaves, and what can go wrong on its cable."""
+"""A ring of emulated slaves, and faults of its cable."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ _LOCAL_BIT = 0x02
 
 @dataclass
 class CableFaults:
-    """Faults of the cable, to be changed while it runs.
+    """Faults of the cable, which may be changed while it runs.
 
     Attributes:
-        drop: so many frames get lost next, on their way to the slaves.
-        drop_answers: so many get lost next, on their way back.
-        drop_share: share of frames that get lost at random, half on either way.
-        hold: so many answers stay behind next and come in a burst with the one after them.
-        connected: slaves that are reached, from the first on; None for all.
-        unplugged: the cable to the master is out, so that nothing arrives.
-        damage: so many frames get damaged next, and so lost.
-        damaged_at: on the cable before which slave, 0 for the first.
+        drop: number of next frames to lose on their way to the slaves.
+        drop_answers: number of next frames to lose on their way back.
+        drop_share: share of frames to lose at random, half of them in each direction.
+        hold: number of next answers to hold back and deliver in a burst with the one after them.
+        connected: number of slaves that frames reach, counted from the first; None for all.
+        unplugged: whether the cable to the master is unplugged, so that nothing arrives.
+        damage: number of next frames to damage, which are then lost.
+        damaged_at: the slave before which the cable damages them, 0 for the first.
     """
 
     drop: int = 0
@@ -41,7 +41,7 @@ class CableFaults:
 
 @dataclass
 class CableCounts:
-    """Frames at the slaves' end: arrived, lost on either way, not EtherCAT."""
+    """Frames at the slaves' end: arrived, lost in either direction, not EtherCAT."""
 
     frames: int = 0
     lost: int = 0
@@ -49,7 +49,7 @@ class CableCounts:
 
 
 class EmulatedRing:
-    """Slaves in a row; a frame runs through all and comes back.
+    """Slaves in a row; a frame passes through all of them and comes back.
 
     Args:
         slaves: the first one next to the master.
@@ -64,7 +64,7 @@ class EmulatedRing:
         self._reached = len(self.slaves)
 
     def process(self, frame: bytes) -> list[bytes]:
-        """What comes back when a frame is sent: usually that frame."""
+        """The frames that come back when one is sent: usually just that frame."""
         self.counts.frames += 1
         self._note_links()
         if self.faults.unplugged or self._loses_frame("drop"):
@@ -83,11 +83,11 @@ class EmulatedRing:
 
     @property
     def due_ns(self) -> int | None:
-        """When the next slave will have work to do; None when all have done theirs."""
+        """When the next slave will have work to do; None if all are done."""
         return min((due_ns for slave in self.slaves if (due_ns := slave.due_ns) is not None), default=None)
 
     def work(self) -> None:
-        """Let the slaves do what is due, so that the next frame need not wait for it."""
+        """Let the slaves do the work that is due, so that the next frame does not wait for it."""
         for slave in self.slaves:
             slave.work()
 
@@ -98,7 +98,7 @@ class EmulatedRing:
         return passed
 
     def _note_links(self) -> None:
-        """Both ends of a cable that is out now, and was not before, count a lost link."""
+        """Count a lost link at both ends of a cable that has just been unplugged."""
         connected = self.faults.connected
         reached = 0 if self.faults.unplugged else len(self.slaves) if connected is None else connected
         if reached < self._reached:
@@ -108,7 +108,7 @@ class EmulatedRing:
         self._reached = reached
 
     def _damages(self, telegrams: Sequence[Telegram]) -> bool:
-        """The slave behind a bad cable counts the frame and does not use it; those before it do."""
+        """Damage the frame: the slave after the bad cable counts it and ignores it; those before it process it."""
         if not self.faults.damage:
             return False
         self.faults.damage -= 1

@@ -1,12 +1,12 @@
-"""The emulated hand in a process of its own, on one end of a cable: ``python -m drivers.emulators.ethercat.server``.
+"""The emulated hand in a separate process, on one end of a cable: ``python -m drivers.emulators.ethercat.server``.
 
-Takes its settings and later orders as lines of JSON on standard input and answers each with one line; it ends with
-its standard input, so that it never outlives the program that started it.
+It reads its settings, and later orders, as lines of JSON on standard input, and answers each with one line. It ends
+when standard input ends, so it never outlives the program that started it.
 
 Orders: ``{"cable": {...}}`` sets fields of :class:`~drivers.emulators.ethercat.ring.CableFaults`; ``{"hung": true}``
 stops the palm's processor; ``{"service_ns": n}`` slows it; ``{"silent": [motors]}``; ``{"fall": [state, code]}`` lets
-the palm leave its state; ``{"power_cycle": true}``; ``{"announce": [bus, identifier, hex]}`` lets a motor speak on its
-CAN bus. Every answer holds the counts.
+the palm leave its state; ``{"power_cycle": true}``; ``{"announce": [bus, identifier, hex]}`` lets a motor send a frame
+on its CAN bus. Every answer contains the counts.
 """
 
 from __future__ import annotations
@@ -33,18 +33,19 @@ _START_s, _ANSWER_s = 30.0, 5.0
 
 
 class HandServer:
-    """Serves frames and orders until its orders end.
+    """Serves frames, and obeys orders until these end.
 
-    The hand's time is that of its wire: a frame is taken at the time of its arrival, however late this program gets to
-    it, and between two frames it is the time up to which none has come. A real palm is not put aside by its computer;
-    so its motors halt, and its watchdog trips, for a master's pause and never for one of this program.
+    The hand's time is that of its wire. A frame is processed as of its time of arrival, however late this program reads
+    it, and between two frames time advances only as far as it is certain that no frame has arrived. A real palm is
+    never suspended by an operating system. So its motors halt, and its watchdog trips, only because the master paused,
+    never because this program did.
 
     Args:
-        hand: what is served; no time passes for it but here.
-        time: the hand's.
-        port: at its end of the cable.
+        hand: the hand to serve; its time is advanced only here.
+        time: the hand's clock.
+        port: the port at its end of the cable.
         can: the motors' buses.
-        clock: that of the port's stamps.
+        clock: the clock of the port's stamps.
     """
 
     def __init__(
@@ -54,7 +55,7 @@ class HandServer:
         self._look_ns = clock.now_ns()
 
     def run(self) -> None:
-        """Serve. Raises DeviceError when the interface goes."""
+        """Serve. Raises DeviceError if the interface disappears."""
         while True:
             now_ns = self._clock.now_ns()
             if (frame := self._port.receive(self._patience_s(now_ns))) is not None:
@@ -70,7 +71,7 @@ class HandServer:
                 say(self._obey(json.loads(line)))
 
     def _pass_to(self, stamp_ns: int) -> None:
-        """Let the hand's time pass, and what is due until then be done when it is due."""
+        """Advance the hand's time, doing everything that is due until then at its time."""
         while (due_ns := self._hand.ring.due_ns) is not None and due_ns <= stamp_ns:
             self._time.sleep_until_ns(due_ns)
             self._hand.ring.work()
@@ -81,7 +82,7 @@ class HandServer:
         return _IDLE_s if due_ns is None else max(due_ns - now_ns, 0) / NANOSECONDS
 
     def _has_order(self) -> bool:
-        """Whether there is an order, or no one left to give one; looked at now and then, as it costs a system call."""
+        """Whether an order waits, or standard input has ended; checked only now and then, as it costs a system call."""
         now_ns = self._clock.now_ns()
         if now_ns < self._look_ns:
             return False
@@ -110,12 +111,12 @@ class HandServer:
     def _counts(self) -> dict[str, Any]:
         hand = self._hand
         counts = dataclasses.asdict(hand.ring.counts) | dataclasses.asdict(hand.palm_slave.counts)
-        counts |= {"can_frames": len(set(self._can.heard))}  # one whose cycle was late comes twice
+        counts |= {"can_frames": len(set(self._can.heard))}  # the status of a late cycle comes twice
         return counts | {"served": hand.palm.served, "state": str(hand.palm_slave.al_status)}
 
 
 def main() -> None:
-    """Read the first line, make the hand, serve it."""
+    """Read the first line, create the hand, and serve it."""
     clock = MonotonicClock()
     with errors_said():
         start = json.loads(sys.stdin.readline())
@@ -130,12 +131,12 @@ def main() -> None:
 
 
 class EmulatedHandProcess:
-    """The emulated hand in another process, as a context.
+    """Runs the emulated hand in another process; a context manager.
 
     Args:
-        interface: network interface it serves.
-        joints: joint calibration file, read backwards.
-        settings: what kind of hand.
+        interface: network interface that it serves.
+        joints: joint calibration file, used in reverse.
+        settings: the kind of hand.
     """
 
     def __init__(self, interface: str, joints: Path, settings: ChainSettings | None = None) -> None:
@@ -157,22 +158,22 @@ class EmulatedHandProcess:
         """Start it and wait until it serves.
 
         Raises:
-            DeviceError: it does not come up, with its own words.
+            DeviceError: it does not start; the message is its own.
         """
         self._child.start(self._start)
         self._child.ready(_START_s)
 
     def order(self, **order: Any) -> dict[str, Any]:
-        """Give an order (see the module); the counts after it.
+        """Give an order (see the module); returns the counts after it.
 
         Raises:
-            DeviceError: the process is gone.
+            DeviceError: the process has ended.
         """
         self._child.give(order)
         return self._child.answer(_ANSWER_s)
 
     def kill(self) -> None:
-        """End it at once, as a power cut would."""
+        """Kill it at once, like a power cut."""
         self._child.kill()
 
     def close(self) -> None:

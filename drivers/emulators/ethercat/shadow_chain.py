@@ -1,4 +1,4 @@
-"""The hand as an EtherCAT master meets it: a bridge, and behind it a palm."""
+"""The emulated hand as seen by an EtherCAT master: a bridge, and behind it a palm."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ _SERVICE_ns = 600_000
 
 
 class PalmApplication:
-    """The palm's processor: hands commands on to the palm, keeps its motors' time.
+    """The palm's processor: passes commands on to the palm, and halts its motors in time.
 
     Args:
-        palm: answers commands.
-        motors: its motors, which halt when no demand comes.
+        palm: the palm that answers commands.
+        motors: its motors, which halt when no demand arrives.
         image: which palm it is.
         clock: for the motors.
         service_ns: from a command's arrival to its status.
@@ -54,13 +54,13 @@ class PalmApplication:
         self.served = 0
 
     def start(self) -> tuple[bytes, ...]:
-        """Before its first service the palm's buffer holds marks (protocols: Palm commands)."""
+        """The palm's buffer before its first cycle, which holds a marker pattern (protocols: Palm commands)."""
         size = self._image.status_bytes - CAN_BYTES
         words = np.full((size - 4) // 2, _NOT_SERVED_WORD, "<u2").tobytes()
         return _NOT_SERVED_EDC.to_bytes(4, "little") + words, bytes(CAN_BYTES)
 
     def serve(self, blocks: tuple[bytes, ...], *, operating: bool) -> tuple[bytes, ...] | None:
-        """One cycle. Outside OP the demands are taken for zero."""
+        """Serve one cycle. Outside OP all demands are treated as zero."""
         self._halt_late_motors()
         if self.hung:
             return None
@@ -79,17 +79,17 @@ class PalmApplication:
 
 @dataclass(frozen=True)
 class ChainSettings:
-    """What is emulated.
+    """Settings of the emulated slaves.
 
     Attributes:
         palm: kind of palm.
         eeprom: what the slaves' EEPROMs hold.
         serial: the hand's.
-        product: product code of the palm; its usual one unless given.
+        product: product code of the palm; by default its usual one.
         vendor: of both slaves.
-        service_ns: how long the palm takes for a command.
+        service_ns: how long the palm needs for a command.
         seed: of noise and losses.
-        tactile: fingertips that send through the palm, where nothing else stands behind them; nothing touches them.
+        tactile: fingertips that send through the palm; without a plant nothing touches them.
     """
 
     palm: PalmName = "0220"
@@ -104,7 +104,7 @@ class ChainSettings:
 
 @dataclass(frozen=True)
 class EmulatedHand:
-    """A hand on a ring, with its parts in reach."""
+    """A hand on a ring, with access to its parts."""
 
     ring: EmulatedRing
     palm: PalmApplication
@@ -130,13 +130,13 @@ def emulated_hand(
 
     Args:
         clock: its time.
-        calibration: joint tables, read backwards.
-        settings: what kind of hand.
+        calibration: joint tables, used in reverse.
+        settings: the kind of hand.
         motor_map: which motor pulls which joint.
         can: the motors' buses.
-        plant: what its motors move; a hand in free air unless given.
+        plant: the model that its motors move; by default a hand in free air.
         sensors: errors of its joint sensors.
-        tactile: fingertips that send through the palm; those of the settings unless given.
+        tactile: fingertips that send through the palm; by default those of the settings.
     """
     settings, free = settings or ChainSettings(), FreeHand(clock)
     plant = plant or free

@@ -1,7 +1,8 @@
-"""A slave controller as an EtherCAT master meets it: registers, EEPROM, FMMUs, SyncManagers, states, watchdog.
+"""An emulated slave controller as seen by an EtherCAT master: registers, EEPROM, FMMUs, SyncManagers, states, watchdog.
 
-Modelled on Beckhoff's ET1200 with 1 KiB of process memory. Only what the hand uses is there: FMMUs map whole bytes and
-SyncManagers have one buffer; others are refused on the way to SAFEOP. No mailbox, no distributed clocks.
+Modelled on Beckhoff's ET1200 with 1 KiB of process memory. Only what the hand uses is emulated: FMMUs map whole bytes
+and SyncManagers have one buffer; other settings are refused on the way to SAFEOP. There is no mailbox and there are no
+distributed clocks.
 """
 
 from __future__ import annotations
@@ -37,10 +38,10 @@ class SlaveController:
         eeprom: its content.
         application: the processor behind it; None for device emulation, where there is none.
         clock: for the watchdog and the application's time.
-        eeprom_busy: so many looks at the EEPROM see it busy after each request.
+        eeprom_busy: how often a read shows the EEPROM busy after each request.
 
     Attributes:
-        fixed: registers that keep what they hold, whoever writes them.
+        fixed: registers that ignore writes.
     """
 
     def __init__(self, eeprom: bytes, application: Application | None, clock: Clock, eeprom_busy: int = 1) -> None:
@@ -66,7 +67,7 @@ class SlaveController:
         self._fed_ns = 0
 
     def power_cycle(self) -> None:
-        """Everything is forgotten but the EEPROM."""
+        """Reset everything but the EEPROM."""
         self._power_up()
 
     @property
@@ -75,15 +76,15 @@ class SlaveController:
         return self._states.status
 
     def fall_to(self, state: AlState, code: int) -> None:
-        """The slave leaves its state by itself, with an error."""
+        """Let the slave leave its state by itself, with an error."""
         self._states.fall(state, code)
 
     def count_damage(self, port: int) -> None:
-        """A frame came in damaged."""
+        """Count a frame that arrived damaged."""
         self._count(Register.ERROR_COUNTERS + 2 * port)
 
     def count_lost_link(self, port: int) -> None:
-        """The link of a port is gone."""
+        """Count a lost link of a port."""
         self._count(Register.LOST_LINKS + port)
 
     def _count(self, register: int) -> None:
@@ -92,7 +93,7 @@ class SlaveController:
     # --- telegrams ---------------------------------------------------------------------------------------------
 
     def process(self, telegram: Telegram) -> Telegram:
-        """A telegram as it leaves this slave."""
+        """Process a telegram; returns it as it leaves this slave."""
         self._catch_up()
         command = telegram.command
         if command in _LOGICAL:
@@ -179,7 +180,7 @@ class SlaveController:
         if block.watched:
             self._fed_ns = now_ns
 
-    # --- registers that do something ---------------------------------------------------------------------------
+    # --- registers with side effects ---------------------------------------------------------------------------
 
     def _react(self, address: int, end: int) -> None:
         if address < Register.FMMU + 0x100 and end > Register.FMMU:
@@ -203,7 +204,7 @@ class SlaveController:
                 self._fmmus.append((logical, length, memory, kind))
 
     def _load_watchdog(self) -> None:
-        """Time without a fed SyncManager after which the slave leaves OP; 0 where nothing is watched."""
+        """Time without process data after which the slave leaves OP; 0 if no SyncManager is watched."""
         (divider,) = struct.unpack_from("<H", self._memory, Register.WATCHDOG_DIVIDER)
         (ticks,) = struct.unpack_from("<H", self._memory, Register.WATCHDOG_TIME)
         self._watchdog_ns = (divider + 2) * _TICK_ns * ticks if self._ram.watched else 0
@@ -219,24 +220,24 @@ class SlaveController:
             self._fed_ns = self._clock.now_ns()
 
     def _setup_error(self) -> bool | None:
-        """What the application misses in the SyncManagers: None nothing, True outputs, False inputs."""
+        """What is missing in the SyncManagers for the application: None nothing, True outputs, False inputs."""
         return self._ram.missing(self.application.sync_managers)
 
     # --- the slave's own side ----------------------------------------------------------------------------------
 
     @property
     def due_ns(self) -> int | None:
-        """When there is something to do about the last command; None when all is done."""
+        """When the last command needs more work; None if all is done."""
         return None if self._service is None else self._service.due_ns
 
     def work(self) -> None:
-        """Between two frames: the application looks at its command, the watchdog at the time."""
+        """Work between two frames: the application processes its command, and the watchdog checks the time."""
         if self._service is not None:
             self._compute(self._service)
         self._catch_up()
 
     def _catch_up(self) -> None:
-        """What is over by now: the application's turn, the watchdog's time."""
+        """Do all that is due by now: finish the application's cycle, and check the watchdog."""
         now_ns = self._clock.now_ns()
         if self._service is not None and now_ns >= self._service.over_ns:
             self._show(self._service)

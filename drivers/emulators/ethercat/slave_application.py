@@ -1,4 +1,4 @@
-"""The processor behind an emulated slave controller, and what the controller counts of its data."""
+"""The processor behind an emulated slave controller, and the controller's statistics of its data."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ class Application(Protocol):
     """The processor behind the controller.
 
     Attributes:
-        sync_managers: what it insists on before it goes to SAFEOP.
-        service_ns: how long it takes from a command's arrival to its status.
+        sync_managers: the SyncManagers that it requires before SAFEOP.
+        service_ns: time from a command's arrival to its status.
     """
 
     sync_managers: tuple[SyncManager, ...]
     service_ns: int
 
     def start(self) -> tuple[bytes, ...]:
-        """SAFEOP is reached: what the blocks to the master hold at first."""
+        """The initial contents of the blocks to the master, on reaching SAFEOP."""
 
     def serve(self, blocks: tuple[bytes, ...], *, operating: bool) -> tuple[bytes, ...] | None:
-        """Take the blocks from the master; those to the master, or None when it writes nothing.
+        """Process the blocks from the master; returns those to the master, or None if it writes nothing.
 
         Args:
             blocks: contents, in the order of the SyncManagers.
-            operating: in OP; else outputs must stay safe.
+            operating: whether the slave is in OP; otherwise outputs must stay safe.
         """
 
 
@@ -45,18 +45,18 @@ class NoApplication:
 
 
 class Service:
-    """A command in the application's hands.
+    """A command that the application is processing.
 
-    The answer is computed at once and shown when the application's time is over: what this program needs to compute
-    is part of the time that a real processor takes, and does not add to it.
+    The answer is computed at once and shown when the application's time is over. So this program's computing time is
+    part of the time that a real processor takes, and does not add to it.
 
     Args:
-        application: has the command.
-        begun_ns: when it came.
+        application: the application that processes the command.
+        begun_ns: when the command arrived.
 
     Attributes:
-        looked_at: whether the application has looked at it, or did not run.
-        answer: what it made of it; None for nothing.
+        looked_at: whether the application has processed it, or did not run.
+        answer: the application's answer; None if there is none.
     """
 
     def __init__(self, application: Application, begun_ns: int) -> None:
@@ -66,7 +66,7 @@ class Service:
 
     @property
     def over_ns(self) -> int:
-        """When the answer may be seen."""
+        """When the answer becomes visible."""
         return self._begun_ns + self._application.service_ns
 
     @property
@@ -82,14 +82,14 @@ class Service:
 
 @dataclass
 class SlaveCounts:
-    """What happened to process data.
+    """Statistics of the process data.
 
     Attributes:
         commands: accepted from the master.
-        refused: not accepted, because the application had not taken the one before.
-        statuses: collected by the master.
-        empty: asked for by the master while there was nothing new.
-        watchdog_trips: falls to SAFEOP for want of commands.
+        refused: not accepted, because the application had not read the one before.
+        statuses: read by the master.
+        empty: reads by the master without a new status.
+        watchdog_trips: falls to SAFEOP for lack of commands.
     """
 
     commands: int = 0

@@ -1,4 +1,4 @@
-"""A network interface whose frames are known by the time at which they arrived, not at which they were looked at."""
+"""A network interface that stamps frames with their time of arrival, not with the time at which they are read."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class StampedPort(RawPort):
 
     Args:
         interface: its name.
-        clock: the stamps are of its time; CLOCK_MONOTONIC.
+        clock: the clock of the stamps; CLOCK_MONOTONIC.
 
     Attributes:
-        arrived_ns: when the frame last received arrived; when it was received, where the kernel does not say.
+        arrived_ns: when the last frame arrived; when it was read, if the kernel gives no stamp.
     """
 
     def __init__(self, interface: str, clock: Clock) -> None:

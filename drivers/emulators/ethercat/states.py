@@ -13,7 +13,7 @@ class StateMachine:
     """States INIT, PREOP, SAFEOP and OP.
 
     Args:
-        setup_error: asked on the way to SAFEOP and OP what is missing in the SyncManagers: None nothing, True
+        setup_error: returns, on the way to SAFEOP and OP, what is missing in the SyncManagers: None nothing, True
             outputs, False inputs.
     """
 
@@ -22,7 +22,9 @@ class StateMachine:
         self.status = AlStatus(AlState.INIT)
 
     def request(self, control: int) -> None:
-        """The master wrote the control register. While an error stands, only an acknowledging request is heard."""
+        """Handle a write to the control register. While there is an error, only a request that acknowledges it is
+        accepted.
+        """
         wanted, acknowledged = control & AL_STATE_MASK, bool(control & AL_ERROR)
         if self.status.error and not acknowledged:
             return
@@ -44,7 +46,7 @@ class StateMachine:
         self.status = AlStatus(state, True, code)
 
     def watchdog(self) -> None:
-        """No process data came in time."""
+        """Fall to SAFEOP, because no process data arrived in time."""
         self.fall(AlState.SAFEOP, AlCode.WATCHDOG)
 
     def _refuse(self, code: AlCode) -> None:
@@ -52,9 +54,9 @@ class StateMachine:
 
 
 class CopiedStates(StateMachine):
-    """States of a slave without a processor, in device emulation: the control word appears in the status as it is.
+    """States of a slave without a processor, in device emulation: the control word is copied into the status unchanged.
 
-    So any request is granted, and an acknowledge looks like an error from then on.
+    So any request is granted, and an acknowledgement looks like an error from then on.
     """
 
     def __init__(self) -> None:

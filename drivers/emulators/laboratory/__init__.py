@@ -1,1 +1,1 @@
-"""Emulators on real wires that share one simulated plant: a process each, so that any of them can fail alone."""
+"""Emulators on real wires that share one simulated plant. Each has its own process, so that any can fail alone."""

@@ -1,4 +1,4 @@
-"""The camera under the table on a TCP socket, fed by the plant: one client at a time."""
+"""The emulated camera under the table on a TCP socket; it sees the plant and serves one client at a time."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class CameraHost:
         self._wire.close()
 
     def _serve_client(self) -> bool:
-        """Serve what the client has sent; whether it is still there."""
+        """Process what the client has sent; returns whether it is still connected."""
         client = self._client
         assert client is not None
         with contextlib.suppress(CodecError, ConnectionError):
@@ -66,7 +66,7 @@ class CameraHost:
 
 
 def make(start: dict[str, Any], clock: Clock) -> CameraHost:
-    """The camera at ``host`` and ``port``, over the table of a simulated rig's settings and seed."""
+    """The camera at ``host`` and ``port``, in a simulated rig with these settings and this seed."""
     settings = SimulationSettings.model_validate(start["simulation"])
     tips = SimulatedCalibration.with_tips(settings.fingertips, Path(start["tips"]))
     world = SimulatedWorld(settings, start["seed"], tips)

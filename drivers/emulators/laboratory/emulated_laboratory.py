@@ -1,4 +1,4 @@
-"""A whole laboratory of emulators: cable, plant, hand, boxes, positioner, camera; started and ended together."""
+"""A whole laboratory of emulators, started and ended together: cable, plant, hand, boxes, positioner and camera."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from drivers.simulation.plant import START_BASE
 from drivers.simulation.settings import SimulationSettings
 
 _GONE_ns = 2_000_000_000
-"""Without a step of the physics for so long there is none."""
+"""If the physics has not stepped for this long, its process counts as dead."""
 
 SERIAL = 634
-"""Of the emulated hand."""
+"""Settings of the emulated hand."""
 
 Place = tuple[str, int]
 
 
 @dataclass(frozen=True)
 class HandPlace:
-    """Where the emulated hand is, and what it is.
+    """The emulated hand: its interfaces and its identity.
 
     Attributes:
-        near, far: the cable's ends; the hand is at the far one.
-        joints, motors: its calibration files, read backwards.
+        near, far: the ends of the cable; the hand is at the far end.
+        joints, motors: its calibration files, used in reverse.
         palm, serial: its identity.
     """
 
@@ -55,12 +55,12 @@ class EmulationPlan:
     """A laboratory to emulate.
 
     Attributes:
-        simulation: the plant, and how imperfect the devices are.
-        seed: of everything random.
+        simulation: the plant, and the errors of the devices.
+        seed: for all random numbers.
         hand: the hand.
-        base: the positioner's place.
+        base: the positioner's address.
         tips: calibration file of the fingertips.
-        wires: of linked fingertips, by finger; each of a kind that has an emulator.
+        wires: wires of fingertips with their own transports, by finger; each kind must have an emulator.
         camera: address and TCP port of the camera, if there is one.
     """
 
@@ -75,18 +75,18 @@ class EmulationPlan:
 
 @dataclass(frozen=True)
 class EmulatedTruth:
-    """What really is; the plant's process does not tell its contacts."""
+    """The true state; contacts are not available from the plant's process."""
 
     world_T_object: Pose3
     contacts: None = None
 
 
 class EmulatedLaboratory:
-    """The running laboratory, a context.
+    """The running laboratory, as a context manager.
 
     Args:
         plan: what to emulate.
-        clock: the session's; real time.
+        clock: the session's clock, in real time.
 
     Attributes:
         stations: the emulators by device: ``plant``, ``hand``, ``base``, ``camera``, ``ft/FF`` to ``ft/TH``.
@@ -99,10 +99,10 @@ class EmulatedLaboratory:
         self.hosts: dict[str, HostProcess] = {}
 
     def __enter__(self) -> Self:
-        """Start everything and wait until it serves. All or nothing.
+        """Start all emulators and wait until they serve. After a failure none is left running.
 
         Raises:
-            DeviceError: something cannot be served; says what and why.
+            DeviceError: an emulator cannot serve; the message says which and why.
         """
         try:
             self._start()
@@ -118,7 +118,7 @@ class EmulatedLaboratory:
         """The object's true pose.
 
         Raises:
-            DeviceError: the physics does not run any more; every emulator goes on, in a world that stands still.
+            DeviceError: the physics has stopped. The emulators continue, but nothing moves any more.
         """
         if self._memory.age_ns > _GONE_ns:
             hint = "Its process has ended, or this computer is too slow: run again"
@@ -127,7 +127,7 @@ class EmulatedLaboratory:
 
     @property
     def lost_s(self) -> float:
-        """Time by which the plant stayed behind the clock: a machine too slow for real time."""
+        """Time by which the plant fell behind the clock; more than zero on a machine too slow for real time."""
         return self._memory.lost_ns / 1e9
 
     @property

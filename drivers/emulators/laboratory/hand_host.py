@@ -1,4 +1,4 @@
-"""The hand's two EtherCAT slaves on the far end of its cable, fed by the plant."""
+"""The hand's two emulated EtherCAT slaves at the far end of its cable, driven by the plant."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from drivers.simulation.settings import SimulationSettings
 
 
 class HandHost:
-    """A hand that serves frames."""
+    """Serves a hand's frames."""
 
     def __init__(
         self, hand: EmulatedHand, time: VirtualClock, interface: str, can: MotorCanBuses, clock: Clock
@@ -35,17 +35,17 @@ class HandHost:
         self._server = HandServer(hand, time, self._port, can, clock)
 
     def serve(self) -> None:
-        """Serve until standard input ends. Raises DeviceError when the interface goes."""
+        """Serve until standard input ends. Raises DeviceError if the interface disappears."""
         request_real_time()
         self._server.run()
 
 
 def make(start: dict[str, Any], clock: Clock) -> HandHost:
-    """The hand at the interface ``far_end``, with the joint and motor tables, and fingertips, of the files named.
+    """The hand at the interface ``far_end``, with joint tables, motor tables and fingertips from the given files.
 
     Raises:
         DeviceError: the interface cannot be used.
-        ConfigurationError: a file that cannot be used.
+        ConfigurationError: a file cannot be used.
     """
     can, time = MotorCanBuses(), VirtualClock(clock.now_ns())
     mirror = PlantMirror(Path(start["mirror"]), time)

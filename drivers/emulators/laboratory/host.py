@@ -1,7 +1,7 @@
 """The common part of every emulator's process: ``python -m drivers.emulators.laboratory.host``.
 
-The first line on standard input says, as JSON, what to be; one line of JSON answers that it serves, or why not. The
-process ends with its standard input, so that it never outlives the laboratory that started it.
+The first line on standard input names, as JSON, the device to emulate; the answer is one line of JSON that says that it
+serves, or why not. The process ends when its standard input ends, so it never outlives the laboratory that started it.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from drivers.core.extensions import load_named_extensions
 from drivers.shadow.device.real_time import request_real_time
 
 ROLES = ("plant", "hand", "camera")
-"""Those that every laboratory has; stand-ins of wires and positioners are modules that their kinds name."""
+"""Emulators that every laboratory has; the kinds of wires and positioners name the modules of theirs."""
 
 PRIORITY = 60
-"""Where permitted, devices come before whatever else the machine does: real ones are never late."""
+"""Scheduling priority, if permitted: emulated devices take precedence over all else, since real ones are never late."""
 
 
 class EmulatorHost(Protocol):
     """One emulator on its wire."""
 
     def serve(self) -> None:
-        """Serve until standard input ends. Raises DeviceError when its wire goes."""
+        """Serve until standard input ends. Raises DeviceError if its wire disappears."""
 
 
 def main() -> None:
-    """Read what to be, be it, and serve."""
+    """Read which device to emulate, create it, and serve."""
     with errors_said():
         start: dict[str, Any] = json.loads(sys.stdin.readline())
         request_real_time(PRIORITY)
@@ -42,7 +42,7 @@ def main() -> None:
 
 
 def _load_host(role: str, start: dict[str, Any]) -> EmulatorHost:
-    """Only this role's modules are loaded: most need no physics and no camera."""
+    """Load only the modules of this role: most need neither physics nor a camera."""
     module = f"drivers.emulators.laboratory.{role}_host" if role in ROLES else role
     made: EmulatorHost = importlib.import_module(module).make(start, MonotonicClock())
     return made

@@ -1,4 +1,4 @@
-"""An emulator's process, seen from the laboratory that started it."""
+"""The laboratory's side of an emulator's process."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ _START_s = 60.0
 
 
 class HostProcess:
-    """One emulator in a process of its own.
+    """One emulator in a separate process.
 
     Args:
-        name: of the device, for messages.
-        role: one of :data:`drivers.emulators.laboratory.host.ROLES`, or a module with a ``make`` like theirs.
-        start: what it needs to know.
+        name: name of the device, for messages.
+        role: one of :data:`drivers.emulators.laboratory.host.ROLES`, or a module with a ``make`` function of the same
+            kind.
+        start: arguments for the emulator.
     """
 
     def __init__(self, name: str, role: str, **start: Any) -> None:
@@ -30,17 +31,17 @@ class HostProcess:
         """Wait until it serves.
 
         Raises:
-            DeviceError: it does not come up, in its own words.
+            DeviceError: it does not start; the message is its own.
         """
         self._child.ready(_START_s)
 
     @property
     def running(self) -> bool:
-        """Whether its process lives."""
+        """Whether its process is running."""
         return self._child.running
 
     def kill(self) -> None:
-        """End it at once, as a power cut would."""
+        """Kill it at once, like a power cut."""
         self._child.kill()
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""One fingertip's Net F/T box on its UDP and http sockets, fed by the plant."""
+"""The emulated Net F/T box of one fingertip on UDP and HTTP sockets, driven by the plant."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ _SATURATED = rdt_codec.SATURATION | 1 << 31
 
 
 class PlantSensor(EmulatedSensor):
-    """The transducer of one finger: feels what the plant's fingertip feels.
+    """The transducer of one finger: measures the load on the plant's fingertip.
 
     Args:
-        serial: of its calibration.
+        serial: serial number of its calibration.
         sensors: the plant's force sensors with their errors.
-        finger: whose.
+        finger: the finger that carries it.
     """
 
     def __init__(self, serial: str, sensors: NanoSensors, finger: str) -> None:
@@ -46,7 +46,7 @@ class PlantSensor(EmulatedSensor):
 
 
 class PlantBox(NetBoxUnit):
-    """A box whose status tells when its sensor is beyond its range."""
+    """A box whose status reports when its sensor is beyond its range."""
 
     def __init__(self, sensor: PlantSensor, rate_hz: int) -> None:
         super().__init__(sensor, rate_hz)
@@ -59,7 +59,7 @@ class PlantBox(NetBoxUnit):
 
 
 class NetBoxHost:
-    """A box that serves in threads of its own."""
+    """Serves a box in its own threads."""
 
     def __init__(self, server: NetBoxServer) -> None:
         self._server = server
@@ -71,10 +71,10 @@ class NetBoxHost:
 
 
 def make(start: dict[str, Any], clock: Clock) -> NetBoxHost:
-    """The box of ``finger`` at the place that its ``wiring`` names.
+    """The box of ``finger`` at the address in its ``wiring``.
 
     Raises:
-        DeviceError: an address is another computer's or taken.
+        DeviceError: an address is not this computer's, or is in use.
     """
     finger, wiring = start["finger"], NetBoxWiring.model_validate(start["wiring"])
     settings = SimulationSettings.model_validate(start["simulation"]).force_sensors

@@ -1,4 +1,4 @@
-"""The physics in real time: steps with the clock, shows its state, takes demands."""
+"""Runs the physics in real time: steps with the clock, publishes its state, and takes demands."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from drivers.simulation.settings import SimulationSettings
 from drivers.simulation.world import SimulatedWorld
 
 PRIORITY = 70
-"""Where permitted the physics comes before whatever else the machine does, but after the hand's frames."""
+"""Scheduling priority, if permitted: the physics takes precedence over all else but the hand's frames."""
 
 _LONGEST_ns = 100_000_000
-"""A delay that the physics makes up for; of a longer one the rest is left out, and counted."""
+"""The longest delay that the physics catches up with; the rest of a longer one is skipped and counted."""
 
 _LOOK_EVERY = 50
 
@@ -31,10 +31,10 @@ class PlantHost:
     """Drives a plant.
 
     Args:
-        plant: at rest.
-        mirror: where others see it.
-        clock: its time.
-        touches: show every touch of the fingertips as well, for sensors that feel where.
+        plant: the plant, at rest.
+        mirror: the shared memory in which others see it.
+        clock: the clock that it follows.
+        touches: whether to publish every contact of the fingertips too, for sensors that measure positions.
     """
 
     def __init__(self, plant: Plant, mirror: PlantMirror, clock: Clock, *, touches: bool = False) -> None:
@@ -51,7 +51,7 @@ class PlantHost:
             self._clock.sleep_until_ns(self._plant.stamp_ns + behind_ns + STEP_ns)
 
     def _catch_up(self, due_ns: int) -> int:
-        """Step up to a time of the plant's own; by how much it stayed behind for good, nanoseconds."""
+        """Step up to a time of the plant; returns the time that it skipped, nanoseconds."""
         late_ns = due_ns - self._plant.stamp_ns
         lost_ns = max(late_ns - _LONGEST_ns, 0)
         duty, base_target = self._mirror.demands
@@ -77,7 +77,7 @@ class PlantHost:
 
 
 def make(start: dict[str, Any], clock: Clock) -> PlantHost:
-    """The plant of a simulated rig's settings and seed, shown in the memory at ``mirror``."""
+    """The plant of a simulated rig with these settings and this seed, published in the memory at ``mirror``."""
     settings = SimulationSettings.model_validate(start["simulation"])
     tips = SimulatedCalibration.with_tips(settings.fingertips, Path(start["tips"]))
     world = SimulatedWorld(settings, start["seed"], tips)

@@ -1,7 +1,7 @@
-"""What the emulators of one laboratory share: the plant's newest state, and what drives it, in shared memory.
+"""Shared memory of one laboratory's emulators: the plant's newest state, and the demands that drive it.
 
 The plant's process writes the state after every step and reads the demands before the next. Emulators, each in its own
-process, read the state whenever their device would measure and write their own demand. Nobody waits for anybody.
+process, read the state whenever their device would measure, and write their own demand. No process waits for another.
 """
 
 from __future__ import annotations
@@ -53,14 +53,14 @@ _TRIES = 1000
 
 
 class PlantMirror:
-    """A plant seen through shared memory, as an emulator needs it; times are those of the common clock.
+    """A plant as an emulator sees it through shared memory; times are those of the common clock.
 
     Args:
         path: the file that holds the memory, made by :meth:`create`.
-        clock: for :attr:`stamp_ns`; a device measures when it is asked.
+        clock: for :attr:`stamp_ns`; a device measures when it is read.
 
     Raises:
-        DeviceError: no such file, or another program's.
+        DeviceError: there is no such file, or it belongs to another program.
     """
 
     def __init__(self, path: Path, clock: Clock) -> None:
@@ -79,7 +79,7 @@ class PlantMirror:
 
     @classmethod
     def create(cls, path: Path, clock: Clock, base: Array) -> PlantMirror:
-        """Make the memory, with the positioner's target where it stands."""
+        """Create the memory; the positioner's target is its present position."""
         path.write_bytes(bytes(_MEMORY.itemsize))
         mirror = cls(path, clock)
         mirror._memory["base_target"][0] = base
@@ -89,7 +89,7 @@ class PlantMirror:
 
     @property
     def stamp_ns(self) -> int:
-        """Now."""
+        """Present time."""
         return self._clock.now_ns()
 
     @property
@@ -118,20 +118,20 @@ class PlantMirror:
         return Pose3(np.asarray(self._state()["world_T_object"]))
 
     def contacts(self) -> tuple[TrueContact, ...]:
-        """Every touch of a fingertip; none where the plant does not show them."""
+        """All contacts of fingertips; empty if the plant does not publish them."""
         touches = self._read("touches")
         return tuple(map(_contact, touches["contact"][: int(touches["count"])]))
 
     def world_T_distal(self, finger: str) -> Pose3:
-        """True pose of a finger's distal frame, where the plant shows touches."""
+        """True pose of a finger's distal frame, if the plant publishes contacts."""
         return Pose3(np.asarray(self._read("touches")["world_T_distal"][FINGERS.index(finger)]))
 
     def drive(self, duty: Array) -> None:
-        """Duty cycles from now on, shape (20,), -1 to 1."""
+        """Set the duty cycles, shape (20,), -1 to 1."""
         self._memory["duty"][0] = duty
 
     def move_base(self, target: Array) -> None:
-        """The positioner's targets from now on, shape (6,)."""
+        """Set the positioner's targets, shape (6,)."""
         self._memory["base_target"][0] = target
 
     # --- for the plant -----------------------------------------------------------------------------------------
@@ -144,7 +144,7 @@ class PlantMirror:
     def publish(
         self, stamp_ns: int, joints_rad: Array, torque_Nm: Array, base: Array, wrenches: Array, world_T_object: Pose3
     ) -> None:
-        """Show a new state; see the properties for shapes."""
+        """Publish a new state; see the properties for shapes."""
         memory = self._memory
         memory["beat"] += 1
         memory["state"][0] = (joints_rad, torque_Nm, base, wrenches, world_T_object.matrix())
@@ -152,7 +152,7 @@ class PlantMirror:
         memory["beat"] += 1
 
     def publish_touches(self, contacts: Sequence[TrueContact], world_T_distal: Sequence[Pose3]) -> None:
-        """Show the fingertips' touches, of many the first, and the distal frames of all fingers."""
+        """Publish the fingertips' contacts (if there are too many, the first), and the distal frames of all fingers."""
         rows = [_row(contact) for contact in contacts[:_MOST_CONTACTS]]
         memory = self._memory
         memory["beat"] += 1
@@ -163,14 +163,14 @@ class PlantMirror:
         memory["beat"] += 1
 
     def count_lost(self, lost_ns: int) -> None:
-        """The plant was so late that this time is left out of it."""
+        """Count time that the plant skipped because it was late."""
         self._memory["lost_ns"] += lost_ns
 
     # --- for people --------------------------------------------------------------------------------------------
 
     @property
     def lost_ns(self) -> int:
-        """Time by which the plant stayed behind the clock, for good."""
+        """Total time that the plant has skipped."""
         return int(self._memory["lost_ns"][0])
 
     @property
@@ -182,7 +182,7 @@ class PlantMirror:
         return self._read("state")
 
     def _read(self, part: str) -> NDArray[np.void]:
-        """A part that was not being written while it was read; the newest look after too many tries."""
+        """Read a part of the memory that is not being written meanwhile; after too many tries, the last reading."""
         memory = self._memory
         for _ in range(_TRIES):
             before = int(memory["beat"][0])

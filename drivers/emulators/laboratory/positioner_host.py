@@ -1,4 +1,4 @@
-"""The positioner on a UDP socket, fed by the plant."""
+"""The emulated positioner on a UDP socket, driven by the plant."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from drivers.simulation.devices.positioner_emulator import PositionerEmulator
 
 
 class PositionerHost:
-    """Answers each command at once."""
+    """Answers each command immediately."""
 
     def __init__(self, emulator: PositionerEmulator, wire: socket.socket) -> None:
         self._emulator, self._wire = emulator, wire
@@ -30,7 +30,7 @@ class PositionerHost:
         self._wire.close()
 
     def _answer(self) -> None:
-        with contextlib.suppress(CodecError, ConnectionError):  # a device does not care who listens
+        with contextlib.suppress(CodecError, ConnectionError):  # like a real device, ignore whether anybody listens
             payload, client = self._wire.recvfrom(1000)
             self._emulator.write(payload)
             for status in self._emulator.read():

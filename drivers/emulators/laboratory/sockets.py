@@ -1,4 +1,4 @@
-"""Sockets that emulators serve on."""
+"""Sockets on which emulators serve."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from drivers.core.errors import DeviceError
 
 
 def bind_socket(kind: socket.SocketKind, host: str, port: int, where: str) -> socket.socket:
-    """A socket at an address of this computer.
+    """Open a socket at an address of this computer.
 
     Raises:
-        DeviceError: the address is another computer's or taken.
+        DeviceError: the address is not this computer's, or is in use.
     """
     made = socket.socket(socket.AF_INET, kind)
     try:

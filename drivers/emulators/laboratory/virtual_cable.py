@@ -13,10 +13,10 @@ from drivers.core.errors import DeviceError
 
 @contextmanager
 def virtual_cable(near: str, far: str) -> Iterator[None]:
-    """Two connected interfaces while the context lasts. Interfaces of these names that exist already are used and kept.
+    """Two connected interfaces for the duration of the context. Existing interfaces of these names are used and kept.
 
     Raises:
-        DeviceError: they do not exist and cannot be made; says how a person with the right to can make them.
+        DeviceError: they do not exist and cannot be created; the message says how an administrator can create them.
     """
     present = {name for _, name in socket.if_nameindex()}
     if {near, far} <= present:

@@ -1,1 +1,1 @@
-"""Far ends of the simulated rig's transports: true quantities in, device bytes out."""
+"""Simulated devices at the far ends of the rig's transports: true quantities in, device bytes out."""

@@ -1,7 +1,7 @@
-"""Five BioTacs in the palm's tactile section: a synthetic answer of skin and fluid to the true contacts.
+"""Five BioTacs in the palm's tactile section: a synthetic response of skin and fluid to the true contacts.
 
-Pressing lowers the counts of the electrodes under the contact and raises those around it a little, as the fluid that is
-squeezed out gathers there; a sideways force drags the skin along. The laws are assumed, not measured.
+Pressing lowers the counts of the electrodes under the contact. It raises those around it a little, because displaced
+fluid collects there. A tangential force drags the skin along. These laws are assumed, not measured.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from drivers.simulation.settings import BiotacSettings
 
 _ALL_VALID = 0b11111
 _PRESSURE_counts_N = 200.0
-_SOFT_UNTIL_N = 2.0  # above, the skin rests on the core and the pressure stands still
+_SOFT_UNTIL_N = 2.0  # above this, the skin rests on the core and the pressure stays constant
 _SQUEEZE_counts, _SQUEEZE_POWER, _SQUEEZE_LIMIT_counts = 330.0, 0.8, 900.0
 _BULGE_SHARE, _BULGE_WIDTH = 0.10, 2.5
 _SKIN_DRAG_m = 0.0012
@@ -31,13 +31,13 @@ _REST_TAC, _REST_TDC = 1998.0, 2283.0
 _PDC_NOISE, _HEAT_NOISE = 0.5, 1.0
 
 _PROTOCOL, _FREQUENCY, _SERIAL = 0xFFF9, 0xFFFA, 0xFFFC
-_WORDS = {_PROTOCOL: 2, _FREQUENCY: 100}  # BioTac; samples in a second
+_WORDS = {_PROTOCOL: 2, _FREQUENCY: 100}  # BioTac; samples per second
 _TEXTS = {0xFFFB: b"SynTouch", 0xFFFD: b"2.3", 0xFFFE: b"1.0"}
 _SERIALS = {19: b"BTSIM-", 24: b"BTSP-SIM-"}
 
 
 class BiotacSkin:
-    """One BioTac: the true contacts on its finger to counts.
+    """One BioTac: converts the true contacts on its finger to counts.
 
     Args:
         calibration: its electrodes, mounting and skin.
@@ -70,9 +70,9 @@ class BiotacSkin:
         return np.asarray(self._rest + np.concatenate([[pressure, 0.0, 0.0], -limited]))
 
     def slot(self, data_type: int, channels: Array | None = None) -> bytes:
-        """The answer to a request, with noise; channels as from :meth:`channels`, or untouched.
+        """The answer to a request, with noise; channels as from :meth:`channels`, by default without contact.
 
-        Channels that this sensor lacks are not valid in it.
+        Channels that this sensor lacks are marked invalid.
         """
         counts = self._rest if channels is None else channels
         known = [channel for channel in (data_type, data_type + 1) if channel <= len(counts)]
@@ -101,7 +101,7 @@ class BiotacSection:
     """The palm's tactile section with a BioTac on every finger.
 
     Args:
-        plant: where the contacts come from.
+        plant: source of the contacts.
         skins: the sensors, by finger.
     """
 
@@ -116,11 +116,11 @@ class BiotacSection:
         settings: BiotacSettings,
         rng: np.random.Generator,
     ) -> BiotacSection:
-        """A section whose sensors are as they were calibrated, one for each finger."""
+        """A section with one sensor per finger, each as calibrated."""
         return cls(plant, {finger: BiotacSkin(calibrations[finger], settings, rng) for finger in FINGERS})
 
     def answer(self, data_type: int) -> tuple[int, NDArray[np.uint8]]:
-        """All five sensors answer every request they know; to others none is valid."""
+        """Answer a request: all five sensors know the same ones; the answers to others are invalid."""
         if data_type == _SERIAL or data_type in _WORDS or data_type in _TEXTS:
             return _ALL_VALID, _slots([self._name(finger, data_type) for finger in FINGERS])
         if not Channel.PDC <= data_type <= electrode_channel(24):
@@ -129,7 +129,7 @@ class BiotacSection:
         return _ALL_VALID, _slots([self._slot(finger, data_type, contacts) for finger in FINGERS])
 
     def _name(self, finger: str, question: int) -> bytes:
-        """The answer to a question about the sensor itself."""
+        """The answer to a request for the sensor's own name."""
         if question == _SERIAL:
             return _SERIALS[self._skins[finger].electrodes] + finger.encode()
         return _WORDS[question].to_bytes(2, "little") if question in _WORDS else _TEXTS[question]
@@ -142,6 +142,6 @@ class BiotacSection:
 
 
 def _slots(answers: Sequence[bytes]) -> NDArray[np.uint8]:
-    """The answers as they stand in the palm's status, shape (5, 16)."""
+    """The answers in the palm's status, shape (5, 16)."""
     together = b"".join(answer.ljust(SLOT_BYTES, b"\0") for answer in answers)
     return np.frombuffer(together, np.uint8).reshape(len(answers), SLOT_BYTES)

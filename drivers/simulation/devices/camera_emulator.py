@@ -1,6 +1,6 @@
-"""The camera under the table as seen from its transport: a trigger in, one picture with its markers out.
+"""The simulated camera under the table, as seen from its transport: a trigger in, one picture with markers out.
 
-One that streams sends the markers of every frame by itself, and the picture with the next frame after a trigger.
+A streaming camera sends the markers of every frame by itself, and the picture with the next frame after a trigger.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ class CameraEmulator:
     """Far end of the camera's transport.
 
     Args:
-        plant: where the object lies.
-        camera: what draws the pictures.
+        plant: the plant with the object.
+        camera: renders the pictures.
         target: the object, for the shape of its underside.
         table_marker: the marker on the table and its pose in the world.
         object_marker: the marker under the object and its pose in the object frame.
-        settings: its pictures, rate and lateness.
-        carried: gives the markers on the hand and their poses in the world; they lie above all others.
+        settings: its picture quality, rate and delay.
+        carried: returns the markers on the hand and their poses in the world; they are drawn in front of all others.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class CameraEmulator:
 
     @property
     def next_event_ns(self) -> int | None:
-        """When it sends its next frame by itself; None for a camera that waits for triggers."""
+        """When it streams its next frame; None for a camera that waits for triggers."""
         return None if self._period_ns is None else (self._counter + 1) * self._period_ns
 
     def tick(self) -> None:
@@ -69,10 +69,10 @@ class CameraEmulator:
         self._wanted = False
 
     def write(self, payload: bytes) -> None:
-        """Take a trigger and a picture.
+        """Process a trigger by taking a picture.
 
         Raises:
-            CodecError: something else than a trigger.
+            CodecError: the bytes are not a trigger.
         """
         if payload != TRIGGER:
             raise CodecError(f"{len(payload)} bytes that are not a trigger", where="simulated camera")

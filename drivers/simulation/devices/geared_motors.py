@@ -1,4 +1,4 @@
-"""The simulated motors: what a duty cycle does to a joint.
+"""The simulated motors: the joint torque of a duty cycle.
 
 Each motor is the linear model of a direct-current motor behind a gear: torque at the joint is
 ``stall * duty - damping * speed``, where the damping stands for the back-EMF seen through the gear
@@ -42,4 +42,4 @@ def motor_class(driven: str) -> MotorClass:
 
 
 DISTAL_COUPLING = 0.6
-"""J1 follows J2 at this share while nothing touches the finger (the tendon pair has no sensor for it)."""
+"""J1 follows J2 by this share while nothing touches the finger (no sensor measures it for the tendon pair)."""

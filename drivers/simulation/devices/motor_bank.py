@@ -27,14 +27,14 @@ DEMAND_TIMEOUT_ns = 20_000_000
 """A motor without a demand for this long halts."""
 
 GAUGE_COUNTS_PER_Nm = 2000.0
-"""Strain-gauge difference per joint torque (assumed: a real hand's is set by its gauges)."""
+"""Strain-gauge difference per joint torque (assumed; a real hand's depends on its gauges)."""
 
 _GAUGE_NOISE = 2.0
 _NO_DEMAND, _OVER_TEMPERATURE = int(MotorFlag.NO_DEMAND), int(MotorFlag.OVER_TEMPERATURE)
 _GAUGE_MIDDLE = 2048
 _SUPPLY_V, _AMBIENT_C, _HALT_C = 24.0, 25.0, 60.0
 _STALL_RISE_C, _THERMAL_TIME_s = 80.0, 200.0
-_WARMING_ns = 10_000_000  # so often the windings' temperature follows their load
+_WARMING_ns = 10_000_000  # interval at which the windings' temperature is updated
 _SLOW_WORDS = (0, 1200, 1200, 0, 4711, 0, 131, 2020, 0x0A1F, 300, 4500, 0, 0, 0, 5, 5000, 0x0D)
 """Answers of the slow data types 0 to 0x10: firmware revision, serial, gear ratio, date, torque loop."""
 
@@ -42,16 +42,16 @@ _SLOW_WORDS = (0, 1200, 1200, 0, 4711, 0, 131, 2020, 0x0A1F, 300, 4500, 0, 0, 0,
 class MotorBank:
     """All motor boards together, vectors by motor number.
 
-    PWM and torque demands, configurations, backlash controls and resets are served. The torque loop runs with the
-    commands, not at 5 kHz: the duty cycle that gives the torque at a standstill, and half of what is missing besides.
+    PWM and torque demands, configurations, backlash controls and resets are served. The torque loop runs once per
+    command, not at 5 kHz. Its output is the duty cycle for this torque at a standstill, plus half of the error.
 
     Args:
-        plant: whose motors turn.
+        plant: the plant that the motors drive.
         motor_map: which motor pulls which joint.
         rng: noise of the strain gauges.
 
     Attributes:
-        backlash_compensated: which motors have it switched on, shape (20,).
+        backlash_compensated: which motors have the compensation switched on, shape (20,).
     """
 
     def __init__(self, plant: HandPlant, motor_map: MotorMap, rng: np.random.Generator) -> None:
@@ -76,11 +76,11 @@ class MotorBank:
 
     @property
     def next_event_ns(self) -> int | None:
-        """When the motors halt unless a demand comes before."""
+        """When the motors halt unless a demand arrives before."""
         return self._halts_at_ns
 
     def tick(self) -> None:
-        """No demand came in time: every motor halts until the next one."""
+        """Halt every motor until the next demand, because none arrived in time."""
         self._halts_at_ns = None
         self._flags |= _NO_DEMAND
         self._turn(np.zeros(MOTORS))
@@ -109,7 +109,7 @@ class MotorBank:
         """The (torque, misc) words of all motors for a requested data type, each of shape (20,)."""
         gauges = self._gauge_difference()
         if kind == FromMotor.SLOW_MISC:
-            kind_now = self._slow_turns // 2 % (len(_SLOW_WORDS) - 1) + 1  # even and odd motors each go through all
+            kind_now = self._slow_turns // 2 % (len(_SLOW_WORDS) - 1) + 1  # even and odd motors each cycle through all
             self._slow_turns += 1
             return np.full(MOTORS, kind_now, np.int16), np.full(MOTORS, _SLOW_WORDS[kind_now], np.uint16)
         return gauges.astype(np.int16), np.rint(self._misc(kind, gauges)).astype(np.int64).astype(np.uint16)
@@ -141,7 +141,7 @@ class MotorBank:
 
     @property
     def _load(self) -> Array:
-        """Share of the stall torque, which is the share of the stall current."""
+        """Share of the stall torque, which equals the share of the stall current."""
         return np.asarray(np.abs(self._torque_Nm) / self._stall_Nm)
 
     def _gauge_difference(self) -> Array:
@@ -164,14 +164,14 @@ class MotorBank:
         self._plant.drive((self._sign * self._pwm).take(self._motor_of_row) / MAX_PWM)
 
     def _reset(self, words: NDArray[np.int_]) -> None:
-        """A reset addresses a motor by its number on its bus; it comes back halted and with its stored settings."""
+        """Reset a motor, addressed by its number on its bus; it restarts halted and with its stored settings."""
         reset = words & 0xFFFF == 0x5200 | np.arange(MOTORS) % 10
         self._flags[reset] = _NO_DEMAND
         self._max_pwm[reset], self._max_torque[reset] = MAX_PWM, MAX_TORQUE
         self._turn(np.where(reset, 0.0, self._pwm))
 
     def _activate(self, checksums: NDArray[np.int_]) -> None:
-        """Take over the uploaded configuration of every motor whose checksum is not 0, if it is right."""
+        """Activate the uploaded configuration of every motor whose checksum is not 0, if the checksum is right."""
         for motor in np.flatnonzero(checksums):
             self._flags[motor] &= ~int(MotorFlag.CONFIG_CRC_MISMATCH | MotorFlag.CONFIG_OUT_OF_RANGE)
             max_pwm = self._config[motor, CONFIG_TYPES.index(ToMotor.MAX_PWM)]
@@ -184,7 +184,7 @@ class MotorBank:
                 self._max_torque[motor] = self._config[motor, CONFIG_TYPES.index(ToMotor.TORQUE_LIMIT)]
 
     def _warm(self) -> None:
-        """Windings approach the temperature of their present load; too hot, they halt for good."""
+        """Let windings approach the temperature of their present load; overheated motors halt permanently."""
         elapsed_ns = self._plant.stamp_ns - self._warmed_at_ns
         if elapsed_ns < _WARMING_ns:
             return

@@ -1,4 +1,4 @@
-"""The five Nano17 sensors themselves: what they feel of a plant, with their errors (protocols: Nano17 ratings)."""
+"""The five Nano17 sensors themselves: their readings of a plant's loads, with errors (protocols: Nano17 ratings)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RESOLUTION = np.array([1 / 320] * 3 + [1e-3 / 64] * 3)
 """Its resolution, newtons and newton metres."""
 
 SHAPE = (len(FINGERS), 6)
-"""Of the readings of all five."""
+"""Sampling of the readings of all five."""
 
 
 class NanoSensors:
@@ -24,8 +24,8 @@ class NanoSensors:
 
     Args:
         plant: the physics behind the sensors.
-        settings: how large the errors are.
-        rng: where they come from.
+        settings: size of the errors.
+        rng: random numbers for the errors.
     """
 
     def __init__(self, plant: LoadedPlant, settings: ForceSensorSettings, rng: np.random.Generator) -> None:
@@ -46,5 +46,5 @@ class NanoSensors:
 
 
 def six(force: float, moment: float) -> Array:
-    """One number for the forces, one for the moments, shape (6,)."""
+    """One value for the forces and one for the moments, as shape (6,)."""
     return np.array([force] * 3 + [moment] * 3)

@@ -1,8 +1,8 @@
-"""The hand's palm as seen from the wire: takes a command image, gives a status image one cycle later.
+"""The hand's palm as seen from the wire: takes a command image and returns a status image one cycle later.
 
-When a command arrives the palm reads joints, motors and fingertips, passes the demands on and leaves a status in its
-buffer; the host collects that status with its *next* command (protocols: Palm images; Palm timing). A palm that was
-not asked for sensor data writes nothing, and an unwritten buffer reads as zeros.
+When a command arrives the palm reads joints, motors and fingertips, passes the demands on and writes a status into its
+buffer; the host reads that status with its *next* command (protocols: Palm images; Palm timing). Unless sensor data
+were requested the palm writes nothing, and an unwritten buffer reads as zeros.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ class JointSensors:
     """The joint sensors: true angles to ADC counts, with this session's bias, noise and rounding.
 
     Args:
-        calibration: the hand's calibration, read backwards.
-        settings: how large the errors are.
-        rng: where they come from.
+        calibration: the hand's calibration, used in reverse.
+        settings: size of the errors.
+        rng: random numbers for the errors.
     """
 
     def __init__(self, calibration: JointCalibration, settings: JointSensorSettings, rng: np.random.Generator) -> None:
@@ -62,14 +62,14 @@ class JointSensors:
 
 
 class CanBuses(Protocol):
-    """The motors' two CAN buses, as the palm reaches them."""
+    """The motors' two CAN buses, as seen by the palm."""
 
     def transfer(self, frame: CanFrame) -> CanFrame:
-        """Send a frame (length 0 with bus 0: none); the frame that came in meanwhile, an empty one for none."""
+        """Send a frame (none if length and bus are 0); returns a frame received meanwhile, or an empty one."""
 
 
 class NoCan:
-    """Buses on which nobody speaks."""
+    """Buses without any traffic."""
 
     def transfer(self, frame: CanFrame) -> CanFrame:
         return CanFrame()
@@ -77,14 +77,14 @@ class NoCan:
 
 @dataclass
 class PalmFaults:
-    """What can be wrong with the sensors and with the motors' answers, to be changed while it runs.
+    """Faults of the sensors and of the motors' answers, which may be changed while it runs.
 
     Attributes:
         silent: motors that do not answer.
-        wrong_type: motors that answer another type than was asked.
-        stuck: counts that channels of joint sensors read whatever their joints do.
-        frozen: channels that keep what they read last.
-        torque: strain-gauge differences that motors report whatever they pull.
+        wrong_type: motors that answer with another type than was requested.
+        stuck: counts that channels of joint sensors read regardless of their joints.
+        frozen: channels that keep their last reading.
+        torque: strain-gauge differences that motors report regardless of their load.
     """
 
     silent: set[int] = field(default_factory=set)
@@ -97,16 +97,16 @@ class PalmFaults:
 class PalmEmulator:
     """Far end of the hand's transport.
 
-    With broken motors it has the firmware's own quirks (protocols: Motor polling): the last packet keeps its old words
-    when its motor is silent, a good answer clears the error bits of all motors before it, and a wrong type is marked as
-    arrived *and* as an error.
+    With broken motors it behaves as oddly as the firmware (protocols: Motor polling): the last packet keeps its old
+    words if its motor is silent, a good answer clears the error bits of all motors before it, and an answer of a wrong
+    type is marked as arrived *and* as an error.
 
     Args:
         plant: the physics behind the sensors.
         joints: joint sensors.
         motors: motor boards.
         tactile: fingertip slots.
-        rng: spread of the palm's idle time.
+        rng: random numbers for the palm's idle time.
         image: which palm it is.
         can: the motors' buses.
     """
@@ -131,21 +131,21 @@ class PalmEmulator:
         self.faults = PalmFaults()
 
     def write(self, payload: bytes) -> None:
-        """Take a command; the status of the command before becomes ready to read."""
+        """Process a command; the status of the previous command can then be read."""
         before = self._buffer
         self._buffer = self.serve(payload) or self._unwritten
         self._outbox.append(Datagram(before, self._plant.stamp_ns))
 
     def read(self) -> list[Datagram]:
-        """The statuses that came back since the last call."""
+        """The statuses that have arrived since the last call."""
         arrived, self._outbox = self._outbox, []
         return arrived
 
     def serve(self, payload: bytes) -> bytes | None:
-        """One cycle of the palm's firmware: the status it writes for a command; None when it writes nothing.
+        """One cycle of the palm's firmware: returns the status for a command; None if it writes nothing.
 
         Raises:
-            CodecError: a command of wrong length.
+            CodecError: the command has a wrong length.
         """
         command = self._image.decode_command(payload)
         status = self._status(command)
@@ -216,7 +216,7 @@ class PalmEmulator:
         return PalmAuxiliary(np.zeros((5, 8), np.uint16), command.aux_data_type, np.zeros(16, np.uint16))
 
     def _can_status(self, command: PalmCommand) -> PalmStatus:
-        """In this mode the palm serves its bridge alone and says that it did (protocols: Motor CAN buses)."""
+        """The status in bridge mode, in which the palm only serves the CAN bridge (protocols: Motor CAN buses)."""
         received = self._can.transfer(command.can)
         return PalmStatus(
             edc_command=EdcCommand.SENSOR_DATA,

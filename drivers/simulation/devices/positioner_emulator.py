@@ -8,11 +8,11 @@ from drivers.simulation.hand_plant import CarriedPlant
 
 
 class PositionerEmulator:
-    """Far end of the positioner's transport. It holds its last target for as long as no other comes.
+    """Far end of the positioner's transport. It holds its last target until another arrives.
 
     Args:
-        plant: what it moves.
-        codec: the form of its messages.
+        plant: the plant that it moves.
+        codec: the format of its messages.
     """
 
     def __init__(self, plant: CarriedPlant, codec: PositionerCodec = BINARY) -> None:
@@ -20,10 +20,10 @@ class PositionerEmulator:
         self._outbox: list[Datagram] = []
 
     def write(self, payload: bytes) -> None:
-        """Take a command and answer with the measured joints under the same sequence number; a question moves nothing.
+        """Process a command and answer with the measured joints and the same sequence number; a query moves nothing.
 
         Raises:
-            CodecError: not a command.
+            CodecError: the bytes are not a command.
         """
         command = self._codec.decode_command(payload)
         if command.targets is not None:

@@ -1,6 +1,6 @@
-"""Net F/T boxes with Nano17 sensors as seen from the wire, one RDT stream a fingertip (protocols: Net F/T).
+"""Net F/T boxes with Nano17 sensors as seen from the wire, one RDT stream per fingertip (protocols: Net F/T).
 
-The boxes of the five fingers sample at the same instants here; on a rig runtime each would keep its own time.
+Here the boxes of the five fingers sample at the same instants; real boxes each follow their own clock.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ _SOCKET_DATAGRAMS = 5000  # what a receive buffer holds before datagrams are los
 
 
 class RdtBox:
-    """Far end of one fingertip's transport: answers requests, sends a record for each reading while a stream runs."""
+    """Far end of one fingertip's transport: processes requests, and sends a record for each reading during a stream."""
 
     def __init__(self) -> None:
         self.sent = 0
         self.bias_asked = False
-        self._left: int | None = 0  # records still to send; None is without end
+        self._left: int | None = 0  # records still to send; None for an endless stream
         self._outbox: deque[Datagram] = deque(maxlen=_SOCKET_DATAGRAMS)
 
     @property
     def streaming(self) -> bool:
-        """Whether a client wants records."""
+        """Whether a client has started a stream."""
         return self._left != 0
 
     def write(self, payload: bytes) -> None:
-        """Take a request. A start counts the records from 1 again; a software bias wants a new start after it.
+        """Process a request. A start numbers the records from 1 again; after a software bias a new start is needed.
 
         Raises:
-            CodecError: not an RDT request.
+            CodecError: the bytes are not an RDT request.
         """
         request = rdt_codec.decode_request(payload)
         if request.command == Command.START:
@@ -52,7 +52,7 @@ class RdtBox:
             self.bias_asked = self.bias_asked or request.command == Command.SET_SOFTWARE_BIAS
 
     def read(self) -> list[Datagram]:
-        """The records that arrived since the last call, one a datagram."""
+        """The records that have arrived since the last call, one per datagram."""
         arrived = list(self._outbox)
         self._outbox.clear()
         return arrived
@@ -69,7 +69,7 @@ class RdtBank:
     Args:
         plant: the physics behind the sensors.
         settings: rate, scale and errors.
-        rng: where the errors come from.
+        rng: random numbers for the errors.
 
     Attributes:
         boxes: far end of each finger's transport.

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Array
@@ -47,6 +48,22 @@ def read_mesh(path: Path | str) -> trimesh.Trimesh:
         )
     trimesh.repair.fix_normals(mesh)  # type: ignore[no-untyped-call]
     return mesh
+
+
+def read_estimated_mesh(path: Path | str) -> tuple[trimesh.Trimesh, Array]:
+    """An estimated surface of this program, metres, and its standard deviation at each vertex, shape (n,).
+
+    Raises:
+        ShapeError: as :func:`read_mesh`, or a mesh without standard deviations.
+    """
+    mesh = read_mesh(path)
+    written = mesh.metadata.get("_ply_raw", {}).get("vertex", {}).get("data")  # reading merges equal vertices
+    if written is None or "sigma_m" not in (written.dtype.names or ()):
+        raise ShapeError(
+            "contains no standard deviations", where=str(path), hint="Replay the session to renew its results"
+        )
+    _, nearest = cKDTree(np.column_stack([written[axis] for axis in "xyz"])).query(mesh.vertices)
+    return mesh, np.asarray(written["sigma_m"], dtype=float)[nearest]
 
 
 def sigma_colours(sigma_m: Array) -> NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""Simulated calibration data by kinematics alone, fast enough for hundreds of runs: touches, and views of a board."""
+"""Simulated calibration data from kinematics alone, fast enough for hundreds of runs: touches and views of a board."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from drivers.shadow.model.kinematics import JOINTS
 JOINT_BIAS_rad = float(np.radians(0.6))
 JOINT_NOISE_rad = float(np.radians(0.1))
 SAMPLES = 20
-"""Joint readings averaged in one press or picture."""
+"""Number of joint readings averaged in one press or picture."""
 
 CONTACT_SIGMA_m = 1e-3
 YIELD_m_N = 3e-4
 FORCES_N = (0.2, 1.0)
 CORNER_SIGMA_px, CORNER_BIAS_px, CORNER_OWN_px = 0.05, 0.03, 0.012
-"""As measured on pictures of the simulated rig's camera; bias of a standing marker: all corners alike, each alone."""
+"""As measured on pictures of the simulated rig's camera; bias of a fixed marker: common to all corners, and of each."""
 PRINT_SHARE = 3e-4
-"""How far prints are from the size that their bars say: one standard deviation of the share."""
+"""Relative difference between the size of a print and that of its check bar, one standard deviation."""
 BASE_SIGMA_m = 1e-4
 
 CAMERA = CameraCalibration(
@@ -49,12 +49,12 @@ BOARD_m = np.concatenate(
 
 @dataclass(frozen=True, eq=False)
 class TrueRig:
-    """What is to be found.
+    """The true parameters that a calibration has to find.
 
     Attributes:
-        world_T_mount: where the mount stands.
+        world_T_mount: pose of the mount.
         bias_rad: of every joint, measured minus true, shape (24,).
-        yield_m_N: how far its tips yield.
+        yield_m_N: compliance of its fingertips.
     """
 
     world_T_mount: Pose3
@@ -63,22 +63,22 @@ class TrueRig:
 
     @classmethod
     def draw(cls, rng: np.random.Generator, *, place_m: float = 0.02, turn_rad: float = 0.03) -> TrueRig:
-        """A rig some way off the nominal place, with a bias on every joint, those of the wrist included."""
+        """A rig displaced from its nominal pose, with a bias on every joint, including those of the wrist."""
         motion = np.concatenate([turn_rad * rng.standard_normal(3), place_m * rng.standard_normal(3)])
         bias = JOINT_BIAS_rad * rng.standard_normal(len(JOINTS))
         return cls(Pose3.Expmap(motion), bias, YIELD_m_N * abs(rng.standard_normal()))
 
     def measure(self, base_q: Array, joints_rad: Array, rng: np.random.Generator) -> HandPose:
-        """What the sensors say of a true pose: bias, and noise averaged over a press or picture."""
+        """The sensors' readings of a true pose: with bias, and with noise averaged over a press or picture."""
         noise = JOINT_NOISE_rad / np.sqrt(SAMPLES) * rng.standard_normal(len(JOINTS))
         shaken = np.repeat([BASE_SIGMA_m, 0.0], 3) * rng.standard_normal(6)
         return HandPose(base_q + shaken, joints_rad + self.bias_rad + noise)
 
 
 def touches_of(plan: Sequence[PlannedTouch], rig: TrueRig, rng: np.random.Generator) -> list[Touch]:
-    """Every planned touch as the sensors would tell it: 1 mm of noise per axis on the contact point.
+    """Every planned touch as measured by the sensors: with 1 mm of noise per axis on the contact point.
 
-    The faces are off by what their geometry states, each by as much in all of its touches.
+    Each face is displaced by the error that its geometry states, the same for all of its touches.
     """
     targets = {planned.patch.target.name: planned.patch.target for planned in plan}
     shifts_m = {name: target.sigma_m * float(rng.standard_normal()) for name, target in targets.items()}
@@ -103,7 +103,9 @@ def _touch(planned: PlannedTouch, shift_m: float, rig: TrueRig, rng: np.random.G
 
 
 def views_of(plan: Sequence[PlannedView], rig: TrueRig, rng: np.random.Generator) -> list[View]:
-    """Every planned picture as the camera would give it, with the board glued on a little askew, both prints off."""
+    """Every planned picture as taken by the camera, with the board glued on slightly askew, and both prints off in
+    size.
+    """
     askew = Pose3.Expmap(np.concatenate([0.03 * rng.standard_normal(3), 0.003 * rng.standard_normal(3)]))
     bias_px = CORNER_BIAS_px * rng.standard_normal(2) + CORNER_OWN_px * rng.standard_normal((4, 2))
     board_size, world_size = 1.0 + PRINT_SHARE * rng.standard_normal(2)

@@ -1,4 +1,4 @@
-"""Objects that are explored grasp by grasp: one that is held fast, and one that every grasp pushes aside."""
+"""Objects that are explored grasp by grasp: one that is fixed, and one that every grasp pushes aside."""
 
 from __future__ import annotations
 
@@ -24,31 +24,31 @@ _SLIP = np.array([SLIP_SIGMA_m, SLIP_SIGMA_m, SLIP_SIGMA_rad])
 
 
 class ExploredObject(Protocol):
-    """What an exploration acts on, and what it knows."""
+    """The object of an exploration, and what is known of it."""
 
     def grasp(self, palm: Array) -> None:
-        """Grasp with the palm at a pose relative to where the object is thought to be, a row (x m, y m, yaw rad)."""
+        """Grasp with the palm at a pose relative to the object's estimated pose, as pose vector (x m, y m, yaw rad)."""
 
     @property
     def world_T_body(self) -> Pose2:
-        """Where the object is thought to be."""
+        """Estimated pose of the object."""
 
     def map(self) -> ExploredMap | None:
-        """The field through all contacts as they are placed now; None before there are any."""
+        """The field through all contacts at their present estimates; None before there are any."""
 
     def in_map_frame(self, points_body_m: Array) -> Array:
-        """The truth, laid over the map by the best fit of all contacts; shape (n, 2). For judging only."""
+        """The true outline, aligned to the map by the best fit of all contacts; shape (n, 2). For evaluation only."""
 
     def belief(self, known: ExploredMap, rng: np.random.Generator) -> Belief:
-        """What a policy may know."""
+        """The belief that a policy may use."""
 
     def registration_mm(self) -> float | None:
-        """Registration error of the trajectory; None where the pose is known."""
+        """Registration error of the trajectory; None if the pose is known."""
 
 
 @dataclass
 class FixedObject:
-    """Its pose is known and never changes; body, object and world frame are one.
+    """Its pose is known and never changes; body, object and world frames are the same.
 
     Attributes:
         hand: executes grasps on it.
@@ -84,14 +84,14 @@ class FixedObject:
 
 @dataclass
 class MovingObject:
-    """Pushed by every grasp as far as the full motion noise; tactile SLAM has to follow it.
+    """Every grasp pushes it with the full motion noise; tactile SLAM has to track it.
 
-    Its place is known at the first grasp only: the candidates are defined relative to the object, so the estimated
-    object frame (born at the first contacts) has to be tied to it once.
+    Its position is known only at the first grasp. Candidates are defined relative to the object, so the estimated
+    object frame (created at the first contacts) has to be related to it once.
 
     Attributes:
         hand: executes grasps on it.
-        slam: follows it.
+        slam: tracks it.
     """
 
     hand: PlanarHand
@@ -103,7 +103,7 @@ class MovingObject:
 
     @classmethod
     def track_by(cls, method: str, hand: PlanarHand, seed: int) -> MovingObject:
-        """Followed by one of the methods of tactile SLAM."""
+        """An object that one of the methods of tactile SLAM tracks."""
         return cls(hand, TactileSlam(SlamSettings.model_validate({"method": method, "dimension": 2}), seed))
 
     @property
@@ -138,7 +138,7 @@ class MovingObject:
         return moved_alike(points_body_m, true, estimated)
 
     def belief(self, known: ExploredMap, rng: np.random.Generator) -> Belief:
-        """Contacts are dealt to grasps in their order; those that the tracker left out are no longer there."""
+        """Contacts are assigned to grasps in order; those that the tracker rejected are missing."""
         field_ = known.field
         latest = _nearest_rows(field_.contacts_m, _place(self.grasps[-1], self._world_T_frame))
         indices = np.zeros(len(field_.contacts_m), dtype=np.int64)
@@ -164,14 +164,14 @@ class MovingObject:
         return registration_rms_mm(points, self.slam.trajectory, self.truth, 2)
 
     def _particles(self, covariance: Array, rng: np.random.Generator) -> Array:
-        """The present estimate's Gaussian, moved as far as the next grasp may push the object."""
+        """Samples of the present estimate, plus the possible push of the next grasp."""
         values, vectors = np.linalg.eigh(covariance)
         spread = rng.normal(size=(_PARTICLES, 3)) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
         return sample_motion(pose_row(self._world_T_frame) + spread, np.zeros(3), MotionNoise(), rng)
 
 
 def moved_alike(points_m: Array, source_m: Array, target_m: Array) -> Array:
-    """Points moved by the rigid motion that takes ``source_m`` best onto ``target_m``; all of shape (n, 2)."""
+    """Points transformed by the rigid motion that best maps ``source_m`` onto ``target_m``; all of shape (n, 2)."""
     start, goal = source_m.mean(axis=0), target_m.mean(axis=0)
     ahead, aside = source_m - start, target_m - goal
     sine = float(np.sum(ahead[:, 0] * aside[:, 1] - ahead[:, 1] * aside[:, 0]))

@@ -1,7 +1,6 @@
-"""Things as they stand in a kitchen or a workshop, made from a few sizes: what a hand meets beside prisms.
+"""Everyday things from kitchen and workshop, defined by a few dimensions, as a complement to prisms.
 
-All lie or stand as they would on a table: z up, metres, the origin where each builder's sizes put it. Cups and bowls
-are hollow.
+All of them lie or stand as on a table: z up, in metres; each builder chooses the origin. Cups and bowls are hollow.
 """
 
 from __future__ import annotations
@@ -16,16 +15,16 @@ from skimage.measure import marching_cubes
 from drivers.simulation.objects import prism_mesh
 
 Distance: TypeAlias = Callable[[Any, Any, Any], Any]
-"""Signed distance from a solid at coordinates x, y and z, negative inside, nearly in metres."""
+"""Approximate signed distance from a solid at coordinates x, y and z, negative inside, metres."""
 
 _GRID_m = 0.0015
 _OFF_NODE_m = 1e-6
-"""A surface through a node of the grid would give triangles without area."""
+"""Offset of the grid: a surface through a grid node would give triangles without area."""
 _SECTIONS = 96
 
 
 def surface_of(distance: Distance, lower_m: tuple[float, ...], upper_m: tuple[float, ...]) -> trimesh.Trimesh:
-    """The closed surface of a solid given by its distance, by marching cubes within two corners of a box."""
+    """The closed surface of a solid given by its signed distance, by marching cubes in a box given by two corners."""
     axes = [np.arange(low, high, _GRID_m) for low, high in zip(lower_m, upper_m, strict=True)]
     values = distance(*np.meshgrid(*axes, indexing="ij"))
     values[np.abs(values) < _OFF_NODE_m] = _OFF_NODE_m
@@ -37,38 +36,38 @@ def surface_of(distance: Distance, lower_m: tuple[float, ...], upper_m: tuple[fl
 
 
 def capped_cylinder(radial_m: Any, along_m: Any, *, radius_m: float, half_length_m: float) -> Any:
-    """Signed distance to a cylinder, from the distance to its axis and the place along it."""
+    """Signed distance to a cylinder, from the distance to its axis and the position along it."""
     beside, above = radial_m - radius_m, np.abs(along_m) - half_length_m
     outside = np.hypot(np.maximum(beside, 0.0), np.maximum(above, 0.0))
     return np.minimum(np.maximum(beside, above), 0.0) + outside
 
 
 def blend(one_m: Any, other_m: Any, width_m: float) -> Any:
-    """The union of two solids given by signed distances, their seam rounded over ``width_m``."""
+    """The union of two solids given by signed distances, with their seam rounded over ``width_m``."""
     near = np.maximum(width_m - np.abs(one_m - other_m), 0.0) / width_m
     return np.minimum(one_m, other_m) - near**2 * width_m / 4
 
 
 def turned(radii_mm: Sequence[float], heights_mm: Sequence[float]) -> trimesh.Trimesh:
-    """A solid of revolution from its profile, which begins and ends on the axis, upward on its outside."""
+    """A solid of revolution from its profile, which starts and ends on the axis and goes upward on the outside."""
     profile = np.column_stack([radii_mm, heights_mm]) / 1000
     mesh: trimesh.Trimesh = trimesh.creation.revolve(profile, sections=_SECTIONS)
     return mesh
 
 
 def _bottle() -> trimesh.Trimesh:
-    """A body of 70 mm with rounded shoulders and a neck of 28 mm, 130 mm high."""
+    """Body of 70 mm diameter with rounded shoulders and a neck of 28 mm, 130 mm high."""
     radii = [0, 32, 35, 35, 34, 30, 23, 17, 14, 14, 12, 0]
     return turned(radii, [-65, -65, -61, 12, 22, 32, 41, 47, 53, 63, 65, 65])
 
 
 def _cup() -> trimesh.Trimesh:
-    """A tapered cup without a handle: 60 mm wide at the foot, 84 at the rim, 95 high, its wall 4 mm."""
+    """A tapered cup without a handle: 60 mm wide at the foot, 84 mm at the rim, 95 mm high, with a wall of 4 mm."""
     return turned([0, 28, 30, 42, 40, 38, 26, 0], [0, 0, 2, 93, 95, 93, 6, 6])
 
 
 def _cup_with_handle() -> trimesh.Trimesh:
-    """The same cup, 90 mm high, with a handle of 12 mm that leaves room for a finger, towards +x."""
+    """The same cup, 90 mm high, with a handle towards +x, 12 mm thick, that leaves room for a finger."""
 
     def distance(x: Any, y: Any, z: Any) -> Any:
         radial = np.hypot(x, y)
@@ -83,7 +82,7 @@ def _cup_with_handle() -> trimesh.Trimesh:
 
 
 def _bowl() -> trimesh.Trimesh:
-    """A bowl of 120 mm and 52 mm height on a foot of 54 mm, its wall 5 mm."""
+    """A bowl of 120 mm diameter and 52 mm height on a foot of 54 mm, with a wall of 5 mm."""
     outside = [(27, 0), (27, 4), (36, 8), (46, 17), (53, 28), (57, 40), (60, 51)]
     inside = [(58, 52), (55, 51), (52, 40), (48, 29), (41, 19), (32, 12), (20, 8)]
     radii, heights = zip((0, 0), *outside, *inside, (0, 7), strict=True)
@@ -91,12 +90,12 @@ def _bowl() -> trimesh.Trimesh:
 
 
 def _tin() -> trimesh.Trimesh:
-    """A flat tin of 84 mm and 38 mm height with a lid set in by 2 mm."""
+    """A flat tin of 84 mm diameter and 38 mm height with a lid recessed by 2 mm."""
     return turned([0, 40, 42, 42, 41, 41, 42, 42, 40, 40, 0], [0, 0, 2, 4, 5, 33, 34, 37, 38, 36, 36])
 
 
 def _wedge() -> trimesh.Trimesh:
-    """100 x 60 mm at the foot, 60 mm high at one end and 15 at the other: its roof leans by 24 degrees."""
+    """100 x 60 mm at the foot, 60 mm high at one end and 15 mm at the other: its top slopes by 24 degrees."""
     corners = [(x, y, z) for y in (-30, 30) for x, z in ((-50, 0), (50, 0), (50, 15), (-50, 60))]
     mesh: trimesh.Trimesh = trimesh.convex.convex_hull(np.array(corners) / 1000)
     return mesh
@@ -109,7 +108,9 @@ def _t_block() -> trimesh.Trimesh:
 
 
 def _hammer() -> trimesh.Trimesh:
-    """Lying: a head of 34 mm and 100 mm length along y, a handle of 24 mm and 110 mm length along x."""
+    """Lying: a head of 34 mm diameter and 100 mm length along y, a handle of 24 mm diameter and 110 mm length along
+    x.
+    """
 
     def distance(x: Any, y: Any, z: Any) -> Any:
         head = capped_cylinder(np.hypot(x, z - 0.017), y, radius_m=0.017, half_length_m=0.050)
@@ -120,7 +121,7 @@ def _hammer() -> trimesh.Trimesh:
 
 
 def _banana() -> trimesh.Trimesh:
-    """Lying: a bow of 80 mm radius over 110 degrees, 36 mm thick in the middle and 16 at its round ends."""
+    """Lying: an arc of 80 mm radius over 110 degrees, 36 mm thick in the middle and 16 mm at its round ends."""
 
     def distance(x: Any, y: Any, z: Any) -> Any:
         angle = np.clip(np.arctan2(y, x), -_HALF_BOW_rad, _HALF_BOW_rad)

@@ -1,10 +1,9 @@
-"""The hand's own grasps on a true surface without physics: kinematics, round fingertips, and the rig's measured noise.
+"""The hand's grasps on a true surface without physics: kinematics, spherical fingertips, and the rig's measured noise.
 
-The hand comes down, lays its fingertips on the top and closes along the same lines as on the rig; a fingertip is a ball
-that stops where it first touches. What physics would add is drawn: fingertips pass beside their lines, contacts are
-measured imprecisely (:mod:`tactile_lab.experiments.data.sensing`), an object that was left lying is moved while the
-hand closes, hardly or, where a link above the fingertips meets it, often far, and one that is carried slips in the
-hand.
+The hand descends, lays its fingertips on the top and closes along the same lines as on the rig; a fingertip is a sphere
+that stops where it first touches. The effects of physics are drawn at random: fingertips miss their lines, contacts
+have noise (:mod:`tactile_lab.experiments.data.sensing`), and a carried object slips in the hand. The closing hand moves
+an object that it does not hold: usually little, but often far if a link above the fingertips meets it.
 """
 
 from __future__ import annotations
@@ -41,8 +40,9 @@ NUDGE_SIGMA_rad = float(np.deg2rad(0.5))
 PUSH_SIGMA_m = 0.0046
 PUSH_SIGMA_rad = float(np.deg2rad(4.5))
 PUSHED_SHARE = 0.45
-"""So far the closing hand moves an object on the simulated rig, per axis and about its middle: hardly, or by more than
-2 mm or 4 degrees, in that share of the grasps with a link above the fingertips in the object."""
+"""How far the closing hand moves an object on the simulated rig, per axis and about its middle: usually little, but by
+more than 2 mm or 4 degrees in this share of the grasps in which a link above the fingertips meets the object.
+"""
 
 _STEP_m = 0.001
 _DESCENT_STEP_m = 0.003
@@ -50,12 +50,12 @@ _DESCENT_STEP_m = 0.003
 
 @dataclass(frozen=True)
 class Attempt:
-    """What came of a plan.
+    """The result of a planned grasp.
 
     Attributes:
-        plan: where the hand really closed: landings shift it.
-        landings_world_m: where fingertips stood on the object, (3,) each.
-        grasp: None where the hand found no way down.
+        plan: the grasp as it was executed; landings shift it.
+        landings_world_m: points where fingertips landed on the object, (3,) each.
+        grasp: the contacts; None if the hand found no way down.
     """
 
     plan: GraspPlan
@@ -64,14 +64,14 @@ class Attempt:
 
 
 class KinematicHand:
-    """Does grasps on an object on the table.
+    """Executes grasps on an object on the table.
 
     Args:
-        solid: the object; it stands near the world's origin, turned anyhow.
+        solid: the object; it stands near the world's origin with any yaw.
         cycle: speeds and times of the rig.
         tip: shape of its fingertips.
-        yaw_window_rad: of its arm.
-        rng: of everything that is drawn.
+        yaw_window_rad: range of yaw of its arm.
+        rng: all random numbers.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class KinematicHand:
         self._count = 0
 
     def attempt(self, plan: GraspPlan) -> Attempt:
-        """Tap on the top if the plan says so, come down, close and measure."""
+        """Tap the top if the plan says so, descend, close and measure."""
         probed = self._tap(plan.frame) if plan.tap else []
         reached, landings = self._descend(plan)
         self.elapsed_s += grasp_time_s(plan, self._cycle, self._here) + len(landings) * self._landing_s
@@ -108,7 +108,7 @@ class KinematicHand:
         return Attempt(reached, landings, grasp)
 
     def carry(self, wanted: Reorientation, attempt: Attempt) -> Pose3:
-        """Turn and shift the object as it is held; it slips. Nothing where it is not held, or to be left.
+        """Turn and shift the object in the hand, with slip. Does nothing if it is not held, or is to be left in place.
 
         Returns:
             The hand's motion in the world.
@@ -129,14 +129,16 @@ class KinematicHand:
 
     @property
     def _landing_s(self) -> float:
-        """How long it takes to lift, shift and come down again."""
+        """Time to lift, shift and descend again."""
         cycle = self._cycle
         return cycle.lift_m / cycle.descent_m_s + cycle.lift_m / cycle.travel_m_s + cycle.rest_s
 
     # --- down --------------------------------------------------------------------------------------------------
 
     def _descend(self, plan: GraspPlan) -> tuple[GraspPlan | None, list[Array]]:
-        """The plan with which the open hand came down to the table, and the landings before; None without a way."""
+        """The plan with which the open hand reached the table, and the landings before; None if there was no way
+        down.
+        """
         table, now, landings = table_of(plan, self._tip), plan, list[Array]()
         landed: set[str] = set()
         for _ in range(self._cycle.landing_tries):
@@ -152,7 +154,7 @@ class KinematicHand:
         return None, landings
 
     def _tap(self, frame: GraspFrame) -> list[Contact]:
-        """Fingertips laid on what stands below: all that reach it when the first has met it."""
+        """Lay the fingertips on what is below: all fingers that reach it when the first one has met it."""
         table, touch = closing(TAP.closing, TAP_HEIGHT_m, self._tip), self._cycle.touch
         above_m = np.array([table.path(finger).centre_m(TAP.progress[finger]) for finger in FINGERS])
         above_m = self._beside(transform_points(frame.pose, above_m))
@@ -168,7 +170,9 @@ class KinematicHand:
         return found
 
     def _coming_down(self, centres_world_m: Array, lowest_m: float) -> tuple[Array, Verdicts]:
-        """Places (n, 5, 3) of fingertips on their way down, the lowest to ``lowest_m``, and which touch, (n, 5)."""
+        """Positions (n, 5, 3) of fingertips on their way down, the lowest one to ``lowest_m``, and which of them touch
+        (n, 5).
+        """
         heights_m = np.arange(self._cycle.lift_m + lowest_m, lowest_m - 1e-9, -_DESCENT_STEP_m)
         places = np.repeat(centres_world_m[None], len(heights_m), axis=0)
         places[:, :, 2] += heights_m[:, None] - centres_world_m[:, 2].min()
@@ -193,7 +197,9 @@ class KinematicHand:
         return contacts, tuple(lines)
 
     def _closing(self, plan: GraspPlan) -> tuple[Array, Array]:
-        """Places (n, 5, 3) that the fingertips' centres would pass in steps, and their directions (5, 3), world."""
+        """Positions (n, 5, 3) that the fingertips' centres would pass, step by step, and their directions (5, 3),
+        world.
+        """
         paths = [table_of(plan, self._tip).path(finger) for finger in FINGERS]
         starts = self._beside(transform_points(plan.frame.pose, np.array([p.centre_m(p.valid[0]) for p in paths])))
         ways = rotate(plan.frame.pose, np.array([path.direction for path in paths]))
@@ -202,7 +208,7 @@ class KinematicHand:
         return starts + steps_m[..., None] * ways, ways
 
     def _links_meet(self, plan: GraspPlan) -> bool:
-        """Whether a link above the fingertips is in the object before they have all come to rest."""
+        """Whether a link above the fingertips enters the object before all of them have come to rest."""
         balls = link_balls(plan.closing, plan.height_m, self._tip)
         paths = [table_of(plan, self._tip).path(finger) for finger in FINGERS]
         ways_m = _STEP_m * self._stops(self._closing(plan)[0])[0]
@@ -211,7 +217,7 @@ class KinematicHand:
         return bool(balls.collides(distances_m, PROGRESS[:, None] < ends))
 
     def _stops(self, places: Array) -> tuple[NDArray[np.intp], Verdicts]:
-        """Step at which each finger stops, and whether it does so on the object: all close together."""
+        """Step at which each finger stops, and whether it stops on the object; all fingers close together."""
         meets = self._distances(places) < self._radius_m
         stops, touched, moving = np.zeros(5, dtype=np.intp), np.zeros(5, dtype=bool), np.ones(5, dtype=bool)
         for step in range(len(places)):
@@ -223,35 +229,35 @@ class KinematicHand:
             moving &= ~touched & ~near
         return stops, touched
 
-    # --- what is drawn -----------------------------------------------------------------------------------------
+    # --- random effects -----------------------------------------------------------------------------------------
 
     def _beside(self, centres_world_m: Array) -> Array:
-        """Fingertips as they really pass."""
+        """The true paths of the fingertips, beside their lines."""
         aside = np.zeros_like(centres_world_m)
         aside[:, :2] = self._rng.normal(0.0, BESIDE_SIGMA_m, (len(aside), 2))
         return np.asarray(centres_world_m + aside)
 
     def _push(self, plan: GraspPlan) -> Pose3:
-        """What the closing hand does to the object; how one that was carried strays, its slip tells."""
+        """Move the object by the closing hand; the error of a carried object is in its slip."""
         was_left = self._motion.equals(Pose3(), 1e-9)
         far = was_left and self._links_meet(plan) and bool(self._rng.random() < PUSHED_SHARE)
         sigmas = (PUSH_SIGMA_m, PUSH_SIGMA_rad) if far else (NUDGE_SIGMA_m, NUDGE_SIGMA_rad)
         return self._stray(np.asarray(self.world_T_body.translation()), *sigmas)
 
     def _stray(self, middle_world_m: Array, sigma_m: float, sigma_rad: float) -> Pose3:
-        """How far the object strays in the world, turning about a place."""
+        """A random displacement of the object in the world, with a rotation about a given point."""
         x, y, turn = self._rng.normal(size=3) * [sigma_m, sigma_m, sigma_rad]
         about = Pose3(Rot3(), middle_world_m)
         return about * spatial(Pose2(x, y, turn)) * about.inverse()
 
     def _measure(self, finger: str, centre_world_m: Array) -> Contact:
-        """The contact of a fingertip that stands at a place: where the surface is nearest to its centre."""
+        """The contact of a fingertip at a position: the point of the surface nearest to its centre."""
         centre = transform_points(self.world_T_body.inverse(), centre_world_m[None])
         _, places = self._solid.nearest(centre)
         normal = centre[0] - places[0]
         return measured_contact(finger, places[0], normal / np.linalg.norm(normal), self.world_T_body, self._rng)
 
     def _distances(self, places_world_m: Array) -> Array:
-        """Of fingertips' centres (..., 3) to the surface."""
+        """Distances of fingertips' centres (..., 3) to the surface."""
         flat = transform_points(self.world_T_body.inverse(), places_world_m.reshape(-1, 3))
         return self._solid.nearest(flat)[0].reshape(places_world_m.shape[:-1])

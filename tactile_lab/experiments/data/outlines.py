@@ -1,4 +1,4 @@
-"""Outlines of the planar objects, and how a straight line meets them."""
+"""Outlines of the planar objects, and their intersections with straight lines."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ OUTLINES_m: Mapping[str, Array] = {
 }
 """Outlines in the object's own coordinates, metres, counter-clockwise, first point not repeated.
 
-No regular polygons but the square: a turn by an angle of its symmetry leaves no trace that could be tracked.
+The square is the only regular polygon: a rotation by an angle of its symmetry cannot be tracked.
 """
 
 
 def first_crossing(
     outline_m: Array, start_m: Array, way: Array, longest_m: float = np.inf
 ) -> tuple[Array, Array] | None:
-    """Where a ray first meets a closed outline, and the outward normal there; None if it does not.
+    """The first intersection of a ray with a closed outline, and the outward normal there; None if there is none.
 
     Args:
         outline_m: counter-clockwise polygon, shape (n, 2).
         start_m, way: start and unit direction, each of shape (2,).
-        longest_m: where the ray ends.
+        longest_m: length of the ray.
     """
     edges = np.roll(outline_m, -1, axis=0) - outline_m
     gap = outline_m - start_m
@@ -74,7 +74,7 @@ def edge_normals(outline_m: Array) -> Array:
 
 
 def random_boundary_points(outline_m: Array, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Points spread evenly at random over a polygon's boundary and the outward normals there, each (count, 2)."""
+    """Random points, uniform over a polygon's boundary, and the outward normals there, each (count, 2)."""
     edges = np.roll(outline_m, -1, axis=0) - outline_m
     lengths = np.linalg.norm(edges, axis=1)
     chosen = rng.choice(len(edges), count, p=lengths / lengths.sum())

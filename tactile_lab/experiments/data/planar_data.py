@@ -45,10 +45,10 @@ class PlanarGrasps(SimulatedGrasps):
 
 
 def outline(shape: str) -> Array:
-    """The outline called ``shape``, shape (n, 2), metres.
+    """The outline named ``shape``, shape (n, 2), metres.
 
     Raises:
-        ConfigurationError: no such shape.
+        ConfigurationError: there is no such shape.
     """
     if shape not in OUTLINES_m:
         hint = f"Available shapes: {', '.join(OUTLINES_m)}"
@@ -63,13 +63,13 @@ def simulate(
 
     Args:
         shape: one of :data:`~tactile_lab.experiments.data.outlines.OUTLINES_m`.
-        seed: of all randomness, with the motion scale.
+        seed: for all random numbers, together with the motion scale.
         motion_scale: slip relative to 10 mm per axis and 20 degrees.
         count: number of grasps.
-        outlier_share: share of contacts that are grossly wrong.
+        outlier_share: share of outliers among the contacts.
 
     Raises:
-        ConfigurationError: no such shape.
+        ConfigurationError: there is no such shape.
     """
     outline_m = outline(shape)
     rng = np.random.default_rng([seed, 20261, round(1000 * motion_scale)])
@@ -96,7 +96,7 @@ def random_contacts(shape: str, count: int, seed: int) -> PlanarGrasps:
     They come as grasps of five contacts (the last may have fewer), without approach paths.
 
     Raises:
-        ConfigurationError: no such shape.
+        ConfigurationError: there is no such shape.
     """
     outline_m = outline(shape)
     rng = np.random.default_rng([seed, 40961])
@@ -112,7 +112,7 @@ def random_contacts(shape: str, count: int, seed: int) -> PlanarGrasps:
 def _reorient(
     last: Grasp, world_T_body: Pose2, body_T_frame: Pose2, scale: float, rng: np.random.Generator
 ) -> tuple[Pose2, Pose2, Pose2]:
-    """The hand turns by 5 to 25 degrees about the grasp's middle and shifts by some millimetres; the object slips.
+    """Turn the hand by 5 to 25 degrees about the grasp's middle and shift it by some millimetres; the object slips.
 
     The slip turns the object about the middle of the first contacts, the origin of the frame that is tracked.
     """
@@ -129,7 +129,7 @@ def _reorient(
 
 
 def _closing_rays(palm: Pose2, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Starts and unit directions of the fingers' ways in the world, each of shape (5, 2)."""
+    """Start points and unit directions of the fingers' paths in the world, each of shape (5, 2)."""
     angles = _FAN_rad + rng.normal(0.0, np.deg2rad(10.0), 5)
     starts = _REACH_m * np.column_stack([np.cos(angles), np.sin(angles)])
     ways = _AIM_m + rng.normal(0.0, 0.012, (5, 2)) - starts
@@ -141,7 +141,9 @@ def _closing_rays(palm: Pose2, rng: np.random.Generator) -> tuple[Array, Array]:
 def _close(
     outline_m: Array, world_T_body: Pose2, palm: Pose2, rng: np.random.Generator, outlier_share: float
 ) -> tuple[tuple[Contact, ...], tuple[ApproachPath, ...]]:
-    """The contacts of one closing, and the ways of all five fingers; those that met nothing cross the palm's middle."""
+    """The contacts of one closing, and the paths of all five fingers; those that meet nothing cross the palm's
+    middle.
+    """
     starts, ways = _closing_rays(palm, rng)
     matrix = world_T_body.matrix()
     contacts: list[Contact] = []

@@ -1,7 +1,7 @@
 """A hand that executes planned grasps on a known outline in the plane, imprecisely, and measures with noise.
 
-The setting of the thesis's section 4.5.2: five fingers on a fan around the palm close along straight lines. The palm
-ends 3 mm and 3 degrees from where it was sent, each finger's base 2 degrees and its aim 2 mm from theirs.
+The setting of the thesis's section 4.5.2: five fingers on a fan around the palm close along straight lines. Standard
+deviations of the execution: 3 mm and 3 degrees for the palm, 2 degrees for each finger's base, and 2 mm for its aim.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PALM_HEIGHT_m = 0.15
 
 
 def planned_rays() -> ClosingRays:
-    """The fingers' ways as planned, in the grasp frame."""
+    """The planned paths of the fingers, in the grasp frame."""
     starts, ways = _ways(FAN_rad, AIM_m)
     return ClosingRays(
         FINGERS, np.pad(starts, ((0, 0), (0, 1))), np.pad(ways, ((0, 0), (0, 1))), np.full(5, 2 * REACH_m)
@@ -40,14 +40,14 @@ class PlanarHand:
 
     Attributes:
         outline_m: true outline in body coordinates, counter-clockwise, shape (n, 2).
-        rng: of execution and measurement.
+        rng: random numbers of execution and measurement.
     """
 
     outline_m: Array
     rng: np.random.Generator
 
     def grasp(self, index: int, world_T_palm: Pose2, world_T_body: Pose2) -> Grasp:
-        """Send the palm to a pose and close the fingers on the object where it is."""
+        """Send the palm to a pose and close the fingers on the object."""
         reached = world_T_palm.compose(Pose2(*(PALM_SIGMAS * self.rng.normal(size=3))))
         starts, ways = _ways(
             FAN_rad + self.rng.normal(0.0, FAN_SIGMA_rad, 5), AIM_m + self.rng.normal(0.0, AIM_SIGMA_m, (5, 2))
@@ -76,7 +76,7 @@ class PlanarHand:
 
 
 def slip(world_T_body: Pose2, body_T_frame: Pose2, sigmas: Array, rng: np.random.Generator) -> Pose2:
-    """The object pushed aside by the fingers: moved and turned about the origin of the frame that is tracked."""
+    """The object's pose after a push by the fingers: moved, and rotated about the origin of the tracked frame."""
     push = sigmas * rng.normal(size=3)
     frame = world_T_body.compose(body_T_frame)
     moved = planar_pose(np.array([frame.x() + push[0], frame.y() + push[1]]), frame.theta() + float(push[2]))
@@ -84,7 +84,7 @@ def slip(world_T_body: Pose2, body_T_frame: Pose2, sigmas: Array, rng: np.random
 
 
 def _ways(fan_rad: Array, aim_m: Array) -> tuple[Array, Array]:
-    """Starts and unit directions in the grasp frame, each of shape (5, 2)."""
+    """Start points and unit directions in the grasp frame, each of shape (5, 2)."""
     starts = REACH_m * np.column_stack([np.cos(fan_rad), np.sin(fan_rad)])
     ways = aim_m - starts
     return starts, ways / np.linalg.norm(ways, axis=1, keepdims=True)

@@ -1,4 +1,6 @@
-"""Where rays first meet a triangle mesh, compiled: thousands of triangles against a few rays, many times."""
+"""First intersections of rays with a triangle mesh; compiled, for many calls with few rays and thousands of
+triangles.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +15,12 @@ _PARALLEL = 1e-14
 
 
 def first_hits(corners_m: Array, starts_m: Array, ways: Array, longest_m: float) -> tuple[Array, Any]:
-    """Distance along each ray to the first triangle it meets, and that triangle's number; -1 if it meets none.
+    """Distance along each ray to the first triangle that it meets, and the triangle's index; -1 if it meets none.
 
     Args:
         corners_m: triangles, shape (m, 3, 3).
         starts_m, ways: starts and unit directions of the rays, each of shape (n, 3).
-        longest_m: where the rays end.
+        longest_m: length of the rays.
     """
     starts, directions = (np.ascontiguousarray(rows, dtype=float) for rows in (starts_m, ways))
     distances, faces = _cast(corners_m, starts, directions, longest_m)
@@ -41,7 +43,7 @@ def _cast(corners: Any, starts: Any, ways: Any, longest: float) -> Any:
 
 @compile_when_called
 def _crossing(corners: Any, start: Any, way: Any) -> Any:
-    """Distance to one triangle (Moeller and Trumbore 1997), -1 where the ray passes it by."""
+    """Distance to one triangle (Moeller and Trumbore 1997); -1 if the ray misses it."""
     ax, ay, az = corners[1, 0] - corners[0, 0], corners[1, 1] - corners[0, 1], corners[1, 2] - corners[0, 2]
     bx, by, bz = corners[2, 0] - corners[0, 0], corners[2, 1] - corners[0, 1], corners[2, 2] - corners[0, 2]
     px, py, pz = way[1] * bz - way[2] * by, way[2] * bx - way[0] * bz, way[0] * by - way[1] * bx

@@ -1,8 +1,8 @@
-"""Full load for a recorder, in a process of its own: a hand and five force sensors at 1 kHz, 30 pictures a second.
+"""Full load for a recorder, in a separate process: a hand and five force sensors at 1 kHz, 30 pictures per second.
 
-Stands in for a whole rig when the recorder is measured or killed. Message n of a stream has a stamp and a content that
-follow from n alone, so that whoever reads the recording can tell what is missing, to the message. How far it has come
-stands in a small shared file, which survives a kill.
+It replaces a whole rig when the recorder is measured or killed. Stamp and content of message n of a stream follow from
+n alone, so that every missing message can be found in the recording. The progress is kept in a small shared file, which
+survives a kill.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ _RDT = struct.Struct(">III6i")
 
 @dataclass(frozen=True)
 class LoadSettings:
-    """What is to be recorded, and what is to go wrong.
+    """The load to record, and the faults to inject.
 
     Attributes:
-        seconds: how long.
+        seconds: duration.
         start_ns: stamp of the first tick.
-        stall_tick, stall_s: from this tick on the disk takes nothing for that long; 0 s: never.
-        jump_tick, jump_ns: from this tick on the clock shows that much more.
-        queue_bytes: of the recorder.
+        stall_tick, stall_s: from this tick on the disk accepts nothing for this time; 0 s for never.
+        jump_tick, jump_ns: from this tick on the clock is ahead by this much.
+        queue_bytes: size of the recorder's queue.
         record: False runs the load with a recorder that keeps nothing, for comparison.
     """
 
@@ -62,21 +62,21 @@ class LoadSettings:
     record: bool = True
 
     def stamp_ns(self, tick: int) -> int:
-        """What the clock shows at a tick."""
+        """The clock's time at a tick."""
         jump_ns = self.jump_ns if self.jump_ns and tick >= self.jump_tick else 0
         return self.start_ns + tick * TICK_ns + jump_ns
 
 
 @dataclass(frozen=True)
 class LoadStatus:
-    """How far the load has come.
+    """Progress of the load.
 
     Attributes:
         ticks: milliseconds of load completed.
-        longest_write_us: longest time a message took to be handed to the recorder.
-        late_ticks: ticks begun more than 5 ms late.
-        finished: it ended by itself.
-        counts: messages that the recorder took, by stream.
+        longest_write_us: longest time for passing a message to the recorder.
+        late_ticks: ticks that started more than 5 ms late.
+        finished: whether it ended by itself.
+        counts: messages that the recorder accepted, by stream.
     """
 
     ticks: int
@@ -87,7 +87,7 @@ class LoadStatus:
 
 
 def read_status(path: Path) -> LoadStatus:
-    """How far a load has come, or had come when it was killed."""
+    """The progress of a load, or its progress when it was killed."""
     content = path.read_bytes()
     ticks, longest, late, finished, *counts = _STATUS.unpack(content.ljust(_STATUS.size, b"\0")[: _STATUS.size])
     return LoadStatus(ticks, longest, late, bool(finished), dict(zip(STREAMS, counts, strict=True)))
@@ -104,7 +104,7 @@ def payload(stream: str, number: int) -> bytes:
 
 
 def number_of(stream: str, data: bytes) -> int:
-    """The number of a message, if it is what the load sends; -1 if it is not."""
+    """The number of a message; -1 if the load does not send such a message."""
     if len(data) < _NUMBER.size:
         return -1
     number = struct.unpack_from(">I", data)[0] - 1 if stream.startswith("ft/") else _NUMBER.unpack_from(data)[0]
@@ -123,7 +123,7 @@ def run_load(root: Path, settings: LoadSettings, status_file: Path) -> None:
     """Record the load in a new session under ``root``.
 
     Raises:
-        SessionError: the recording cannot be made, or failed.
+        SessionError: the recording cannot be started, or failed.
         WriteError: its folder cannot be written.
     """
     status_file.write_bytes(bytes(_STATUS.size))
@@ -146,7 +146,7 @@ def run_load(root: Path, settings: LoadSettings, status_file: Path) -> None:
 
 
 class _Progress:
-    """The shared file: four figures, then the number of messages of each stream."""
+    """The shared file: four numbers, then the number of messages of each stream."""
 
     def __init__(self, shared: mmap.mmap) -> None:
         self._shared = shared
@@ -199,14 +199,14 @@ def _wait_until(deadline_ns: int, progress: _Progress) -> None:
 
 
 class StallingFile(CutBackFile):
-    """A file on a disk that takes nothing for a while."""
+    """A file on a disk that accepts nothing for a while."""
 
     until = 0.0
-    """Monotonic time, seconds; the same for all files, as the disk is."""
+    """End of the stall, monotonic time in seconds; common to all files, because they share the disk."""
 
     @classmethod
     def stall(cls, seconds: float) -> None:
-        """From now on no write and no synchronisation comes back for so long."""
+        """Let no write and no synchronisation return for this time."""
         cls.until = time.monotonic() + seconds
 
     def write(self, data: bytes) -> int:
@@ -222,7 +222,7 @@ class StallingFile(CutBackFile):
 
 
 def main() -> None:
-    """Run a load whose settings come as JSON; the exit code tells how it ended: 0, or 1 with the reason on stderr."""
+    """Run a load with settings given as JSON; exits with 0, or with 1 and the reason on standard error."""
     parser = argparse.ArgumentParser(description="Records a synthetic full load; used by the recorder's measurements.")
     parser.add_argument("root", type=Path)
     parser.add_argument("status", type=Path)

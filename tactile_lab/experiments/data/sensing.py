@@ -1,6 +1,6 @@
-"""What every simulated data set shares: the sensors' noise, the object's slip, and the shape of a session.
+"""Common to all simulated data sets: the sensors' noise, the object's slip, and the form of a session.
 
-Default noise: contacts 1 mm and 5 degrees, motion 10 mm per axis and 20 degrees a re-orientation at scale 1
+Default noise: contacts 1 mm and 5 degrees; motion 10 mm per axis and 20 degrees per re-orientation at scale 1
 (thesis section 3.4; its "100 %").
 """
 
@@ -31,7 +31,7 @@ class SimulatedGrasps:
 
     Attributes:
         shape: name of the object.
-        grasps: what the program may see.
+        grasps: the data that the program may use.
         world_T_body: true pose of the object at each grasp.
     """
 
@@ -58,7 +58,7 @@ def measured_contact(
         world_T_body: true pose of the object.
         rng: source of the noise; every call draws at least seven numbers.
         axes: which axes of the world are noisy, 1 or 0, shape (3,).
-        outlier_share: probability that the contact is off by 10 mm per axis, with a normal anywhere.
+        outlier_share: probability of an outlier: an error of 10 mm per axis, and a random normal.
     """
     point = transform_points(world_T_body, point_body_m[None])[0] + axes * rng.normal(0.0, POINT_SIGMA_m, 3)
     normal = rotate(world_T_body, normal_body[None])[0]
@@ -71,10 +71,10 @@ def measured_contact(
 
 
 def line_to_contact(start_world_m: Array, contact: Contact) -> ApproachPath:
-    """The way of a finger that touched: to where its contact was measured, as a rig knows it."""
+    """The path of a finger that touched, up to its measured contact, as known on a rig."""
     return ApproachPath(contact.finger, start_world_m, contact.point_world_m, touched=True)
 
 
 def planar_pose(place_m: Array, heading_rad: float = 0.0) -> Pose2:
-    """A pose in the plane from a place, of which x and y count, and a heading."""
+    """A pose in the plane from a position, of which x and y are used, and a heading."""
     return Pose2(float(place_m[0]), float(place_m[1]), heading_rad)

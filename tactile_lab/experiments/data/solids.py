@@ -1,4 +1,4 @@
-"""Solids for the experiments: those of the simulated rig's catalogue, some of our own, and scanned objects.
+"""Solids for the experiments: those of the simulated rig's catalogue, additional ones, and scanned objects.
 
 All meshes are watertight, in metres, in the object's own frame: z up as it stands, origin as its builder states.
 """
@@ -28,14 +28,14 @@ DATA_VARIABLE = "TACTILE_LAB_DATA"
 YCB_PREFIX = "ycb:"
 YCB_NAMES = ("cracker_box", "mug", "mustard_bottle", "tomato_soup_can")
 MORE_YCB_NAMES = ("foam_brick", "potted_meat_can", "sugar_box")
-"""Scans that only the experiments on everyday things take."""
+"""Scans that are used only in the experiments on everyday things."""
 
 
 class Solid:
-    """A watertight mesh that rays can be cast at.
+    """A watertight mesh with ray casting.
 
     Attributes:
-        name: of the object.
+        name: name of the object.
         mesh: its surface in its own frame.
     """
 
@@ -55,7 +55,9 @@ class Solid:
         return float(self.mesh.bounds[1, 2] - self.mesh.bounds[0, 2])
 
     def touch(self, starts_m: Array, ways: Array, longest_m: float) -> list[tuple[Array, Array] | None]:
-        """For each ray (starts, unit directions: shape (n, 3)) the first point met and the outward normal there."""
+        """For each ray (start points and unit directions, shape (n, 3)) the first intersection and the outward normal
+        there.
+        """
         distances_m, faces = first_hits(self._corners, starts_m, ways, longest_m)
         return [
             None if face < 0 else (start + distance * way, self._normals[face])
@@ -63,16 +65,16 @@ class Solid:
         ]
 
     def nearest(self, points_m: Array) -> tuple[Array, Array]:
-        """For points of shape (n, 3): distance to the surface, shape (n,), and the place of it that is nearest."""
+        """For points of shape (n, 3): the distance to the surface, shape (n,), and the nearest point on it."""
         return nearest_on_mesh(points_m, self.mesh)
 
 
 @lru_cache(maxsize=32)
 def solid(name: str) -> Solid:
-    """The solid called ``name``: one of :data:`SOLIDS`, of the rig's catalogue, or ``ycb:<name>``.
+    """The solid named ``name``: one of :data:`SOLIDS`, of the rig's catalogue, or ``ycb:<name>``.
 
     Raises:
-        ConfigurationError: no such solid, or the scanned meshes are not on this machine.
+        ConfigurationError: there is no such solid, or the scanned meshes are not on this machine.
         ShapeError: the mesh file cannot be used.
     """
     if name.startswith(YCB_PREFIX):
@@ -89,7 +91,7 @@ def ycb_path(name: str) -> Path:
     """The file of a scanned object.
 
     Raises:
-        ConfigurationError: the folder is not set, or holds no such file.
+        ConfigurationError: the folder is not set, or does not contain the file.
     """
     folder = os.environ.get(DATA_VARIABLE)
     if not folder:
@@ -111,7 +113,7 @@ def _ellipsoid() -> trimesh.Trimesh:
 
 
 def _mug() -> trimesh.Trimesh:
-    """A filled mug: a cylinder of 76 mm and 96 mm height, and a ring of 16 mm thickness for a handle towards +x."""
+    """A filled mug: a cylinder of 76 mm diameter and 96 mm height, and a ring 16 mm thick as a handle towards +x."""
 
     def distance(x: Any, y: Any, z: Any) -> Any:
         body = capped_cylinder(np.hypot(x, y), z, radius_m=0.038, half_length_m=0.048)
@@ -122,4 +124,4 @@ def _mug() -> trimesh.Trimesh:
 
 
 SOLIDS: Mapping[str, Callable[[], trimesh.Trimesh]] = {"ellipsoid": _ellipsoid, "mug": _mug, **HOUSEHOLD}
-"""Solids that the rig's catalogue does not have."""
+"""Solids that are not in the rig's catalogue."""

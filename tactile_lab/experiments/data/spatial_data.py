@@ -1,11 +1,11 @@
 """Simulated grasps of solids: standing on a table and turned about the vertical, or moved freely in space.
 
-On the table the five fingers come from the sides, tilted downward by up to 30 degrees, towards one of three
-heights in turn (a fifth, a half and four fifths of the object's); in most grasps one of them presses from
-above instead. Everyday things are tall, and all of their height is grasped: the middle of a grasp goes up and down in
-even shares of it, the fingers within a hand's breadth of that. In free motion the palm comes from a new side every
-time. A finger that meets nothing tries up to five other ways. The hand re-centres from its own last contacts, never
-from an estimate, so every method sees the same data for one solid, motion, noise and seed. Noise as in
+On the table the five fingers come from the sides, tilted downward by up to 30 degrees, towards one of three heights in
+turn (a fifth, a half and four fifths of the object's); in most grasps one of them presses from above instead. Everyday
+things are tall and are grasped over their whole height: the middles of grasps are spread evenly over it, with the
+fingers within a hand's breadth of the middle. In free motion the palm comes from a new side every time. A finger that
+meets nothing tries up to five other paths. The hand re-centres from its own last contacts, never from an estimate, so
+every method sees the same data for one solid, motion, noise and seed. Noise as in
 :mod:`tactile_lab.experiments.data.sensing`.
 """
 
@@ -42,7 +42,7 @@ _LEVEL_SIGMA_m = 0.003
 _EDGE_m = 0.004
 _HALF_BREADTH_m = 0.033
 _GOLDEN = (np.sqrt(5) - 1) / 2
-"""Multiples of it, but for whole numbers, divide an interval ever more evenly."""
+"""The fractional parts of its multiples fill an interval ever more evenly (golden ratio)."""
 _TOP_SHARE = 0.7
 _TRIES = 6
 _TABLE_CLEARANCE_m = 0.002
@@ -62,7 +62,7 @@ class SpatialGrasps(SimulatedGrasps):
 
 @dataclass(frozen=True)
 class _Rays:
-    """Starts and unit directions of the fingers' ways, each of shape (5, 3)."""
+    """Start points and unit directions of the fingers' paths, each of shape (5, 3)."""
 
     starts: Array
     ways: Array
@@ -82,16 +82,16 @@ def simulate(
 
     Args:
         shape: name of a solid, see :func:`tactile_lab.experiments.data.solids.solid`.
-        seed: of all randomness, with the motion and its scale.
-        motion: "table" slips by 10 mm along x and y and 20 degrees about the vertical at scale 1, "free" by as
-            much along and about all three axes.
+        seed: for all random numbers, together with the motion and its scale.
+        motion: "table": slip of 10 mm along x and y and 20 degrees about the vertical at scale 1; "free": the same
+            along and about all three axes.
         motion_scale: slip relative to that.
         count: number of grasps.
-        outlier_share: share of contacts that are grossly wrong.
+        outlier_share: share of outliers among the contacts.
         heights: on the table, "three" levels in turn, or "all" of the solid's height.
 
     Raises:
-        ConfigurationError: no such solid, or its mesh is not on this machine.
+        ConfigurationError: there is no such solid, or its mesh is not on this machine.
     """
     rng = np.random.default_rng([seed, 31607, round(1000 * motion_scale), ("table", "free").index(motion)])
     on_table = _OnTable if heights == "three" else _AtAllHeights
@@ -111,18 +111,18 @@ def simulate(
 
 
 def random_contacts(shape: str, count: int, seed: int, *, foot: bool = False) -> SpatialGrasps:
-    """Contacts spread at random over a solid standing on a table that does not move.
+    """Contacts spread at random over a fixed solid that stands on a table.
 
     They come as grasps of five contacts (the last may have fewer), without approach paths.
 
     Args:
         shape: name of a solid.
         count: number of contacts.
-        seed: of all randomness.
-        foot: the foot and what is just above the table are touched as well, as if there were no table.
+        seed: for all random numbers.
+        foot: whether to touch the underside and the part just above the table too, as if there were no table.
 
     Raises:
-        ConfigurationError: no such solid, or its mesh is not on this machine.
+        ConfigurationError: there is no such solid, or its mesh is not on this machine.
     """
     body = solid(shape)
     rng = np.random.default_rng([seed, 40963])
@@ -137,7 +137,7 @@ def random_contacts(shape: str, count: int, seed: int, *, foot: bool = False) ->
 
 
 class _Session:
-    """One solid, its true pose and the palm's; the kinds of motion differ in how they are drawn."""
+    """One solid, its true pose and that of the palm; subclasses draw the different kinds of motion."""
 
     floor_m: float = -np.inf
     world_T_palm: Pose3
@@ -148,11 +148,11 @@ class _Session:
         self._body_T_frame = Pose3()
 
     def bear_frame(self, origin_world_m: Array) -> None:
-        """The frame that is tracked is born here; slips are expressed in it."""
+        """Define the tracked frame here; slips are expressed in it."""
         self._body_T_frame = self.world_T_body.between(Pose3(Rot3(), origin_world_m))
 
     def close(self, index: int, outlier_share: float) -> tuple[tuple[Contact, ...], tuple[ApproachPath, ...]]:
-        """The contacts of one closing, and the ways of all five fingers."""
+        """The contacts of one closing, and the paths of all five fingers."""
         rays = self.rays(index, 1.0)
         hits = self._cast(rays)
         for _ in range(_TRIES - 1):
@@ -165,11 +165,11 @@ class _Session:
         return self._measure(rays, hits, outlier_share)
 
     def rays(self, index: int, spread: float) -> _Rays:
-        """The fingers' ways in the world; a smaller spread aims them closer to the palm's middle."""
+        """The fingers' paths in the world; a smaller spread aims them closer to the palm's middle."""
         raise NotImplementedError
 
     def reorient(self, last: Grasp) -> Pose3:
-        """The hand carries the object, which slips, and comes back from elsewhere; the hand's motion is returned."""
+        """Carry the object, which slips, and approach it from elsewhere; returns the hand's motion."""
         middle = self.world_T_palm.translation()
         if last.contacts:
             middle = (last.points_world_m.min(axis=0) + last.points_world_m.max(axis=0)) / 2
@@ -181,15 +181,15 @@ class _Session:
         return hand_motion
 
     def hand_step(self) -> tuple[Array, Rot3]:
-        """How the hand moves while it holds: a shift, and a turn about the grasp's middle."""
+        """The hand's motion while it holds the object: a shift, and a rotation about the grasp's middle."""
         raise NotImplementedError
 
     def slip(self) -> Pose3:
-        """How the object moves beside that, in the tracked frame."""
+        """The object's additional motion, in the tracked frame."""
         raise NotImplementedError
 
     def approach(self, middle_world_m: Array) -> None:
-        """The palm comes back over the middle of its last contacts."""
+        """Bring the palm back over the middle of its last contacts."""
         raise NotImplementedError
 
     def _cast(self, rays: _Rays) -> list[tuple[Array, Array] | None]:
@@ -212,7 +212,7 @@ class _Session:
         return tuple(contacts), tuple(lines)
 
     def _end_of_way(self, start: Array, way: Array) -> Array:
-        """Where a finger stops that meets nothing: at the end of its reach, or just above the table."""
+        """Where a finger that meets nothing stops: at the end of its reach, or just above the table."""
         length = 2 * _REACH_m
         if way[2] < 0 and start[2] + length * way[2] < self.floor_m:
             length = (start[2] - self.floor_m) / -way[2]
@@ -263,10 +263,10 @@ class _OnTable(_Session):
 
 
 class _AtAllHeights(_OnTable):
-    """The same with grasps all over the height."""
+    """The same, with grasps over the whole height."""
 
     def levels_m(self, index: int) -> Array:
-        """As wide as a hand is, or as the solid is high."""
+        """The heights span the width of a hand, or the height of a lower solid."""
         height = self.solid.height_m
         breadth = min(_HALF_BREADTH_m, height / 2)
         middle = breadth + ((index + 1) * _GOLDEN % 1.0) * (height - 2 * breadth)
@@ -311,7 +311,7 @@ def _directions(angles_rad: Array, tilts_rad: Array) -> Array:
 
 
 def _any_rotation(rng: np.random.Generator) -> Rot3:
-    """Uniform over all rotations (a unit quaternion uniform on its sphere)."""
+    """A rotation drawn uniformly from all rotations (by a uniform unit quaternion)."""
     w, x, y, z = _unit(rng.normal(size=4))
     return Rot3.Quaternion(w, x, y, z)
 

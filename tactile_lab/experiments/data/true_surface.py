@@ -1,4 +1,4 @@
-"""The true surface of an object, and what of it an estimate comes near."""
+"""The true surface of an object, and the part of it that lies near an estimate."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _LEAST_AREA_m2 = 1e-12
 
 
 def true_outline(mesh: trimesh.Trimesh) -> Array:
-    """The outline half-way up, shape (n, 2)."""
+    """The outline at half the height, shape (n, 2)."""
     return horizontal_outline(mesh, float(mesh.bounds[:, 2].mean()))
 
 
 def reachable_points(mesh: trimesh.Trimesh, dimension: int) -> Array:
-    """Points of the true surface that fingers can touch: the outline half-way up, or all but the underside.
+    """Points of the true surface that fingers can touch: the outline at half the height, or all but the underside.
 
     Returns:
         Shape (n, dimension), object frame.
@@ -36,14 +36,16 @@ def reachable_points(mesh: trimesh.Trimesh, dimension: int) -> Array:
 
 
 def within(points_m: Array, places_m: Array, reach_m: float) -> NDArray[np.bool_]:
-    """Which points lie nearer to one of some places than a reach; none where there are no places."""
+    """Which points lie within reach of one of the given places; none if there are no places."""
     if len(places_m) == 0:
         return np.zeros(len(points_m), dtype=bool)
     return np.asarray(cKDTree(places_m).query(points_m)[0] < reach_m)
 
 
 def lay_over(points_m: Array, source_m: Array, target_m: Array) -> Array:
-    """Points moved as ``source_m`` is moved best onto ``target_m``, both (n, 3): in the plane, and along z."""
+    """Points transformed by the motion that best maps ``source_m`` onto ``target_m``, both (n, 3): in the plane, and
+    along z.
+    """
     flat = moved_alike(points_m[:, :2], source_m[:, :2], target_m[:, :2])
     if points_m.shape[1] == 2:
         return flat
@@ -51,7 +53,7 @@ def lay_over(points_m: Array, source_m: Array, target_m: Array) -> Array:
 
 
 def surface_within(surface: Surface | None, points_m: Array, reach_m: float) -> NDArray[np.bool_]:
-    """Which points, shape (n, 3), lie within reach of the surface as estimated now; none where there is none."""
+    """Which points, shape (n, 3), lie within reach of the estimated surface; none if there is no surface."""
     if surface is None:
         return np.zeros(len(points_m), dtype=bool)
     mesh = trimesh.Trimesh(surface.points_m, surface.cells, process=False)
@@ -59,13 +61,13 @@ def surface_within(surface: Surface | None, points_m: Array, reach_m: float) -> 
 
 
 def true_share(surface: Surface, origin_height_m: float, mesh: trimesh.Trimesh, reach_m: float) -> float:
-    """Share of an estimated surface within reach of the true one, but for what faces the table.
+    """Share of an estimated surface within reach of the true one, without the part that faces the table.
 
     Args:
-        surface: as estimated.
-        origin_height_m: height of the object frame's origin over the table.
-        mesh: the true one, in the same frame.
-        reach_m: what counts as near.
+        surface: the estimated surface.
+        origin_height_m: height of the object frame's origin above the table.
+        mesh: the true surface, in the same frame.
+        reach_m: largest distance that counts as near.
     """
     away_m, _ = nearest_on_mesh(surface.points_m, mesh)
     sizes = surface.sizes * surface.touchable(origin_height_m)

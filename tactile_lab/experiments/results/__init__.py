@@ -1,1 +1,1 @@
-"""Results that the repository keeps, and the pages that are made of them."""
+"""Results stored in the repository, and the pages made from them."""

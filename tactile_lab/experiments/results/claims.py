@@ -1,7 +1,7 @@
-"""What is claimed of the program, where the figures stand in the stored results, and whether they reach what was asked.
+"""The claims about the program, where their figures are found in the stored results, and whether these meet the goals.
 
-The claims are written by hand (``docs/results/claims.yaml``); their figures are not, so that they cannot be older than
-the tables.
+The claims are written by hand (``docs/results/claims.yaml``). Their figures are taken from the tables, so that they
+cannot be older than these.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ _FIGURES_KEY = "dot: the figure on the right"
 
 
 class Place(StrictModel):
-    """A row of a stored result and a column: the newest table that has both, and has one such row.
+    """A row and a column of a stored result, in the newest table that has this column and exactly one such row.
 
     Attributes:
-        result: its name.
-        where: texts of the row by the titles of their columns, without units.
+        result: name of the result.
+        where: texts in the row, by the titles of their columns without units.
         column: title of the column; "" in a panel's rows.
     """
 
@@ -41,17 +41,17 @@ class Place(StrictModel):
 
 
 class Goal(StrictModel):
-    """A figure and what was asked of it.
+    """A figure and the limit that it should meet.
 
     Attributes:
-        what: the figure in words.
-        place: where it stands.
-        number: which of the cell's numbers it is; None shows the whole cell and takes the first.
-        percent_of: column that it is a percentage of.
-        over: where the figure stands that it is divided by.
-        unit: behind the numbers.
-        asked: the limit; None where nothing was asked.
-        at_least: the limit is one from below.
+        what: the figure, described in words.
+        place: where it is found.
+        number: index among the cell's numbers; None shows the whole cell and uses the first.
+        percent_of: column of which it is a percentage.
+        over: where the divisor is found.
+        unit: text after the numbers.
+        asked: the limit; None if there is none.
+        at_least: whether the limit is a lower bound.
     """
 
     what: str
@@ -70,11 +70,11 @@ class Panel(StrictModel):
     Attributes:
         title: above it.
         label: of its axis.
-        place: of all rows, but for what differs.
+        place: common to all rows, without the column that differs.
         by: the column that differs.
-        names: its texts from the top, with the words that are shown for them.
-        number: which of the cell's numbers is shown; None for a spread, or the first.
-        asked: of the dots; None where nothing was.
+        names: its texts from top to bottom, and the words to show for them.
+        number: index of the cell's number to show; None for a spread, or the first.
+        asked: the limit of the dots; None where nothing was.
     """
 
     title: str
@@ -90,11 +90,11 @@ class Claim(StrictModel):
     """One claim.
 
     Attributes:
-        name: of its picture.
-        title: of its section.
+        name: name of its picture.
+        title: title of its section.
         text: what was reached and what was not, in Markdown.
-        pages: results that tell more.
-        goals: its figures.
+        pages: results with more details.
+        goals: its figures and limits.
         panels: of its plot.
     """
 
@@ -110,9 +110,9 @@ class Claims(StrictModel):
     """The overview.
 
     Attributes:
-        intro: above the claims.
+        intro: text above the claims.
         claims: in their order.
-        outro: below the claims.
+        outro: text below the claims.
     """
 
     intro: str
@@ -125,9 +125,9 @@ class Found:
     """A cell of a stored result.
 
     Attributes:
-        text: of the cell.
-        row: texts by the titles of their columns.
-        part: that holds it.
+        text: text of the cell.
+        row: texts of its row, by the titles of their columns.
+        part: the part that contains it.
     """
 
     text: str
@@ -141,8 +141,8 @@ class Reached:
 
     Attributes:
         text: with its unit.
-        verdict: met, missed, or "" where nothing was asked.
-        part: of the result that it stands in.
+        verdict: met, missed, or "" if there is no limit.
+        part: the part of the result that contains it.
     """
 
     text: str
@@ -151,7 +151,7 @@ class Reached:
 
 
 def judge_goal(goal: Goal, results: Mapping[str, StoredResult]) -> Reached:
-    """The figure of a goal. Raises ConfigurationError where there is none."""
+    """The figure of a goal. Raises ConfigurationError if it is not found."""
     found = find(goal.place, results)
     numbers = numbers_in(found.text)
     if not numbers:
@@ -174,7 +174,7 @@ def _verdict(goal: Goal, value: float) -> str:
 
 
 def plot(claim: Claim, results: Mapping[str, StoredResult]) -> Plot:
-    """The plot of a claim. Raises ConfigurationError where a row is missing."""
+    """The plot of a claim. Raises ConfigurationError if a row is missing."""
     panels = tuple(_panel(panel, results) for panel in claim.panels)
     notes = [line.note.count(" / ") for panel in panels for line in panel.lines]
     key = {0: _FIGURES_KEY, 1: _PAIRS_KEY}.get(max(notes), RANGES_KEY)
@@ -199,7 +199,7 @@ def _line(panel: Panel, name: str, shown: str, results: Mapping[str, StoredResul
 
 
 def find(place: Place, results: Mapping[str, StoredResult]) -> Found:
-    """The cell at a place. Raises ConfigurationError where there is none, or more than one."""
+    """The cell at a place. Raises ConfigurationError if there is none, or more than one."""
     parts = results[place.result].parts if place.result in results else ()
     tables = [(table, part) for part in parts for table in part.tables if place.column in table.head]
     told = [(table, part) for table, part in tables if _tells(table, place)]
@@ -213,7 +213,7 @@ def find(place: Place, results: Mapping[str, StoredResult]) -> Found:
 
 
 def _tells(table: Table, place: Place) -> bool:
-    """Whether the place names all that tells which row it is: a single shape is not taken for all shapes together."""
+    """Whether the place names all keys of the row: a single shape must not be mistaken for all shapes together."""
     return all(title in place.where or title.partition(",")[0] in place.where for title in table.head[: table.keys])
 
 
@@ -227,7 +227,7 @@ def _words(place: Place) -> str:
 
 
 def numbers_in(text: str) -> list[float]:
-    """The numbers of a cell, spaces between thousands taken out."""
+    """The numbers of a cell, without spaces between thousands."""
     return list(_numbers(_BESIDE.sub("", text)))
 
 

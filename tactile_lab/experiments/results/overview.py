@@ -1,4 +1,4 @@
-"""The page of all claims: what was asked, what is reached, a plot for each, and links to the pages of the results."""
+"""The page of all claims: goals, what is reached, a plot for each claim, and links to the pages of the results."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def overview(docs: Path, results: Mapping[str, StoredResult], sources: str) -> d
     """The page and the pictures of the claims, by their paths in the folder of documents.
 
     Raises:
-        ConfigurationError: the claims are none, or name what no stored result has.
+        ConfigurationError: the claims are invalid, or name something that no stored result has.
     """
     written = load_model(docs / RESULTS / CLAIMS, Claims)
     texts = {_picture(claim): draw(claim.title, plot(claim, results)) for claim in written.claims}
@@ -65,7 +65,7 @@ def _section(claim: Claim, results: Mapping[str, StoredResult]) -> str:
 
 
 def _balance(claim: Claim, results: Mapping[str, StoredResult]) -> str:
-    """How many of the claim's goals are met."""
+    """The number of the claim's goals that are met, as a sentence."""
     verdicts = [verdict for goal in claim.goals if (verdict := judge_goal(goal, results).verdict)]
     missed = len(verdicts) - verdicts.count(MET)
     if not verdicts:

@@ -1,4 +1,4 @@
-"""The page of a stored result: what made it, what it means, its commands, its plot and its tables."""
+"""The page of a stored result: its origin, its meaning, its commands, its plot and its tables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tactile_lab.experiments.summary import markdown
 
 SPREADS = "Where a heading says nothing else, three figures are median / p90 / maximum."
 WIDTH = 140
-"""Of the pages' lines, where they are prose."""
+"""Line length of prose on the pages."""
 _ABOUT = re.compile(r"<!-- about: (?P<version>.+?) -->\n+")
 
 
@@ -22,10 +22,11 @@ def page(result: StoredResult, sources: str, notes: str = "", picture: str = "")
     """The page in Markdown.
 
     Args:
-        result: what it shows.
-        sources: hash of the sources as they are now: what others made says that it is older.
-        notes: by hand, in Markdown; a first line ``<!-- about: VERSION -->`` tells which version they speak of.
-        picture: of the plot, from the page; "" where there is none.
+        result: the result that it shows.
+        sources: hash of the present sources: parts made by others are marked as older.
+        notes: written by hand in Markdown; a first line ``<!-- about: VERSION -->`` names the version that they refer
+            to.
+        picture: path of the plot, relative to the page; "" if there is none.
     """
     first, *earlier = result.parts
     begin = [f"# {result.name}", fill(result.sentence, WIDTH), first.made_by.words(sources)]
@@ -52,7 +53,7 @@ def _table(table: Table) -> str:
 
 
 def _notes(notes: str, newest: Part) -> str:
-    """What was written by hand; with a word about its version where the figures are of another."""
+    """The hand-written notes, with a remark if they refer to another version than the figures."""
     found, text = _ABOUT.match(notes), _ABOUT.sub("", notes, count=1).strip()
     made = newest.made_by.sources or newest.made_by.commit
     if found is None or found["version"] == made:
@@ -61,7 +62,7 @@ def _notes(notes: str, newest: Part) -> str:
 
 
 def merge_plots(parts: Sequence[Part]) -> Plot | None:
-    """The newest part's plot, with the lines that only earlier ones have, marked by a star."""
+    """The newest part's plot, plus lines that only earlier parts have, marked by an asterisk."""
     shown: Plot | None = None
     for plot in (part.plot for part in parts if part.plot is not None):
         shown = plot if shown is None else _with_earlier(shown, plot)

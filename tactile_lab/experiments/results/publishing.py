@@ -17,7 +17,7 @@ MARK = "<!-- `make results` writes this page from data/{name}.json and notes/{na
 
 
 def stored_results(docs: Path) -> dict[str, StoredResult]:
-    """All stored results by name. Raises SessionError for a file that is none."""
+    """All stored results by name. Raises SessionError for a file that is not a stored result."""
     files = sorted((docs / RESULTS / DATA).glob("*.json"))
     return {file.stem: StoredResult.read(file) for file in files}
 
@@ -27,10 +27,10 @@ def make_pages(docs: Path, sources: str | None = None) -> dict[str, str]:
 
     Args:
         docs: folder of the documents.
-        sources: hash of the sources that results are compared with; None for those of this program.
+        sources: hash of the sources to compare results with; None for those of this program.
 
     Raises:
-        SessionError: a stored result is none.
+        SessionError: a file is not a stored result.
         ConfigurationError: the claims do not fit the stored results.
     """
     sources, results = sources or version(), stored_results(docs)
@@ -46,7 +46,7 @@ def make_pages(docs: Path, sources: str | None = None) -> dict[str, str]:
 
 
 def publish(docs: Path) -> list[Path]:
-    """Write what has changed, and give it. Raises as :func:`make_pages`, and WriteError."""
+    """Write what has changed, and return it. Raises as :func:`make_pages`, and WriteError."""
     changed = _changed(docs, make_pages(docs))
     for path, text in changed.items():
         write_whole(path, text)

@@ -1,7 +1,7 @@
 """The stored outcome of an experiment: tables and a plot, the command, the seeds, and the version that made them.
 
-One file of JSON a result, a row of a table on one line, so that a change can be read. A result has several parts when
-only some of its rows were made again: what an earlier version made stays, and says so.
+Each result is one JSON file, with a row of a table on one line, so that differences are readable. A result has several
+parts if only some of its rows were made again: rows made by an earlier version are kept and marked as such.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ class Table:
     """A table of texts.
 
     Attributes:
-        title: above it, "" for none.
+        title: text above it, "" for none.
         head: titles of the columns.
-        rows: as many texts each.
-        keys: how many of the first columns tell which row it is.
+        rows: one text per column.
+        keys: number of first columns that identify a row.
     """
 
     title: str
@@ -36,11 +36,11 @@ class Table:
     keys: int = 1
 
     def key(self, row: Sequence[str]) -> tuple[str, ...]:
-        """Which row it is."""
+        """The texts that identify a row."""
         return tuple(row[: self.keys])
 
     def without(self, other: Table) -> Table:
-        """The rows that the other table does not have; all of them where its columns are others."""
+        """The rows that the other table does not have; all of them if its columns differ."""
         known = {other.key(row) for row in other.rows} if self.head == other.head else set()
         return replace(self, rows=tuple(row for row in self.rows if self.key(row) not in known))
 
@@ -60,14 +60,14 @@ class Table:
 
 @dataclass(frozen=True)
 class MadeBy:
-    """What made a result.
+    """The origin of a result.
 
     Attributes:
         program: version of the package.
-        sources: hash of the sources that results depend on; None where it was not kept.
-        commit: of the repository, where the sources were not kept; None otherwise.
+        sources: hash of the sources that results depend on; None if it was not kept.
+        commit: commit of the repository, if the hash was not kept; None otherwise.
         date: day, ISO 8601.
-        machine: in words.
+        machine: description of the machine.
     """
 
     program: str
@@ -81,7 +81,7 @@ class MadeBy:
         return self.sources == sources
 
     def words(self, sources: str) -> str:
-        """Which version, and whether it is older than the sources."""
+        """The version, and whether it is older than the sources, as a sentence."""
         by = f"commit {self.commit}" if self.sources is None else f"{self.program}, sources {self.sources}"
         if self.is_of(sources):
             return f"Made by this version of the code ({by}), {self.date}, {self.machine}."
@@ -90,14 +90,14 @@ class MadeBy:
 
 @dataclass(frozen=True)
 class Part:
-    """What one version of the program made.
+    """The part of a result that one version of the program made.
 
     Attributes:
         made_by: that version.
-        commands: that made it.
-        about: seeds and numbers of runs in words, "" if the tables tell it.
+        commands: the commands that made it.
+        about: seeds and numbers of runs as text, "" if the tables show them.
         tables: in the order of the page.
-        plot: None where there is none.
+        plot: the plot, None if there is none.
     """
 
     made_by: MadeBy
@@ -126,12 +126,12 @@ class Part:
 
 @dataclass(frozen=True)
 class StoredResult:
-    """A result of the repository.
+    """A result stored in the repository.
 
     Attributes:
-        name: of its file and of its page.
+        name: name of its file and of its page.
         sentence: what it shows.
-        parts: what each version made, the newest first.
+        parts: the parts made by each version, the newest first.
     """
 
     name: str
@@ -143,7 +143,7 @@ class StoredResult:
         """Read a file.
 
         Raises:
-            SessionError: it cannot be read, or is no stored result.
+            SessionError: it cannot be read, or is not a stored result.
         """
         try:
             found = json.loads(file.read_text(encoding="utf-8"))
@@ -155,7 +155,7 @@ class StoredResult:
             raise SessionError(f"is not a stored result ({error!r})", where=str(file), hint=hint) from error
 
     def write(self, folder: Path) -> Path:
-        """Write the file ``NAME.json`` into a folder and give its path. Raises WriteError."""
+        """Write the file ``NAME.json`` into a folder and return its path. Raises WriteError."""
         parts = [part.as_json() for part in self.parts]
         content = {"format": FORMAT, "name": self.name, "sentence": self.sentence, "parts": parts}
         file = folder / f"{self.name}.json"
@@ -164,7 +164,7 @@ class StoredResult:
 
 
 def dump_json(content: Any, indent: str = "") -> str:
-    """JSON, in which what holds no further lists or objects stands on one line."""
+    """JSON text in which innermost lists and objects are on one line."""
     inside = list(content.values() if isinstance(content, dict) else content if isinstance(content, list) else ())
     if not any(isinstance(part, dict | list) for part in inside):
         return json.dumps(content, ensure_ascii=False, allow_nan=False)

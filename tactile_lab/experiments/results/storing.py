@@ -1,4 +1,4 @@
-"""A new part into a stored result: its rows replace those of the same settings, the others stay as older ones."""
+"""Adds a new part to a stored result: its rows replace those with the same settings; the others stay, as older ones."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from drivers.core.errors import SessionError
 from tactile_lab.experiments.results.stored_result import Part, StoredResult
 
 RESULTS, DATA, NOTES, PICTURES = "results", "data", "notes", "pictures"
-"""Folders: pages under the documents, stored results and notes under the pages, pictures under the documents."""
+"""Folders: pages in the documents, stored results and notes in the pages' folder, pictures in the documents."""
 
 
 def store(docs: Path, name: str, sentence: str, part: Part, *, forget: bool = False) -> Path:
-    """Put a part into the stored result ``name`` of a folder of documents, and give its file.
+    """Add a part to the stored result ``name`` in a folder of documents; returns its file.
 
     Args:
-        docs: folder of the documents, with the folder of the results in it.
-        name: of the result.
+        docs: folder of the documents, which contains the folder of results.
+        name: name of the result.
         sentence: what it shows.
-        part: what this version of the program made.
-        forget: leave out what earlier versions made.
+        part: the part made by this version of the program.
+        forget: whether to drop what earlier versions made.
 
     Raises:
-        SessionError: there is no such folder, or the file there is no stored result.
+        SessionError: there is no such folder, or the file in it is not a stored result.
         WriteError: the file cannot be written.
     """
     folder = docs / RESULTS / DATA
@@ -36,9 +36,9 @@ def store(docs: Path, name: str, sentence: str, part: Part, *, forget: bool = Fa
 
 
 def combine(new: Part, before: tuple[Part, ...]) -> tuple[Part, ...]:
-    """The new part, and of those before what it does not have.
+    """The new part, and the rows of earlier parts that it does not have.
 
-    Commands of the same version are collected: its runs go on in one file.
+    Parts made by the same version are merged, with all of their commands.
     """
     if before and before[0].made_by.sources == new.made_by.sources:
         commands = dict.fromkeys((*before[0].commands, *new.commands))

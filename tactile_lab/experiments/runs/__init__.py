@@ -1,1 +1,1 @@
-"""One run of each experiment, from a cell to its figures."""
+"""The runs of each experiment, from a cell to its figures."""

@@ -1,7 +1,7 @@
 """Method "joint" with one mechanism left out at a time, on the same grasps.
 
-Some mechanisms say themselves whether they changed anything. Where such a one did not, a run without it is the same and
-is not made again, but for the seeds that check exactly that and time it.
+Some mechanisms report whether they changed anything. If such a mechanism changed nothing, a run without it gives the
+same result and is not repeated, except for seeds that check exactly this and measure its time.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         "fixed lag": {"joint": {"window": 1000}},
     }
 )
-"""What is left out, by name, as settings."""
+"""Settings that switch a mechanism off, by its name."""
 
 _IN_SPACE_ONLY = ("polyhedron", "prism", "standing field", "strays", "held-out contacts", "pose uncertainty")
 _IN_PLANE_ONLY = ("corners", "without one")
@@ -103,16 +103,18 @@ _TELLING: Mapping[str, frozenset[str]] = MappingProxyType(
         }.items()
     }
 )
-"""Mechanisms without which a run is the same unless one of these changed something in the full run."""
+"""Mechanisms, and the reports of changes: without a mechanism a run stays the same if none of these occurred in the
+full run.
+"""
 
 
 _COMPARED = ("registration_mm", "hausdorff_mm", "within_2_sigma")
 _SAME = 1e-3
-"""Millimetres, and a share: optimisers that start elsewhere end no farther apart."""
+"""Tolerances, in millimetres and as a share: optimizers with different starts differ by less."""
 
 
 def settings(grasps: int) -> list[Setting]:
-    """Every condition with every mechanism that it can have; 0 grasps for each condition's own number."""
+    """Every condition with every mechanism that applies to it; 0 grasps means each condition's own number."""
     return [
         setting
         for condition, shapes in SHAPES.items()
@@ -133,7 +135,9 @@ def _left_out_in(condition: str) -> list[str]:
 
 
 def track_without(cell: Cell) -> dict[str, Any]:
-    """The figures of a run, and whether the mechanism is idle in it. Cell: condition, shape, grasps, without."""
+    """The figures of a run, and whether the mechanism changed nothing in it. Cell: condition, shape, grasps,
+    without.
+    """
     full, changed = _full(cell["condition"], cell["shape"], cell["grasps"], cell.seed)
     name = cell["without"]
     if name == NOTHING:
@@ -151,7 +155,7 @@ def _nearly(one: float | None, other: float | None) -> bool:
 
 @lru_cache(maxsize=2)
 def _full(condition: str, shape: str, grasps: int, seed: int) -> tuple[dict[str, Any], frozenset[str]]:
-    """Of the method with all its mechanisms, and those that changed something; asked for by all that are left out."""
+    """Figures of the full method, and the mechanisms that changed something; cached, since all other runs need them."""
     cell = Cell((("condition", condition),), seed)
     return _tracked(_data(condition, shape, grasps, seed), {}, cell)
 
@@ -173,7 +177,7 @@ def _tracked(data: SimulatedGrasps, overlay: Overlay, cell: Cell) -> tuple[dict[
 
 
 def _processor_ms(work: Callable[[], _Result]) -> tuple[float, _Result]:
-    """Processor time and outcome: runs are compared that other programs may have slowed down by turns."""
+    """Processor time and outcome; elapsed time would depend on the load by other programs."""
     started = time.process_time()
     found = work()
     return round(1e3 * (time.process_time() - started), 1), found

@@ -1,4 +1,6 @@
-"""One calibration of the forearm from simulated data: how far off it is, and whether its region tells so."""
+"""One calibration of the forearm from simulated data: its error, and whether its confidence region contains the
+truth.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +27,9 @@ GEOMETRY = KnownGeometry(table=TableEdges(size_m=(1.0, 1.0), thickness_m=0.02, p
 def calibrate_forearm(cell: Cell) -> Mapping[str, Any]:
     """Draw a rig and its data, solve, and compare with the truth.
 
-    The bias is 0.6 degrees on every joint, the wrist's included; contacts are off by 1 mm per axis, corners by 0.05
-    pixels, and those of the world marker by 0.03 more in all pictures, all four alike; prints are 0.03 % too large.
+    Standard deviations: bias of every joint, including the wrist, 0.6 degrees; contacts 1 mm per axis; corners 0.05
+    pixels. The world marker's four corners have a further common error of 0.03 pixels in all pictures; the size of
+    prints is off by 0.03 %.
     """
     rng = np.random.default_rng(cell.seed)
     rig = TrueRig.draw(rng)

@@ -1,4 +1,4 @@
-"""The marker camera under ten conditions: error of the true pose, and flipped poses that are taken for valid."""
+"""The marker camera under ten conditions: error of the pose, and flipped poses that are accepted as valid."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ CONDITIONS: Mapping[str, Mapping[str, Any]] = {
     "far": {"world_T_camera": _FAR},
     "glass forgotten": {"assumed_glass_m": 0.0},
 }
-"""What differs from the rig's usual camera; at 640 x 480 pixels."""
+"""Differences from the rig's usual camera, at 640 x 480 pixels."""
 
 
 def see_object(cell: Cell) -> Mapping[str, Any]:
-    """A few frames of an object at rest somewhere: errors of the pose on the table, and of the free poses."""
+    """Evaluate a few frames of an object at rest: errors of the pose on the table, and of unconstrained poses."""
     rng = np.random.default_rng(cell.seed)
     condition = dict(CONDITIONS[str(cell["condition"])])
     side_m, assumed_m = condition.pop("side_m", 0.035), condition.pop("assumed_glass_m", 0.008)
@@ -88,7 +88,7 @@ def _on_table(lens: CameraCalibration, markers: MarkerSettings, frames: list[Fra
 
 
 def _free(lens: CameraCalibration, markers: MarkerSettings, frames: list[Frame], truth: Pose3) -> dict[str, Any]:
-    """The same with an object that may be anywhere: valid poses, ambiguous ones, and flips among the valid."""
+    """The same without the table constraint: valid poses, ambiguous ones, and flips among the valid ones."""
     tracker = ObjectTracker(lens, markers.model_copy(update={"freedom": "spatial"}))
     valid = [seen for frame in frames if (seen := tracker.observe(frame).sighting) is not None]
     flips = [bool(rotation_angle_rad(truth.between(seen.world_T_object)) > FLIP_rad) for seen in valid]

@@ -1,13 +1,14 @@
-"""What grasps can tell of an object with flat sides at all: the Cramér-Rao bound of its sides and of its poses.
+"""The Cramér-Rao bound for an object with flat sides: how well grasps can determine its sides and poses at best.
 
-The errors of an estimate that wastes nothing have the inverse of the contacts' information as their covariance. Unknown
-are the sides, whose number and neighbours are told, and the object's pose at every grasp but the first, which fixes the
-frame. Each contact lies on its side up to the sensors' noise and points along its normal; between grasps the object
-slips by the noise of the motion, in the plane or on a table. One error is drawn a run, and its shape and its poses are
-judged as estimates are. Nothing is estimated here; what does estimate can only do better by knowing more, for instance
-which sides tend to be parallel, or that contacts lie between the ends of their sides.
+The errors of an efficient estimate have the inverse of the contacts' information matrix as their covariance. Unknown
+are the sides, whose number and neighbours are given, and the object's pose at every grasp but the first, which fixes
+the frame. Each contact lies on its side and points along its normal, up to the sensors' noise; between grasps the
+object slips by the noise of the motion, in the plane or on a table. Each run draws one error from this covariance, and
+its shape and poses are evaluated like those of an estimate. No estimator runs here. An estimator can do better than
+this bound only with additional knowledge, for instance that sides tend to be parallel, or that contacts lie between the
+ends of their sides.
 
-Sides may also be *regular*: it is then told which are parallel or at right angles to which.
+Sides may also be *regular*: then it is known which of them are parallel or perpendicular to each other.
 """
 
 from __future__ import annotations
@@ -47,12 +48,12 @@ METHODS = (REFERENCE_METHOD, "estimated-pose")
 _STEP = 1e-7
 _ALIKE_rad = 1e-9
 _REACH_m, _REACH_rad = 0.050, 1.0
-"""What is known of a side without contacts: it lies within the hand."""
+"""Prior for a side without contacts: it lies within the hand."""
 
 
 @dataclass(frozen=True)
 class FlatSides:
-    """Sides ``u . x = distance`` and how they may differ from that.
+    """Sides ``u . x = distance``, and the directions in which they may vary.
 
     Attributes:
         normals: outward unit normals u, shape (n, d).
@@ -68,17 +69,17 @@ class FlatSides:
 
     @property
     def unknown(self) -> tuple[int, int]:
-        """How many angles and displacements."""
+        """The number of angles and displacements."""
         return self.turning.shape[2], self.sliding.shape[1]
 
     def at(self, angles_rad: Array, displacements_m: Array) -> tuple[Array, Array]:
-        """Normals and distances that differ by so much."""
+        """Normals and distances after these changes."""
         turned = self.normals + self.turning @ angles_rad
         turned /= np.linalg.norm(turned, axis=1, keepdims=True)
         return turned, self.distances_m + self.sliding @ displacements_m
 
     def corners(self, corners_m: Array, meeting: NDArray[np.bool_], error: EstimateOffset) -> Array:
-        """Where corners of shape (k, d) are moved to by an error, ``meeting`` (k, n) sides each."""
+        """Corners of shape (k, d) after an error; ``meeting`` (k, n) tells the sides that meet at each."""
         normals, distances_m = self.at(error.angles_rad, error.displacements_m)
         moved = corners_m.copy()
         for corner, sides in zip(moved, meeting, strict=True):
@@ -88,11 +89,11 @@ class FlatSides:
 
 @dataclass(frozen=True)
 class EstimateOffset:
-    """What an estimate is off by.
+    """The error of an estimate.
 
     Attributes:
         angles_rad, displacements_m: of the sides, see :class:`FlatSides`.
-        rows: (x, y, heading) by which the contacts of each grasp are displaced, the first one's zero, shape (k, 3).
+        rows: displacements (x, y, heading) of the contacts of each grasp, zero for the first, shape (k, 3).
     """
 
     angles_rad: Array
@@ -102,7 +103,7 @@ class EstimateOffset:
 
 @dataclass(frozen=True)
 class SeenSession:
-    """The truth in the frame that is tracked, whose origin the object slips about.
+    """The truth in the tracked frame, about whose origin the object slips.
 
     Attributes:
         world_T_frame: rows (x, y, heading), shape (k, 3).
@@ -121,7 +122,9 @@ class SeenSession:
 
     @classmethod
     def of(cls, data: SimulatedGrasps, scale: float) -> SeenSession:
-        """Of simulated grasps with slips of ``scale`` times the full motion noise; heights as in the world."""
+        """The truth of simulated grasps with slips of ``scale`` times the full motion noise; heights as in the
+        world.
+        """
         bodies = [planar(pose) for pose in data.world_T_body]
         body_T_frame = bodies[0].between(planar_pose(data.grasps[0].points_world_m.mean(axis=0)))
         rows = np.array([pose_row(body.compose(body_T_frame)) for body in bodies])
@@ -139,17 +142,17 @@ class SeenSession:
         return PLANAR.to_object(self.world_T_frame[0], placed, placed)[0]
 
     def estimate(self, error: EstimateOffset) -> list[Pose3]:
-        """``world_T_frame`` of somebody with this error."""
+        """``world_T_frame`` of an estimate with this error."""
         return [spatial(row_pose(row)) for row in compose(self.world_T_frame, inverse(error.rows))]
 
 
 @dataclass(frozen=True)
 class Limit:
-    """What is seen of flat sides in a session.
+    """The information about flat sides in a session.
 
     Attributes:
-        session: in whose frame the sides are.
-        sides: of the object.
+        session: defines the frame of the sides.
+        sides: the sides of the object.
         touched: side of each contact, shape (n,).
     """
 
@@ -158,16 +161,16 @@ class Limit:
     touched: NDArray[np.int64]
 
     def drawn_error(self, rng: np.random.Generator, *, known_poses: bool) -> EstimateOffset:
-        """One error of an estimate that wastes nothing.
+        """Draw one error of an efficient estimate.
 
-        Drawn by Cholesky's factor: axes of equal variance, which symmetric objects have, are any in a spectral one, so
-        that rounding would choose the error.
+        Uses the Cholesky factor: in a spectral decomposition the axes of equal variance, which symmetric objects have,
+        are arbitrary, so that rounding would determine the error.
         """
         covariance = np.linalg.inv(self._information(known_poses=known_poses))
         return self._error(rng.multivariate_normal(np.zeros(len(covariance)), covariance, method="cholesky"))
 
     def _information(self, *, known_poses: bool) -> Array:
-        """In everything that is seen, about all unknowns or the sides' alone: square."""
+        """The information matrix of all measurements, for all unknowns or only for the sides."""
         angles, displacements = self.sides.unknown
         poses = 0 if known_poses else self.session.slips.size
         change = approx_fprime(np.zeros(angles + displacements + poses), self._misfit, _STEP)
@@ -175,7 +178,7 @@ class Limit:
         return np.asarray(change.T @ change + np.diag(weak))
 
     def _error(self, unknowns: Array) -> EstimateOffset:
-        """From one row; what is left out of it is zero."""
+        """The error from one vector; unknowns that it lacks are zero."""
         angles, displacements = self.sides.unknown
         given = np.zeros(angles + displacements + self.session.slips.size)
         given[: len(unknowns)] = unknowns
@@ -183,7 +186,9 @@ class Limit:
         return EstimateOffset(first, second, np.vstack([np.zeros(3), rows.reshape(-1, 3)]))
 
     def _misfit(self, unknowns: Array) -> Array:
-        """Of places, of normals and of slips, in standard deviations of their noise; the contacts where they touch."""
+        """Residuals of points, normals and slips, in standard deviations of their noise; contacts at their true
+        points.
+        """
         error, seen, dimension = self._error(unknowns), self.session, self.sides.normals.shape[1]
         normals, distances_m = self.sides.at(error.angles_rad, error.displacements_m)
         contacts_m, true = seen.contacts_m[:, :dimension], self.sides.normals[self.touched]
@@ -196,7 +201,9 @@ class Limit:
 
 
 def together(angles_rad: Array) -> Array:
-    """1 where a side with its normal at this angle is parallel or at right angles to others, shape (n, groups)."""
+    """Groups of sides that are parallel or perpendicular to each other, by the angles of their normals, 0 or 1, shape
+    (n, groups).
+    """
     away = angles_rad[:, None] - angles_rad
     alike = np.abs((away + np.pi / 4) % (np.pi / 2) - np.pi / 4) < _ALIKE_rad
     return np.asarray(np.unique(alike, axis=0).T, dtype=float)

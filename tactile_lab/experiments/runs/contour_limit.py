@@ -1,4 +1,4 @@
-"""What grasps can tell of a polygon at all, at known poses and at estimated ones (:mod:`contact_limit`)."""
+"""How well grasps can determine a polygon at best, with known and with estimated poses (:mod:`contact_limit`)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def limit_of_contour(cell: Cell) -> dict[str, Any]:
 
 
 def _sides(outline_m: Array, *, regular: bool) -> FlatSides:
-    """Sides from each corner to the next; those that are regular turn together."""
+    """Sides from each corner to the next; regular ones rotate together."""
     normals = edge_normals(outline_m)
     groups = together(np.arctan2(normals[:, 1], normals[:, 0])) if regular else np.eye(len(normals))
     along = np.column_stack([-normals[:, 1], normals[:, 0]])

@@ -1,14 +1,15 @@
 """Coverage of an exploring session after every action, and the expected and actual gain of its decisions.
 
 A session ends when the object is explored, when its budget of actions is spent, or when the object is lost. In the
-plane it counts as explored by A and B of :mod:`tactile_lab.experiments.coverage_criteria`, on the outline at the height
-of the fingertips. In space the surface counts without the underside, which nothing can touch: A, 90 % of it lies within
-5 mm of the estimated surface and 90 % of that within 5 mm of the true one, ends the session; B, a contact lies within
-12 mm of 90 % besides (half the distance of neighbouring fingertips). The estimated surface is that of the most probable
-model, which the planner uses and a session would end with. It may fit by luck, and not after the next grasp: so in
-space a goal is reached at the first of two successive checks that both find it reached, or at the last check that the
-budget allows. *Touched* is the surface near true contact positions (4.5 mm in the plane, 12 mm in space), independent
-of the estimate: the gain that a decision predicts.
+plane the object is explored when the outline at the height of the fingertips is, by definitions A and B of
+:mod:`tactile_lab.experiments.coverage_criteria`. In space the underside, which nothing can touch, is ignored, and
+definition A ends the session: 90 % of the surface lies within 5 mm of the estimated one, and 90 % of that within 5 mm
+of the true one. Definition B also asks for a contact within 12 mm (half the distance of neighbouring fingertips) of 90
+% of the surface. The estimated surface is that of the most probable model, which the planner uses and with which a
+session would end. It may fit by chance, and no longer fit after the next grasp. So in space a goal counts as reached at
+the first of two successive checks that both find it reached, or at the last check that the budget allows. The surface
+near true contact positions counts as *touched* (4.5 mm in the plane, 12 mm in space), independent of the estimate; this
+is the gain that a decision predicts.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.tactile_slam import TactileSlam
 
 MEASURES = ("A", "B", "touched")
-"""What is followed from action to action."""
+"""The quantities recorded after each action."""
 
 _WITHIN_m = 0.005
 _CONTACT_IN_SPACE_m = 0.012
@@ -56,8 +57,8 @@ class Look:
     """Coverage after a grasp.
 
     Attributes:
-        actions: so far.
-        minutes: of simulated time.
+        actions: number of actions so far.
+        minutes: simulated time.
         shares: of the surface, by each of the measures.
     """
 
@@ -67,14 +68,14 @@ class Look:
 
 
 class CoverageMonitor:
-    """Monitors the coverage of a running session; the session only learns from it when to end.
+    """Monitors the coverage of a running session; it only tells the session when to end.
 
     Args:
         mesh: the true surface, in the frame of the true poses.
         slam: the estimation.
         shape: returns the present shape of the session's planner.
         dimension: 2 or 3.
-        budget: of actions.
+        budget: largest number of actions.
     """
 
     def __init__(
@@ -92,21 +93,21 @@ class CoverageMonitor:
         self.grasps: list[Grasp] = []
         self.choices: dict[int, Choice] = {}
         self.looks: list[Look] = []
-        """One per grasp."""
+        """One for each grasp."""
         self.actions = 0
-        """Approaches so far: each grasp, finished or given up, is one, and a tap on the top before it another."""
+        """Number of approaches: each grasp, finished or given up, is one, and a tap on the top before it is another."""
         self.carried = 0
         """How often the object was carried."""
 
     @property
     def is_explored(self) -> bool:
-        """By both definitions in the plane, by A in space: contacts everywhere would take fifty grasps there."""
+        """By both definitions in the plane; by A in space, where contacts everywhere would take fifty grasps."""
         asked = ("A", "B") if self._dimension == 2 else ("A",)
         return all(self._first(measure) is not None for measure in asked)
 
     @property
     def is_over(self) -> bool:
-        """Explored, or the budget is spent."""
+        """Whether the object is explored, or the budget is spent."""
         return self.is_explored or self.actions >= self._budget
 
     def keep(self, choice: PolicyChoice) -> None:
@@ -115,7 +116,7 @@ class CoverageMonitor:
         self.choices[choice.number - 1] = choice
 
     def look(self, minutes: float) -> None:
-        """See what is explored after a grasp that was done at this time."""
+        """Update the coverage after a grasp that ended at this time."""
         self.looks.append(Look(self.actions, minutes, self._coverage()))
 
     def _coverage(self) -> dict[str, float]:
@@ -123,7 +124,7 @@ class CoverageMonitor:
         return {"A": near[0], "B": near[1], "touched": touched}
 
     def _near_and_touched(self) -> tuple[tuple[float, float], float]:
-        """Shares by A and B, and what was truly touched."""
+        """Shares by A and B, and the share that was truly touched."""
         true_contacts_m = np.concatenate([_see(g, t) for g, t in zip(self.grasps, self.truth, strict=False)])
         touched = within(self._true_points_m, true_contacts_m[:, : self._dimension], self._reach_m)
         known, points = self._shape(), self._in_map_frame(self._true_points_m)
@@ -145,7 +146,7 @@ class CoverageMonitor:
         return shares, float(touched.mean())
 
     def _true_share(self, known: KnownShape) -> float:
-        """Share of the surface as estimated now that lies near the true one."""
+        """Share of the estimated surface that lies near the true one."""
         vertices = self._in_map_frame(np.asarray(self._mesh.vertices))
         if known.surface is None or vertices is None:
             return 0.0
@@ -154,11 +155,11 @@ class CoverageMonitor:
 
     @property
     def _reach_m(self) -> float:
-        """How far beside a contact the surface counts as touched."""
+        """Distance from a contact within which the surface counts as touched."""
         return CONTACT_m if self._dimension == 2 else _CONTACT_IN_SPACE_m
 
     def _in_map_frame(self, points_m: Array) -> Array | None:
-        """True points laid over the estimate by the best fit of all contacts; None before there are enough."""
+        """True points aligned to the estimate by the best fit of all contacts; None before there are enough."""
         placed = zip(self.grasps, self._slam.trajectory, self.truth, strict=False)
         parts = [(_see(grasp, pose), _see(grasp, true)) for grasp, pose, true in placed if pose and grasp.contacts]
         if sum(len(part[0]) for part in parts) < 3:
@@ -172,7 +173,7 @@ class CoverageMonitor:
         return next((self.looks[number] for number in numbers if self._is_reached(measure, number)), None)
 
     def _is_reached(self, measure: str, number: int) -> bool:
-        """In space only if the next look confirms it, or the budget leaves none; see the module's text."""
+        """In space only if the next check confirms it, or the budget allows none; see the module's text."""
         shares = [look.shares[measure] for look in self.looks[number:]]
         if shares[0] < GOAL or self._dimension == 2:
             return shares[0] >= GOAL
@@ -196,14 +197,16 @@ class CoverageMonitor:
         }
 
     def _effort_to_goal(self, measure: str) -> dict[str, float | None]:
-        """Actions and simulated minutes until the goal, None where it was not reached; the budget counts at most."""
+        """Actions and simulated minutes until the goal, None if it was not reached; actions count up to the budget."""
         look = self._first(measure)
         actions, minutes = (None, None) if look is None else (look.actions, look.minutes)
         most = self._budget if actions is None else actions
         return {f"actions_{measure}": actions, f"minutes_{measure}": minutes, f"at_most_{measure}": most}
 
     def _history(self) -> dict[str, Any]:
-        """Each measure after 0, 1, ... actions, its mean, and at the end; it stays where it was when the hand stops."""
+        """Each measure after 0, 1, ... actions, its mean, and its final value; it stays constant after the hand
+        stops.
+        """
         figures: dict[str, Any] = {}
         for measure in MEASURES:
             curve = [self._share_after(actions, measure) for actions in range(self._budget + 1)]
@@ -217,13 +220,13 @@ class CoverageMonitor:
         return done[-1] if done else 0.0
 
     def status(self, ending: str) -> str:
-        """How a session that ended so counts: "ok" where all was explored."""
+        """The status of a session that ended for this reason: "ok" if the object was explored."""
         if ending != "complete":
             return ending
         return "ok" if self.is_explored else "not explored"
 
     def _hausdorff_mm(self, result: SlamResult) -> float | None:
-        """At the best rigid fit; None where there is no shape."""
+        """Hausdorff distance at the best rigid fit; None if there is no shape."""
         if result.contour is not None:
             outline = true_outline(self._mesh)
             return 1e3 * compare_contour(result.contour.points_m[:-1], outline, None).best_fit.hausdorff_m
@@ -233,7 +236,9 @@ class CoverageMonitor:
         return None
 
     def _kept_promises(self) -> list[list[float]]:
-        """What each decision promised, and the share of the surface that its grasp truly touched for the first time."""
+        """The gain that each decision predicted, and the share of the surface that its grasp touched for the first
+        time.
+        """
         touched = [0.0, *(look.shares["touched"] for look in self.looks)]
         return [
             [choice.decision.promised_gain, touched[index + 1] - touched[index]]
@@ -243,7 +248,7 @@ class CoverageMonitor:
 
 
 class UntilExplored(PolicyDecisions):
-    """Follows the policy until the monitor reports that the object is explored or the budget spent.
+    """Follows the policy until the monitor reports that the object is explored or the budget is spent.
 
     Args:
         estimator: client of the planner with the policy.

@@ -1,7 +1,7 @@
-"""One accident of a recording under full load, from a cell to its figures.
+"""One failure of a recording under full load, from a cell to its figures.
 
-The load runs in a process of its own and is killed, or loses its disk; what it had handed to the recorder is known
-from a shared file, what came back is read from the recovered session, message by message.
+The load runs in a separate process and is killed, or loses its disk. A shared file tells which messages it had passed
+to the recorder; the recovered session is compared with it, message by message.
 """
 
 from __future__ import annotations
@@ -52,17 +52,17 @@ _JUMP_ns = 1_000_000_000
 
 
 def needs_root() -> str:
-    """What an ordinary user cannot try."""
+    """The faults that an ordinary user cannot cause, as text."""
     return "" if os.geteuid() == 0 else "a full disk and a read-only one, which only root can mount"
 
 
 def faults_here() -> list[str]:
-    """The faults that can be tried on this machine."""
+    """The faults that can be caused on this machine."""
     return [fault for fault in FAULTS if not needs_root() or fault not in (FULL, READ_ONLY)]
 
 
 def crash_and_recover(cell: Cell) -> dict[str, Any]:
-    """An accident at an instant that follows from the seed. Cell: fault, one of :data:`FAULTS`.
+    """Cause a failure at a time that follows from the seed. Cell: fault, one of :data:`FAULTS`.
 
     Raises:
         SessionError: the recording could not be recovered, lost something from before the last flush, or more than
@@ -73,7 +73,7 @@ def crash_and_recover(cell: Cell) -> dict[str, Any]:
         return _TRIALS[fault](Path(folder), instant_s)
 
 
-# --- the accidents -------------------------------------------------------------------------------------------------
+# --- the failures -------------------------------------------------------------------------------------------------
 
 
 def _kill(folder: Path, instant_s: float) -> dict[str, Any]:
@@ -132,7 +132,7 @@ _TRIALS: dict[str, Callable[[Path, float], dict[str, Any]]] = {
 
 
 class _Load:
-    """The load's process; its sessions are made in ``disk`` under the folder."""
+    """The load's process; its sessions are in ``disk`` in the folder."""
 
     def __init__(self, folder: Path, settings: LoadSettings) -> None:
         self.settings, self.told = settings, ""
@@ -143,7 +143,7 @@ class _Load:
         self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=child_environment())
 
     def wait_for_tick(self, tick: int) -> None:
-        """Return once so many milliseconds of load are recorded. Raises SessionError."""
+        """Wait until this many milliseconds of load are recorded. Raises SessionError."""
         give_up = time.monotonic() + _LONGEST_s
         while self.status().ticks < tick:
             if self.process.poll() is not None or time.monotonic() > give_up:
@@ -151,25 +151,25 @@ class _Load:
             time.sleep(0.0005)
 
     def wait(self) -> None:
-        """Until it ends by itself."""
+        """Wait until it ends by itself."""
         try:
             self.told = self.process.communicate(timeout=2 * _LONGEST_s)[1]
         finally:
             self.end()
 
     def end(self) -> str:
-        """Make sure that it has ended; what it said."""
+        """Make sure that it has ended; returns what it printed."""
         if self.process.poll() is None:
             self.process.kill()
         self.told = self.told or self.process.communicate()[1] or ""
         return self.told
 
     def status(self) -> LoadStatus:
-        """How far it has come."""
+        """Its progress."""
         return read_status(self._status) if self._status.is_file() else LoadStatus(0, 0, 0, False, {})
 
     def sessions(self) -> list[Path]:
-        """The folders of its sessions."""
+        """Folders of its sessions."""
         return sorted(self._root.iterdir())
 
 
@@ -192,16 +192,17 @@ def _expect(told: str, words: str) -> None:
         raise SessionError(f"the load said {told!r}, not {words!r}", where="full load")
 
 
-# --- what came back ------------------------------------------------------------------------------------------------
+# --- the recovered session
+# ------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class _Found:
-    """What a recording holds of the load.
+    """The part of the load that is in a recording.
 
     Attributes:
-        counts: messages by stream; they are the first ones of the stream, in order and unchanged.
-        drops, late: messages that the recorder says it dropped, and that came late.
+        counts: number of messages by stream; they are the first ones of each stream, in order and unchanged.
+        drops, late: messages that the recorder reports as dropped, and messages that were late.
     """
 
     counts: Counter[str]
@@ -210,13 +211,13 @@ class _Found:
 
 
 def _figures(load: _Load, recover_into: Path | None = None) -> dict[str, Any]:
-    """Recover the only session of a load and compare, message by message. Raises SessionError."""
+    """Recover the only session of a load and compare it message by message. Raises SessionError."""
     (session,) = load.sessions()
     recovery = recover(session, recover_into)
     found, status = _read(recovery.folder or session), load.status()
     losses = {stream: _lost_ms(load, status, stream, found.counts[stream]) for stream in STREAMS}
     worst = max(losses.values())
-    full = "full" in load.told  # then the last moments are what did not fit, and what came while that was noticed
+    full = "full" in load.told  # the lost end is then what did not fit, plus what arrived until this was noticed
     if worst > ALLOWED_LOSS_ms and not full:
         raise SessionError(f"{worst:.0f} ms lost at the end", where=str(session))
     return {
@@ -233,7 +234,7 @@ def _figures(load: _Load, recover_into: Path | None = None) -> dict[str, Any]:
 
 
 def _read(folder: Path) -> _Found:
-    """Raises SessionError when a message is missing between others, or is not what was sent."""
+    """Raises SessionError if a message is missing between others, or differs from what was sent."""
     session = Session.open(folder)
     counts: Counter[str] = Counter()
     for message in session.traffic().messages():
@@ -248,7 +249,7 @@ def _read(folder: Path) -> _Found:
 
 
 def _lost_ms(load: _Load, status: LoadStatus, stream: str, recovered: int) -> float:
-    """From the first message of a stream that is lost to the end of the load; 0 when none is lost."""
+    """Time from the first lost message of a stream to the end of the load; 0 if none is lost."""
     if recovered >= status.counts[stream]:
         return 0.0
     plain = replace(load.settings, jump_ns=0)

@@ -26,14 +26,17 @@ OUTLINE_m = OUTLINES_m["rectangle"]
 TRUE_POINTS_m = sample_polygon(OUTLINE_m, 0.001)
 MOST_GRASPS = 80
 CLAIRVOYANT, INFORMED = "clairvoyant", "outline known"
-"""Bounds: one knows even the errors of execution beforehand, the other the true outline and how large errors are."""
+"""Bounds: one policy knows even the errors of execution in advance, the other the true outline and the size of
+errors.
+"""
 
 _SHIFT_m, _TURN_rad = 0.006, float(np.deg2rad(8.0))
 
 
 def palms_called(name: str, seed: int) -> Array:
-    """Palm poses relative to the object, rows (x m, y m, yaw rad): "10", "10 shifted" (each also moved by 6 mm and 8
-    degrees), or "100" at random around the object, new for every seed."""
+    """Palm poses relative to the object, as pose vectors (x m, y m, yaw rad): "10", "10 shifted" (each displaced by 6
+    mm and 8 degrees), or "100" at random around the object, new for every seed.
+    """
     if name == "100":
         rng = np.random.default_rng([seed, 100])
         spread = rng.uniform([-0.035, -0.010, 0.0], [0.035, 0.010, 2 * np.pi], (100, 3))
@@ -53,7 +56,9 @@ def fixed_settings(grasps: int) -> list[Setting]:
 
 
 def moving_settings(grasps: int) -> list[Setting]:
-    """Table 4.3: the thesis's filter with its policies, then all with the default method, and ours told the outline."""
+    """Table 4.3: the thesis's filter with its policies, then all policies with the default method, and ours knowing the
+    outline.
+    """
     shape = ("random", "variance", "clusters", "entropy", "igef")
     everyone = (*shape, "det", "det-modes", "kl", "mutual-information", "renyi", "information", INFORMED)
     return [
@@ -63,7 +68,7 @@ def moving_settings(grasps: int) -> list[Setting]:
 
 
 def explore_fixed(cell: Cell) -> dict[str, Any]:
-    """Pose known and fixed. Cell: candidates, policy, grasps (the budget)."""
+    """Explore an object at a known, fixed pose. Cell: candidates, policy, grasps (the budget)."""
     hand = PlanarHand(OUTLINE_m, np.random.default_rng([cell.seed, 6]))
     palms = palms_called(cell["candidates"], cell.seed)
     if cell["policy"] == CLAIRVOYANT:
@@ -74,7 +79,9 @@ def explore_fixed(cell: Cell) -> dict[str, Any]:
 
 
 def explore_moving(cell: Cell) -> dict[str, Any]:
-    """Pushed at full motion noise by every grasp, ten candidates. Cell: tracking, policy, grasps (the budget)."""
+    """Explore an object that every grasp pushes with full motion noise; ten candidates. Cell: tracking, policy, grasps
+    (the budget).
+    """
     hand = PlanarHand(OUTLINE_m, np.random.default_rng([cell.seed, 16]))
     thing = MovingObject.track_by(cell["tracking"], hand, cell.seed)
     rng = np.random.default_rng([cell.seed, 15])
@@ -84,14 +91,14 @@ def explore_moving(cell: Cell) -> dict[str, Any]:
 
 @dataclass
 class Exploration:
-    """One run: grasp, place, look, decide. The policy does not know by which definition it is judged.
+    """One run: grasp, estimate the pose, check coverage, decide. The policy does not know the definition of coverage.
 
     Attributes:
-        thing: what is explored.
-        palms: candidates relative to it.
-        definitions: of what counts as explored; the run ends when the goal is reached by all of them.
-        policy_name: who decides.
-        rng: of the decisions.
+        thing: the object to explore.
+        palms: candidate poses relative to it.
+        definitions: definitions of coverage; the run ends when the goal is reached by all of them.
+        policy_name: name of the policy.
+        rng: random numbers for the decisions.
     """
 
     thing: ExploredObject
@@ -119,7 +126,7 @@ class Exploration:
         return self._figures()
 
     def _record_coverage(self, known: ExploredMap | None, count: int) -> bool:
-        """Take note of what is explored; whether that is enough by all definitions."""
+        """Record the coverage; returns whether the goal is reached by all definitions."""
         self._shares.append(self._coverage(known))
         for definition, share in self._shares[-1].items():
             if share >= GOAL:
@@ -133,7 +140,7 @@ class Exploration:
         return {each: float(known.explored_points(each, true_points).mean()) for each in self.definitions}
 
     def _decide(self, policy: Policy | None, known: ExploredMap | None) -> Decision:
-        """The policy's choice, and how long it took; before any contact, chance."""
+        """The policy's choice, and its computing time; random before the first contact."""
         if known is None:
             return Decision(self.policy_name, "nothing", None, (), "nothing has been touched yet")
         belief = self.thing.belief(known, self.rng)
@@ -150,7 +157,7 @@ class Exploration:
         return Surface.of(Contour(points, np.zeros(len(points)), is_closed=True))
 
     def _kept_promises(self) -> list[list[float]]:
-        """What was promised and what came of it by definition B, decision by decision."""
+        """The predicted and the actual gain of each decision, by definition B."""
         shares = [share["B"] for share in self._shares]
         gained = np.diff(shares).tolist()
         return [[p, g] for p, g in zip(self._promises, gained, strict=False) if p is not None]

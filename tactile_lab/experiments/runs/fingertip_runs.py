@@ -1,4 +1,6 @@
-"""Calibrations of a force fingertip from simulated wrenches: how far off, and whether their regions tell so."""
+"""Calibrations of a force fingertip from simulated wrenches: their errors, and whether confidence regions contain the
+truth.
+"""
 
 from __future__ import annotations
 
@@ -41,9 +43,9 @@ CONTACT_m = 1e-4
 def calibrate_fingertip(cell: Cell) -> Mapping[str, Any]:
     """Draw a fingertip and its wrenches, fit, and compare with the truth.
 
-    The sensor is mounted at any angle about the finger and a little askew; masses are 4 to 20 g; the ellipsoid is off
-    by 1 mm per coordinate; every joint of the finger by 0.6 degrees; forces slide 9 to 23 degrees from the plate's
-    normal; readings drift as those of a Nano17, 10 mN and 0.05 N mm.
+    The sensor is mounted at any angle about the finger and slightly askew; masses are 4 to 20 g; the ellipsoid is off
+    by 1 mm per coordinate, and every joint of the finger by 0.6 degrees; friction tilts forces by 9 to 23 degrees from
+    the plate's normal; readings drift like those of a Nano17, by 10 mN and 0.05 N mm.
     """
     rng = np.random.default_rng(cell.seed)
     truth = draw(rng)
@@ -52,7 +54,7 @@ def calibrate_fingertip(cell: Cell) -> Mapping[str, Any]:
 
 
 def draw(rng: np.random.Generator) -> FingertipCalibration:
-    """A fingertip that is not as it was meant to be."""
+    """Draw a fingertip that differs from its nominal parameters."""
     lean, turn = ASKEW_rad * rng.standard_normal(2), float(rng.uniform(-np.pi, np.pi))
     shape = np.array([*NOMINAL.centre_distal_m, *NOMINAL.semi_axes_m]) + SHAPE_m * rng.standard_normal(6)
     com = np.array(NOMINAL.com_distal_m) + 2e-3 * rng.standard_normal(3)
@@ -70,9 +72,11 @@ def draw(rng: np.random.Generator) -> FingertipCalibration:
 
 
 def recording(truth: FingertipCalibration, rng: np.random.Generator, presses: int = 10) -> FingertipData:
-    """What the station would record of a fingertip: every planned step, and each press with the moment before it."""
+    """A fingertip's recording as the measurer would make it: every planned step, and each press with the moment before
+    it.
+    """
     bias_rad = JOINT_BIAS_rad * rng.standard_normal(len(JOINTS))
-    bias_rad[[JOINT_INDEX[joint] for joint in WRIST]] = 0.0  # the forearm's calibration has taken it in
+    bias_rad[[JOINT_INDEX[joint] for joint in WRIST]] = 0.0  # the forearm's calibration has absorbed it
     free, pressed, times = [], [], []
     for index, planned in enumerate(plan_wrenches(FINGER, presses)):
         turned = _orientations(planned, bias_rad)
@@ -99,7 +103,7 @@ def _poses(
 
 
 def _orientations(planned: PlannedWrench, bias_rad: Array) -> tuple[Array, Array]:
-    """The distal frame in the world, as it stands and as it is measured, shape (3, 3) each."""
+    """The true and the measured orientation of the distal frame in the world, shape (3, 3) each."""
     joints = pointing_vector(FINGER)
     if isinstance(planned, PlannedFree):
         base_q = planned.base_q(Pose3(), joints)
@@ -111,7 +115,7 @@ def _orientations(planned: PlannedWrench, bias_rad: Array) -> tuple[Array, Array
 
 
 def _force(up: Array, rng: np.random.Generator) -> Array:
-    """A press's force, distal frame, off the plate's normal by friction, any way."""
+    """The force of a press, distal frame, tilted from the plate's normal by friction in a random direction."""
     sideways = np.cross(up, rng.standard_normal(3))
     turn = Rot3.Expmap(rng.uniform(*SLIDING_rad) * sideways / np.linalg.norm(sideways))
     return np.asarray(rng.uniform(*PRESSES_N) * turn.matrix() @ up)
@@ -120,7 +124,7 @@ def _force(up: Array, rng: np.random.Generator) -> Array:
 def _wrench(
     truth: FingertipCalibration, world_R_distal: Array, press_N: Array | None, rng: np.random.Generator
 ) -> Array:
-    """What acts on the sensor, sensor frame, shape (6,)."""
+    """The load on the sensor, sensor frame, shape (6,)."""
     mounting, up = truth.distal_T_sensor.pose(), world_R_distal[2]
     place, rotation = np.asarray(mounting.translation()), mounting.rotation().matrix()
     weight = -truth.mass_kg * GRAVITY * up

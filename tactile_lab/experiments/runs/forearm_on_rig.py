@@ -1,8 +1,8 @@
-"""The forearm's calibration as the wizard makes it, on the simulated rig with its physics, against the rig's truth.
+"""The wizard's calibration of the forearm on the simulated rig with its physics, compared with the rig's truth.
 
-Everything is the wizard's own: plan, station, check of the motion, solution and verdict, as ``calibrate forearm --rig
-sim --no-input`` has them. Only the rig is worse than the one that ships: its mount stands elsewhere than its file says,
-and the wrist's joints are off as the fingers' are.
+Plan, measurer, motion check, solution and verdict are the wizard's own, as with ``calibrate forearm --rig sim
+--no-input``. Only the rig is worse than the packaged one: its mount is not where its file says, and the wrist's joints
+have the same bias as the fingers'.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from tactile_lab.workflow.calibrating_forearm import ForearmRequest, forearm_wiz
 
 RIG = "sim"
 PLACE_m, TURN_rad = 0.005, float(np.radians(0.5))
-"""How far the mount is from where the rig's file has it, one standard deviation per axis: a guess by tape measure."""
+"""Distance of the mount from its pose in the rig's file, one standard deviation per axis: as if measured by tape."""
 
 _NOT_FELT: Mapping[str, Any] = {"errors_mm": [], "errors_deg": [], "inside": None}
-_TOUCHED_FACES = 5  # of the shipped rig's geometry: the table's top and its four edges
+_TOUCHED_FACES = 5  # in the packaged rig's geometry: the top of the table and its four edges
 
 
 def calibrate_on_rig(cell: Cell) -> Mapping[str, Any]:
     """One run of the wizard. Cell: method, poses."""
-    rng = np.random.default_rng((cell.seed, 1))  # draws of its own beside those of the rig and its board
+    rng = np.random.default_rng((cell.seed, 1))  # random numbers independent of those for the rig and its board
     rig, method, poses = displaced_rig(rng), str(cell["method"]), int(cell["poses"])
     request = ForearmRequest(rig, method, cell.seed, touches=poses // _TOUCHED_FACES, pictures=poses)
     with forearm_wizard(request, NullTraffic()) as (wizard, measurer):
@@ -49,7 +49,7 @@ def calibrate_on_rig(cell: Cell) -> Mapping[str, Any]:
 
 
 def displaced_rig(rng: np.random.Generator) -> Rig:
-    """The shipped rig with its mount off and its wrist's joints off, by what is drawn."""
+    """The packaged rig with random errors of its mount and of its wrist's joints."""
     rig = load_rig(RIG)
     off = Pose3.Expmap(np.repeat([TURN_rad, PLACE_m], 3) * rng.standard_normal(6))
     (x, y, z), (roll, pitch, yaw) = off.translation().tolist(), off.rotation().xyz().tolist()
@@ -63,7 +63,9 @@ def displaced_rig(rng: np.random.Generator) -> Rig:
 
 
 def rougher(data: ForearmData, rng: np.random.Generator) -> ForearmData:
-    """The touches with contact points a further millimetre off per axis: the rig's own sensors are better than that."""
+    """The touches with an additional error of a millimetre per axis, because the rig's own sensors are better than
+    that.
+    """
     added = CONTACT_SIGMA_m**2 * np.eye(3)
     touches = tuple(
         replace(
@@ -92,7 +94,7 @@ def _figures(data: ForearmData, settings: WizardSettings, truth: Pose3) -> dict[
 
 
 def _stated_error(result: ForearmResult) -> dict[str, float]:
-    """The error that the result expects of itself, root mean square."""
+    """The root mean square error that the result itself states."""
     covariance = result.solution.covariance
     return {
         "stated_mm": 1e3 * float(np.sqrt(np.trace(covariance[3:, 3:]))),

@@ -1,12 +1,12 @@
-"""Stress test of pose graphs: wrong loops among right ones, and odometry that is no start.
+"""Stress test of pose graphs: wrong loops among right ones, and odometry that is too poor as an initial estimate.
 
-An object is turned 50 times. Odometry is uncertain by 10 mm and 20 degrees a step; loops between random pairs of
-grasps are good to 1 mm and 2 degrees, but a fifth of them are aliases: the object was taken for itself, turned by
-90 or 180 degrees about some point. Compared are gtsam's solvers as they come, started from odometry; the same told
-which loops are right ("oracle"); and :func:`tactile_lab.slam.graph.robust.solve_robustly`.
+An object is turned 50 times. Odometry is uncertain by 10 mm and 20 degrees per step; loops between random pairs of
+grasps are accurate to 1 mm and 2 degrees, but a fifth of them are aliases: they match the object with itself rotated by
+90 or 180 degrees about some point. The test compares gtsam's solvers with their default settings, started from
+odometry; the same solvers knowing the right loops ("oracle"); and :func:`tactile_lab.slam.graph.robust.solve_robustly`.
 
-The number of loops, the object's own motion and the place of the aliases' centre were chosen once so that the
-stock solvers show the figures known from an earlier study of this setting (``docs/results/graph-stress.md``).
+The number of loops, the object's own motion and the place of the aliases' centre were chosen once so that the stock
+solvers reproduce the figures of an earlier study of this setting (``docs/results/graph-stress.md``).
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ ALIASES_rad = np.deg2rad([90.0, 180.0, -90.0])
 
 @dataclass(frozen=True)
 class StressSettings:
-    """The setting.
+    """Settings of the test.
 
     Attributes:
         grasps: number of poses.
         loops: number of loops, between random different pairs at least two apart.
-        wrong_share: probability of a loop to be an alias.
-        motion_m: the object's true motion a step, standard deviation per axis; it turns by up to 25 degrees.
-        alias_centre_m: standard deviation, per axis, of the point an alias turns about.
+        wrong_share: probability that a loop is an alias.
+        motion_m: the object's true motion per step, standard deviation per axis; it turns by up to 25 degrees.
+        alias_centre_m: standard deviation, per axis, of the point about which an alias is rotated.
     """
 
     grasps: int = 50
@@ -130,7 +130,7 @@ def _solve_with_right_loops(graph: StressGraph) -> Array:
 
 
 def _solve_with_truth(graph: StressGraph) -> Array:
-    """What the data hold: no solver can be expected to do better."""
+    """Solve with the right loops, starting at the truth: no solver can be expected to do better."""
     right = [loop for loop, wrong in zip(graph.loops, graph.wrong, strict=True) if not wrong]
     return solve(graph.odometry, right, graph.rows)
 

@@ -1,8 +1,9 @@
-"""Exploration by the simulated hand: policies over the hand's own candidates, whole sessions, truth for judging only.
+"""Exploration by the simulated hand: policies over the hand's own candidates in whole sessions; truth for evaluation
+only.
 
 Hand, sensors, contacts and friction are the simulated rig's; see
-:mod:`tactile_lab.experiments.runs.kinematic_exploration` for the same without physics. What counts as explored stands
-in :mod:`tactile_lab.experiments.runs.coverage_monitor`.
+:mod:`tactile_lab.experiments.runs.kinematic_exploration` for the same without physics.
+:mod:`tactile_lab.experiments.runs.coverage_monitor` defines what counts as explored.
 """
 
 from __future__ import annotations
@@ -64,15 +65,15 @@ def explore_by_hand(cell: Cell) -> dict[str, Any]:
 
 
 def estimation(rig: Rig, cell: Cell) -> TactileSlam:
-    """The best method, told how the rig's objects move."""
+    """The default method, with the motion noise of the rig's objects."""
     wanted = {"method": "joint", "dimension": cell["dimension"], "motion": rig.description.motion.model_dump()}
     return TactileSlam(SlamSettings.model_validate(wanted), cell.seed)
 
 
 def conductor_settings(rig: Rig, cell: Cell) -> SessionSettings:
-    """Those of the rig, with the cell's policy; every grasp is an action at least.
+    """The rig's settings, with the cell's policy; every grasp is at least one action.
 
-    The objects are known to be low: nothing is felt before the first grasp, as in the thesis.
+    The objects are known to be low, so there is no probing before the first grasp, as in the thesis.
     """
     own = rig.description.conductor
     exploration = own.exploration.model_copy(update={"policy": cell["policy"]})
@@ -81,11 +82,11 @@ def conductor_settings(rig: Rig, cell: Cell) -> SessionSettings:
 
 
 class Watch(NullProgress):
-    """Shows a running session on the simulated rig to its monitor.
+    """Passes the state of a running session on the simulated rig to its monitor.
 
     Args:
         world: the truth.
-        monitor: of the session.
+        monitor: the session's monitor.
     """
 
     def __init__(self, world: SimulatedWorld, monitor: CoverageMonitor) -> None:
@@ -100,5 +101,5 @@ class Watch(NullProgress):
         self._captured = name == "capture"
 
     def grasp_done(self, report: GraspReport) -> None:
-        """See what is explored now."""
+        """Update the coverage."""
         self._monitor.look((self._world.clock.now_ns() - self._begun_ns) / NANOSECONDS / 60)

@@ -1,4 +1,4 @@
-"""Policies over the hand's own candidates without physics: seconds a session, so that many can be compared.
+"""Policies over the hand's own candidates without physics: a session takes seconds, so that many can be compared.
 
 Planner, candidates, policies, estimation and monitor are those of a session on the simulated rig
 (:mod:`tactile_lab.experiments.runs.hand_exploration`); the grasps are done by
@@ -58,7 +58,7 @@ def _session(
     monitor: CoverageMonitor,
     settings: SessionSettings,
 ) -> str:
-    """Grasps until the decisions end it, or the object is lost by the limits of a session; how it ended."""
+    """Grasp until the decisions end the session, or its limits say that the object is lost; returns how it ended."""
     missed = empty = 0
     while True:
         index = len(monitor.grasps)

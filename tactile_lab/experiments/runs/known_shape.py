@@ -1,10 +1,10 @@
-"""Following an object whose shape is known: how well a trajectory can be told from the contacts at all.
+"""Tracking an object of known shape: how well contacts can determine a trajectory at best.
 
-As known poses are the limit of the shape, the known shape is the limit of the tracking: a method that has to find out
-both can hardly follow an object better than one that is told the shape, the first pose and the sizes of all noise. The
-posterior over trajectories is sampled: a particle filter forwards, and trajectories drawn through its particles
-backwards. What is judged is the trajectory with the smallest expected error, each of its poses averaged with those that
-place the grasp alike: an average over everything would lie between two places.
+Known poses give a bound for the shape; a known shape gives a bound for the tracking. A method that has to estimate both
+can hardly track an object better than one that knows the shape, the first pose and all noise levels. The posterior over
+trajectories is sampled by a particle filter forwards, and by drawing trajectories through its particles backwards. The
+result is the trajectory with the smallest expected error. Each of its poses is averaged only with poses that place the
+grasp in the same way, because an average over all would lie between two modes.
 """
 
 from __future__ import annotations
@@ -43,18 +43,18 @@ _TRAJECTORIES = 200
 _GRID_m, _MARGIN_m = 0.0015, 0.020
 _SURFACE_SIGMA_m = 0.0003
 _INSIDE_m = 0.003
-"""A place that was free lies no deeper in the object than this, noise of poses and contacts allowed for."""
+"""A place known to be free lies no deeper in the object than this; allows for noise of poses and contacts."""
 
 _FORBIDDEN_nats = 12.0
 _FIRST_SIGMA = np.array([1e-4, 1e-4, 1e-3])
-"""The first pose is told: it only fixes the frame. So much that particles differ."""
+"""The first pose is given, since it only fixes the frame; this small spread makes particles differ."""
 
 _JITTER = np.array([3e-4, 3e-4, 3e-3])
-"""Particles that were drawn twice part by a third of what a grasp can tell."""
+"""Particles drawn twice are separated by a third of the uncertainty that a grasp leaves."""
 
 _NEGLIGIBLE = 1e-7
 _ALIKE_m = 0.015
-"""Poses that place a grasp's contacts so close to each other are the same place on the object."""
+"""Poses that place a grasp's contacts this close together count as the same place on the object."""
 
 
 def follow_known_shape(cell: Cell) -> dict[str, Any]:
@@ -75,7 +75,7 @@ def follow_known_shape(cell: Cell) -> dict[str, Any]:
 
 
 def _frame(data: spatial_data.SpatialGrasps) -> Pose3:
-    """Of the object: where the first contacts' centre is, about which it slips."""
+    """The object's frame, at the centre of the first contacts, about which it slips."""
     middle = data.grasps[0].points_world_m.mean(axis=0)
     return Pose3(Rot3(), data.world_T_body[0].transformTo(middle))
 
@@ -110,7 +110,7 @@ class _Follower:
 
         Args:
             grasps: in order.
-            first: pose at the first of them, a row.
+            first: pose at the first of them, as a pose vector.
         """
         beliefs = self._filter(grasps, first)
         motions = [planar_motion(grasp.hand_motion_world) for grasp in grasps]
@@ -135,7 +135,7 @@ class _Follower:
         return beliefs
 
     def _log_likelihood(self, rows: Array, grasp: Grasp) -> Array:
-        """Of contacts, and of the places that fingers went through."""
+        """Log likelihood of the contacts, and of the free space that fingers passed."""
         contacts = ContactSet.of_grasp(grasp, 3, self.height_m)
         found = np.zeros(len(rows))
         if len(contacts):
@@ -159,21 +159,23 @@ class _Follower:
         return np.stack(rows[::-1], axis=1)
 
     def _before(self, row: Array, moved: Array, weights: Array) -> int:
-        """One of the particles before, by how likely it led to a pose."""
+        """Draw one of the previous particles by the probability that it led to a pose."""
         away = deviation(moved, row) / self.noise.sigmas
         likely = weights * np.exp(-0.5 * np.sum(away**2, axis=1)) + np.finfo(float).tiny
         return int(np.searchsorted(np.cumsum(likely), self.rng.random() * likely.sum()))
 
 
 def _average(rows: Array, middle: int, placed_m: Array) -> Array:
-    """The mean of the poses, shape (s, 3), that place a grasp's contacts, shape (s, n, 3), as one of them does."""
+    """The mean of those poses, shape (s, 3), that place a grasp's contacts, shape (s, n, 3), like a given one of
+    them.
+    """
     away_m = np.linalg.norm(placed_m - placed_m[middle], axis=2).max(axis=1, initial=0.0)
     alike = rows[away_m <= _ALIKE_m]
     return np.asarray(rows[middle] + deviation(alike, rows[middle]).mean(axis=0))
 
 
 def _apart(placed_m: Array) -> Array:
-    """RMS distance of contacts between each two of the trajectories that place them, shape (s, n, 3) to (s, s)."""
+    """RMS distance of the contacts between each pair of trajectories, shape (s, n, 3) to (s, s)."""
     flat = placed_m.reshape(len(placed_m), -1)
     squared = np.sum(flat**2, axis=1)
     return np.asarray(np.sqrt(np.maximum(squared[:, None] + squared - 2 * flat @ flat.T, 0.0) / placed_m.shape[1]))

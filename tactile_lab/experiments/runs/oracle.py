@@ -1,7 +1,7 @@
-"""How few grasps would do if all were known beforehand, even the errors of execution: a bound for every policy.
+"""The smallest number of grasps if all is known in advance, even the errors of execution: a bound for every policy.
 
-Each candidate is executed several times before the run; the errors stay as they came. A beam search picks the fewest
-of these executions whose contacts explore the contour: first by what each explores alone, then judged together.
+Each candidate is executed several times before the run, with random errors. A beam search selects the fewest of these
+executions whose contacts explore the contour: first by what each of them explores alone, then together.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ def fewest_grasps(
     """Smallest number of grasps found that explores the share ``goal`` of the contour; ``most`` if none does.
 
     Args:
-        hand: executes on the object at the origin.
+        hand: executes grasps on the object at the origin.
         palms: candidates, shape (n, 3).
-        definition: of what counts as explored.
+        definition: definition of coverage.
         true_points_m: of the contour, shape (m, 2).
-        goal: share of them.
-        most: where the search ends.
+        goal: share of them to explore.
+        most: largest number of grasps to try.
     """
     repeats = max(1, _EXECUTIONS // len(palms))
     grasps = [hand.grasp(0, Pose2(*palm), Pose2()) for palm in np.repeat(palms, repeats, axis=0)]
@@ -49,7 +49,7 @@ def fewest_grasps(
 def _extend(
     beam: list[tuple[NDArray[np.bool_], Chosen]], alone: NDArray[np.bool_]
 ) -> list[tuple[NDArray[np.bool_], Chosen]]:
-    """The sets of one grasp more that cover most."""
+    """The sets with one more grasp that cover most."""
     found: dict[Chosen, NDArray[np.bool_]] = {}
     for covered, chosen in beam:
         gains = (alone & ~covered).sum(axis=1)

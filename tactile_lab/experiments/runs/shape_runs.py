@@ -41,20 +41,22 @@ def contour_of_random_contacts(cell: Cell) -> dict[str, Any]:
 
 
 def mesh_of_random_contacts(cell: Cell) -> dict[str, Any]:
-    """As :func:`contour_of_random_contacts` for a solid that is touched from all sides."""
+    """As :func:`contour_of_random_contacts`, for a solid that is touched from all sides."""
     data = spatial_data.random_contacts(cell["shape"], MOST_CONTACTS, cell.seed, foot=True)
     shape, seconds = _fit(_first_contacts(data, cell["contacts"], 3), cell["model"])
     return {**mesh_figures(shape.mesh(), data.mesh), "model": shape.name, "fit_ms": 1e3 * seconds}
 
 
 def _first_contacts(data: SimulatedGrasps, count: int, dimension: int) -> ContactSet:
-    """The first contacts in the world, which for random contacts is the object's frame but for its height."""
+    """The first contacts in the world frame, which for random contacts differs from the object's frame only in
+    height.
+    """
     sets = [ContactSet.of_grasp(grasp, dimension, 0.0) for grasp in data.grasps]
     return ContactSet.concatenate(sets).select(np.arange(count))
 
 
 def _fit(contacts: ContactSet, model: str) -> tuple[FittedShape, float]:
-    """A shape model with its kernel optimised, and the seconds that took."""
+    """Fit a shape model with its kernel optimized; also returns the computing time, seconds."""
     started = time.perf_counter()
     gpis = Gpis.fit(
         contacts.points_m, contacts.normals, contacts.point_sigma_m, contacts.normal_sigma_rad, SHAPE_MODELS[model]

@@ -1,7 +1,7 @@
-"""What grasps can tell of a solid with flat faces on a table, at known poses and at estimated ones.
+"""How well grasps can determine a solid with flat faces on a table at best, with known and with estimated poses.
 
-As :mod:`contact_limit` has it. Known besides are the table, and so the foot; regular solids have upright walls and a
-level top.
+Uses :mod:`contact_limit`. The table, and so the underside, is also known; regular solids have vertical walls and a
+horizontal top.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 from tactile_lab.slam.tracking.faces.flat_faces import tangents
 
 _DECIMALS = 6
-"""Triangles whose planes agree so far are one face."""
+"""Triangles whose planes agree this well form one face."""
 
 _UPRIGHT, _LEVEL = 0.99, 0.01
 _NORMAL_WEIGHT_m = 1e-3
-"""A place on an edge belongs to the face whose normal is the contact's; elsewhere its own distance decides."""
+"""Weight of the normal in assigning contacts to faces: on an edge the normal decides, elsewhere the distance."""
 
 
 def limit_of_solid(cell: Cell) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def _faces(mesh: trimesh.Trimesh) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def _sides(mesh: trimesh.Trimesh, faces: Array, *, regular: bool) -> FlatSides:
-    """All faces may turn and be displaced but the foot, which stands on the table."""
+    """All faces may rotate and move but the underside, which is on the table."""
     normals, distances = faces[:, :3], faces[:, 3]
     foot = normals[:, 2] < -_UPRIGHT
     turning = _turning_upright(normals) if regular else _turning_freely(normals, ~foot)
@@ -68,14 +68,14 @@ def _sides(mesh: trimesh.Trimesh, faces: Array, *, regular: bool) -> FlatSides:
 
 
 def _turning_freely(normals: Array, loose: NDArray[np.bool_]) -> Array:
-    """Each loose face about both of its tangents."""
+    """Each free face may rotate about both of its tangents."""
     each = np.eye(len(normals))[:, loose]
     both = tangents(normals)
     return np.concatenate([both[:, :, axis, None] * each[:, None, :] for axis in (0, 1)], axis=2)
 
 
 def _turning_upright(normals: Array) -> Array:
-    """Walls about the vertical, those together that are parallel or at right angles."""
+    """Walls may rotate about the vertical; parallel and perpendicular ones rotate together."""
     walls = np.abs(normals[:, 2]) < _LEVEL
     shared = together(np.arctan2(normals[walls, 1], normals[walls, 0]))
     groups = np.zeros((len(normals), shared.shape[1]))
@@ -92,7 +92,7 @@ def _touched_faces(session: SeenSession, mesh: trimesh.Trimesh, sides: FlatSides
 
 
 def _surface(corners_m: Array, mesh: trimesh.Trimesh) -> SurfaceMesh:
-    """The solid with other corners."""
+    """The solid with its corners displaced."""
     moved = trimesh.Trimesh(corners_m, mesh.faces, process=False)
     normals = np.asarray(moved.vertex_normals)
     return SurfaceMesh(corners_m, np.asarray(mesh.faces), np.zeros(len(corners_m)), normals, is_closed=True)

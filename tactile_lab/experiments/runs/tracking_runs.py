@@ -30,7 +30,7 @@ _Data = TypeVar("_Data", bound=SimulatedGrasps)
 Figures: TypeAlias = Callable[[_Data, SlamResult], dict[str, Any]]
 
 WITHOUT_GRAPH = "particle, no graph"
-"""The calibrated filter whose poses the pose graph does not correct."""
+"""The calibrated filter without corrections by the pose graph."""
 
 _LEAST_NOISE = 0.05
 _DRIFT_SIGMAS = np.array([0.0025, 0.0025, np.deg2rad(3.0)])
@@ -38,7 +38,9 @@ _KERNEL_STEPS = 30
 
 
 def track_in_plane(cell: Cell) -> dict[str, Any]:
-    """A method on planar grasps. Cell: shape, noise (percent), outliers (percent), method, grasps, particles."""
+    """Evaluate a method on planar grasps. Cell: shape, noise (percent), outliers (percent), method, grasps,
+    particles.
+    """
     data = planar_data.simulate(
         cell["shape"],
         cell.seed,
@@ -50,21 +52,23 @@ def track_in_plane(cell: Cell) -> dict[str, Any]:
 
 
 def track_on_table(cell: Cell) -> dict[str, Any]:
-    """A method on grasps of a solid. Cell: as in the plane, without outliers."""
+    """Evaluate a method on grasps of a solid. Cell: as in the plane, without outliers."""
     scale = cell["noise"] / 100
     data = spatial_data.simulate(cell["shape"], cell.seed, motion_scale=scale, count=cell["grasps"])
     return _track(data, cell, dimension=3)
 
 
 def track_in_space(cell: Cell) -> dict[str, Any]:
-    """A method on grasps of a solid that is held free, with all six degrees of freedom. Cell: as on the table."""
+    """Evaluate a method on grasps of a solid held free in space, with all six degrees of freedom. Cell: as on the
+    table.
+    """
     scale = cell["noise"] / 100
     data = spatial_data.simulate(cell["shape"], cell.seed, motion="free", motion_scale=scale, count=cell["grasps"])
     return _track(data, cell, dimension=3, freedom="space")
 
 
 def track_everyday_thing(cell: Cell) -> dict[str, Any]:
-    """A method on grasps all over a thing on the table, judged where it was touched. Cell: as on the table."""
+    """Evaluate a method, where it was touched, on grasps all over a thing on the table. Cell: as on the table."""
     scale = cell["noise"] / 100
     data = spatial_data.simulate(cell["shape"], cell.seed, motion_scale=scale, count=cell["grasps"], heights="all")
     return _track(data, cell, dimension=3, figures=touched_figures)
@@ -85,7 +89,7 @@ def _track(
 
 
 def _slam_settings(cell: Cell, dimension: int, freedom: str) -> SlamSettings:
-    """The method is told the noise of the motion, as the thesis's simulations tell theirs."""
+    """The method knows the noise of the motion, as in the thesis's simulations."""
     scale, method = max(cell["noise"] / 100, _LEAST_NOISE), cell["method"]
     given: dict[str, Any] = {
         "method": "particle" if method == WITHOUT_GRAPH else method,
@@ -103,7 +107,7 @@ def _slam_settings(cell: Cell, dimension: int, freedom: str) -> SlamSettings:
 def correct_by_loops(cell: Cell) -> dict[str, Any]:
     """Drifting poses corrected by a pose graph with some of its loops. Cell: shape, constraints, grasps.
 
-    The drift is a random walk of 2.5 mm per axis and 3 degrees a grasp, what a filter that barely works leaves.
+    The drift is a random walk of 2.5 mm per axis and 3 degrees per grasp, as with a filter that barely works.
     """
     data = planar_data.simulate(cell["shape"], cell.seed, count=cell["grasps"])
     rng = np.random.default_rng([cell.seed, 315])
@@ -125,7 +129,7 @@ def correct_by_loops(cell: Cell) -> dict[str, Any]:
 
 
 def _outline(contact_map: ContactMap) -> Contour | None:
-    """Of the shape that the contacts make most probable; None if they enclose nothing."""
+    """The outline of the most probable shape given the contacts; None if they enclose nothing."""
     try:
         return best_shape(contact_map.with_best_kernel(_KERNEL_STEPS).fit()).contour()
     except ShapeError:
@@ -133,7 +137,7 @@ def _outline(contact_map: ContactMap) -> Contour | None:
 
 
 def _drifting_map(data: planar_data.PlanarGrasps, rng: np.random.Generator) -> ContactMap:
-    """The grasps at their true poses moved by a random walk in the object's frame; the first stays."""
+    """The grasps at their true poses plus a random walk in the object's frame; the first one is unchanged."""
     drift, placed = np.zeros(3), []
     for grasp, pose in zip(data.grasps, data.world_T_body, strict=True):
         row = compose(planar_motion(pose), drift)

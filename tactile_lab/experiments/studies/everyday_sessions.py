@@ -1,8 +1,8 @@
-"""Whole sessions of the simulated hand on everyday objects, standing and lying, as a user would run them.
+"""Whole sessions of the simulated hand on everyday objects, standing and lying, with a user's settings.
 
-Nothing is known of an object before: the session is the default one of the rig, with the estimation ``joint``. Judged
-are how it ended, with what force fingertips really touched before and in a grasp, whether the object was left where it
-stood, and the model.
+Nothing is known of an object in advance: each session has the rig's default settings, with the estimation ``joint``.
+Evaluated are how it ended, the true forces of fingertips before and during a grasp, whether the object stayed where it
+was, and the model.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from tactile_lab.workflow.running import slam_settings
 
 RIG, GRASPS = "sim", 16
 LOW = "cube-6"
-"""An object of the rig's own, to compare with."""
+"""An object of the simulated rig, for comparison."""
 
 SCANS = tuple(YCB_PREFIX + name for name in (*YCB_NAMES, *MORE_YCB_NAMES))
 LAID = ("bottle", "cup")
@@ -99,7 +99,7 @@ def explore_everyday(cell: Cell) -> dict[str, Any]:
 
 
 class ForceWatch(NullProgress):
-    """Sees what fingertips really press with, and where the object is, in a running session.
+    """Records the true forces of fingertips, and the object's true pose, in a running session.
 
     Args:
         world: the truth.
@@ -121,14 +121,14 @@ class ForceWatch(NullProgress):
         self._phase = name
 
     def on_sample(self, link: str, sample: object) -> None:
-        """Look at the truth once a cycle."""
+        """Record the truth once per cycle."""
         if link == HAND_LINK:
             grasping = self._phase in ("close", "capture", "squeeze", "re-orient", "release")
             forces_N = [contact.force_N for contact in self._world.truth().contacts]
             self._most_N[grasping] = max([self._most_N[grasping], *forces_N])
 
     def figures(self) -> dict[str, Any]:
-        """Forces, how far the object was moved, and the session's simulated time."""
+        """Forces, displacement of the object, and simulated time of the session."""
         moved = self._first.inverse() * self._world.truth().world_T_object
         return {
             "outside_N": self._most_N[False],

@@ -1,4 +1,4 @@
-"""Which grasp is next: tables of the thesis, and the simulated hand."""
+"""Experiments on the choice of the next grasp: tables of the thesis, and the simulated hand."""
 
 from __future__ import annotations
 

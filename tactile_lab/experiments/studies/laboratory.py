@@ -1,4 +1,4 @@
-"""What the laboratory rests on: camera, pose graph, calibration, recording."""
+"""Experiments on the laboratory's foundations: camera, pose graph, calibration, recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tracking and shape in the plane."""
+"""Experiments on tracking and shape in the plane."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tracking and shape of solids, on a table and held free."""
+"""Experiments on tracking and shape of solids, on a table and held free."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SPATIAL_GRASPS = 24
 
 
 def scans_left_out(scans: tuple[str, ...] = SCANNED_SOLIDS) -> str:
-    """Why scanned solids are left out, "" where they are here."""
+    """Why scanned solids are left out, "" if they are available."""
     try:
         for name in scans:
             ycb_path(name.removeprefix(YCB_PREFIX))
@@ -74,7 +74,9 @@ def _kind_of_solid(cell: Cell) -> str:
 
 
 def _followable(cell: Cell) -> str:
-    """Mugs by themselves: contacts cannot tell the turn of a handle that hardly any of them touches."""
+    """Separates mugs from other solids: contacts cannot determine the angle of a handle that hardly any of them
+    touches.
+    """
     return "mugs" if str(cell["shape"]).endswith("mug") else _kind_of_solid(cell)
 
 

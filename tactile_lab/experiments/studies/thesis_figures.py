@@ -1,4 +1,4 @@
-"""Figures of the thesis's chapters 2 and 3 again."""
+"""Reproduces figures of the thesis's chapters 2 and 3."""
 
 from __future__ import annotations
 

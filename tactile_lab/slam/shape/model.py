@@ -12,8 +12,8 @@ class FittedShape(Protocol):
 
     Attributes:
         name: name of the model in settings.
-        log_evidence: logarithm of how probable the model makes the contacts (values and normals), comparable among
-            models that have one; None for models without a likelihood.
+        log_evidence: logarithm of the probability of the contacts (values and normals) under the model, comparable
+            between models; None for models without a likelihood.
     """
 
     @property
@@ -26,12 +26,12 @@ class FittedShape(Protocol):
         """The outline, for contacts in the plane.
 
         Raises:
-            ShapeError: the contacts were in space, or enclose nothing.
+            ShapeError: the contacts are in space, or enclose nothing.
         """
 
     def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
-        """The surface, for contacts in space, ending in a flat foot at the table if its height is given.
+        """The surface, for contacts in space; it ends in a flat foot at the table if its height is given.
 
         Raises:
-            ShapeError: the contacts were in the plane, or enclose nothing.
+            ShapeError: the contacts are in the plane, or enclose nothing.
         """

@@ -1,11 +1,11 @@
-"""Regularities of faces:
+"""Regularities of faces.
 
-right angles, parallel, upright and level faces, if the contacts allow them. Manufactured objects are full of
-regularities. One is accepted if it is the more likely explanation: any angle within a quarter turn costs more than the
-misfit that the regularity adds (Bayes factor, both as likely before). The directions of all faces are one Gaussian
-state; a regularity is an exact measurement of it, with the usual gate, so that information about one wall improves all
-walls related to it. After each one the state is conditioned anew on all of them, linearised where they hold exactly:
-elsewhere a regularity that follows from others would seem informative, and fix what is still undetermined.
+Manufactured objects have right angles and parallel, vertical and horizontal faces. A regularity is accepted if it is
+the more likely explanation: if its misfit costs less than an arbitrary angle within a quarter turn (Bayes factor with
+equal priors). The directions of all faces form one Gaussian state. A regularity is an exact measurement of this state,
+with the usual gate, so that information about one wall improves all walls related to it. After each regularity the
+state is conditioned again on all of them, linearised where they hold exactly. Otherwise a regularity that follows from
+others would seem informative, and would fix what is still undetermined.
 """
 
 from __future__ import annotations
@@ -23,24 +23,26 @@ Kind: TypeAlias = Literal["level", "upright", "parallel", "right angle"]
 
 _LARGEST_TURN_rad = np.deg2rad(15.0)
 _IMPLIED = 1e-6
-"""Share of a variance that is left where a regularity follows from others: rounding."""
+"""Remaining share of a variance, due to rounding, if a regularity follows from others."""
 _ANY_ANGLE_rad = np.pi / 2
 _MOST_STEPS, _EXACT_rad = 8, 1e-9
 
 
 class Stated(NamedTuple):
-    """``gap = rows . directions`` is to vanish, with directions all normals one after the other: (r,) and (r, s d)."""
+    """``gap = rows . directions`` is to vanish, where ``directions`` are all normals one after the other; shapes (r,)
+    and (r, s d).
+    """
 
     gap: Array
     rows: Array
 
 
 class Regularity(NamedTuple):
-    """A relation of two faces, or of a level or upright face to the vertical.
+    """A relation between two faces, or between a horizontal or vertical face and the vertical axis.
 
     Attributes:
         kind: of regularity.
-        face, other: numbers of the faces, the same one twice where the vertical is the other.
+        face, other: numbers of the faces; the same number twice for a relation to the vertical.
     """
 
     kind: Kind
@@ -48,7 +50,7 @@ class Regularity(NamedTuple):
     other: int
 
     def state(self, normals: Array) -> Stated:
-        """At unit normals of shape (s, d), nearly regular."""
+        """The linearised condition at nearly regular unit normals of shape (s, d)."""
         count, dimension = normals.shape
         rows = np.zeros((dimension - 1, count, dimension))
         one, other = normals[self.face], normals[self.other]
@@ -68,13 +70,13 @@ class Regularity(NamedTuple):
 
 @dataclass(frozen=True)
 class RegularNormals:
-    """Normals that meet regularities.
+    """Normals that satisfy regularities.
 
     Attributes:
         normals: shape (s, d).
         covariance: of all their components, shape (s d, s d), square radians.
-        regularities: those that were taken.
-        saved: parameters that they make unnecessary.
+        regularities: the accepted regularities.
+        saved: number of parameters that they make unnecessary.
     """
 
     normals: Array
@@ -97,7 +99,7 @@ def regular_normals(normals: Array, covariance: Array, *, upright: bool) -> Regu
     Args:
         normals: unit normals of faces, shape (s, d).
         covariance: of all their components, shape (s d, s d), square radians.
-        upright: the third axis is vertical, and level and upright faces are likely.
+        upright: whether the third axis is vertical, so that horizontal and vertical faces are likely.
     """
     turned, known, taken = normals, covariance, tuple[Regularity, ...]()
     for regularity in _promising_first(normals, covariance, upright=upright):
@@ -111,7 +113,7 @@ def regular_normals(normals: Array, covariance: Array, *, upright: bool) -> Regu
 
 
 def _rank(taken: tuple[Regularity, ...], normals: Array) -> int:
-    """How many angles the regularities fix; one that was taken early may follow from those that came later."""
+    """Number of angles that the regularities fix; an early one may follow from later ones."""
     rows = [np.empty((0, normals.size)), *(regularity.state(normals).rows for regularity in taken)]
     return int(np.linalg.matrix_rank(np.vstack(rows), tol=_IMPLIED))
 
@@ -134,12 +136,12 @@ def _candidates(count: int, *, upright: bool) -> Iterator[Regularity]:
 
 
 def _advantage(stated: Stated, covariance: Array, before: Array) -> float:
-    """Twice the log Bayes factor of a regularity against any angle; 0 if it follows from those that were taken.
+    """Twice the log Bayes factor of a regularity against an arbitrary angle; 0 if it follows from accepted ones.
 
     Args:
         stated: the regularity.
         covariance: of the normals, given the regularities so far.
-        before: the same without any.
+        before: the covariance without any regularity.
     """
     variances, axes = np.linalg.eigh(stated.rows @ covariance @ stated.rows.T)
     still_open = variances > _IMPLIED * np.trace(stated.rows @ before @ stated.rows.T)
@@ -148,11 +150,11 @@ def _advantage(stated: Stated, covariance: Array, before: Array) -> float:
 
 
 def _condition(normals: Array, covariance: Array, taken: tuple[Regularity, ...], start: Array) -> tuple[Array, Array]:
-    """The likeliest normals that meet all regularities, shape (s, d), and their covariance (Gauss-Newton).
+    """The most likely normals that satisfy all regularities, shape (s, d), and their covariance (Gauss-Newton).
 
     Args:
-        normals, covariance: as known without them.
-        taken: the regularities.
+        normals, covariance: the state without regularities.
+        taken: the accepted regularities.
         start: normals near the solution, shape (s, d).
     """
     found = start

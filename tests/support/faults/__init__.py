@@ -1,7 +1,7 @@
-"""Things that go wrong on a wire, on purpose: a wrapper around any transport, and the faults it can inject.
+"""Injects faults into a wire: a wrapper for any transport, and the kinds of faults.
 
-One wrapper injects one fault and counts how often; wrappers can be nested. What a fault must know of a driver's
-messages (where its counters and values stand) is said once by the driver's tests in a :class:`MessageLayout`.
+A wrapper injects one fault and counts how often; wrappers can be nested. The driver's tests define once, in a
+:class:`MessageLayout`, what faults need to know of its messages (the positions of counters and values).
 """
 
 from __future__ import annotations

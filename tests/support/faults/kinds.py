@@ -1,4 +1,4 @@
-"""The ways in which a wire, or what hangs on it, goes wrong."""
+"""The kinds of faults of a wire, and of the device at its end."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ SLAVE_TO_SAFEOP = "slave to SAFEOP"
 
 @runtime_checkable
 class Injectable(Protocol):
-    """A transport whose far end can be told to misbehave in its own way, as an EtherCAT ring can."""
+    """A transport whose far end has faults of its own, like an EtherCAT ring."""
 
     def inject(self, fault: str) -> None:
-        """Let the far end do ``fault`` once. Raises ValueError for one it does not know."""
+        """Let the far end have ``fault`` once. Raises ValueError for an unknown one."""
 
 
 class Fault:
-    """One way to go wrong. ``strike`` treats a message that is hit, ``spare`` one that is not."""
+    """One kind of fault. ``strike`` processes a message that is hit, ``spare`` one that is not."""
 
     name = "none"
 
@@ -35,7 +35,7 @@ class Fault:
         return [datagram]
 
     def release_held(self) -> list[Datagram]:
-        """What was held back and arrives with this reading of the transport."""
+        """Messages held back before that arrive with this reading of the transport."""
         return []
 
 
@@ -58,7 +58,7 @@ class Duplicate(Fault):
 
 
 class Reorder(Fault):
-    """The message arrives behind the next one."""
+    """The message arrives after the next one."""
 
     name = "reorder"
 
@@ -75,7 +75,7 @@ class Reorder(Fault):
 
 
 class Delay(Fault):
-    """From the hit on nothing arrives for some readings of the transport; then all of it does, stamped late."""
+    """From the hit on nothing arrives for some readings of the transport; then everything arrives, with late stamps."""
 
     name = "delay"
 
@@ -112,7 +112,9 @@ class Truncate(Fault):
 
 
 class FlipBit(Fault):
-    """One bit of the message is wrong; ``bit`` counts from the first byte's lowest, negative from the end."""
+    """One bit of the message is wrong; ``bit`` counts from the first byte's lowest bit, or backwards from the end if
+    negative.
+    """
 
     name = "flip a bit"
 
@@ -147,7 +149,7 @@ class StaleSequence(Fault):
 
 
 class CounterWrap(Fault):
-    """The device's counters are near their end: from the first message on they run so that one wraps at the hit."""
+    """The device's counters are near overflow: from the first message on they are such that one wraps at the hit."""
 
     name = "counter wrap"
 
@@ -168,7 +170,7 @@ class CounterWrap(Fault):
 
 
 class Saturate(Fault):
-    """A value stands at its limit."""
+    """A value is at its limit."""
 
     name = "saturate"
 
@@ -182,9 +184,9 @@ class Saturate(Fault):
 
 
 class StuckValue(Fault):
-    """The measured values do not move any more, and neither does the device's last counter.
+    """The measured values do not change any more, and neither does the device's last counter.
 
-    Messages of one length are taken as of one kind.
+    Messages of equal length count as the same kind.
     """
 
     name = "stuck value"
@@ -205,7 +207,7 @@ class StuckValue(Fault):
 
 
 class Unplug(Fault):
-    """The wire is pulled: from the hit on reading and writing fail, until the transport is opened again."""
+    """The wire is unplugged: from the hit on reading and writing fail, until the transport is opened again."""
 
     name = "unplug"
 
@@ -214,7 +216,7 @@ class Unplug(Fault):
 
 
 class ClockJump(Fault):
-    """The host's clock jumps: from the hit on the stamps are off."""
+    """The host's clock jumps: from the hit on the stamps are wrong."""
 
     name = "clock jump"
 
@@ -230,7 +232,7 @@ class ClockJump(Fault):
 
 
 class FarEnd(Fault):
-    """The far end does something of its own, such as :data:`WORKING_COUNTER_LOW` or :data:`SLAVE_TO_SAFEOP`."""
+    """The far end has a fault of its own, such as :data:`WORKING_COUNTER_LOW` or :data:`SLAVE_TO_SAFEOP`."""
 
     def __init__(self, name: str, transport: Injectable) -> None:
         self.name, self._transport = name, transport
@@ -241,7 +243,7 @@ class FarEnd(Fault):
 
 
 def standard_faults(layout: MessageLayout) -> dict[str, tuple[Fault, When]]:
-    """A fresh fault of every kind that a driver with such messages can meet, by name, with its schedule."""
+    """A new fault of every kind that is possible with such messages, by name, with its schedule."""
     faults: list[tuple[Fault, When]] = [
         (Drop(), When(count=3, every=4)),
         (Duplicate(), When(count=3, every=4)),

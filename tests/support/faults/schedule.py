@@ -1,4 +1,4 @@
-"""When a fault strikes, and what it must know of the messages it damages."""
+"""When a fault strikes, and what it must know of the messages that it damages."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 class When:
     """Which received messages a fault strikes: every ``every``-th from number ``first`` on, ``count`` in all.
 
-    ``share`` strikes at random instead; ``count`` 0 is without end.
+    With ``share`` it strikes at random instead; ``count`` 0 means no limit.
     """
 
     first: int = 10
@@ -22,7 +22,7 @@ class When:
     share: float | None = None
 
     def strikes(self, number: int, struck: int, rng: np.random.Generator) -> bool:
-        """Whether message ``number`` (from 0) is struck when ``struck`` were before it."""
+        """Whether message ``number`` (from 0) is struck, after ``struck`` earlier ones were."""
         if number < self.first or (self.count and struck >= self.count):
             return False
         return bool(rng.random() < self.share) if self.share is not None else (number - self.first) % self.every == 0
@@ -48,13 +48,13 @@ class Field:
 
 @dataclass(frozen=True)
 class MessageLayout:
-    """What faults must know of a driver's messages; left out where a message has no such thing.
+    """What faults must know of a driver's messages; omitted if messages have no such part.
 
     Attributes:
         counters: sequence counters.
-        values: where the measured values begin and end (one past the last byte).
-        seal: makes check bytes right again after a field was changed.
-        saturate: the message with a value at its limit, as the device would send it.
+        values: start and end of the measured values (one past the last byte).
+        seal: corrects check bytes after a field was changed.
+        saturate: returns the message with a value at its limit, as the device would send it.
     """
 
     counters: tuple[Field, ...] = ()
@@ -63,5 +63,5 @@ class MessageLayout:
     saturate: Callable[[bytes], bytes] | None = None
 
     def sealed(self, payload: bytes) -> bytes:
-        """The message with right check bytes."""
+        """The message with correct check bytes."""
         return self.seal(payload) if self.seal else payload

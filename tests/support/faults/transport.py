@@ -14,10 +14,10 @@ class FaultyTransport:
     """Any transport, with a fault.
 
     Args:
-        transport: what to wrap.
-        fault: what goes wrong.
+        transport: the transport to wrap.
+        fault: the fault to inject.
         when: which messages it strikes.
-        seed: of the random ones.
+        seed: for random schedules.
 
     Attributes:
         injected: how often the fault struck.
@@ -47,7 +47,7 @@ class FaultyTransport:
         self._transport.send(payload)
 
     def receive(self) -> list[Datagram]:
-        """What arrives, faults included. Raises DeviceError, also while unplugged."""
+        """Received messages, including faults. Raises DeviceError, also while unplugged."""
         self._check_plug()
         if not self.armed:
             return self._transport.receive()
@@ -57,11 +57,11 @@ class FaultyTransport:
         return arrived
 
     def health(self) -> tuple[str, ...]:
-        """What the wrapped transport knows to be wrong."""
+        """Problems that the wrapped transport reports."""
         return link_health(self._transport)
 
     def inject(self, fault: str) -> None:
-        """Pass a far end's fault on. Raises ValueError when the wrapped transport knows none."""
+        """Pass a far end's fault on. Raises ValueError if the wrapped transport does not support it."""
         if not isinstance(self._transport, Injectable):
             raise ValueError(f"{self.name}: the far end of this link has no fault {fault!r}")
         self._transport.inject(fault)

@@ -1,1 +1,1 @@
-"""Shape models to compare with (thesis section 2.1)."""
+"""Shape models for comparison (thesis section 2.1)."""

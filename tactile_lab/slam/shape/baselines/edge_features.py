@@ -1,11 +1,11 @@
-"""Local surface features (2.21-2.23): a field that keeps edges and corners which smooth kernels round off.
+"""Local surface features (2.21-2.23): a field that keeps the edges and corners that smooth kernels round off.
 
-The field blends the contacts' tangent planes, and the blend leans to the outermost plane where the contacts around
-are convex and to the innermost where they are concave, so that planes meet in an edge.
+The field blends the contacts' tangent planes. The blend favours the innermost or outermost plane, depending on whether
+the contacts around are concave or convex, so that planes meet in an edge.
 
 The thesis prints (2.21) with weights omega and (2.23) with an angular kernel without defining either (section 2.2.3);
-here the weights make the blend an average, and the angular kernel is the mean convexity of the neighbours that lie in
-the direction of the place asked about, as seen from the contact within its tangent plane.
+here the weights make the blend an average, and the angular kernel is the mean convexity of those neighbours that lie in
+the direction of the query point, as seen from the contact in its tangent plane.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 
 _LENGTH_BOUNDS_m = (0.008, 0.040)
 _NEIGHBOUR, _REACH = 3, 1.5
-"""The kernel reaches so much farther than the contacts' third neighbours are away, in the median."""
+"""Length of the kernel relative to the median distance of the contacts' third neighbours."""
 _ANGULAR_WIDTH = 0.5
-"""Of the angular kernel, in units of one minus the cosine."""
+"""Width of the angular kernel, in units of one minus the cosine."""
 _FLAT_NORMALS = 0.35
-"""Neighbours whose normals differ by less (20 degrees) are taken as the same face, neither convex nor concave."""
+"""Neighbours whose normals differ by less (20 degrees) count as the same face, neither convex nor concave."""
 _MOST_CONVEX = 0.97
-"""Below one, so that places behind all planes still have a value."""
+"""Below one, so that points behind all planes still have a value."""
 _LEAST_WEIGHT = 1e-3
-"""Neighbours that together weigh less are too far to tell convex from concave."""
+"""Neighbours with a smaller total weight are too far away to distinguish convex from concave."""
 _NEIGHBOURS = 16
 _SUPPORT_SLACK_m, _SUPPORT_TILT = 0.002, 0.1
-"""A contact's plane is known to so much, and its direction to so many radians."""
+"""Assumed errors of a contact's plane (m) and of its direction (rad)."""
 _MARGIN_m = 0.012
 _PAIRS_AT_ONCE = 1 << 21
 
@@ -44,7 +44,7 @@ class EdgeFeatureField:
     Attributes:
         points_m: contacts, shape (n, d).
         normals: shape (n, d).
-        length_m: of the kernel.
+        length_m: length of the kernel.
     """
 
     def __init__(self, points_m: Array, normals: Array, length_m: float | None = None) -> None:
@@ -53,7 +53,7 @@ class EdgeFeatureField:
         self._neighbours, self._convexity, self._near = self._bent_neighbours()
 
     def value(self, places_m: Array) -> Array:
-        """f at places of shape (q, d), shape (q,)."""
+        """f at points of shape (q, d); shape (q,)."""
         size = max(1, _PAIRS_AT_ONCE // (len(self.points_m) * _NEIGHBOURS))
         blocks = [self._value(places_m[first : first + size]) for first in range(0, len(places_m), size)]
         return np.concatenate(blocks) if blocks else np.empty(0)
@@ -68,7 +68,7 @@ class EdgeFeatureField:
         return np.asarray(np.sum(weight * height, axis=1) / np.sum(weight, axis=1))
 
     def _lean(self, offset: Array, height: Array) -> Array:
-        """``beta*(phi)``: convexity around each contact in the direction of each place, shape (q, n)."""
+        """``beta*(phi)``: convexity around each contact in the direction of each query point, shape (q, n)."""
         sideways = _unit(offset - height[..., None] * self.normals)
         cosine = np.einsum("qid,ijd->qij", sideways, self._neighbours)
         weight = self._near * np.exp((cosine - 1) / _ANGULAR_WIDTH)
@@ -76,8 +76,9 @@ class EdgeFeatureField:
         return np.asarray(np.clip(found, -_MOST_CONVEX, _MOST_CONVEX))
 
     def _bent_neighbours(self) -> tuple[Array, Array, Array]:
-        """For each contact those near it on other faces: directions in its tangent plane (n, k, d), convexity from -1
-        to 1 and weight by distance (n, k)."""
+        """For each contact, its neighbours on other faces: directions in its tangent plane (n, k, d), convexity from -1
+        to 1, and weight by distance (n, k).
+        """
         between = self.points_m[None] - self.points_m[:, None]
         turned = self.normals[None] - self.normals[:, None]
         product, size = np.sum(between * turned, axis=2), np.linalg.norm(turned, axis=2)
@@ -95,8 +96,8 @@ class EdgeFeatureField:
 class EdgeFeatureShape:
     """The zero level of (2.21) as a :class:`FittedShape`, without evidence.
 
-    Far from all contacts the function is that of the nearest planes, which go on for ever; what is clearly beyond a
-    plane that has all contacts behind it is not part of the shape.
+    Far from all contacts the function is that of the nearest planes, which extend to infinity. So points clearly beyond
+    a plane that has all contacts behind it are excluded from the shape.
 
     Attributes:
         field: the function.
@@ -130,7 +131,7 @@ class EdgeFeatureShape:
 
 
 def _beyond(places_m: Array, points_m: Array, normals: Array) -> Array:
-    """How far places are clearly beyond contacts' planes, shape (q, n): less what is not known of the planes."""
+    """Distance of points beyond the contacts' planes, less the uncertainty of the planes, shape (q, n)."""
     offset = places_m[:, None] - points_m[None]
     height = np.einsum("qnd,nd->qn", offset, normals)
     return np.asarray(height - _SUPPORT_TILT * np.linalg.norm(offset, axis=2) - _SUPPORT_SLACK_m)

@@ -1,4 +1,4 @@
-"""Outline and surface of any function that is negative inside, for shape models that have one."""
+"""Outline and surface of any function that is negative inside, for shape models that define one."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def contour_of(value: Function, lower_m: Array, upper_m: Array, resolution_m: fl
 
     Args:
         value: of points of shape (n, 2), negative inside.
-        lower_m, upper_m: of the box; the shape is cut where it goes beyond.
-        resolution_m: spacing of the grid, between whose nodes the function is taken as linear.
+        lower_m, upper_m: corners of the box, at which the shape is cut off.
+        resolution_m: spacing of the grid; the function is interpolated linearly between nodes.
         sigma: standard deviation of the outline at points of shape (n, 2).
 
     Raises:
-        ShapeError: the shape is in space, there is no inside, or the grid would be too large.
+        ShapeError: the function is spatial, has no inside, or the grid would be too large.
     """
     _check_dimension(lower_m, 2)
     first, nodes = _tabulate(value, lower_m, upper_m, resolution_m)
@@ -60,7 +60,7 @@ def mesh_of(
 ) -> SurfaceMesh:
     """The surface of a spatial function within a box; arguments and errors as :func:`contour_of`.
 
-    What is below ``floor_m`` is cut off with a flat foot.
+    The part below ``floor_m`` is cut off, leaving a flat foot.
     """
     _check_dimension(lower_m, 3)
     first, nodes = _tabulate(value, lower_m, upper_m, resolution_m)
@@ -83,7 +83,7 @@ def mesh_of_nodes(
 
 
 def vertex_normals(vertices: Array, faces: NDArray[np.int64]) -> Array:
-    """Outward unit normals, of the faces around each vertex by their area."""
+    """Outward unit normals: the area-weighted mean of the faces around each vertex."""
     corners = vertices[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = np.zeros_like(vertices)
@@ -100,7 +100,7 @@ def _check_dimension(lower_m: Array, wanted: int) -> None:
 
 
 def _tabulate(value: Function, lower_m: Array, upper_m: Array, resolution_m: float) -> tuple[Array, Array]:
-    """First node, and values on the nodes of the box and a little around it."""
+    """The first node, and values on the nodes of the box and a small margin around it."""
     first = lower_m - _MARGIN_NODES * resolution_m
     counts = np.ceil((upper_m - lower_m) / resolution_m).astype(int) + 2 * _MARGIN_NODES + 1
     if np.prod(counts, dtype=float) > LARGEST_NODE_COUNT:
@@ -113,7 +113,9 @@ def _tabulate(value: Function, lower_m: Array, upper_m: Array, resolution_m: flo
 
 
 def _one_body(nodes: Array, resolution_m: float) -> tuple[Array, bool]:
-    """The largest region of negative nodes without cavities and with a positive border; whether none was cut there."""
+    """The largest region of negative nodes, with cavities filled and a positive border; and whether the border cut
+    nothing.
+    """
     labels, _ = ndimage.label(nodes < 0)
     sizes = np.bincount(labels.ravel())
     if len(sizes) < 2:

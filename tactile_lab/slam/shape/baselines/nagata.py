@@ -1,9 +1,9 @@
 """Nagata patches (eq. 2.2): quadratic curves and triangles through contacts that respect their normals.
 
-Each edge between two contacts becomes the quadratic curve that is tangent to both contacts' planes; the coefficients
-of a triangle's patch follow from its three edges (Nagata 2005). The thesis leaves open how contacts are joined: in
-the plane in their order along an outline, in space by the convex hull of their directions from the middle. Contacts
-closer to each other than a few millimetres, which noise would turn into folds, are averaged.
+Each edge between two contacts becomes the quadratic curve that is tangent to both contacts' planes; the coefficients of
+a triangle's patch follow from its three edges (Nagata 2005). The thesis leaves open how contacts are joined: in the
+plane in their order along an outline, in space by the convex hull of their directions from the middle. Contacts within
+a few millimetres of each other are averaged, because noise would cause folds there.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ from tactile_lab.slam.shape.surfaces.sampling import polygon_area
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 
 LARGEST_BULGE = 0.22
-"""An edge may bow by this share of its length; a wilder curve would come from a wrong normal and is left straight."""
+"""Largest bulge of an edge relative to its length; a larger one would come from a wrong normal, and the edge stays
+straight.
+"""
 
 _PARALLEL = 1e-9
 
@@ -67,7 +69,7 @@ def patch_points(corners_m: Array, normals: Array, eta: Array, zeta: Array) -> A
 
 @dataclass(frozen=True)
 class NagataShape:
-    """Contacts joined by Nagata curves or patches; a :class:`FittedShape` without evidence.
+    """Contacts connected by Nagata curves or patches; a :class:`FittedShape` without evidence.
 
     Attributes:
         points_m: contacts, close ones averaged; in the plane in counter-clockwise order; shape (n, d).
@@ -138,7 +140,9 @@ def _by_angle(points_m: Array) -> NDArray[np.int64]:
 
 
 def _triangulate(points_m: Array) -> NDArray[np.int64]:
-    """Triangles of the contacts as seen from the middle, counter-clockwise from outside; every contact is a corner."""
+    """Triangulation of the contacts as seen from the middle, counter-clockwise from outside; every contact is a
+    corner.
+    """
     middle = (points_m.min(axis=0) + points_m.max(axis=0)) / 2
     offset = points_m - middle
     distance = np.linalg.norm(offset, axis=1, keepdims=True)

@@ -1,8 +1,8 @@
-"""Occupancy grid: for each cell the logarithm of the odds that the object is there.
+"""Occupancy grid: for each cell the log odds that it belongs to the object.
 
-A contact says "occupied" behind itself and "free" before itself, the less the farther a cell is from it; places where
-fingertips passed are free, whatever contacts say. Cells that nothing speaks about but that occupied ones enclose
-belong to the object.
+A contact marks cells behind it as occupied and cells in front of it as free, with a weight that decreases with
+distance. Places that fingertips passed are free regardless of contacts. Unobserved cells that are enclosed by occupied
+ones belong to the object.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ FREE = -20.0
 """Log odds of a cell that a fingertip passed."""
 
 _ACROSS_m = 0.012
-"""How far a contact speaks sideways."""
+"""Range of a contact's influence along the surface."""
 _INWARD_m = 0.030
-"""How far a contact speaks along its normal."""
+"""Range of a contact's influence along its normal."""
 _OCCUPIED, _EMPTY = 2.0, 6.0
-"""Log odds that one contact gives to a cell next to it, behind and before; its fingertip was there for sure."""
+"""Log odds that one contact gives to a cell next to it, behind and in front; the fingertip was certainly in front."""
 _UNTOLD = -0.7
-"""Log odds of a cell that nothing speaks about."""
+"""Log odds of an unobserved cell."""
 _MARGIN_CELLS = 6
 _CLOSED_OVER_m = 0.020
 """Gaps up to about twice this between occupied cells are closed before the inside is filled."""
@@ -41,7 +41,7 @@ _CLOSED_OVER_m = 0.020
 
 @dataclass(frozen=True)
 class OccupancyShape:
-    """A :class:`FittedShape`; the resolution is that of its cells, whatever is asked for.
+    """A :class:`FittedShape`; its resolution is always that of its cells.
 
     Attributes:
         first_m: centre of the first cell, shape (d,).
@@ -63,10 +63,10 @@ class OccupancyShape:
     def of(
         cls, points_m: Array, normals: Array, point_sigma_m: Array, free_points_m: Array | None = None
     ) -> OccupancyShape:
-        """The grid of contacts of shape (n, d) and places known to be free, shape (q, d).
+        """Make the grid from contacts of shape (n, d) and places known to be free, shape (q, d).
 
         Raises:
-            ShapeError: contacts so far apart that the grid would be too large.
+            ShapeError: the contacts are so far apart that the grid would be too large.
         """
         cell_m = CELL_m[points_m.shape[1]]
         lower = points_m.min(axis=0) - _MARGIN_CELLS * cell_m
@@ -91,8 +91,9 @@ class OccupancyShape:
 
 
 def _contact_log_odds(cells: Array, points_m: Array, normals: Array, cell_m: float) -> Array:
-    """Log odds before free places are known; linear in the distance near a contact's plane, so that cells' corners
-    do not decide where the surface is."""
+    """Log odds from contacts alone; linear in the distance near a contact's plane, so that the surface is not bound to
+    the cells' borders.
+    """
     log_odds = np.full(cells.shape[:-1], _UNTOLD)
     for point, normal in zip(points_m, normals, strict=True):
         offset = cells - point
@@ -106,7 +107,7 @@ def _contact_log_odds(cells: Array, points_m: Array, normals: Array, cell_m: flo
 def _passed_cells(
     counts: NDArray[np.int64], lower: Array, cell_m: float, free_points_m: Array | None
 ) -> NDArray[np.bool_]:
-    """Cells whose centres are around a free place: the surface between cells can then not hold it either."""
+    """Cells with centres around a free place, so that the interpolated surface does not contain the place either."""
     passed = np.zeros(tuple(counts), dtype=bool)
     if free_points_m is not None and len(free_points_m):
         below = np.floor((free_points_m - lower) / cell_m).astype(int)
@@ -118,7 +119,7 @@ def _passed_cells(
 
 
 def _fill(log_odds: Array, free: NDArray[np.bool_], cell_m: float) -> Array:
-    """Enclosed cells that nothing speaks about become occupied; passed ones are free."""
+    """Fill unobserved cells that are enclosed; passed cells stay free."""
     reach = int(np.ceil(_CLOSED_OVER_m / cell_m))
     occupied = np.pad((log_odds > 0) & ~free, reach)
     grown = ndimage.distance_transform_edt(~occupied) <= reach

@@ -1,4 +1,4 @@
-"""The contacts themselves as the shape: the tightest hull of simplices that holds them all together."""
+"""The contacts themselves as the shape: the tightest hull of simplices that contains all of them in one body."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 
 _TRIES = 60
 _AMPLE = 1.5
-"""The ball is so many times the smallest one that will do, which still cuts into the body between sparse contacts."""
+"""Radius relative to the smallest possible one, which would cut into the body between sparse contacts."""
 
 
 @dataclass(frozen=True)
 class PointCloudShape:
-    """An alpha shape as a :class:`FittedShape`: its ball is 1.5 times the smallest that keeps all contacts in one body.
+    """An alpha shape as a :class:`FittedShape`; its radius is 1.5 times the smallest that keeps all contacts in one
+    body.
 
     Normals are not used, and there is no evidence.
 
@@ -85,7 +86,7 @@ def _circumradii(corners_m: Array) -> Array:
 
 
 def _boundary(points_m: Array, simplices: NDArray[np.int64]) -> NDArray[np.int64] | None:
-    """The outer facets of one body of simplices with all points in it; None if it is not one, or pinched."""
+    """The outer facets of a body of simplices with all points in it; None if it has several parts, or is pinched."""
     if len(np.unique(simplices)) < len(points_m):
         return None
     corner_count = simplices.shape[1]
@@ -102,7 +103,7 @@ def _boundary(points_m: Array, simplices: NDArray[np.int64]) -> NDArray[np.int64
 
 
 def _one_body(owner: NDArray[np.int64], where: NDArray[np.int64], uses: NDArray[np.int64], count: int) -> bool:
-    """Whether all simplices hang together by shared facets."""
+    """Whether all simplices are connected by shared facets."""
     shared = np.flatnonzero(uses[where] == 2)
     pairs = owner[shared[np.argsort(where[shared], kind="stable")]].reshape(-1, 2)
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
@@ -119,7 +120,7 @@ def _facing_outwards(points_m: Array, facets: NDArray[np.int64], opposite: NDArr
 
 
 def _is_clean(facets: NDArray[np.int64]) -> bool:
-    """Whether each ridge (corner in the plane, edge in space) belongs to two facets, and all facets hang together."""
+    """Whether each ridge (corner in the plane, edge in space) belongs to two facets, and all facets are connected."""
     corner_count = facets.shape[1]
     ridges = np.concatenate([np.delete(facets, left, axis=1) for left in range(corner_count)])
     owner = np.tile(np.arange(len(facets)), corner_count)

@@ -1,4 +1,4 @@
-"""What models that join contacts have in common: averaging close ones, fine meshes, and a sigma by distance."""
+"""Common parts of models that connect contacts: averaging close ones, fine meshes, and a sigma by distance."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Patches: TypeAlias = Callable[[Array, Array], Array]
 _MERGED_WITHIN_m = 0.005
 _MERGED_COSINE = 0.87
 _GUESS_SHARE = 0.25
-"""Models without probabilities are taken to be wrong by this share of the distance to the nearest contact."""
+"""Models without probabilities are assumed to be wrong by this share of the distance to the nearest contact."""
 _MOST_STEPS = 40
 
 
 def merge(points_m: Array, normals: Array) -> tuple[Array, Array]:
-    """Contacts within 5 mm and 30 degrees of an earlier one are averaged with it; the order stays."""
+    """Average contacts with an earlier one within 5 mm and 30 degrees; the order is kept."""
     left, groups = np.ones(len(points_m), dtype=bool), []
     for index, (point, normal) in enumerate(zip(points_m, normals, strict=True)):
         if left[index]:
@@ -38,13 +38,15 @@ def merge(points_m: Array, normals: Array) -> tuple[Array, Array]:
 
 
 def distance_sigma(places_m: Array, contacts_m: Array, point_sigma_m: float) -> Array:
-    """A guess of the standard deviation at places of shape (n, d): that of contacts, growing away from them."""
+    """A guess of the standard deviation at points of shape (n, d): that of contacts, increasing with distance from
+    them.
+    """
     away, _ = cKDTree(contacts_m).query(places_m)
     return np.asarray(np.hypot(point_sigma_m, _GUESS_SHARE * away))
 
 
 def along_edges(starts_m: Array, ends_m: Array, curvature: Array, resolution_m: float) -> Array:
-    """Points on the edges ``start + (d - c) t + c t^2`` one after another, at most so far apart, ends left out."""
+    """Points along the edges ``start + (d - c) t + c t^2`` in order, at most this far apart, without their ends."""
     pieces = []
     for start, along, bow in zip(starts_m, ends_m - starts_m, curvature, strict=True):
         count = max(1, int(np.ceil((np.linalg.norm(along) + np.linalg.norm(bow)) / resolution_m)))
@@ -69,7 +71,7 @@ def patched_mesh(
         patches: gives points of all m patches at parameters, ``(0, 0), (1, 0), (1, 1)`` being the corners.
         resolution_m: wanted length of the edges.
         point_sigma_m: standard deviation of the contacts.
-        floor_m: vertices below are put onto this height.
+        floor_m: vertices below are moved up to this height.
     """
     sides = corners_m[faces] - corners_m[np.roll(faces, 1, axis=1)]
     longest = float(np.linalg.norm(sides, axis=2).max())
@@ -101,8 +103,8 @@ def _shared_numbers(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Vertex number of each point of each patch, shape (m, q), and of each vertex one of its points.
 
-    A point is told by its weights on the corners: on a shared edge those of the edge's two corners, in order of the
-    corners' numbers, whatever patch it is seen from.
+    A point is identified by its weights on the corners. On a shared edge these are the weights of the edge's two
+    corners, in order of the corners' numbers, so they are the same for both patches.
     """
     weights = np.stack([steps - first, first - second, second], axis=1)
     shape = (len(faces), *weights.shape)

@@ -1,4 +1,4 @@
-"""Superquadrics (eq. 2.1): their distance field, and the one that fits given contacts best.
+"""Superquadrics (eq. 2.1): their distance field, and the best fit to given contacts.
 
 In the plane the figure is the superellipse with one exponent. Both are written with nested p-norms, which stay finite
 for boxes (small exponents) where the powers of the usual inside-outside function overflow.
@@ -16,18 +16,18 @@ from drivers.core.contacts import Array
 from tactile_lab.slam.shape.fields.observations import check_contacts
 
 EXPONENT_BOUNDS = (0.1, 1.9)
-"""From a box with hardly rounded edges to nearly an octahedron."""
+"""Range of exponents: from a box with hardly rounded edges to nearly an octahedron."""
 
 SEMI_AXIS_BOUNDS_m = (0.003, 0.5)
 _SIZE_LOG_SIGMA = 1.0
-"""How little is known of the semi-axes beforehand: a factor e either way, for sides that nothing has touched."""
+"""Prior standard deviation of the logarithms of the semi-axes (a factor e), for sides without contacts."""
 _EXPONENT_SIGMA = 1.0
 _LOSS_SCALE = 2.0
-"""Beyond so many standard deviations a contact's pull stops growing."""
+"""Beyond this many standard deviations the influence of a contact stops growing."""
 _START_EXPONENTS = (0.4, 1.0)
 _FIRST_EVALUATIONS, _EVALUATIONS = 12, 60
 _FINISHED = 2
-"""So many of the starts, those that are best after the first evaluations, are followed to their optimum."""
+"""Number of initial values, the best after the first evaluations, that are optimized to the end."""
 _STEP = 1e-5
 
 
@@ -39,7 +39,7 @@ class Superquadric:
         centre_m: shape (d,).
         axes: its axes as rows, orthonormal, shape (d, d).
         semi_axes_m: a1, a2 (and a3) of (2.1), shape (d,).
-        exponents: epsilon_1 and epsilon_2 of (2.1); in the plane epsilon_2 alone.
+        exponents: epsilon_1 and epsilon_2 of (2.1); in the plane only epsilon_2.
     """
 
     centre_m: Array
@@ -62,7 +62,9 @@ class Superquadric:
         return np.asarray(outward * (1 - 1 / safe)[:, None] + (ray / safe)[:, None] * by_place) * (radius > 0)[:, None]
 
     def _norm_and_gradient(self, points_m: Array) -> tuple[Array, Array, Array]:
-        """Distance from the centre; the norm that is one on the surface; its gradient by the place, shape (n, d)."""
+        """Distance from the centre; the norm that is one on the surface; its gradient with respect to the point, shape
+        (n, d).
+        """
         offset = points_m - self.centre_m
         local = offset @ self.axes.T / self.semi_axes_m
         size = np.abs(local)
@@ -76,7 +78,7 @@ class Superquadric:
 
 
 def _ray_length(radius: Array, norm: Array) -> Array:
-    """From the centre to the surface through each point."""
+    """Distance from the centre to the surface along the ray through each point."""
     return np.divide(radius, norm, where=norm > 0, out=np.zeros_like(radius))
 
 
@@ -91,13 +93,13 @@ def _p_norm(a: Array, b: Array, power: float) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True)
 class SuperquadricFit:
-    """What :func:`fit_superquadric` found.
+    """The result of :func:`fit_superquadric`.
 
     Attributes:
         superquadric: the best one.
         log_evidence: by the Bayesian information criterion, comparable with a field's log marginal likelihood.
-        parameters: centre, turn, logarithms of the semi-axes, exponents.
-        covariance: of the parameters, shape (p, p); zero for those that were held.
+        parameters: centre, rotation, logarithms of the semi-axes, exponents.
+        covariance: of the parameters, shape (p, p); zero for those held fixed.
     """
 
     superquadric: Superquadric
@@ -118,22 +120,23 @@ class SuperquadricFit:
 def fit_superquadric(
     points_m: Array, normals: Array, point_sigma_m: Array, normal_sigma_rad: Array, *, exponents: Array | None = None
 ) -> SuperquadricFit:
-    """The superquadric of largest posterior, by robust least squares from several starts.
+    """The superquadric with the largest posterior density, by robust least squares from several initial values.
 
-    Centre, directions, semi-axes and exponents together; distances to the surface and directions of its normals both
-    count, each by its standard deviation. Sizes have a wide prior, so that contacts on one side give one that is small
-    and uncertain on the others. (The thesis's sources use a genetic algorithm; starts along the principal axes of
-    the points and of the normals, each axis in turn as the third, find the same optimum in a fraction of the time.)
+    Centre, directions, semi-axes and exponents are fitted together to distances from the surface and directions of its
+    normals, each weighted by its standard deviation. Sizes have a wide prior, so that contacts on one side give a
+    superquadric that is small and uncertain on the others. (The thesis's sources use a genetic algorithm. Starting
+    along the principal axes of the points and of the normals, with each axis in turn as the third, finds the same
+    optimum in a fraction of the time.)
 
     Args:
         points_m: shape (n, 2) or (n, 3).
         normals: outward unit normals, shape (n, d).
         point_sigma_m: shape (n,), metres.
         normal_sigma_rad: shape (n,), radians.
-        exponents: held at these values if given, ones for an ellipsoid.
+        exponents: held fixed at these values if given; ones for an ellipsoid.
 
     Raises:
-        ShapeError: contacts that cannot be used, see :func:`check_contacts`.
+        ShapeError: the contacts cannot be used, see :func:`check_contacts`.
     """
     check_contacts(points_m, normals, point_sigma_m, normal_sigma_rad)
     fit = _Fit(points_m, normals, point_sigma_m, normal_sigma_rad, exponents)
@@ -146,7 +149,7 @@ def fit_superquadric(
 
 
 class _Fit:
-    """Residuals of the contacts, and where to start."""
+    """Residuals of the contacts, and initial values."""
 
     def __init__(
         self, points_m: Array, normals: Array, point_sigma_m: Array, normal_sigma: Array, exponents: Array | None
@@ -168,7 +171,7 @@ class _Fit:
         return [self._start(axes, np.broadcast_to(shape, self.dimension - 1)) for axes in frames for shape in shapes]
 
     def from_start(self, start: Array, evaluations: int) -> tuple[float, Array, Array]:
-        """Cost, parameters and the covariance of the free ones at the optimum reached from a start."""
+        """Cost, parameters, and covariance of the free parameters at the optimum reached from an initial value."""
         held = start.copy()
 
         def residuals(free: Array) -> Array:
@@ -186,13 +189,13 @@ class _Fit:
         return float(found.cost), held, np.linalg.inv(information + 1e-9 * np.diag(np.diag(information) + 1.0))
 
     def log_likelihood(self, parameters: Array) -> float:
-        """Gaussian, of all values and gradients, as in a field's marginal likelihood."""
+        """Gaussian log likelihood of all values and gradients, as in a field's marginal likelihood."""
         squared = self._contact_residuals(parameters) ** 2
         scale = np.log(self._point_sigma_m).sum() + self.dimension * np.log(self._normal_sigma).sum()
         return float(-0.5 * squared.sum() - scale - 0.5 * len(squared) * np.log(2 * np.pi))
 
     def spread(self, free_covariance: Array) -> Array:
-        """The covariance with the parameters that were held, which are certain."""
+        """The full covariance, in which parameters held fixed are certain."""
         size = 2 * self.dimension + (1 if self.dimension == 2 else 3) + self.dimension - 1
         covariance = np.zeros((size, size))
         covariance[np.ix_(self._free, self._free)] = free_covariance
@@ -229,7 +232,7 @@ class _Fit:
 
 
 def _from_parameters(parameters: Array, dimension: int) -> Superquadric:
-    """Centre, rotation (angle or rotation vector), logarithms of the semi-axes, exponents; in this order."""
+    """Parameters in this order: centre, rotation (angle or rotation vector), logarithms of the semi-axes, exponents."""
     centre, rest = parameters[:dimension], parameters[dimension:]
     if dimension == 2:
         cosine, sine = np.cos(rest[0]), np.sin(rest[0])
@@ -240,7 +243,7 @@ def _from_parameters(parameters: Array, dimension: int) -> Superquadric:
 
 
 def _principal_axes(directions: Array) -> Array:
-    """Right-handed orthonormal axes as rows, those of largest spread first."""
+    """Right-handed orthonormal axes as rows, that of largest spread first."""
     axes = np.linalg.eigh(directions.T @ directions)[1].T[::-1].copy()
     if np.linalg.det(axes) < 0:
         axes[-1] *= -1

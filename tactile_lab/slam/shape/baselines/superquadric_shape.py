@@ -15,7 +15,7 @@ class SuperquadricShape:
     """A :class:`FittedShape`.
 
     Attributes:
-        fit: the superquadric and how well it is known.
+        fit: the superquadric and its covariance.
         name: "superquadric".
     """
 
@@ -24,7 +24,7 @@ class SuperquadricShape:
 
     @property
     def log_evidence(self) -> float:
-        """By the Bayesian information criterion."""
+        """The log evidence by the Bayesian information criterion."""
         return self.fit.log_evidence
 
     def contour(self, resolution_m: float = 0.001) -> Contour:
@@ -34,7 +34,7 @@ class SuperquadricShape:
         return mesh_of(self.fit.superquadric.value, *self._box(), resolution_m, self.fit.sigma, floor_m)
 
     def _box(self) -> tuple[Array, Array]:
-        """Corners of the box along the frame's axes that holds it."""
+        """Corners of its bounding box along the frame's axes."""
         figure = self.fit.superquadric
         reach = figure.semi_axes_m @ abs(figure.axes)
         return figure.centre_m - reach, figure.centre_m + reach

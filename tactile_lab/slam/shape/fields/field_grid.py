@@ -1,4 +1,4 @@
-"""A field tabulated on a regular grid, for asking at very many places (particle weighting, surface extraction)."""
+"""A field tabulated on a regular grid, for evaluation at very many points (particle weighting, surface extraction)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Indices: TypeAlias = NDArray[np.intp]
 Nodes = TypeVar("Nodes")
 
 LARGEST_NODE_COUNT = 20_000_000
-"""Grids beyond this would take gigabytes; a smaller one is a mistake in spacing or extent."""
+"""Larger grids would take gigabytes, and indicate a mistake in spacing or extent."""
 
 
 class Field(Protocol):
@@ -30,8 +30,8 @@ class Field(Protocol):
 class FieldGrid:
     """Values, gradients and variances of a field on a grid, with linear interpolation between the nodes.
 
-    Beyond the grid the field goes on as if everything there were outside: the border's value plus the
-    distance to the border, with the border's gradient and variance.
+    Beyond the grid the field is extrapolated as if everything there were outside: the border's value plus the distance
+    to the border, with the border's gradient and variance.
 
     Attributes:
         lower_m: coordinates of the first node, shape (d,).
@@ -66,8 +66,8 @@ class FieldGrid:
     ) -> Self:
         """Evaluate a field on the grid from ``lower_m`` to at least ``upper_m`` (both of shape (d,)).
 
-        ``variance_step`` evaluates variances, which cost most and change least, on a grid coarser by this factor and
-        interpolates them to the nodes.
+        ``variance_step`` is the factor by which the grid of the variances is coarser; these cost most and vary least,
+        and are interpolated to the nodes.
 
         Raises:
             ShapeError: the grid would have more than :data:`LARGEST_NODE_COUNT` nodes.
@@ -83,7 +83,7 @@ class FieldGrid:
 
     @classmethod
     def _of_variances(cls, field: Field, lower_m: Array, upper_m: Array, spacing_m: float) -> Self:
-        """A grid of variances alone, in single precision where that is good enough."""
+        """Variances on a grid, in single precision where that is accurate enough."""
         shape, nodes = _nodes(lower_m, upper_m, spacing_m)
         if isinstance(field, Gpis):
             return cls(lower_m, spacing_m, np.zeros(shape), None, field.variance(nodes, rough=True))
@@ -110,7 +110,7 @@ class FieldGrid:
         """Interpolate at points of shape (q, d).
 
         Raises:
-            ShapeError: gradients or variances are asked of a grid tabulated without them.
+            ShapeError: gradients or variances are requested, but the grid was tabulated without them.
         """
         corners, beyond_m = self._locate(np.asarray(points_m, dtype=float))
         mean = _interpolate(self.values_m.ravel(), corners) + beyond_m
@@ -123,7 +123,8 @@ class FieldGrid:
         return Prediction(mean, slope, spread)
 
     def interleave(self) -> Array:
-        """Value, gradient and variance node by node, shape (nodes, 2 + d): one cell's numbers lie together in memory.
+        """Value, gradient and variance node by node, shape (nodes, 2 + d), so that a cell's numbers are close in
+        memory.
 
         Raises:
             ShapeError: the grid was tabulated without gradients or variances.
@@ -135,9 +136,9 @@ class FieldGrid:
         return self._interleaved
 
     def _locate(self, points_m: Array) -> tuple[list[tuple[Indices, Array]], Array]:
-        """Node index and weight of the corners of each point's cell, and the distance to the grid from beyond it.
+        """Node index and weight of the corners of each point's cell, and the distance of outer points to the grid.
 
-        Axis by axis on contiguous columns, which is several times faster than on whole points.
+        Works axis by axis on contiguous columns, which is several times faster than on whole points.
         """
         first, beyond, shares = np.zeros(len(points_m), dtype=np.intp), np.zeros(len(points_m)), []
         for axis, count in enumerate(self.values_m.shape):
@@ -151,7 +152,7 @@ class FieldGrid:
         return corners, self.spacing_m * np.sqrt(beyond)
 
     def _corner_steps(self) -> list[tuple[tuple[int, ...], int]]:
-        """For each corner of a cell its side along each axis, and its distance in memory from the first corner."""
+        """For each corner of a cell, its side along each axis and its memory offset from the first corner."""
         corners = list(product((0, 1), repeat=self.values_m.ndim))
         return [(sides, int(np.ravel_multi_index(sides, self.values_m.shape))) for sides in corners]
 

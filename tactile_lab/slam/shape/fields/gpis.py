@@ -33,7 +33,7 @@ from tactile_lab.slam.shape.fields.row_factor import RowFactor
 from tactile_lab.slam.shape.fields.settings import GpisSettings, initial_kernel, observe, prior_mean
 
 _BLOCK_ENTRIES = 1 << 19
-"""Entries of the largest temporary matrix in a prediction, 4 MiB: it stays in the cache."""
+"""Entries of the largest temporary matrix in a prediction: 4 MiB, which fits the cache."""
 
 _SINGLE_PRECISION_RATIO = 1000.0
 """Largest ratio of the prior's variance to a value's noise at which single precision keeps sigma to half a percent."""
@@ -52,7 +52,7 @@ class Gpis:
         settings: as given to :meth:`fit`.
         kernel: the covariance function with its current parameters.
         prior: the prior mean.
-        noise_scale: factor on all observation standard deviations, 1 unless optimised.
+        noise_scale: factor on all standard deviations of observations, 1 unless optimised.
     """
 
     def __init__(
@@ -92,8 +92,8 @@ class Gpis:
             settings: the defaults if None.
 
         Raises:
-            ShapeError: contacts that cannot be used (see :func:`check_contacts`), or a covariance that is
-                not positive definite even with jitter.
+            ShapeError: the contacts cannot be used (see :func:`check_contacts`), or their covariance is not positive
+                definite even with jitter.
         """
         settings = settings or GpisSettings()
         points_m, normals = np.array(points_m, dtype=float), np.array(normals, dtype=float)
@@ -110,10 +110,10 @@ class Gpis:
         point_sigma_m: Array | float = 0.001,
         normal_sigma_rad: Array | float = 0.1,
     ) -> Self:
-        """The field with contacts appended; kernel, noise scale and prior stay as they are.
+        """The field with contacts appended; kernel, noise scale and prior are unchanged.
 
-        With normals the factor only grows, in order ``n^2`` for few contacts, where a fresh fit takes ``n^3``.
-        Arguments and errors as of :meth:`fit`.
+        With normals the Cholesky factor is extended, at a cost of order ``n^2`` for few contacts; a new fit costs
+        ``n^3``. Arguments and errors as of :meth:`fit`.
         """
         points_m, normals = np.array(points_m, dtype=float), np.array(normals, dtype=float)
         sigmas = _one_each(point_sigma_m, points_m), _one_each(normal_sigma_rad, points_m)
@@ -128,7 +128,7 @@ class Gpis:
         )
 
     def of_some(self, kept: NDArray[np.intp]) -> Self:
-        """The field of some contacts by their indices, its kernel as it is; normals are observed."""
+        """The field of a subset of contacts, given by indices, with the same kernel; normals are observed."""
         seen = self.observations
         sigmas = seen.value_sigma_m[kept], seen.gradient_sigma[kept]
         fewer = type(self).fit(self.contacts_m[kept], self.normals[kept], *sigmas, self.settings)
@@ -139,9 +139,9 @@ class Gpis:
     ) -> Self:
         """The field with the kernel's parameters (and the noise scale) at a maximum of the marginal likelihood.
 
-        L-BFGS on the logarithms of the parameters with the analytic gradient, from the present values and
-        within bounds that keep the covariance well-conditioned. A present value outside them is moved in; the
-        kernel's length stays below ``longest_m``.
+        L-BFGS on the logarithms of the parameters with the analytic gradient, from the present values and within bounds
+        that keep the covariance well-conditioned. A present value outside the bounds is moved inside; the kernel's
+        length stays below ``longest_m``.
         """
         bounds = np.log(self._bounds(noise, longest_m))
         start = np.append(self.kernel.log_parameters, np.log(self.noise_scale))[: len(bounds)]
@@ -199,11 +199,11 @@ class Gpis:
     def leave_one_out_costs(self, asked: NDArray[np.intp]) -> Array:
         """Negative log density of some contacts, value and normal, each given all others, up to a constant.
 
-        The marginal likelihood of all contacts is that of the others times this density, so these costs tell what
-        would be gained by leaving a contact out.
+        The marginal likelihood of all contacts is that of the others times this density, so these costs show the gain
+        from leaving a contact out.
 
         Args:
-            asked: indices of the contacts, shape (a,), the costs are in the same order; normals must be observed.
+            asked: indices of the contacts, shape (a,); costs are in the same order. Normals must be observed.
         """
         each = np.arange(self.contacts_m.shape[1] + 1)
         groups = asked[:, None] + len(self.contacts_m) * each
@@ -213,7 +213,7 @@ class Gpis:
     def sigma_inflation(self) -> float:
         """How many times larger than stated the standard deviation of the surface is, at least 1.
 
-        By :func:`tactile_lab.slam.shape.fields.leave_one_out.inflation`; off-surface points do not tell.
+        From :func:`tactile_lab.slam.shape.fields.leave_one_out.inflation`; 1 with off-surface points.
         """
         if self._gradient_count == 0:
             return 1.0
@@ -257,7 +257,9 @@ class Gpis:
         return Prediction(mean, slope if gradient else slope[:0], self.variance(points_m) if variance else mean[:0])
 
     def _contact_sigmas(self) -> tuple[Array, Array]:
-        """Of points and normals; off-surface points do not know that of the normals, nor use it."""
+        """Standard deviations of points and normals; models with off-surface points neither know nor use those of
+        normals.
+        """
         seen, count = self.observations, len(self.contacts_m)
         return seen.value_sigma_m[:count], seen.gradient_sigma if self._gradient_count else np.zeros(count)
 
@@ -268,7 +270,7 @@ class Gpis:
         return np.concatenate([values, gradients.T.ravel()])
 
     def _factorise(self) -> RowFactor:
-        """Of ``K + noise``, with the least jitter that it needs."""
+        """The Cholesky factor of ``K + noise``, with the least jitter that it needs."""
         matrix = covariance(self.kernel, self.observations.points_m, self._gradient_count)
         factor = RowFactor.of(matrix, self.noise_scale**2 * self.observations.noise_variance)
         if factor is None:
@@ -280,7 +282,7 @@ class Gpis:
         return factor
 
     def _extended_factor(self, observations: Observations) -> RowFactor | None:
-        """The factor for these observations with normals, the first of which are the present ones."""
+        """The factor extended to these observations with normals, the first of which are the present ones."""
         old, total, dimension = len(self.contacts_m), len(observations.points_m), self.contacts_m.shape[1]
         new = observations.points_m[old:]
         corner = covariance(self.kernel, new, len(new))
@@ -313,5 +315,5 @@ class Gpis:
 
 
 def _one_each(sigma: Array | float, points_m: Array) -> Array:
-    """A standard deviation for every contact, where one is given for all."""
+    """A standard deviation for each contact, also if one is given for all."""
     return np.full(len(points_m), float(sigma)) if np.ndim(sigma) == 0 else np.array(sigma, dtype=float)

@@ -9,8 +9,8 @@ in any dimension, with ``d = x - z``:
     cov(f(x),    df(z)_j) = -2 phi' d_j
     cov(df(x)_i, df(z)_j) = -4 phi'' d_i d_j - 2 phi' [i = j]
 
-Kernels do not care about units: with points in metres and a field in metres, amplitudes are square
-metres and lengths are metres. Adjustable parameters are handed to optimisers as logarithms.
+Kernels work in any units: with points and field in metres, amplitudes are in square metres and lengths in metres.
+Adjustable parameters are passed to optimisers as logarithms.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from drivers.core.contacts import Array
 
 
 class Profile(NamedTuple):
-    """``phi`` and its derivatives by squared distance, each of the shape of the squared distances."""
+    """``phi`` and its derivatives with respect to the squared distance, each of the shape of the squared distances."""
 
     value: Array
     first: Array
@@ -49,7 +49,7 @@ class Kernel(Protocol):
         """``phi`` and two derivatives at squared distances."""
 
     def log_parameter_profiles(self, squared: Array) -> list[Profile]:
-        """Derivatives of :meth:`profile` by each logarithmic parameter."""
+        """Derivatives of :meth:`profile` with respect to each logarithmic parameter."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Matern52(_Scaled):
     """Matérn kernel of smoothness 5/2: fields with continuous second derivatives, less stiff than (2.15)."""
 
     def profile(self, squared: Array) -> Profile:
-        """In place wherever that is possible: there are few operations on each number, and many numbers."""
+        """Computed in place where possible, because there are many numbers and few operations on each."""
         rate, scaled, second = self._terms(squared)
         value = scaled / 3
         value += 1
@@ -123,10 +123,10 @@ class Matern52(_Scaled):
 class ThinPlate:
     """``amplitude * (2 r^3 - 3 R r^2 + R^3) / R^3`` with the radius R (eq. 2.17, there with amplitude ``R^3 / 12``).
 
-    The thin plate is only conditionally positive definite: it is a covariance within a domain whose
-    largest distance is at most R, so R has to cover the data and the places asked about. Farther apart
-    than R, points count as independent. The second derivative grows without bound towards ``r = 0``,
-    where it only ever appears multiplied by ``d_i d_j``; it is set to zero there.
+    The thin plate is only conditionally positive definite: it is a covariance within a domain whose largest distance is
+    at most R, so R has to cover the data and the query points. Points farther apart than R count as independent. The
+    second derivative grows without bound towards ``r = 0``, where it only ever appears multiplied by ``d_i d_j``; it is
+    set to zero there.
     """
 
     radius: float
@@ -151,7 +151,7 @@ class ThinPlate:
 
 
 def differences(points: Array, others: Array) -> Array:
-    """``points - others`` for all pairs, shape (d, n, m): one contiguous plane a coordinate."""
+    """``points - others`` for all pairs, shape (d, n, m), contiguous for each coordinate."""
     return points.T[:, :, None] - others.T[:, None, :]
 
 

@@ -1,4 +1,4 @@
-"""What contacts tell about the surface field: rows of values and gradients with their noise."""
+"""Observations of the surface field by contacts: rows of values and gradients, with their noise."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 
 LARGEST_SPREAD_m = 2.0
-"""Contacts of one graspable object lie closer together than this; more means wrong units."""
+"""Contacts of a graspable object lie closer together than this; larger distances mean wrong units."""
 
 _OUTER_SPHERE_POINTS, _INNER_SPHERE_POINTS = 60, 12
 _OUTER_SPHERE_RATIO, _INNER_SPHERE_RATIO = 1.3, 0.4
@@ -42,7 +42,7 @@ class Observations:
 
 
 def derivative_observations(points_m: Array, normals: Array, point_sigma_m: Array, normal_sigma: Array) -> Observations:
-    """On each contact the field is zero and its gradient is the normal, so that it is nearly a signed distance.
+    """At each contact the field is zero and its gradient is the normal, so that the field is nearly a signed distance.
 
     Args:
         points_m: contact points, shape (n, d).
@@ -100,11 +100,11 @@ def fibonacci_sphere(count: int) -> Array:
 
 
 def check_contacts(points_m: Array, normals: Array, point_sigma_m: Array, normal_sigma: Array) -> None:
-    """Refuse contacts that no surface can be fitted to.
+    """Refuse contacts to which no surface can be fitted.
 
     Raises:
-        ShapeError: no contact, shapes that do not belong together, NaN, infinite or negative entries,
-            normals that are not of unit length, contacts metres apart.
+        ShapeError: there are no contacts, array shapes do not match, entries are NaN, infinite or negative, normals are
+            not of unit length, or contacts are metres apart.
     """
     count = len(points_m)
     if count < 1:

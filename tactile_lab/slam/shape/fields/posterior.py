@@ -1,4 +1,4 @@
-"""What the field of :mod:`tactile_lab.slam.shape.fields.gpis` says at a place, from the weights of its observations."""
+"""Predictions of the field of :mod:`tactile_lab.slam.shape.fields.gpis`, from the weights of its observations."""
 
 from __future__ import annotations
 

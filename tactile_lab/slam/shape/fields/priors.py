@@ -1,8 +1,8 @@
-"""Prior means of the surface field (section 2.2.3): what is believed where nothing has been touched.
+"""Prior means of the surface field (section 2.2.3), which apply where nothing has been touched.
 
-All are positive outside and zero on the surface that is believed in, with a slope of about one there, as our fields
-are distances. The thesis leaves the factor h of (2.19) open and does not say how the primitive's pose and size are
-found; here h makes the slope at the contacts one on average, and pose and size come from the contacts.
+All are positive outside and zero on the assumed surface, with a slope of about one there, since our fields are
+distances. The thesis leaves the factor h of (2.19) open and does not say how the primitive's pose and size are found;
+here h makes the slope at the contacts one on average, and pose and size come from the contacts.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from drivers.core.contacts import Array
 
 _RADIUS_BOUNDS_m = (0.005, 0.200)
 _RADIUS_SHARE = 0.1
-"""How much one guessed radius counts beside the contacts: it decides only where they leave the radius open."""
+"""Weight of a guessed radius relative to the contacts: it matters only if they do not determine the radius."""
 _ROUNDNESS_SHARE = 0.01
-"""How much the sphere counts beside the contacts in the ellipsoid's curvatures, which they may leave open."""
+"""Weight of the sphere relative to the contacts for the ellipsoid's curvatures, which contacts may not determine."""
 _SLOPE_ROUNDS = 4
 _LARGEST_AXES_RATIO = 4.0
-"""Of each of the ellipsoid's semi-axes to the sphere's radius, either way."""
+"""Largest ratio of each of the ellipsoid's semi-axes to the sphere's radius, in either direction."""
 
 
 class PriorMean(Protocol):
@@ -35,7 +35,7 @@ class PriorMean(Protocol):
 
 
 class ZeroMean:
-    """The thesis's default, (2.13): untouched space is believed to lie on the surface."""
+    """The thesis's default, (2.13): untouched space is assumed to lie on the surface."""
 
     def value(self, points_m: Array) -> Array:
         return np.zeros(len(points_m))
@@ -46,7 +46,7 @@ class ZeroMean:
 
 @dataclass(frozen=True)
 class OutwardMean:
-    """Untouched space is believed to be outside, and the more so the farther from the data.
+    """Untouched space is assumed to be outside, increasingly with the distance from the data.
 
     ``sqrt(|x - centre|^2 + softness^2)``: a cone with a rounded tip, positive everywhere and of slope one far
     out like a distance, in place of the quadratic of (2.19), whose slope grows without bound.
@@ -91,7 +91,7 @@ class EllipsoidMean:
     def sphere_around(cls, points_m: Array, normals: Array) -> Self:
         """The sphere (circle) whose points with the contacts' normals are nearest to the contacts, by least squares.
 
-        Where the contacts leave its radius open, as those on one flat face do, half their spread is taken.
+        If the contacts do not determine its radius, as those on one flat face, half their spread is used.
         """
         centre, radius = _sphere(points_m, normals)
         return cls(centre, np.eye(len(centre)) / radius**2, radius)
@@ -100,7 +100,7 @@ class EllipsoidMean:
     def ellipsoid_around(cls, points_m: Array, normals: Array) -> Self:
         """The ellipsoid (ellipse) whose quadratic is zero at the contacts with the normals as gradients.
 
-        Linear least squares in the quadratic's coefficients, drawn towards the sphere where the contacts say little.
+        Linear least squares in the quadratic's coefficients, regularized towards the sphere.
         """
         centre, radius = _sphere(points_m, normals)
         curvature, linear, constant = _quadratic((points_m - centre) / radius, normals)
@@ -134,8 +134,8 @@ def _sphere(points_m: Array, normals: Array) -> tuple[Array, float]:
 def _quadratic(points: Array, normals: Array) -> tuple[Array, Array, float]:
     """B, b and c of ``x^T B x / 2 + b^T x + c`` with zeros at the points and their normals as gradients.
 
-    Only the gradients' directions are data: their lengths, one on average, are those of the quadratic found before.
-    Beside the n points a unit sphere is among the data, with the weight ``_ROUNDNESS_SHARE * n``.
+    Only the directions of gradients are data: their lengths, one on average, are those of the quadratic found before. A
+    unit sphere is added to the data of the n points, with the weight ``_ROUNDNESS_SHARE * n``.
     """
     count, dimension = points.shape
     first, second = np.triu_indices(dimension)

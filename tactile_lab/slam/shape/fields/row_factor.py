@@ -12,16 +12,16 @@ from scipy.linalg import lapack
 from drivers.core.contacts import Array
 
 JITTERS = (1e-10, 1e-8, 1e-6, 1e-4)
-"""Added to the diagonal relative to its entries, the first that makes it positive definite."""
+"""Additions to the diagonal, relative to its entries; the first one that makes the matrix positive definite is used."""
 
 
 @dataclass(frozen=True)
 class RowFactor:
-    """Cholesky factor of a covariance whose rows may stand in another order.
+    """Cholesky factor of a covariance whose rows may be in another order.
 
     Attributes:
         lower: of ``covariance[rows][:, rows]``, shape (n, n), column after column in memory.
-        rows: shape (n,); a factor that has grown has its rows in their order of arrival.
+        rows: shape (n,); in an extended factor rows are in the order in which they were added.
         jitter: relative addition to the diagonal.
     """
 
@@ -31,7 +31,9 @@ class RowFactor:
 
     @classmethod
     def of(cls, matrix: Array, noise_variance: Array) -> Self | None:
-        """Of a prior covariance with noise on its diagonal (overwritten); None if even the largest jitter fails."""
+        """The factor of a prior covariance with noise on its diagonal (overwritten); None if even the largest jitter
+        fails.
+        """
         diagonal = np.diag(matrix) + noise_variance
         for jitter in JITTERS:
             np.fill_diagonal(matrix, diagonal * (1 + jitter))
@@ -71,7 +73,7 @@ class RowFactor:
         return np.asarray(found.T @ found)
 
     def in_single_precision(self) -> Array:
-        """The factor as single-precision numbers, half as dear to solve with."""
+        """The factor in single precision, with which solving takes half the time."""
         return np.asarray(self.lower, dtype=np.float32, order="F")
 
     def inverse(self) -> Array:
@@ -82,14 +84,14 @@ class RowFactor:
         return restored
 
     def inverse_diagonal(self) -> Array:
-        """The diagonal of :meth:`inverse`, for a third of the work."""
+        """The diagonal of :meth:`inverse`, in a third of the time."""
         inverted, _ = lapack.dtrtri(self.lower, lower=1)
         diagonal = np.empty(len(self.rows))
         diagonal[self.rows] = np.einsum("ij,ij->j", inverted, inverted)
         return diagonal
 
     def inverse_blocks(self, groups: NDArray[np.intp]) -> Array:
-        """Blocks of :meth:`inverse`, for a third of the work or less.
+        """Blocks of :meth:`inverse`, in a third of the time or less.
 
         Args:
             groups: rows that belong together, shape (a, e).
@@ -111,13 +113,13 @@ class RowFactor:
         return np.asarray(np.einsum("rai,raj->aij", own, own))
 
     def extend(self, cross: Array, corner: Array, old_rows: NDArray[np.intp], rows: NDArray[np.intp]) -> Self | None:
-        """The factor with m rows more, at a cost of order ``n^2 m``; None if they make it indefinite.
+        """The factor with m more rows, at a cost of order ``n^2 m``; None if they make it indefinite.
 
         Args:
             cross: prior covariance of the new rows with the old ones, shape (m, n), the old ones in their own order.
             corner: covariance of the new rows with their noise, shape (m, m).
-            old_rows: where each old row stands among all, shape (n,).
-            rows: where each new row stands among all, shape (m,).
+            old_rows: index of each old row among all rows, shape (n,).
+            rows: index of each new row among all rows, shape (m,).
         """
         count = len(self.lower)
         beside, _ = lapack.dtrtrs(self.lower, self._order(cross).T, lower=1)

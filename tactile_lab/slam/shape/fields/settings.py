@@ -1,4 +1,4 @@
-"""How contacts are turned into a field, as a person writes it, and the model parts that follow from it."""
+"""Settings for turning contacts into a field, and the parts of the model that follow from them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ShapePart: TypeAlias = Literal[
     "right angles",
     "face extents",
 ]
-"""What the choice of the shape's model is made of, see docs/estimator.md."""
+"""Parts of the choice of the shape model, see docs/estimator.md."""
 
 
 class GpisSettings(StrictModel):
@@ -38,12 +38,12 @@ class GpisSettings(StrictModel):
         kernel: covariance function, (2.15), Matérn 5/2 or (2.17).
         amplitude_m: prior standard deviation of the field; start value if optimised.
         length_m: length of the kernel; start value if optimised. The thin plate takes its radius from the data.
-        prior_mean: (2.18); "zero" is (2.13), "outward" positive everywhere and the more the farther from the data,
-            "sphere", "ellipsoid" (2.19) and "superquadric" are primitives placed by the contacts (the last by a fit
-            that takes about a second in space).
+        prior_mean: (2.18); "zero" is (2.13), "outward" is positive everywhere and increases with the distance from the
+            data, "sphere", "ellipsoid" (2.19) and "superquadric" are primitives fitted to the contacts (the last in
+            about a second, in space).
         prior_softness_m: value of the outward prior amid the data.
         offsurface_distance_m: distance of the inside and outside points from their contact.
-        without: parts of the choice of the shape's model that are left out, to see what they are worth.
+        without: parts of the choice of the shape model to leave out, to measure their worth.
     """
 
     observations: Literal["normals", "offsurface"] = "normals"
@@ -73,12 +73,12 @@ def initial_kernel(observations: Observations, settings: GpisSettings) -> Kernel
 
 
 def _domain_diameter(points_m: Array) -> float:
-    """Largest distance in the domain of interest: the observations' and the space around them."""
+    """Largest distance in the domain of interest: the observations and the space around them."""
     return float(2 * np.linalg.norm(np.ptp(points_m, axis=0)) + 0.040)
 
 
 def prior_mean(contacts_m: Array, normals: Array, settings: GpisSettings) -> PriorMean:
-    """The prior that the settings ask for, placed by the contacts."""
+    """The prior that the settings name, fitted to the contacts."""
     if settings.prior_mean == "zero":
         return ZeroMean()
     if settings.prior_mean == "outward":

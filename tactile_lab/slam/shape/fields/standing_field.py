@@ -1,10 +1,10 @@
 """A smooth field that stands on a table, and may end in a flat top.
 
-A field alone rounds what it has not touched: walls curl inward below the lowest contacts, and the rim of a flat top is
-blunt. Here walls go on to the table where the lowest contacts are on upright walls: the field is fitted to mirror
-images of them below the table as well, a little inward, and cut there. A level top is treated likewise, as far as its
-contacts are better explained by one height than by the field. Where the walls are upright all the way and their upper
-edge was felt to be round, as that of a tin or a carton is, the edge at the foot is taken to be as round.
+A field alone rounds untouched parts: walls curve inward below the lowest contacts, and the rim of a flat top is blunt.
+Here walls continue to the table if the lowest contacts are on vertical walls: the field is also fitted to mirror images
+of these below the table, slightly inward, and cut at the table. A level top is treated likewise if one height explains
+its contacts better than the field does. If the walls are vertical over the whole height and contacts show that their
+upper edge is round, as that of a tin or a carton, the edge at the foot is assumed to have the same radius.
 """
 
 from __future__ import annotations
@@ -25,20 +25,24 @@ _LEVEL_COSINE = np.cos(np.deg2rad(20.0))
 _MIRRORED_SHARE = 0.35
 """Share of the object's height from which walls are mirrored at an end."""
 _LEAST_UPRIGHT_SHARE = 0.8
-"""Walls are only mirrored where so many of the contacts on sides near the end are upright: not below a sphere."""
+"""Walls are mirrored only if this share of the contacts near the end is on vertical walls: not below a sphere."""
 _INSET_SLOPE, _LARGEST_INSET_m = 0.2, 0.006
-"""Mirror images lie inward by this share of their distance from the end: edges at the foot are often rounded, and
-walls that were not touched near it should end between a sharp and a rounded one."""
+"""Mirror images are moved inward by this share of their distance from the end: edges at the foot are often rounded, and
+walls not touched near it should end between a sharp and a rounded edge.
+"""
 _ROUND_SHARE, _LEAST_ROUND_CONTACTS = 0.15, 4
-"""A round edge at the top is felt by so many contacts, all within this share of the height, between level and upright:
-noise alone turns hardly any contact so far."""
+"""A round edge at the top needs this many contacts within this share of the height, with normals between horizontal and
+vertical; noise alone tilts hardly any contact this far.
+"""
 _UPRIGHT_DOWN_SHARE = 0.9
-"""So many of the contacts below the edge must be upright."""
+"""Share of the contacts below the edge that must be on vertical walls."""
 _LARGEST_RETREAT = 0.10
-"""So far inside of the walls below it, as a share of the height, an edge may lie; a neck lies farther inside."""
+"""Largest distance of an edge inside the walls below it, as a share of the height; a neck lies farther inside."""
 _EDGE_TILTS_rad = np.deg2rad([20.0, 50.0])
 _VAGUENESS = 2.0
-"""A foot's edge is drawn by two rows of places, where normals fall by so much, known so much less than contacts."""
+"""An edge at the foot is represented by two rows of points: the downward tilts of their normals, and the factor on
+their standard deviations.
+"""
 _LEAST_TOP_CONTACTS = 3
 _KERNEL_STEPS = 10
 _SAME_HEIGHT_SIGMAS = 4.0
@@ -52,8 +56,8 @@ class StandingField:
         field: fitted to the contacts and their mirror images.
         floor_m: height of the table.
         ceiling_m: height of the flat top, None if it has none.
-        log_evidence: of all contacts, mirror images apart.
-        mirrored: ends that walls were mirrored at, each with the distance of the nearest contact on a wall.
+        log_evidence: log evidence of all contacts, without mirror images.
+        mirrored: ends at which walls were mirrored, each with the distance of the nearest contact on a wall.
         name: "standing gpis".
     """
 
@@ -66,11 +70,11 @@ class StandingField:
 
     @classmethod
     def fit(cls, gpis: Gpis, floor_m: float) -> StandingField:
-        """Let a field stand on the table; its kernel changes only if a level top is taken out of it.
+        """Let a field stand on the table; its kernel changes only if a level top is removed from its contacts.
 
         Args:
             gpis: a field fitted in space.
-            floor_m: height of the table in its frame.
+            floor_m: height of the table in the field's frame.
 
         Raises:
             ShapeError: the contacts are in the plane, or all below the table.
@@ -96,7 +100,7 @@ class StandingField:
         raise ShapeError("contacts in space have a surface, not an outline", hint="Ask for the mesh")
 
     def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
-        """The surface, ending on the table it was fitted for whether or not its height is given again.
+        """The surface; it ends at the table for which it was fitted, even if the height is not given again.
 
         Raises:
             ShapeError: the field has no inside near the contacts.
@@ -106,7 +110,7 @@ class StandingField:
         return replace(mesh, sigma_m=np.hypot(mesh.sigma_m, self._doubt_m(mesh)))
 
     def _doubt_m(self, mesh: SurfaceMesh) -> Array:
-        """Of walls between the contacts next to an end and the end itself: they may be sharp there or rounded."""
+        """Uncertainty of walls between an end and the contacts next to it, where the edge may be sharp or rounded."""
         doubt = np.zeros(len(mesh.vertices))
         for end_m, gap_m in self.mirrored:
             away = np.abs(mesh.vertices[:, 2] - end_m) / max(gap_m, 1e-6)
@@ -129,7 +133,7 @@ def _top(contacts: WeightedContacts) -> Indices:
 
 
 def _level(contacts: WeightedContacts, top: Indices, level_m: float) -> float:
-    """Log likelihood of a level top, with the price of its height (BIC)."""
+    """Log likelihood of a level top, with the BIC penalty for its height."""
     weights, turns = contacts.point_weights[top], contacts.normal_weights[top]
     away = contacts.normals[top] - [0.0, 0.0, 1.0]
     misfit = np.sum(weights * (contacts.points_m[top, 2] - level_m) ** 2) + np.sum(turns[:, None] * away**2)
@@ -138,7 +142,7 @@ def _level(contacts: WeightedContacts, top: Indices, level_m: float) -> float:
 
 
 def _walls_near(contacts: WeightedContacts, rest: Indices, end_m: float, ends_m: list[float]) -> Indices:
-    """Contacts on the walls that stand on an end; none if what is near it is not mostly upright."""
+    """Contacts on the walls that meet an end; none if the contacts near it are not mostly on vertical walls."""
     reach_m = _MIRRORED_SHARE * float(np.ptp(np.append(contacts.points_m[:, 2], ends_m)))
     up = np.abs(contacts.normals[rest, 2])
     near = (np.abs(contacts.points_m[rest, 2] - end_m) < reach_m) & (up < _LEVEL_COSINE)
@@ -147,14 +151,14 @@ def _walls_near(contacts: WeightedContacts, rest: Indices, end_m: float, ends_m:
 
 
 def _gaps(contacts: WeightedContacts, rest: Indices, ends_m: list[float]) -> tuple[tuple[float, float], ...]:
-    """The ends with walls on them, and how far the nearest contact on these is."""
+    """The ends with walls, and the distance of the nearest contact on these walls."""
     walls = [(end_m, _walls_near(contacts, rest, end_m, ends_m)) for end_m in ends_m]
     gaps = [(end_m, np.abs(contacts.points_m[members, 2] - end_m)) for end_m, members in walls]
     return tuple((end_m, float(away.min())) for end_m, away in gaps if len(away))
 
 
 def _edge_radius_m(gpis: Gpis, contacts: WeightedContacts, rest: Indices, floor_m: float) -> float:
-    """Radius of the upper edge of walls that are upright down to the table; zero where it is sharp or they are not.
+    """Radius of the upper edge of walls that are vertical down to the table; zero if it is sharp, or if they are not.
 
     Least squares over the contacts on the edge: one whose normal rises by an angle t lies ``radius (1 - sin t)`` below
     the top.
@@ -179,7 +183,7 @@ def _edge_radius_m(gpis: Gpis, contacts: WeightedContacts, rest: Indices, floor_
 
 @dataclass(frozen=True)
 class _Image:
-    """What stands for a wall beyond its contacts: which of these, where they appear, how much less is known there."""
+    """Virtual contacts that continue a wall: their originals, their positions, and the factor on their sigmas."""
 
     source: Indices
     points_m: Array
@@ -188,7 +192,7 @@ class _Image:
 
     @classmethod
     def mirror(cls, contacts: WeightedContacts, walls: Indices, end_m: float) -> _Image:
-        """Contacts on walls seen in a mirror at the end, a little inward."""
+        """Mirror contacts on walls at the end, slightly inward."""
         points, normals = contacts.points_m[walls], contacts.normals[walls]
         inset_m = np.minimum(_INSET_SLOPE * np.abs(points[:, 2] - end_m), _LARGEST_INSET_m)
         inward = points - inset_m[:, None] * normals
@@ -196,7 +200,7 @@ class _Image:
 
     @classmethod
     def round_foot(cls, contacts: WeightedContacts, walls: Indices, floor_m: float, radius_m: float) -> list[_Image]:
-        """Below contacts on walls, on an edge of a radius at the foot."""
+        """Place virtual contacts below those on walls, on a rounded edge at the foot."""
         level = contacts.normals[walls] * [1.0, 1.0, 0.0]
         level /= np.linalg.norm(level, axis=1, keepdims=True)
         feet = contacts.points_m[walls] * [1.0, 1.0, 0.0] + [0.0, 0.0, floor_m]
@@ -209,7 +213,7 @@ class _Image:
 
 
 def _images(gpis: Gpis, contacts: WeightedContacts, rest: Indices, ends_m: list[float]) -> list[_Image]:
-    """What stands for the walls' ends, the first of which is the table."""
+    """Virtual contacts at the ends of walls; the first end is the table."""
     images: list[_Image] = []
     for index, end_m in enumerate(ends_m):
         walls = _walls_near(contacts, rest, end_m, ends_m)
@@ -222,7 +226,7 @@ def _images(gpis: Gpis, contacts: WeightedContacts, rest: Indices, ends_m: list[
 
 
 def _fit(gpis: Gpis, contacts: WeightedContacts, rest: Indices, ends_m: list[float]) -> Gpis:
-    """The field of some contacts and of their mirror images at the ends, with the kernel of another field."""
+    """Fit the field of some contacts and of their images at the ends, with the kernel of another field."""
     images = _images(gpis, contacts, rest, ends_m)
     source = np.concatenate([rest, *(image.source for image in images)])
     vagueness = np.concatenate([np.ones(len(rest)), *(np.full(len(one.source), one.vagueness) for one in images)])

@@ -21,14 +21,16 @@ _FINALISTS = 3
 _PLANAR_STARTS = 8
 _SETTLED_m = 1e-7
 _WEAKEST_DIRECTION = 1e-4
-"""Motions that the data determine less than this, relative to the best, are ignored (a sphere's rotations)."""
+"""Motions that the data determine less than this, relative to the best determined one, are ignored (a sphere's
+rotations).
+"""
 
 
 def align_contours(estimated_m: Array, truth_m: Array) -> Pose2:
     """``truth_T_estimated`` that fits one closed polygon of shape (n, 2) best to another.
 
-    Least squares over nearest points in both directions (iterated closest points, at the end along the
-    normals), from the given pose and from eight turns about the middles; repeatable.
+    Least squares over nearest points in both directions (iterated closest points, finally along the normals), from the
+    given pose and from eight rotations about the centres; deterministic.
     """
     source, target = (_polygon_surface(outline) for outline in (estimated_m, truth_m))
     rigid = _best(source, target, turns=list(_planar_turns(2)), upright=False)
@@ -41,7 +43,7 @@ def align_meshes(estimated: TriangleMesh, truth: TriangleMesh, *, upright: bool)
     Args:
         estimated: the mesh to move.
         truth: the mesh that stays.
-        upright: True turns about the vertical axis only, as on a table; False turns freely, starting from the 24
+        upright: True rotates only about the vertical axis, as on a table; False rotates freely, starting from the 24
             assignments of the principal axes.
     """
     source, target = (_mesh_surface(mesh) for mesh in (estimated, truth))
@@ -73,7 +75,9 @@ class _Surface:
 
 
 def _best(source: _Surface, target: _Surface, *, turns: list[Array], upright: bool) -> _Rigid:
-    """Short runs from all starts on few points, long runs of the most promising; the first of equals wins."""
+    """Short runs from all initial poses with few points, then long runs of the best; the first of equal results
+    wins.
+    """
     dimension = source.points.shape[1]
     middles = source.points.mean(axis=0), target.points.mean(axis=0)
     starts = [_Rigid(np.eye(dimension), np.zeros(dimension))]
@@ -92,7 +96,7 @@ class _ClosestPoints:
         self._source_tree, self._target_tree = cKDTree(source.points), cKDTree(target.points)
 
     def run(self, pose: _Rigid, steps: int) -> _Rigid:
-        """Least squares of the pairs' distances: slow to converge, but from far away."""
+        """Least squares of the pairs' distances: converges slowly, but from far away."""
         for _ in range(steps):
             sources, targets, _ = self._pairs(pose)
             pose = _fit_rigid(sources, targets, upright=self._upright)
@@ -126,7 +130,7 @@ class _ClosestPoints:
 
 
 def _fit_along_normals(moved: Array, targets: Array, normals: Array, *, upright: bool) -> _Rigid:
-    """The small motion of ``moved`` that brings it nearest to the targets' tangents."""
+    """The small motion of ``moved`` that minimizes its distances to the targets' tangents."""
     middle = moved.mean(axis=0)
     generators = _generators(moved.shape[1], upright)
     turning = [np.sum(normals * ((moved - middle) @ generator.T), axis=1) for generator in generators]
@@ -139,7 +143,7 @@ def _fit_along_normals(moved: Array, targets: Array, normals: Array, *, upright:
 
 
 def _generators(dimension: int, upright: bool) -> Array:
-    """Skew matrices of the turns allowed, shape (k, d, d); the one about the vertical first."""
+    """Skew matrices of the allowed rotations, shape (k, d, d); that about the vertical first."""
     planes = [(1, 0)] if upright or dimension == 2 else [(1, 0), (2, 1), (0, 2)]
     generators = np.zeros((len(planes), dimension, dimension))
     for generator, (i, j) in zip(generators, planes, strict=True):
@@ -168,7 +172,7 @@ def _planar_turns(dimension: int) -> Iterator[Array]:
 
 
 def _spatial_turns(source: Array, target: Array) -> Iterator[Array]:
-    """Rotations that align the principal axes of one set with those of the other, in all 24 ways."""
+    """The 24 rotations that align the principal axes of one set with those of the other."""
     axes_source, axes_target = (
         np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2] for points in (source, target)
     )

@@ -57,7 +57,7 @@ def contour_errors(estimated_m: Array, truth_m: Array, truth_T_estimated: Pose2 
         truth_T_estimated: applied to the estimate first; identity if None.
 
     Raises:
-        ShapeError: an outline with fewer than three points, or with coordinates that are not numbers.
+        ShapeError: an outline has fewer than three points, or coordinates that are not numbers.
     """
     _check_polygon(estimated_m, "the estimated outline")
     _check_polygon(truth_m, "the true outline")
@@ -83,7 +83,7 @@ def mesh_errors(estimated: TriangleMesh, truth: TriangleMesh, truth_T_estimated:
         truth_T_estimated: applied to the estimate first; identity if None.
 
     Raises:
-        ShapeError: a mesh without faces, or with coordinates that are not numbers.
+        ShapeError: a mesh has no faces, or coordinates that are not numbers.
     """
     moved = _Mesh(*mesh_arrays(estimated))
     if truth_T_estimated is not None:
@@ -101,7 +101,7 @@ class _Mesh:
 
 @dataclass(frozen=True)
 class _Directed:
-    """From one surface to the other: distances of even samples, and the largest, corners included."""
+    """Distances from one surface to the other: of evenly spread samples, and the largest one, including corners."""
 
     distances_m: Array
     largest_m: float

@@ -30,7 +30,7 @@ def mesh_overlap(first: TriangleMesh, second: TriangleMesh) -> float:
 
 
 def shared_area(first_m: Array, second_m: Array) -> float:
-    """Area within both polygons, positive if they turn the same way.
+    """Area of the intersection of both polygons, positive if they have the same orientation.
 
     The inside of a polygon is the sum of the signed strips between its edges and a line below, so that the
     shared area is the signed sum, over all pairs of edges, of the area below both edges.
@@ -52,7 +52,7 @@ def shared_area(first_m: Array, second_m: Array) -> float:
 
 
 def _edges(polygon_m: Array) -> tuple[Array, Array]:
-    """Begins and ends of the edges, each of shape (2, n)."""
+    """Start and end points of the edges, each of shape (2, n)."""
     return polygon_m.T, np.roll(polygon_m, -1, axis=0).T
 
 
@@ -64,7 +64,7 @@ def _height(begin: Array, end: Array, x: Array) -> Array:
 
 
 def _mean_magnitude(first: Array, last: Array) -> Array:
-    """Mean of ``|y|`` where y goes linearly from ``first`` to ``last``."""
+    """Mean of ``|y|`` while y goes linearly from ``first`` to ``last``."""
     total = np.abs(first) + np.abs(last)
     crossing = np.divide(first**2 + last**2, total, out=np.zeros_like(total), where=total > 0)
     return np.asarray(np.where(first * last < 0, crossing, total) / 2)

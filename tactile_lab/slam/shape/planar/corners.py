@@ -1,7 +1,7 @@
 """Contacts at the corners of an outline.
 
-A fingertip that straddles a corner touches it with a normal anywhere between those of the two faces. Treated as
-separate faces, such contacts would cut corners off; treated as errors, they are lost; treated as corner contacts, they
+A fingertip that straddles a corner touches it with any normal between those of the two faces. Treated as separate
+faces, such contacts would cut corners off; treated as outliers, they would be lost; treated as corner contacts, they
 determine the corner. Concave corners are never touched like this: there the fingertip rests on both faces.
 """
 
@@ -20,11 +20,11 @@ CORNER_SHARE = 0.1
 """Prior share of contacts at corners."""
 
 _LEAST_ON_FACE = 3
-"""Faces with fewer contacts may actually be corners between larger ones."""
+"""Faces with fewer contacts may in fact be corners between larger faces."""
 
 _LEAST_TURN_rad = float(np.deg2rad(20.0))
 _CLEARLY = 4.0
-"""Chi-square by which a corner must explain a contact better than a face."""
+"""Reduction of chi-square by which a corner must explain a contact better than a face."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Corners:
     Attributes:
         places_m: shape (c, 2).
         directions_rad: angle of the outward normal of the face before each corner, counter-clockwise, shape (c,).
-        turns_rad: angle from there to the normal of the face behind, above zero, shape (c,).
+        turns_rad: angle from there to the normal of the face after the corner, positive, shape (c,).
     """
 
     places_m: Array
@@ -52,10 +52,11 @@ class Corners:
         return cls(places, before[convex], turns[convex])
 
     def chi_squares(self, contacts: PlanarContacts) -> Array:
-        """Of each contact at the corner that explains it best, shape (n,), comparable with that on a face.
+        """Chi-square of each contact at the corner that explains it best, shape (n,), comparable with that on a face.
 
-        The point is at the corner, the normal anywhere in between. That the place along the face and the direction are
-        not free, but the one given and the other spread out, counts, and so does how rare such contacts are.
+        The point is at the corner, and the normal anywhere in between. Compared with a contact on a face, the position
+        along the face is fixed and the direction is spread out; both are taken into account, and so is the rarity of
+        such contacts.
         """
         if len(self.places_m) == 0:
             return np.full(len(contacts), np.inf)
@@ -70,7 +71,9 @@ class Corners:
 
 
 def at_corners(contacts: PlanarContacts, faces: Faces) -> NDArray[np.bool_]:
-    """Contacts that corners between the larger faces explain clearly better than the faces they are on, shape (n,)."""
+    """Which contacts are explained clearly better by corners between larger faces than by their own faces, shape
+    (n,).
+    """
     sizes = np.bincount(faces.labels, minlength=faces.count)
     larger = np.flatnonzero(sizes >= _LEAST_ON_FACE)
     if len(larger) < 2:
@@ -82,7 +85,7 @@ def at_corners(contacts: PlanarContacts, faces: Faces) -> NDArray[np.bool_]:
 
 
 def _chi_squares_on_faces(contacts: PlanarContacts, faces: Faces) -> Array:
-    """Of each contact on its own face, shape (n,)."""
+    """Chi-square of each contact on its own face, shape (n,)."""
     outward = faces.normals[faces.labels]
     away = np.sum(contacts.points_m * outward, axis=1) - faces.offsets_m[faces.labels]
     tilt = 2 * (1 - np.sum(contacts.normals * outward, axis=1))

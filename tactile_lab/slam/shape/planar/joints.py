@@ -19,21 +19,22 @@ _LEAST_TURN = 0.12
 """Sine of the least angle between two faces whose lines are intersected, 7 degrees; flatter ones are bridged."""
 
 _SLACK_SIGMAS = 8.0
-"""A corner may lie so many standard deviations of a contact behind the outermost contacts of its faces."""
+"""Largest distance of a corner behind the outermost contacts of its faces, in standard deviations of a contact."""
 
 _MANY = 6
-"""On a face with at least this many contacts one may be beyond the corner."""
+"""On a face with at least this many contacts, one may lie beyond the corner."""
 
 _LARGEST_CORNER_SIGMA_m = 0.015
-"""A corner with a larger standard deviation is a guess."""
+"""A corner with a larger standard deviation counts as a guess."""
 
 _UNSEEN_CONTACTS = 2.5
 _LARGEST_ROUNDING_m = 0.015
-"""So is one farther from the provisional outline than that rounds corners off, where moreover so many more contacts
-were to be expected than on the short cut, and none was found: a face between was missed."""
+"""So does a corner that is farther from the provisional outline than rounding explains, if in addition this many
+contacts would be expected beyond the short cut, but there are none: a face in between was missed.
+"""
 
 _LONGEST_DETOUR = 4.0
-"""A piece of the provisional outline bridges two faces unless it is so many times longer than a straight line."""
+"""A piece of the provisional outline bridges two faces unless it is this many times longer than a straight line."""
 
 _BRIDGE_STEPS = 8
 
@@ -52,7 +53,7 @@ class Joint:
 
 
 class JointMaker:
-    """Joints between successive faces.
+    """Makes joints between successive faces.
 
     Args:
         contacts, faces: as of the polygon.
@@ -94,7 +95,7 @@ class JointMaker:
         return np.asarray(np.linalg.solve(normals, self._faces.offsets_m[pair]))
 
     def _is_plausible(self, face: int, following: int, corner: Array, last: int, first: int) -> bool:
-        """Whether the corner lies between both faces, leaves out no contacts, and is known well."""
+        """Whether the corner lies between both faces, cuts off no contacts, and is well determined."""
         ends, tangents = self._ends(face, following, last, first), self._faces.tangents
         slack_m = _SLACK_SIGMAS * float(self._contacts.point_sigma_m[[last, first]].max())
         leaps = np.array([(corner - ends[0]) @ tangents[face], (ends[1] - corner) @ tangents[following]])
@@ -111,9 +112,9 @@ class JointMaker:
         return float(distances_to_polygon(corner[None], self._provisional.points_m)[0]) if self._provisional else 0.0
 
     def _bridge(self, ends: Array) -> Joint:
-        """Between two ends: the provisional outline if it runs there, otherwise a straight line.
+        """A bridge between two ends: the provisional outline if it goes there, otherwise a straight line.
 
-        Along a straight line sigma grows towards the middle, to a quarter of its length: nothing was touched there.
+        Along a straight line sigma grows to a quarter of its length at the middle, since nothing was touched there.
         """
         base = float(self._contacts.point_sigma_m.mean())
         length = float(np.linalg.norm(ends[1] - ends[0]))
@@ -124,7 +125,7 @@ class JointMaker:
         return Joint(ends[0] + share[:, None] * (ends[1] - ends[0]), base + length * share * (1 - share))
 
     def _piece_of_provisional(self, ends: Array, longest_m: float) -> Contour | None:
-        """What lies between the points nearest to the ends, counter-clockwise, without those points."""
+        """The provisional outline between the points nearest to the ends, counter-clockwise, without these points."""
         if self._provisional is None:
             return None
         points = self._provisional.points_m
@@ -137,9 +138,10 @@ class JointMaker:
 
 
 def _outermost(before: Indices, after: Indices) -> list[tuple[np.int64, np.int64]]:
-    """The last contact of a face and the first of the next; either may be left out of account on a face of many.
+    """The last contact of a face and the first of the next; on a face with many contacts, this one may be ignored.
 
-    Grasps that touch parallel faces only slide along them unseen, and carry a contact beyond the corner.
+    The position of grasps that touch only parallel faces is undetermined along them, so that a contact may end up
+    beyond the corner.
     """
     pairs = [(before[-1], after[0])]
     pairs += [(before[-2], after[0])] if len(before) >= _MANY else []

@@ -1,4 +1,4 @@
-"""Closed polygons in the plane: crossing, inside and outside."""
+"""Closed polygons in the plane: self-intersection, inside and outside."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _PAIRS_AT_ONCE = 1 << 20
 
 
 def is_simple(polygon_m: Array) -> bool:
-    """Whether no two edges of a closed polygon of shape (n, 2) cross or touch, but for neighbours at their corner."""
+    """Whether no two edges of a closed polygon of shape (n, 2) cross or touch, except neighbours at their corner."""
     starts, ends = polygon_m, np.roll(polygon_m, -1, axis=0)
     count = len(starts)
     first, second = np.triu_indices(count, k=2)

@@ -20,7 +20,7 @@ from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 LEAST_FACES = 3
 
 BRIDGE = -1
-"""Face number of a part of the outline that no face covers."""
+"""Face number of parts of the outline that no face covers."""
 
 
 class Polygon:
@@ -29,7 +29,7 @@ class Polygon:
     Attributes:
         name: "polygon".
         contacts: those that lie on faces.
-        faces: which of them lies on which face.
+        faces: assignment of these contacts to faces.
         corner_contacts: the others, each at one of the corners.
         outline_m: vertices of the simple closed outline, counter-clockwise, shape (k, 2): its corners, and the points
             of bridges where two neighbouring faces do not meet in a plausible corner.
@@ -56,17 +56,17 @@ class Polygon:
         provisional: Contour | None = None,
         corner_contacts: PlanarContacts | None = None,
     ) -> Self:
-        """The outline of faces, each met by its neighbours.
+        """Make the outline from faces, each of which meets its neighbours.
 
         Args:
-            contacts: what the faces were found in.
+            contacts: the contacts in which the faces were found.
             faces: at least three.
-            provisional: an outline that corners must not stray from, and that bridges gaps where faces do not meet;
-                straight lines do if it is None or goes a long way round.
+            provisional: an outline from which corners must not deviate, and that bridges gaps where faces do not meet;
+                straight lines bridge gaps if it is None or makes a long detour.
             corner_contacts: further contacts, which lie at corners and not on the faces.
 
         Raises:
-            ShapeError: fewer than three faces, or faces that do not enclose one simple region: no polygon then.
+            ShapeError: there are fewer than three faces, or they do not enclose one simple region.
         """
         if faces.count < LEAST_FACES:
             raise ShapeError(f"{faces.count} faces enclose nothing", hint="Contacts on three sides are needed")
@@ -89,13 +89,13 @@ class Polygon:
 
     @property
     def corners(self) -> Corners:
-        """The convex ones that a fingertip may straddle."""
+        """Convex corners, which a fingertip may straddle."""
         before, after = np.roll(self.edge_faces, 1)[self._is_corner], self.edge_faces[self._is_corner]
         return Corners.between(self.faces, np.column_stack([before, after]))
 
     @cached_property
     def uncertainty(self) -> FaceUncertainty:
-        """Of the faces, the scatter found included."""
+        """Uncertainty of the faces, including the observed scatter."""
         return FaceUncertainty.of(self.contacts, self.faces).scale(_scatter(self.contacts, self.faces))
 
     @property
@@ -119,7 +119,7 @@ class Polygon:
         return Contour(np.vstack(points), np.concatenate(sigmas), is_closed=True)
 
     def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
-        """An outline has no surface. Raises ShapeError."""
+        """Raises ShapeError: an outline has no surface."""
         raise ShapeError("a polygon is an outline in the plane and has no surface")
 
     @property
@@ -128,6 +128,6 @@ class Polygon:
 
 
 def _scatter(contacts: PlanarContacts, faces: Faces) -> float:
-    """Root of chi-square per degree of freedom, if above one: the contacts scatter more than stated."""
+    """Root of chi-square per degree of freedom, at least one; above one if contacts scatter more than stated."""
     freedom = 2 * len(contacts) - faces.count - len(np.unique(faces.direction_groups))
     return float(np.sqrt(max(1.0, faces.chi_square / freedom))) if freedom > 0 else 1.0

@@ -1,8 +1,9 @@
 """Makes faces parallel or perpendicular if the contacts allow it.
 
-Directions known to some degrees each are known better together. Two faces, or two groups of them, share one direction
-up to quarter turns if that costs less chi-square than one direction more is worth: the narrowing of a prior over a
-quarter turn by the contacts. So the evidence decides, and a clearly oblique face keeps its direction.
+Directions that are uncertain by some degrees each are determined better together. Two faces, or two groups of faces,
+share one direction up to quarter turns if the increase of chi-square is less than the penalty for a further direction:
+the narrowing of a prior over a quarter turn by the contacts. So the evidence decides, and a clearly oblique face keeps
+its direction.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from tactile_lab.slam.shape.regularities import offsets_of_faces
 _QUARTER_rad = np.pi / 2
 
 _LONERS = 3.0
-"""Prior weight of a face of its own direction against joining one other face."""
+"""Prior weight of a separate direction for a face, relative to joining one other face."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,8 @@ class _Group:
 
     Attributes:
         faces: their numbers.
-        turns: quarter turns from the shared direction to each one's own.
-        moments: of all, see :func:`tactile_lab.slam.shape.planar.runs.chi_square_at`.
+        turns: quarter turns from the shared direction to that of each face.
+        moments: moments of all faces, see :func:`tactile_lab.slam.shape.planar.runs.chi_square_at`.
         angle_rad: the best shared direction.
     """
 
@@ -39,7 +40,7 @@ class _Group:
 
 
 def with_right_angles(contacts: PlanarContacts, faces: Faces) -> Faces:
-    """The same faces, made parallel or perpendicular where the evidence allows."""
+    """The same faces, made parallel or perpendicular if the evidence allows it."""
     groups, gained = [_alone(contacts, faces, face) for face in range(faces.count)], 0.0
     while (found := _most_gained(groups)) is not None:
         gain, *pair = found
@@ -61,8 +62,10 @@ def _alone(contacts: PlanarContacts, faces: Faces, face: int) -> _Group:
 
 
 def _most_gained(groups: list[_Group]) -> tuple[float, int, int] | None:
-    """Chi-square's worth that two groups gain by sharing a direction, the most, and these two; None if none do."""
-    from tactile_lab.slam.shape.planar.runs import most_gained  # here: compiled loops are slow to import
+    """The largest gain in chi-square by letting two groups share a direction, and these two; None if there is none."""
+    from tactile_lab.slam.shape.planar.runs import (
+        most_gained,
+    )  # here: compiled loops load slowly
 
     moments, angles = np.array([group.moments for group in groups]), np.array([group.angle_rad for group in groups])
     sizes = np.array([float(len(group.faces)) for group in groups])
@@ -71,7 +74,10 @@ def _most_gained(groups: list[_Group]) -> tuple[float, int, int] | None:
 
 
 def _join(one: _Group, other: _Group) -> _Group:
-    from tactile_lab.slam.shape.planar.runs import fit_direction, turn_back  # here: compiled loops are slow to import
+    from tactile_lab.slam.shape.planar.runs import (
+        fit_direction,
+        turn_back,
+    )  # here: compiled loops load slowly
 
     turns = round((other.angle_rad - one.angle_rad) / _QUARTER_rad)
     moments = one.moments + turn_back(other.moments, turns)
@@ -80,7 +86,9 @@ def _join(one: _Group, other: _Group) -> _Group:
 
 
 def _assemble(contacts: PlanarContacts, faces: Faces, groups: list[_Group]) -> Faces:
-    from tactile_lab.slam.shape.planar.runs import chi_square_at  # here: compiled loops are slow to import
+    from tactile_lab.slam.shape.planar.runs import (
+        chi_square_at,
+    )  # here: compiled loops load slowly
 
     directions = np.array(faces.directions_rad)
     numbers = np.empty(faces.count, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Straight runs of contacts: what each costs as one face, the cheapest division into runs, and shared directions."""
+"""Straight runs of contacts: the cost of each as one face, the cheapest division into runs, and shared directions."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def fit_direction(xx: float, xy: float, yy: float, gx: float, gy: float) -> floa
 
 @compile_when_called
 def chi_square_at(angle: float, moments: Array) -> float:
-    """Chi-square of faces at the direction of a unit normal.
+    """Chi-square of faces for a given direction of the unit normal.
 
     Args:
         angle: of the normal, radians.
@@ -58,7 +58,7 @@ def direction_variance(angle: float, moments: Array) -> float:
 
 @compile_when_called
 def turn_back(moments: Array, turns: int) -> Array:
-    """The moments of the same faces for a direction that is so many quarter turns back."""
+    """The moments of the same faces for a direction rotated back by this many quarter turns."""
     xx, xy, yy, gx, gy, constant = moments
     if turns % 2:
         xx, xy, yy = yy, -xy, xx
@@ -71,17 +71,18 @@ def turn_back(moments: Array, turns: int) -> Array:
 def most_gained(moments: Array, angles: Array, sizes: Array, loners: float) -> tuple[float, int, int]:
     """The two groups of faces that gain most chi-square by sharing one direction up to quarter turns.
 
-    A direction of its own must save what its narrowing from a quarter turn is worth, and what the ways to group
-    faces are (the Chinese restaurant process): few large groups are likely, a pair among many faces is chance.
+    The gain is measured against two penalties of a separate direction: the narrowing of its prior over a quarter turn,
+    and the prior over groupings of faces (a Chinese restaurant process), in which few large groups are likely and a
+    pair among many faces is a coincidence.
 
     Args:
         moments: of the groups, shape (g, 6), see :func:`chi_square_at`.
         angles: their best directions, shape (g,).
         sizes: their numbers of faces, shape (g,).
-        loners: prior weight of a face of its own direction against joining one other face.
+        loners: prior weight of a separate direction for a face, relative to joining one other face.
 
     Returns:
-        The gain, zero where no two gain anything, and the groups, the earlier one first.
+        The gain, zero if there is none, and the two groups, the earlier one first.
     """
     quarter, best, pair = np.pi / 2, 0.0, (0, 0)
     for second in range(len(angles)):
@@ -133,7 +134,8 @@ def run_costs(points: Array, normals: Array, point_weights: Array, normal_weight
 
 @compile_when_called
 def cheapest_division(costs: Array, price: float) -> tuple[float, NDArray[Any]]:
-    """Divide 0..n-1 into runs of the least total cost, each run costing ``price`` more (dynamic programming).
+    """Divide 0..n-1 into runs with the least total cost, where each run costs an additional ``price`` (dynamic
+    programming).
 
     Returns:
         The total, and the first member of the last run for every prefix, shape (n + 1,).

@@ -1,10 +1,10 @@
-"""Contacts in the plane divided into the straight faces they lie on.
+"""Divides contacts in the plane into the straight faces on which they lie.
 
 The contacts are ordered along a provisional outline and divided into runs by dynamic programming. A run costs the
-chi-square of its points against one line and of its normals against the line's; every face costs what the Bayesian
-information criterion (BIC) asks for its three parameters: direction, offset and where it begins. The criterion's usual
-form takes for granted that a parameter was known beforehand as well as one contact tells it. A face may point anywhere
-and lie anywhere within the reach of a hand, so the price holds the widths of these priors as well.
+chi-square of its points against one line and of its normals against the line's; every face costs the penalty of the
+Bayesian information criterion (BIC) for its three parameters: direction, offset and where it begins. The usual form of
+the criterion assumes a prior as informative as one contact. Here a face may have any direction and any offset within
+the reach of a hand, so the penalty includes the widths of these priors as well.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.surfaces.sampling import polygon_area, sample_polygon
 
 PARAMETERS_PER_FACE = 3
-"""Direction, offset, and the place along the outline where it begins."""
+"""Direction, offset, and the position along the outline where it begins."""
 
 PRIOR_REACH_m = 0.100
-"""A face lies somewhere within a range of this width."""
+"""Width of the prior range of a face's offset."""
 
 _ORDER_STEP_m = 0.0005
 _REORDERINGS = 3
@@ -38,9 +38,10 @@ class Faces:
         offsets_m: each face is the line ``u . x = offset``, shape (s,).
         order: indices of the contacts in cyclic order along the outline, counter-clockwise, shape (n,); starts with
             the contacts of face 0.
-        chi_square: of all points and normals.
+        chi_square: misfit of all points and normals.
         direction_groups: faces of the same number share one direction up to quarter turns, shape (s,).
-        regularity_nats: log evidence of the shared directions, their misfit apart: angles that need not be known.
+        regularity_nats: log evidence of the shared directions without their misfit: the gain from the angles that need
+            not be estimated.
     """
 
     labels: NDArray[np.int64]
@@ -72,7 +73,7 @@ class Faces:
 
 @dataclass(frozen=True)
 class PlanarContacts:
-    """Contacts with the standard deviations that weigh them.
+    """Contacts with the standard deviations that determine their weights.
 
     Attributes:
         points_m, normals: shape (n, 2).
@@ -92,10 +93,10 @@ class PlanarContacts:
     def of(
         cls, points_m: Array, normals: Array, point_sigma_m: Array | float, normal_sigma_rad: Array | float
     ) -> PlanarContacts:
-        """With one standard deviation for all or one each.
+        """Contacts with one standard deviation for all, or one for each.
 
         Raises:
-            ShapeError: arrays that do not belong together, are not in the plane or have no positive sigma.
+            ShapeError: arrays do not match, are not in the plane, or sigmas are not positive.
         """
         points_m, normals = np.asarray(points_m, dtype=float), np.asarray(normals, dtype=float)
         if points_m.ndim != 2 or points_m.shape[1] != 2 or normals.shape != points_m.shape or len(points_m) == 0:
@@ -107,22 +108,22 @@ class PlanarContacts:
         return cls(points_m, normals, *sigmas)
 
     def select(self, mask: NDArray[np.bool_]) -> PlanarContacts:
-        """The contacts picked by a boolean array."""
+        """The contacts selected by a boolean array."""
         return PlanarContacts(
             self.points_m[mask], self.normals[mask], self.point_sigma_m[mask], self.normal_sigma_rad[mask]
         )
 
 
 def segment(contacts: PlanarContacts, contour_m: Array) -> Faces:
-    """Divide contacts into the straight faces of least BIC.
+    """Divide contacts into straight faces with the least BIC.
 
     Args:
-        contacts: all of an object.
-        contour_m: a provisional closed outline, shape (m, 2), in any direction of turning; it only orders the
-            contacts, and is replaced by the faces found as soon as those make an outline themselves.
+        contacts: all contacts of an object.
+        contour_m: a provisional closed outline, shape (m, 2), in any orientation. It only orders the contacts, and is
+            replaced by the faces as soon as these form an outline themselves.
 
     Raises:
-        ShapeError: an outline of less than three points.
+        ShapeError: the outline has fewer than three points.
     """
     if len(contour_m) < 3:
         raise ShapeError("the outline that orders the contacts has less than three points")
@@ -136,10 +137,10 @@ def segment(contacts: PlanarContacts, contour_m: Array) -> Faces:
 
 
 def price_of_face(point_sigma_m: Array, normal_sigma_rad: Array) -> float:
-    """Chi-square that one face more must save among contacts of these standard deviations, each of shape (n,).
+    """Chi-square that an additional face must save, for contacts with these standard deviations, each of shape (n,).
 
-    Twice the negative logarithm of how much the contacts narrow the priors, ``sqrt(n) width / (sqrt(2 pi) sigma)`` for
-    direction and offset each, and of one among n places to begin at.
+    Twice the logarithm of the factor by which the contacts narrow the priors: ``sqrt(n) width / (sqrt(2 pi) sigma)``
+    for direction and offset each, and n for the start, which is one of n positions.
     """
     widths = np.array([2 * np.pi / np.median(normal_sigma_rad), PRIOR_REACH_m / np.median(point_sigma_m)])
     narrowing = np.log(np.maximum(widths / np.sqrt(2 * np.pi), 1.0)).sum()
@@ -147,18 +148,18 @@ def price_of_face(point_sigma_m: Array, normal_sigma_rad: Array) -> float:
 
 
 def description_length(contacts: PlanarContacts, faces: Faces) -> float:
-    """Chi-square and the price of the faces: the smaller, the better."""
+    """Chi-square plus the penalty of the faces: smaller is better."""
     return faces.chi_square + faces.count * price_of_face(contacts.point_sigma_m, contacts.normal_sigma_rad)
 
 
 def log_evidence(chi_square: float, face_count: int, point_sigma_m: Array, normal_sigma_rad: Array) -> float:
     """Logarithm of the probability of the contacts by the Bayesian information criterion.
 
-    The Gaussian log likelihood of each contact's value and of both components of its normal, less half the price of
+    The Gaussian log likelihood of each contact's value and of both components of its normal, minus half the penalty of
     the faces: comparable with :meth:`Gpis.log_marginal_likelihood` of the same contacts with normals.
 
     Args:
-        chi_square: of all values and normals.
+        chi_square: misfit of all values and normals.
         face_count: number of faces.
         point_sigma_m, normal_sigma_rad: of each contact, shape (n,).
     """
@@ -171,8 +172,8 @@ def log_evidence(chi_square: float, face_count: int, point_sigma_m: Array, norma
 def order_along(contacts: PlanarContacts, contour_m: Array) -> NDArray[np.int64]:
     """The contacts in cyclic order along an outline, counter-clockwise.
 
-    Each contact belongs to the place that fits best in position and normal together, so that two sides of a thin
-    wall are told apart.
+    Each contact is assigned to the point that fits best in position and normal together, so that the two sides of a
+    thin wall are distinguished.
     """
     places = sample_polygon(contour_m if polygon_area(contour_m) > 0 else contour_m[::-1], _ORDER_STEP_m)
     along = np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)
@@ -185,7 +186,9 @@ def order_along(contacts: PlanarContacts, contour_m: Array) -> NDArray[np.int64]
 
 
 def order_along_faces(contacts: PlanarContacts, faces: Faces) -> NDArray[np.int64]:
-    """The contacts in cyclic order along faces: each at the face, within its contacts' extent, that fits it best."""
+    """The contacts in cyclic order along faces: each at the face that fits it best within the extent of its
+    contacts.
+    """
     along = contacts.points_m @ faces.tangents.T
     extents = [along[faces.labels == face, face] for face in range(faces.count)]
     beyond = np.column_stack(
@@ -204,8 +207,8 @@ def order_along_faces(contacts: PlanarContacts, faces: Faces) -> NDArray[np.int6
 def divide(contacts: PlanarContacts, order: NDArray[np.int64]) -> Faces:
     """The cheapest division of contacts in a given cyclic order.
 
-    The circle is opened where successive normals differ most, and then once more at a border found on the other
-    side, so that no face is cut by the opening.
+    The cycle is opened where successive normals differ most, and then again at a border found on the other side, so
+    that the opening does not cut a face.
     """
     normals = contacts.normals[order]
     opening = int(np.argmin(np.sum(normals * np.roll(normals, 1, axis=0), axis=1)))
@@ -218,7 +221,9 @@ def divide(contacts: PlanarContacts, order: NDArray[np.int64]) -> Faces:
 
 
 def _divide_opened(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[Faces, NDArray[np.int64]]:
-    from tactile_lab.slam.shape.planar.runs import cheapest_division  # here: compiled loops are slow to import
+    from tactile_lab.slam.shape.planar.runs import (
+        cheapest_division,
+    )  # here: compiled loops load slowly
 
     costs, angles, offsets = _runs(contacts, order)
     _, firsts = cheapest_division(costs, price_of_face(contacts.point_sigma_m, contacts.normal_sigma_rad))
@@ -235,7 +240,7 @@ def _divide_opened(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[
 
 def _runs(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[Array, Array, Array]:
     """Chi-square, direction and offset of every run of successive contacts; see :func:`run_costs`."""
-    from tactile_lab.slam.shape.planar.runs import run_costs  # here: compiled loops are slow to import
+    from tactile_lab.slam.shape.planar.runs import run_costs  # here: compiled loops load slowly
 
     centre = contacts.points_m.mean(axis=0)
     costs, angles, offsets = run_costs(

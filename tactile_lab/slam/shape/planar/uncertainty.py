@@ -13,13 +13,14 @@ from tactile_lab.slam.shape.planar.segmentation import Faces, PlanarContacts
 
 @dataclass(frozen=True)
 class FaceUncertainty:
-    """Each face moves across itself at its contacts' middle, and turns about it, independently.
+    """Each face has independent errors: an offset along its normal at the middle of its contacts, and a rotation about
+    this point.
 
     Attributes:
-        faces: which ones.
-        middles_m: place of each face's weighted middle along its tangent, shape (s,).
+        faces: the faces.
+        middles_m: position of each face's weighted middle along its tangent, shape (s,).
         offset_variances_m2: of each face at its middle, shape (s,).
-        direction_variances: of each face's direction, square radians, shape (s,); faces of one direction group turn
+        direction_variances: of each face's direction, square radians, shape (s,); faces of one direction group rotate
             together.
     """
 
@@ -30,7 +31,7 @@ class FaceUncertainty:
 
     @classmethod
     def of(cls, contacts: PlanarContacts, faces: Faces) -> Self:
-        """From the standard deviations of the contacts."""
+        """Uncertainty from the standard deviations of the contacts."""
         weights, stiffness = contacts.point_sigma_m**-2.0, contacts.normal_sigma_rad**-2.0
         along = np.sum(contacts.points_m * faces.tangents[faces.labels], axis=1)
         totals = np.bincount(faces.labels, weights, faces.count)
@@ -40,7 +41,7 @@ class FaceUncertainty:
         return cls(faces, middles, 1 / totals, 1 / information[faces.direction_groups])
 
     def scale(self, factor: float) -> Self:
-        """With all standard deviations so many times larger."""
+        """The same with all standard deviations multiplied by a factor."""
         return replace(
             self,
             offset_variances_m2=factor**2 * self.offset_variances_m2,
@@ -54,7 +55,7 @@ class FaceUncertainty:
         return np.array([[turning, middle * turning], [middle * turning, offset]])
 
     def variance_m2(self, face: int, places_m: Array) -> Array:
-        """Variance of places of shape (q, 2) on a face, across it, shape (q,)."""
+        """Variance along the normal of points of shape (q, 2) on a face, shape (q,)."""
         levers = self._levers_m(face, places_m)
         return np.asarray(self.offset_variances_m2[face] + levers**2 * self.direction_variances[face])
 

@@ -1,7 +1,7 @@
-"""What a model of the surface foretells of contacts that it was not fitted to.
+"""Cross-validation of surface models: how well they predict contacts to which they were not fitted.
 
-Many small faces follow a rounded edge, and the contacts that they were fitted to say that they do so well; contacts
-that were held out say otherwise. A quarter of the contacts is foretold by the rest, each quarter in turn.
+Many small faces can follow a rounded edge and fit their own contacts well, but predict held-out contacts poorly. Each
+quarter of the contacts in turn is predicted from the rest.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from tactile_lab.slam.shape.solids.polyhedron import contacts_of
 from tactile_lab.slam.shape.surfaces.surface import Indices, SurfaceMesh
 
 _WORST_nats = 30.0
-"""What a contact held out costs at most: more than an outlier does, or a whole rounded edge would count as outliers."""
+"""Largest cost of a held-out contact: more than that of an outlier, or a whole rounded edge would count as outliers."""
 _PARTS = 4
 _SETTLED_nats = 45.0
-"""With so much for or against, further quarters are not asked."""
+"""With this much evidence for or against, the remaining quarters are skipped."""
 
 
 def foretells_better(
     fit: Callable[[Gpis], FittedShape], gpis: Gpis, resolution_m: float, floor_m: float | None
 ) -> bool:
-    """Whether a sharp solid foretells the contacts of a field better than the field does.
+    """Whether a sharp solid predicts the contacts of a field better than the field does.
 
     Args:
         fit: makes the solid from the field of some of the contacts.
         gpis: the field, its kernel at a maximum of the marginal likelihood.
-        resolution_m: of the solid's surface; its faces do not depend on it.
+        resolution_m: resolution of the solid's surface; its faces do not depend on it.
         floor_m: height of the table, if there is one.
     """
     contacts = contacts_of(gpis)
@@ -53,7 +53,9 @@ def foretells_better(
 
 
 def _log_density(contacts: WeightedContacts, held: Indices, mesh: SurfaceMesh) -> float:
-    """Of contacts, each on that triangle of a surface which place and normal fit best; at worst :data:`_WORST_nats`."""
+    """Log density of contacts, each on the triangle of a surface that fits its position and normal best; limited by
+    :data:`_WORST_nats`.
+    """
     corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)

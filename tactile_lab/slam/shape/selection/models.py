@@ -25,24 +25,24 @@ from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.surfaces.surface import extract_contour
 
 Fit: TypeAlias = Callable[[Gpis, Array | None, float | None], FittedShape]
-"""Makes a shape from a field's contacts, places known to be outside, and the height of the table."""
+"""Makes a shape from a field with its contacts, places known to be outside, and the height of the table."""
 
 _GRADIENT_SIGMA = 0.1
 """Standard deviation of normals if the field has none, as with the thesis's off-surface points."""
 
 
 def fit_shape(name: str, gpis: Gpis, free_points_m: Array | None = None, floor_m: float | None = None) -> FittedShape:
-    """The shape model of a name, made from the contacts of a field.
+    """Fit the shape model of a given name to the contacts of a field.
 
     Args:
-        name: one of :data:`SHAPE_MODELS`; "auto" is chosen by evidence.
+        name: one of :data:`SHAPE_MODELS`; "auto" chooses by evidence.
         gpis: the field, with its contacts and their standard deviations.
         free_points_m: places known to be outside, shape (q, d).
         floor_m: height of the table that the object stands on, for contacts in space.
 
     Raises:
-        ConfigurationError: no such model.
-        ShapeError: the contacts do not make such a shape.
+        ConfigurationError: there is no such model.
+        ShapeError: the contacts do not define such a shape.
     """
     return SHAPE_MODELS[name](gpis, free_points_m, floor_m)
 
@@ -67,7 +67,7 @@ def _nagata(gpis: Gpis, _: Array | None, __: float | None) -> FittedShape:
         contacts = PlanarContacts.of(gpis.contacts_m, gpis.normals, _point_sigma(gpis), _normal_sigma(gpis))
         try:
             order = order_along(contacts, extract_contour(gpis).points_m)
-        except ShapeError:  # no outline to go along: the order by angle is left
+        except ShapeError:  # without an outline, contacts are ordered by angle
             order = None
     return NagataShape.of(gpis.contacts_m, gpis.normals, _point_sigma(gpis), order)
 

@@ -25,7 +25,7 @@ from tactile_lab.slam.shape.surfaces.sampling import distances_to_polygon
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extract_contour, extract_mesh
 
 FINGERTIP_RADIUS_m = 0.006
-"""Each contact's fingertip was at least this thick, so that the place this far outside of it is free."""
+"""Smallest thickness of a fingertip: the point this far outside of each contact is free."""
 
 _FREE_WEIGHT = 0.5
 _ON_OUTLINE_SIGMAS = 5.0
@@ -47,7 +47,7 @@ class GpisShape:
 
     @property
     def log_evidence(self) -> float | None:
-        """The log marginal likelihood; None for off-surface points, which no other model explains."""
+        """The log marginal likelihood; None with off-surface points, which other models do not explain."""
         return self.gpis.log_marginal_likelihood() if self.gpis.settings.observations == "normals" else None
 
     def contour(self, resolution_m: float = 0.001) -> Contour:
@@ -63,9 +63,9 @@ def best_shape(gpis: Gpis, free_points_m: Array | None = None, floor_m: float | 
     For contacts in space see :func:`tactile_lab.slam.shape.selection.spatial_choice.best_spatial_shape`.
 
     Args:
-        gpis: a field with its kernel at a maximum of the marginal likelihood, else the comparison favours faces.
-        free_points_m: places known to be outside, shape (q, d), for example on the ways of fingertips; those at each
-            contact's own fingertip are always looked at.
+        gpis: a field with its kernel at a maximum of the marginal likelihood; otherwise the comparison favours faces.
+        free_points_m: places known to be outside, shape (q, d), for example on the paths of fingertips; those at each
+            contact's own fingertip are always checked.
         floor_m: height of the table that the object stands on; for contacts in space.
     """
     field = GpisShape(gpis)
@@ -77,7 +77,7 @@ def best_shape(gpis: Gpis, free_points_m: Array | None = None, floor_m: float | 
     try:
         provisional = field.contour()
         polygon = polygon_of(gpis, provisional)
-    except ShapeError:  # no outline, or no polygon in it: the field says what can be said
+    except ShapeError:  # no outline, or no polygon: the field is the best description
         return field
     free = _free_points(gpis, free_points_m)
     advantage = polygon.log_evidence - field.log_evidence
@@ -92,7 +92,9 @@ def polygon_of(gpis: Gpis, provisional: Contour) -> Polygon:
 
 
 def outline_of(gpis: Gpis, provisional: Contour) -> tuple[Polygon, NDArray[np.bool_]]:
-    """As :func:`polygon_of`, and which of the field's contacts lie at its corners, shape (n,). Raises ShapeError."""
+    """As :func:`polygon_of`; also returns which of the field's contacts lie at its corners, shape (n,). Raises
+    ShapeError.
+    """
     seen = gpis.observations
     contacts = PlanarContacts.of(gpis.contacts_m, gpis.normals, seen.value_sigma_m, seen.gradient_sigma)
     faces = segment(contacts, provisional.points_m)
@@ -115,7 +117,7 @@ def outline_of(gpis: Gpis, provisional: Contour) -> tuple[Polygon, NDArray[np.bo
 def _corner(
     contacts: PlanarContacts, leaning: NDArray[np.bool_], provisional: Contour, *, regular: bool
 ) -> Polygon | None:
-    """The polygon of the other contacts, these at its corners; None if those enclose nothing."""
+    """The polygon of the other contacts, with these at its corners; None if the others enclose nothing."""
     on_faces = contacts.select(~leaning)
     try:
         faces = segment(on_faces, provisional.points_m)
@@ -133,7 +135,7 @@ def _free_points(gpis: Gpis, free_points_m: Array | None) -> Array:
 def free_evidence(contour: Contour, free_points_m: Array, gpis: Gpis) -> float:
     """Logarithm of the probability that places known to be free are outside of an outline.
 
-    Places are known as well as contacts are, the outline by its own sigma. Neighbouring places tell nearly the same,
+    The error of a place is that of a contact, plus the outline's own sigma. Neighbouring places are nearly redundant,
     hence a weight below one.
     """
     if len(free_points_m) == 0:
@@ -146,10 +148,11 @@ def free_evidence(contour: Contour, free_points_m: Array, gpis: Gpis) -> float:
 
 
 def _holds_contacts(polygon: Polygon) -> bool:
-    """All contacts but a few lie on the outline itself, not only on the lines of its faces, and none far along those.
+    """Whether all contacts but a few lie on the outline itself, not only on the lines of its faces, and none far along
+    a line.
 
-    A wrong contact may lie anywhere. One that continues a face in place and direction, far beyond its end, shows that
-    the object extends there: untouched faces are missing.
+    An outlier may lie anywhere. But a contact that continues a face, in position and direction, far beyond its end
+    shows that the object extends there: untouched faces are missing.
     """
     contacts, faces = polygon.contacts, polygon.faces
     away_m = distances_to_polygon(contacts.points_m, polygon.outline_m)

@@ -1,4 +1,6 @@
-"""Which model describes a solid best, by what the contacts say: smooth field, flat faces, or upright walls."""
+"""Chooses the model that describes a solid best, by the evidence of contacts: smooth field, flat faces, or vertical
+walls.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +28,12 @@ _NOISE_SIGMAS = 2.0
 _LARGEST_SHARE_OFF, _LARGEST_SHARE_FILLED = 0.15, 0.05
 _KERNEL_STEPS = 10
 _LEFT_OUT_nats = 12.0
-"""A contact that is off the surface by centimetres is as improbable as an outlier among twenty good contacts."""
+"""Cost of a contact that is centimetres off the surface: that of one outlier among twenty good contacts."""
 _BEYOND_DOUBT_nats = 3.0
-"""A sharp solid that explains each contact so much better than the field is taken at once: no curved thing came near
-(2.7 was the most), looking takes its time, and a face of few contacts may be missing where some are held out."""
+"""A sharp solid that explains each contact this much better than the field is accepted at once. No curved object came
+near this value (2.7 at most), cross-validation takes time, and with contacts held out a face with few contacts may be
+missing.
+"""
 
 OutlineChoice = Callable[[Gpis, "Array | None"], FittedShape]
 Fit = Callable[[Gpis], FittedShape]
@@ -42,19 +46,19 @@ def best_spatial_shape(
     free_points_m: Array | None = None,
     floor_m: float | None = None,
 ) -> FittedShape:
-    """The field itself, or a solid with flat faces or upright walls if that is the more probable one.
+    """The field itself, or a solid with flat faces or vertical walls if that is more probable.
 
-    A sharp solid is only taken if it holds what is known: its contacts lie on its surface, and it does not fill
-    places that fingers went through. And it has to foretell contacts that it was not fitted to better than the field
+    A sharp solid is accepted only if it is consistent with what is known: its contacts lie on its surface, and it does
+    not fill places that fingers passed. It must also predict contacts to which it was not fitted better than the field
     does (:mod:`tactile_lab.slam.shape.selection.held_out`).
 
     Args:
-        field: the field as a shape, taken unless another model is more probable; without a table it keeps all contacts.
+        field: the field as a shape, used unless another model is more probable; without a table it keeps all contacts.
         gpis: the field, with its kernel at a maximum of the marginal likelihood.
         best_outline: chooses the model of an outline.
-        free_points_m: places that a finger went through, shape (k, 3), or None.
-        floor_m: height of the table if the object stands on one; upright walls are considered only then, and the
-            field ends there as :class:`StandingField` does.
+        free_points_m: places that a finger passed, shape (k, 3), or None.
+        floor_m: height of the table if the object stands on one; only then vertical walls are considered, and the field
+            ends at the table like :class:`StandingField`.
     """
     if field.log_evidence is None:
         return field
@@ -74,7 +78,7 @@ def best_spatial_shape(
 
 
 def _earned(fit: Fit, evidence: float, gpis: Gpis, floor_m: float | None) -> bool:
-    """Whether a sharp solid with more evidence than the field has not got it by following its own contacts."""
+    """Whether a sharp solid with more evidence than the field also passes the cross-validation."""
     if not gpis.settings.without.isdisjoint({"field", "held-out contacts"}):
         return True
     if evidence - gpis.log_marginal_likelihood() > _BEYOND_DOUBT_nats * len(gpis.contacts_m):
@@ -83,7 +87,7 @@ def _earned(fit: Fit, evidence: float, gpis: Gpis, floor_m: float | None) -> boo
 
 
 def _without_strays(gpis: Gpis) -> Gpis:
-    """The field without contacts that share a plane with no other, where it explains the rest so much better.
+    """The field without contacts that share a plane with no other, if it explains the rest sufficiently better.
 
     Every contact left out costs :data:`_LEFT_OUT_nats`, so that good contacts on curved parts stay.
     """
@@ -104,7 +108,7 @@ def _without_strays(gpis: Gpis) -> Gpis:
 def _candidates(
     settings: GpisSettings, best_outline: OutlineChoice, free_points_m: Array | None, floor_m: float | None
 ) -> list[Fit]:
-    """What makes each sharp solid from a field."""
+    """Functions that fit the sharp solids to a field."""
     upright, fits = floor_m is not None, list[Fit]()
     if "polyhedron" not in settings.without:
         fits.append(lambda gpis: Polyhedron.fit(gpis, free_points_m, upright=upright))
@@ -116,17 +120,17 @@ def _candidates(
 def _try_make(maker: Callable[[], FittedShape]) -> FittedShape | None:
     try:
         return maker()
-    except ShapeError:  # the contacts do not allow this model: the others remain
+    except ShapeError:  # the contacts do not allow this model; the others remain
         return None
 
 
 def _checked_evidence(
     shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_m: float | None, *, at_least: float
 ) -> float:
-    """The evidence of a sharp solid, less for contacts that its planes explain but its surface leaves out.
+    """The evidence of a sharp solid, reduced for contacts that its planes explain but its surface excludes.
 
-    Minus infinity where it has no surface, leaves out many contacts, or fills places that are free; its surface is
-    only made if the evidence can reach ``at_least``.
+    Minus infinity if it has no surface, excludes many contacts, or fills free places. Its surface is computed only if
+    the evidence can reach ``at_least``.
     """
     if shape.log_evidence is None or shape.log_evidence <= at_least:
         return -np.inf
@@ -142,7 +146,8 @@ def _checked_evidence(
 
 
 def stray_cost(away_m: Array, weights: Array) -> float:
-    """What contacts cost that a solid's planes explain but its surface leaves out, nats; at most a wrong contact each.
+    """Cost, in nats, of contacts that a solid's planes explain but its surface excludes; at most that of an outlier
+    each.
 
     Args:
         away_m: distances of the contacts from the surface, shape (n,).

@@ -1,7 +1,7 @@
 """The arrangement of planes within a box: convex cells, and the convex facets between them.
 
-Cells, facets, edges and vertices are kept as one complex. A plane splits each edge, facet and cell it meets exactly
-once, so that neighbours always agree on what they share and every surface made of facets closes.
+Cells, facets, edges and vertices form one complex. A plane splits each edge, facet and cell that it meets exactly once,
+so that neighbours share identical parts and every surface made of facets is closed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ BEYOND = -1
 
 LARGEST_CELL_COUNT = 20_000
 _APART_m = 1e-8
-"""Planes are shifted by about this, each by its own share, so that no four of them meet in one point."""
+"""Planes are shifted by about this distance, each by a different amount, so that no four of them meet in one point."""
 
 Loop = tuple[int, ...]
 
@@ -52,7 +52,7 @@ class Arrangement:
     Attributes:
         vertices_m: shape (v, 3).
         facets: all facets, those of the box included; their positive side is :data:`BEYOND`.
-        signs: for each cell on which side of each plane it lies, shape (c, S), True where positive.
+        signs: for each cell its side of each plane, shape (c, S), True for the positive side.
         normals, offsets_m: of the planes, shapes (S, 3) and (S,).
         centres_m: a point inside each cell, shape (c, 3).
         volumes_m3: shape (c,).
@@ -73,7 +73,7 @@ class Arrangement:
         return len(self.signs)
 
     def locate(self, points_m: Array) -> NDArray[np.int64]:
-        """The cell of each point of shape (q, 3); :data:`BEYOND` for points of no cell."""
+        """The cell of each point of shape (q, 3); :data:`BEYOND` for points outside all cells."""
         places = {row.tobytes(): index for index, row in enumerate(self.signs)}
         above = points_m @ self.normals.T > self.offsets_m
         within = np.all((points_m >= self.vertices_m.min(axis=0)) & (points_m <= self.vertices_m.max(axis=0)), axis=1)
@@ -99,7 +99,9 @@ def arrange(normals: Array, offsets_m: Array, lower_m: Array, upper_m: Array) ->
 
 
 class _Complex:
-    """The growing arrangement. Facets are replaced by their halves, cells keep their number on the negative side."""
+    """The arrangement under construction. Facets are replaced by their halves; a cell keeps its number on the negative
+    side.
+    """
 
     def __init__(self, lower_m: Array, upper_m: Array) -> None:
         corners = np.array([lower_m, upper_m])
@@ -111,7 +113,7 @@ class _Complex:
         self.cells: list[set[int]] = [set(range(6))]
 
     def split(self, plane: int, normal: Array, offset_m: float) -> None:
-        """Cut everything that the plane meets."""
+        """Split everything that the plane meets."""
         heights = np.array(self.vertices) @ normal - offset_m
         self._heights = heights
         self._cuts: dict[tuple[int, int], int] = {}
@@ -131,7 +133,7 @@ class _Complex:
             self._split_cell(cell, edges, halves, plane, normal, above)
 
     def _split_facet(self, number: int, facet: Facet, above: list[bool]) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Replace a facet by its halves below and above; the ends of the seam, and the numbers of the halves."""
+        """Replace a facet by its halves below and above; returns the ends of the seam and the numbers of the halves."""
         below_loop: list[int] = []
         above_loop: list[int] = []
         seam: list[int] = []
@@ -150,7 +152,7 @@ class _Complex:
         return (seam[0], seam[1]), (len(self.facets) - 2, len(self.facets) - 1)
 
     def _cut(self, a: int, b: int) -> int:
-        """The vertex in which the plane meets an edge, the same for all facets at the edge."""
+        """The vertex at which the plane meets an edge, shared by all facets at the edge."""
         edge = (min(a, b), max(a, b))
         if edge not in self._cuts:
             share = self._heights[edge[0]] / (self._heights[edge[0]] - self._heights[edge[1]])
@@ -233,13 +235,13 @@ def _chain(edges: list[tuple[int, int]]) -> Loop:
 
 
 def _area_vector(corners: Array) -> Array:
-    """Normal of a planar polygon of shape (k, 3), as long as its area is large."""
+    """Normal of a planar polygon of shape (k, 3), with its area as length."""
     arms = corners[1:] - corners[0]
     return np.asarray(0.5 * np.cross(arms[:-1], arms[1:]).sum(axis=0))
 
 
 def _volumes(vertices: Array, facets: tuple[Facet, ...], vectors: Array, centres: Array) -> Array:
-    """Volumes of the cells, as cones from their centres to their facets."""
+    """Volumes of the cells, as sums of pyramids from their centres to their facets."""
     volumes = np.zeros(len(centres))
     for facet, vector in zip(facets, vectors, strict=True):
         foot = vertices[facet.loop[0]]

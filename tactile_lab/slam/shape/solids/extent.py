@@ -1,4 +1,4 @@
-"""Bounds a solid by the field's extent where no plane does."""
+"""Bounds a solid by the field's extent on sides without a plane."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.solids.planes import Planes
 
 _LEAST_COSINE_UP, _LEAST_COSINE_ASIDE = 0.5, 0.3
-"""A side is open where no plane's normal has at least this share of the side's direction."""
+"""A side is open if no plane's normal has at least this component in the side's direction."""
 _SPACING_m, _MARGIN_m = 0.007, 0.030
 _LEAST_SIGMA_m = 0.003
 _BISECTIONS = 12
@@ -22,13 +22,13 @@ _FLATTEST_SLOPE = 0.1
 
 @dataclass(frozen=True)
 class Cap:
-    """A plane at the end of the field, on a side that was not touched.
+    """A plane at the end of the field, on an untouched side.
 
     Attributes:
         normal: outward, shape (3,).
         foot_m: the point of the field's surface farthest in this direction, shape (3,).
         offset_m: ``normal . foot``.
-        sigma_m: standard deviation of the offset, by the field.
+        sigma_m: standard deviation of the offset, from the field.
     """
 
     normal: Array
@@ -38,7 +38,7 @@ class Cap:
 
 
 def open_sides(gpis: Gpis, planes: Planes, floor_m: float | None) -> tuple[Cap, ...]:
-    """Caps for the sides that no plane bounds; the floor bounds the lower one. Empty where the field has no inside."""
+    """Caps for the sides that no plane bounds; a floor bounds the lower side. Empty if the field has no inside."""
     sides = [side for side, least in _sides(planes, floor_m) if (planes.normals @ side).max() < least]
     if not sides:
         return ()
@@ -47,7 +47,7 @@ def open_sides(gpis: Gpis, planes: Planes, floor_m: float | None) -> tuple[Cap, 
 
 
 def field_end(gpis: Gpis, side: Array) -> Cap:
-    """Where the field's inside ends in a direction, a unit vector of shape (3,).
+    """Where the field's inside ends in a direction, given as unit vector of shape (3,).
 
     Raises:
         ShapeError: it has no inside near the contacts.

@@ -1,9 +1,9 @@
-"""Which cells of an arrangement are material: evidence inside every cell against the area of surface between them.
+"""Labels the cells of an arrangement as material or free, by the evidence in every cell and the area between them.
 
 The labels are the exact minimum of an energy in nats, found as a minimum cut (Chauve, Labatut and Pons 2010 use the
-same for buildings). Evidence is of three kinds: each contact has material just behind it and a fingertip before it,
-places that a finger went through are free, and elsewhere the field says how probable material is. Where nothing is
-known the smaller surface wins.
+same for buildings). There are three kinds of evidence: each contact has material just behind it and a fingertip in
+front of it; places that a finger passed are free; and elsewhere the field gives the probability of material. Without
+evidence the smaller surface wins.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tactile_lab.slam.shape.solids.cells import BEYOND, Arrangement, Mask
 from tactile_lab.slam.shape.solids.planes import Planes
 
 CONTACT_DEPTHS_m = (0.001, 0.004, 0.008)
-"""Distances behind and before a contact at which it tells material from free space; a fingertip is larger."""
+"""Distances behind and in front of a contact at which there is material and free space; a fingertip is larger."""
 _BEHIND_nats, _BEFORE_nats = (4.0, 1.0, 0.5), (4.0, 2.0, 1.0)
 _FREE_nats = 1.5
 _AREA_nats_per_m2 = 3000.0
@@ -47,7 +47,7 @@ def label_cells(
         planes: with the plane of each contact; negative labels for contacts on none of them.
         contacts_m: shape (n, 3).
         field: a fitted field, for the parts far from contacts.
-        free_points_m: places that a finger went through, shape (k, 3).
+        free_points_m: places that a finger passed, shape (k, 3).
         floor_m: height of the table, the lower side of the box; None if the object stands on nothing.
     """
     odds = _field_odds(arrangement, field)
@@ -65,7 +65,9 @@ def _counts(arrangement: Arrangement, points_m: Array) -> Array:
 
 
 def _contact_odds(arrangement: Arrangement, planes: Planes, contacts_m: Array) -> Array:
-    """Contacts are moved onto their plane first, so that noise does not put them on the wrong side of it."""
+    """Log odds by contacts, which are first moved onto their planes so that noise does not put them on the wrong
+    side.
+    """
     kept = planes.labels >= 0
     labels, points = planes.labels[kept], contacts_m[kept]
     normals = planes.normals[labels]
@@ -78,7 +80,7 @@ def _contact_odds(arrangement: Arrangement, planes: Planes, contacts_m: Array) -
 
 
 def _field_odds(arrangement: Arrangement, field: Field) -> Array:
-    """Log odds of material by the field: the mean over points of a grid in the cell, times the cell's volume."""
+    """Log odds of material from the field: the mean over grid points in the cell, times the cell's volume."""
     lower, upper = arrangement.vertices_m.min(axis=0), arrangement.vertices_m.max(axis=0)
     counts = np.maximum(np.round((upper - lower) / _FIELD_SPACING_m).astype(int), 1)
     steps = (np.moveaxis(np.indices(counts), 0, -1).reshape(-1, 3) + 0.5) / counts
@@ -95,7 +97,7 @@ def _field_odds(arrangement: Arrangement, field: Field) -> Array:
 
 
 def _open_cells(arrangement: Arrangement, floor_m: float | None) -> NDArray[np.int64]:
-    """Cells at the sides of the box, the floor apart: the object does not go on there."""
+    """Cells at the sides of the box, except the floor: the object does not extend there."""
     sides = [
         facet.below
         for facet in arrangement.facets
@@ -109,7 +111,7 @@ def _is_foot(corners_m: Array, floor_m: float | None) -> bool:
 
 
 def _minimum_cut(arrangement: Arrangement, odds: Array, floor_m: float | None) -> Mask:
-    """Labels of least ``sum of odds against the label + price of the area between different labels``."""
+    """Labels that minimize ``sum of odds against the label + cost of the area between different labels``."""
     count = arrangement.cell_count
     source, sink = count, count + 1
     inner = [k for k, facet in enumerate(arrangement.facets) if facet.above != BEYOND]
@@ -132,7 +134,7 @@ def _minimum_cut(arrangement: Arrangement, odds: Array, floor_m: float | None) -
 
 
 def _one_body(arrangement: Arrangement, material: Mask, odds: Array) -> Mask:
-    """The part with most evidence, its cavities filled."""
+    """The connected part with most evidence, with its cavities filled."""
     if not material.any():
         return material
     body = _parts(arrangement, material)

@@ -1,4 +1,4 @@
-"""Contacts merged into planes from the bottom up, in machine code: every cluster is known by its moments."""
+"""Merges contacts into planes from the bottom up, in compiled code: every cluster is represented by its moments."""
 
 from __future__ import annotations
 
@@ -107,14 +107,14 @@ def _dot(a: Array, b: Array) -> float:
 
 @compile_when_called
 def _choose_partner(costs: Array, partner: NDArray[np.int64], cheapest: Array, a: int) -> None:
-    """Write down with which other cluster a merges at the least cost."""
+    """Store the other cluster with which cluster a merges at the least cost."""
     partner[a] = np.argmin(costs[a])
     cheapest[a] = costs[a, partner[a]]
 
 
 @compile_when_called
 def _leave_out(costs: Array, cheapest: Array, labels: NDArray[np.int64], a: int, b: int) -> None:
-    """Cluster b is part of a from now on and merges with nothing."""
+    """Mark cluster b as part of a, so that it is not merged again."""
     cheapest[b] = np.inf
     for c in range(len(labels)):
         costs[b, c], costs[c, b] = np.inf, np.inf
@@ -126,12 +126,12 @@ def _leave_out(costs: Array, cheapest: Array, labels: NDArray[np.int64], a: int,
 def merge_clusters(
     points: Array, normals: Array, point_weights: Array, normal_weights: Array, limit: float, least_cosine: float
 ) -> NDArray[np.int64]:
-    """Merge clusters of contacts, always the two whose common plane adds least to chi-square.
+    """Merge clusters of contacts, always those two whose common plane increases chi-square least.
 
     Args:
         points, normals: contacts, each of shape (n, 3).
         point_weights, normal_weights: inverse variances, each of shape (n,).
-        limit: the merging stops where every merger adds more than this.
+        limit: merging stops when every merger adds more than this.
         least_cosine: clusters whose mean normals differ by more are never merged.
 
     Returns:

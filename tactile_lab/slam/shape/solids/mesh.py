@@ -1,4 +1,4 @@
-"""The surface between material and free cells as a watertight mesh of triangles as fine as asked for."""
+"""The surface between material and free cells as a watertight triangle mesh with a given resolution."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class FacetMesh:
     Attributes:
         vertices_m: shape (n, 3).
         triangles: shape (m, 3), counter-clockwise seen from outside.
-        planes: index of each triangle's plane, shape (m,); of a side of the box negative.
+        planes: index of each triangle's plane, shape (m,); negative for a side of the box.
     """
 
     vertices_m: Array
@@ -33,7 +33,7 @@ class FacetMesh:
 
 
 def boundary(arrangement: Arrangement, material: Mask) -> FacetMesh:
-    """The facets between material and free space, as fans of triangles. The surface closes.
+    """The facets between material and free space, as fans of triangles. The surface is closed.
 
     Raises:
         ShapeError: no cell is material.
@@ -61,7 +61,7 @@ def _outer_loops(arrangement: Arrangement, material: Mask) -> list[tuple[Loop, i
 
 
 def _manifold(arrangement: Arrangement, material: Mask) -> Mask:
-    """Labels without edges at which four facets meet: the smallest cell there takes the other label."""
+    """Labels without edges at which four facets meet: the smallest cell at such an edge gets the other label."""
     material = material.copy()
     for _ in range(_FLIPS):
         uses = Counter(edge for loop, _ in _outer_loops(arrangement, material) for edge in _edges(loop))
@@ -86,9 +86,9 @@ def _edges(loop: Loop) -> list[tuple[int, int]]:
 
 
 def borders(mesh: FacetMesh) -> Indices:
-    """Planes that end at each other, shape (k, 3): plane, the one that it ends at, and 1 at a ridge or -1 in a notch.
+    """Pairs of planes that end at each other, shape (k, 3): plane, the other plane, and 1 at a ridge or -1 in a notch.
 
-    Every border is listed from both sides. Planes that meet in ridges as well as in notches bound each other nowhere.
+    Every border is listed from both sides. Planes that meet both in ridges and in notches are left out.
     """
     _, edge_of = _numbered_edges(mesh.triangles)
     one, other = (np.argsort(edge_of.ravel(), kind="stable").reshape(-1, 2) // 3).T
@@ -103,7 +103,7 @@ def borders(mesh: FacetMesh) -> Indices:
 
 
 def refine(mesh: FacetMesh, longest_m: float) -> FacetMesh:
-    """The same surface with edges of at most ``longest_m``: long edges are halved for both their triangles."""
+    """The same surface with edges of at most ``longest_m``: long edges are halved in both their triangles."""
     while True:
         ends, edge_of = _numbered_edges(mesh.triangles)
         long = np.linalg.norm(np.diff(mesh.vertices_m[ends], axis=1)[:, 0], axis=1) > longest_m
@@ -117,7 +117,7 @@ def refine(mesh: FacetMesh, longest_m: float) -> FacetMesh:
 
 
 def _numbered_edges(triangles: Indices) -> tuple[Indices, Indices]:
-    """Ends of all edges, shape (e, 2), and the edges opposite to no corner but after it, shape (m, 3)."""
+    """Ends of all edges, shape (e, 2), and the edge that follows each corner of each triangle, shape (m, 3)."""
     following = np.roll(triangles, -1, axis=1)
     pairs = np.sort(np.stack([triangles, following], axis=-1).reshape(-1, 2), axis=1)
     ends, number = np.unique(pairs, axis=0, return_inverse=True)
@@ -125,7 +125,7 @@ def _numbered_edges(triangles: Indices) -> tuple[Indices, Indices]:
 
 
 def _divide(triangles: Indices, middles: Indices, vertices: Array) -> tuple[Indices, Indices]:
-    """Triangles cut at the middles of their edges (-1 where not cut), and which triangle each comes from."""
+    """Triangles split at the middles of their edges (-1 if not split), and the original triangle of each."""
     pieces, sources = [], []
     cuts = (middles >= 0).sum(axis=1)
     for count in range(4):
@@ -138,7 +138,7 @@ def _divide(triangles: Indices, middles: Indices, vertices: Array) -> tuple[Indi
 
 
 def _turn(corners: Indices, middles: Indices, count: int) -> tuple[Indices, Indices]:
-    """Corners renumbered so that a single cut is on the first edge, and a single whole edge is the last."""
+    """Rotate the corners so that a single split is on the first edge, and a single unsplit edge is the last."""
     is_cut = middles >= 0
     first = is_cut.argmax(axis=1) if count == 1 else (is_cut.argmin(axis=1) + 1) % 3
     order = (first[:, None] + np.arange(3)) % 3

@@ -1,9 +1,9 @@
-"""Contacts in space divided into the planes they lie on: appendix A's clusters, found by likelihood.
+"""Divides contacts in space into the planes on which they lie: the clusters of appendix A, found by likelihood.
 
-The thesis joins contacts of similar normals and then splits the clusters by paths. Here both the points and the
-normals of a cluster are held against one plane, each with its own standard deviation; clusters are merged from
-single contacts upward while the plane's parameters saved are worth more than the misfit added (BIC). Faces on one
-plane share it: which parts of the plane are surface is decided by :mod:`tactile_lab.slam.shape.solids.cells`.
+The thesis joins contacts of similar normals and then splits the clusters by paths. Here points and normals of a cluster
+are compared with one plane, each with its own standard deviation. Starting with single contacts, clusters are merged as
+long as the parameters saved are worth more than the added misfit (BIC). Faces on the same plane share it; the parts of
+the plane that are surface are found by :mod:`tactile_lab.slam.shape.solids.cells`.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from drivers.core.contacts import Array
 from tactile_lab.slam.shape.fields.observations import check_contacts
 
 PARAMETERS_PER_PLANE = 4
-"""Two angles and the offset, and the choice of its members."""
+"""Two angles, the offset, and the choice of its members."""
 
 _LARGEST_ANGLE_rad = np.deg2rad(50.0)
 _REASSIGNMENTS = 30
 _WORTH_MOVING = 4.0
-"""A contact changes its plane only where this much chi-square is saved, so that it cannot go back and forth."""
+"""A contact changes its plane only if this much chi-square is saved, so that it cannot go back and forth."""
 
 
 @dataclass(frozen=True)
 class Planes:
-    """Contacts divided into planes, those of most contacts first.
+    """Contacts divided into planes; the planes with most contacts come first.
 
     Attributes:
         labels: plane of each contact, shape (n,).
@@ -47,7 +47,7 @@ class Planes:
 
     @property
     def sizes(self) -> NDArray[np.int64]:
-        """Contacts of each plane, shape (S,)."""
+        """Number of contacts on each plane, shape (S,)."""
         return np.bincount(self.labels, minlength=self.count)
 
     def heights_m(self, points_m: Array) -> Array:
@@ -95,7 +95,7 @@ def segment_planes(
 def weighted_contacts(
     points_m: Array, normals: Array, point_sigma_m: Array | float, normal_sigma_rad: Array | float
 ) -> WeightedContacts:
-    """Contacts checked and with the weights of their sigmas. Raises ShapeError as :func:`check_contacts`."""
+    """Check contacts and add weights from their sigmas. Raises ShapeError as :func:`check_contacts`."""
     points_m, normals = np.array(points_m, dtype=float), np.array(normals, dtype=float)
     sigmas = [
         np.broadcast_to(np.asarray(sigma, dtype=float), len(points_m)) for sigma in (point_sigma_m, normal_sigma_rad)
@@ -106,8 +106,8 @@ def weighted_contacts(
 
 
 def divide(contacts: WeightedContacts) -> Planes:
-    """Merge, reassign single contacts, dissolve planes that are not worth their parameters."""
-    from tactile_lab.slam.shape.solids.merging import merge_clusters  # here: compiling takes its time
+    """Merge clusters, reassign single contacts, and dissolve planes that are not worth their parameters."""
+    from tactile_lab.slam.shape.solids.merging import merge_clusters  # imported here, because compiling takes time
 
     price = plane_price(len(contacts))
     columns = contacts.points_m, contacts.normals, contacts.point_weights, contacts.normal_weights
@@ -123,7 +123,7 @@ def divide(contacts: WeightedContacts) -> Planes:
 
 
 def plane_price(count: int) -> float:
-    """Chi-square that one more plane has to save among so many contacts (BIC)."""
+    """Chi-square that an additional plane must save for this number of contacts (BIC)."""
     return float(PARAMETERS_PER_PLANE * np.log(max(count, 2)))
 
 
@@ -151,7 +151,7 @@ def fit_plane(contacts: WeightedContacts, members: NDArray[np.intp]) -> tuple[Ar
 
 
 def _reassign(contacts: WeightedContacts, planes: Planes) -> NDArray[np.int64]:
-    """Labels with each contact at its best plane."""
+    """Labels that assign each contact to its best plane."""
     costs = contacts.chi_squares(planes.normals, planes.offsets_m)
     rows = np.arange(len(contacts))
     best = costs.argmin(axis=1)
@@ -160,10 +160,11 @@ def _reassign(contacts: WeightedContacts, planes: Planes) -> NDArray[np.int64]:
 
 
 def _dissolve(contacts: WeightedContacts, planes: Planes, price: float) -> Planes:
-    """Planes without the smallest one whose contacts fit elsewhere, or together with another's, for less than it costs.
+    """Remove the smallest plane whose contacts fit other planes, or together with those of another, at less than its
+    cost.
 
-    A few contacts that happen to agree better with each other than with their face can be chosen in many ways; the
-    entropy of the labels is the price of that choice.
+    A few contacts that agree better with each other than with their face by coincidence can be chosen in many ways; the
+    entropy of the labels is the penalty for this choice.
     """
     costs = contacts.chi_squares(planes.normals, planes.offsets_m)
     sizes = planes.sizes
@@ -181,7 +182,7 @@ def _dissolve(contacts: WeightedContacts, planes: Planes, price: float) -> Plane
 
 
 def _joining_cost(contacts: WeightedContacts, planes: Planes, costs: Array, plane: int, host: int) -> float:
-    """Chi-square added by one plane in place of two."""
+    """Chi-square added by replacing two planes with one."""
     both = np.flatnonzero((planes.labels == plane) | (planes.labels == host))
     normal, offset_m = fit_plane(contacts, both)
     together = contacts.chi_squares(normal[None], np.array([offset_m]))[both, 0].sum()
@@ -189,7 +190,7 @@ def _joining_cost(contacts: WeightedContacts, planes: Planes, costs: Array, plan
 
 
 def _label_entropy(first: int, second: int) -> float:
-    """Twice the log likelihood lost by telling the members of two clusters apart."""
+    """Twice the log likelihood lost by distinguishing the members of two clusters."""
     sizes = np.array([first + second, first, second], dtype=float)
     return float(2 * np.sum(sizes * np.log(sizes) * [1, -1, -1]))
 

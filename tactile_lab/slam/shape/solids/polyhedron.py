@@ -1,4 +1,6 @@
-"""A solid with flat faces from contacts: planes, the cells they divide space into, and those that are material."""
+"""A solid with flat faces from contacts: planes, the cells into which they divide space, and the cells that are
+material.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,7 @@ LARGEST_PLANE_COUNT = 24
 """More planes make thousands of cells; a shape that needs more is a curved one."""
 
 OFFSET_RANGE_m = 0.1
-"""Objects that a hand explores are about so large; the prior range of a plane's offset."""
+"""Prior range of a plane's offset: about the size of objects that a hand explores."""
 
 _DEFAULT_NORMAL_SIGMA_rad = 0.1
 _MARGIN_m = 0.030
@@ -34,16 +36,17 @@ _LEAST_SUPPORT, _LARGEST_SINGLE_SHARE = 2, 0.04
 _VERTEX_SPACING = 2.0
 _FOOT_SIGMA_m = 1e-4
 _SUPPORT_m, _UNSUPPORTED_SLOPE = 0.020, 0.05
-"""A face is trusted so far around its contacts; farther, its sigma grows by this share of the distance."""
+"""A face is trusted up to this distance from its contacts; beyond, its sigma grows by this share of the distance."""
 
 
 class Polyhedron:
-    """Planes through contacts and the body they enclose; implements FittedShape. Made by :meth:`fit`.
+    """Planes through contacts and the body that they enclose; implements FittedShape. Made by :meth:`fit`.
 
     Attributes:
         name: "polyhedron".
-        planes: all planes, turned to be as regular as the contacts allow.
-        log_evidence: Gaussian log likelihood of points and normals, minus what the planes cost (:func:`_log_evidence`).
+        planes: all planes, made as regular as the contacts allow.
+        log_evidence: Gaussian log likelihood of points and normals, minus the penalty of the planes
+            (:func:`_log_evidence`).
     """
 
     name = "polyhedron"
@@ -55,12 +58,12 @@ class Polyhedron:
 
     @classmethod
     def fit(cls, gpis: Gpis, free_points_m: Array | None = None, *, upright: bool = True) -> Self:
-        """Fit planes to the contacts of a field, with its sigmas.
+        """Fit planes to the contacts of a field, with the field's sigmas.
 
         Args:
-            gpis: a field fitted in space; it also closes the solid where no contact was made.
+            gpis: a field fitted in space; it also bounds the solid on untouched sides.
             free_points_m: places that a finger went through, shape (k, 3), or None.
-            upright: the third axis is vertical: horizontal and vertical faces are likely.
+            upright: whether the third axis is vertical, so that horizontal and vertical faces are likely.
 
         Raises:
             ShapeError: the contacts are in the plane, or on too many planes.
@@ -80,7 +83,7 @@ class Polyhedron:
     def ends(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Where the planes end: the plane of each contact, shape (n,), and :func:`borders` between planes.
 
-        A plane that bounds nothing, as a wrong contact's, is -1.
+        The plane is -1 if it bounds nothing, as that of an outlier.
 
         Raises:
             ShapeError: the planes enclose nothing.
@@ -106,7 +109,7 @@ class Polyhedron:
         return SurfaceMesh(fine.vertices_m, fine.triangles, sigma_m, area_weighted_normals(fine), is_closed=True)
 
     def _build(self, floor_m: float | None) -> tuple[FacetMesh, RegularPlanes, tuple[Cap, ...]]:
-        """The coarse body, the planes it is made of, and the caps that follow them."""
+        """The coarse body, its planes, and the caps that come after them."""
         kept = _drop_lone_planes(self._regular)
         if kept.planes.count == 0:
             raise ShapeError("no plane is touched twice: these enclose nothing")
@@ -131,7 +134,7 @@ class Polyhedron:
         return lower, upper
 
     def _sigma(self, mesh: FacetMesh, regular: RegularPlanes, caps: tuple[Cap, ...]) -> Array:
-        """At each vertex the largest sigma of the planes that meet there."""
+        """The largest sigma of the planes that meet at each vertex."""
         sigma = np.full(len(mesh.vertices_m), _FOOT_SIGMA_m)
         for plane in np.unique(mesh.planes[mesh.planes >= 0]):
             touched = np.unique(mesh.triangles[mesh.planes == plane])
@@ -140,7 +143,7 @@ class Polyhedron:
         return sigma
 
     def _plane_sigma(self, plane: int, points_m: Array, regular: RegularPlanes, caps: tuple[Cap, ...]) -> Array:
-        """Of a plane at points on it: its own, more where contacts scatter, and more far from its contacts."""
+        """Sigma of a plane at points on it: its own, increased if contacts scatter, and far from its contacts."""
         if plane >= regular.planes.count:
             return np.full(len(points_m), caps[plane - regular.planes.count].sigma_m)
         contacts = self._contacts.points_m[regular.planes.labels == plane]
@@ -150,12 +153,12 @@ class Polyhedron:
 
     @property
     def _scatter(self) -> float:
-        """How much more the contacts scatter about their planes than their sigmas say, at least 1."""
+        """Ratio of the contacts' scatter about their planes to their sigmas, at least 1."""
         return max(1.0, float(np.sqrt(self.planes.chi_square / (3 * len(self._contacts)))))
 
 
 def contacts_of(gpis: Gpis) -> WeightedContacts:
-    """Contacts of a field with the noise it assumes, its noise scale included.
+    """Contacts of a field with its assumed noise, including its noise scale.
 
     Raises:
         ShapeError: the contacts are in the plane.
@@ -170,11 +173,11 @@ def contacts_of(gpis: Gpis) -> WeightedContacts:
 
 
 def _log_evidence(contacts: WeightedContacts, regular: RegularPlanes) -> float:
-    """Log likelihood at the best planes, and for each plane how far the contacts narrow what was known before.
+    """Log likelihood at the best planes, minus for each plane the narrowing of its prior by the contacts.
 
-    That is Laplace's approximation of the integral over the planes, with even priors of normals over the sphere and
-    of offsets over :data:`OFFSET_RANGE_m`. A regularity saves the price of one angle and costs the choice between yes
-    and no.
+    This is Laplace's approximation of the integral over the planes, with uniform priors of normals over the sphere and
+    of offsets over :data:`OFFSET_RANGE_m`. A regularity saves the penalty for one angle and costs the choice between
+    yes and no.
     """
     count = len(contacts)
     scale = 0.5 * np.log(contacts.point_weights).sum() + 1.5 * np.log(contacts.normal_weights).sum()
@@ -186,9 +189,9 @@ def _log_evidence(contacts: WeightedContacts, regular: RegularPlanes) -> float:
 
 
 def _drop_lone_planes(regular: RegularPlanes) -> RegularPlanes:
-    """Without planes of a single contact that lie close to others: most likely that contact is wrong.
+    """Remove planes of a single contact that lie close to others: this contact is most likely wrong.
 
-    Where single contacts are many, they are all most likely wrong.
+    If there are many single contacts, all of them are most likely wrong.
     """
     planes = regular.planes
     similar = planes.normals @ planes.normals.T > np.cos(_SIMILAR_ANGLE_rad)

@@ -1,7 +1,7 @@
-"""An outline times a range of heights: upright walls, whatever their outline, and a level top.
+"""A prism: vertical walls over any outline, between two heights, and a level top.
 
-Contacts at all heights then belong to one outline, whose model (smooth field or straight faces) is chosen as in the
-plane. Most things that stand on a table are of this kind, and for those the walls are known far better.
+Contacts at all heights belong to one outline, whose model (smooth field or straight faces) is chosen as in the plane.
+Most things that stand on a table are prisms, and for these the walls are determined far better.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from tactile_lab.slam.shape.solids.polyhedron import contacts_of
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 
 _LEVEL_COSINE = np.sqrt(0.5)
-"""A contact whose normal points up by more than this is one of the top."""
+"""A contact whose normal points up by more than this is on the top."""
 _LEAST_WALL_CONTACTS = 6
 _FLAT_EAR = 1e-7
-"""Twice the area of an ear that counts as flat, as a share of the squared extent of the polygon."""
+"""An ear counts as flat if twice its area is below this share of the squared extent of the polygon."""
 _CORNER_TURN = 0.15
 _FOOT_SIGMA_m = 1e-4
 _VERTEX_SPACING = 2.0
@@ -42,7 +42,7 @@ class Level:
     Attributes:
         height_m: along the third axis.
         sigma_m: standard deviation of the height.
-        log_likelihood: of the contacts on it, with the height's own price (BIC).
+        log_likelihood: log likelihood of the contacts on it, with the BIC penalty for the height.
     """
 
     height_m: float
@@ -56,9 +56,9 @@ class Prism:
     Attributes:
         name: "prism".
         outline: model of the horizontal section.
-        top, bottom: the levels it ends at, by the field where no contact is on them; above the table the bottom is
-            replaced by it.
-        log_evidence: that of the outline, and how well walls are upright and the ends level.
+        top, bottom: the levels at which it ends, taken from the field if no contact is on them; a bottom above the
+            table is replaced by the table.
+        log_evidence: that of the outline, plus that of vertical walls and level ends.
     """
 
     name = "prism"
@@ -68,27 +68,27 @@ class Prism:
 
     @property
     def top(self) -> Level:
-        """Raises ShapeError: it was not touched, and the field has no inside."""
+        """Raises ShapeError if it was not touched and the field has no inside."""
         return self._top.level
 
     @property
     def bottom(self) -> Level:
-        """Raises ShapeError: it was not touched, and the field has no inside."""
+        """Raises ShapeError if it was not touched and the field has no inside."""
         return self._bottom.level
 
     @classmethod
     def fit(
         cls, gpis: Gpis, best_outline: Callable[[Gpis, Array | None], FittedShape], free_points_m: Array | None = None
     ) -> Self:
-        """Fit walls and ends to the contacts of a field, which closes the prism where no end was touched.
+        """Fit walls and ends to the contacts of a field, which bounds the prism at untouched ends.
 
         Args:
             gpis: a field fitted in space.
-            best_outline: chooses the model of contacts in the plane, given free places or None.
+            best_outline: chooses the model for contacts in the plane, given free places or None.
             free_points_m: places that a finger went through, shape (k, 3), or None.
 
         Raises:
-            ShapeError: too few contacts on walls, or an outline without evidence.
+            ShapeError: there are too few contacts on walls, or the outline has no evidence.
         """
         contacts = contacts_of(gpis)
         up = contacts.normals[:, 2]
@@ -149,11 +149,11 @@ def on_walls(normals: Array) -> NDArray[np.bool_]:
 class _End:
     """An end of a prism: upward for side 1, downward for -1.
 
-    Where the field ends is looked for only when that is asked for: most prisms are made for their evidence alone.
+    The end of the field is searched only on demand, because most prisms are made only for their evidence.
 
     Attributes:
         gpis: the field.
-        side: see above.
+        side: 1 for the top, -1 for the bottom.
         members: indices of the contacts on it.
     """
 
@@ -163,12 +163,12 @@ class _End:
 
     @property
     def log_likelihood(self) -> float:
-        """Of the contacts on it, zero if there are none."""
+        """Log likelihood of the contacts on it, zero if there are none."""
         return self.level.log_likelihood if len(self.members) else 0.0
 
     @cached_property
     def level(self) -> Level:
-        """The level that its contacts lie on, or where the field ends if there are none."""
+        """The level of its contacts, or the end of the field if there are none."""
         if len(self.members) == 0:
             end = field_end(self.gpis, np.array([0.0, 0.0, self.side]))
             return Level(self.side * end.offset_m, end.sigma_m, 0.0)
@@ -208,7 +208,7 @@ def _beside(free_points_m: Array | None, top: _End, bottom: _End) -> Array | Non
 
 
 def _thin(contour: Contour, step_m: float) -> tuple[Array, Array]:
-    """Points of a contour about ``step_m`` apart, its corners kept, and their sigmas."""
+    """Points of a contour about ``step_m`` apart, including its corners, and their sigmas."""
     points = contour.points_m
     before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
     lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
@@ -239,9 +239,9 @@ def _extrude(ring_m: Array, bottom_m: float, top_m: float) -> FacetMesh:
 
 
 def ear_triangles(ring_m: Array) -> Indices:
-    """Triangles that fill a simple counter-clockwise polygon of shape (n, 2): ears cut off, the roundest first.
+    """Triangulate a simple counter-clockwise polygon of shape (n, 2) by cutting off ears, the roundest first.
 
-    Flat ears, on straight sides with points between their ends, are left for last: their halves would fall together.
+    Flat ears, which occur on straight sides with intermediate points, are cut last, because they would be degenerate.
 
     Raises:
         ShapeError: the polygon crosses itself.
@@ -267,7 +267,7 @@ def ear_triangles(ring_m: Array) -> Indices:
 def _ears(ring_m: Array, before: Indices, corners: Indices, after: Indices, least_m2: float) -> Array:
     """Whether each corner can be cut off: it turns left, and no other corner lies in its triangle or on its sides.
 
-    Below ``least_m2``, of twice a triangle's area, three points lie on a line.
+    Three points count as collinear if twice the area of their triangle is below ``least_m2``.
     """
     a, b, c = ring_m[before], ring_m[corners], ring_m[after]
     ears = _turn(a, b, c) > least_m2

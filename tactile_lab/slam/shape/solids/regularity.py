@@ -1,4 +1,4 @@
-"""The planes of a solid turned to be as regular as its contacts allow, and what is known of them then."""
+"""Makes the planes of a solid as regular as its contacts allow, and gives their uncertainty."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from tactile_lab.slam.shape.solids.planes import Planes, WeightedContacts
 
 @dataclass(frozen=True)
 class RegularPlanes:
-    """Planes with their regularities and what is known of them.
+    """Planes with their regularities and their uncertainty.
 
     Attributes:
-        planes: as before, turned to meet the regularities.
+        planes: the planes, rotated to satisfy the regularities.
         middles_m: weighted middle of each plane's contacts, shape (S, 3).
         turn_covariances: of each normal, shape (S, 3, 3), square radians.
         offset_variances_m2: of each plane's distance at its middle, shape (S,).
-        log_angle_areas: logarithm of the product of each normal's two principal sigmas by its own contacts, shape (S,).
-        saved: parameters that the regularities make unnecessary.
+        log_angle_areas: logarithm of the product of each normal's two principal sigmas from its own contacts, shape
+            (S,).
+        saved: number of parameters that the regularities make unnecessary.
     """
 
     planes: Planes
@@ -39,13 +40,13 @@ class RegularPlanes:
 
 
 def regularise(contacts: WeightedContacts, planes: Planes, *, upright: bool, regular: bool = True) -> RegularPlanes:
-    """Turn planes until they are as regular as the contacts allow.
+    """Rotate planes until they are as regular as the contacts allow.
 
     Args:
-        contacts: of all planes.
+        contacts: contacts of all planes.
         planes: as fitted to them.
-        upright: the third axis is vertical, and horizontal and vertical planes are likely.
-        regular: look for regularities; else every plane stays as it is.
+        upright: whether the third axis is vertical, so that horizontal and vertical planes are likely.
+        regular: whether to look for regularities; otherwise every plane stays unchanged.
     """
     middles, covariance, offset_variances = _uncertainty(contacts, planes)
     log_areas = np.array([_log_angle_area(block) for block in _own_blocks(covariance)])

@@ -1,4 +1,4 @@
-"""The signed distance from a solid as a field that grasps can be matched with."""
+"""The signed distance from a solid as a field, so that grasps can be matched with it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class SolidField:
         self._sigma_m = sigma_m
 
     def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
-        """Distances, and as gradients the normals at the nearest places, at points of shape (q, 3)."""
+        """Distances at points of shape (q, 3); gradients are the normals at the nearest points of the surface."""
         import igl  # here, so that importing this module stays quick
 
         kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
@@ -34,17 +34,17 @@ class SolidField:
         return Prediction(np.asarray(found[0]), np.asarray(found[3]) if gradient else np.empty((0, 3)), variance_m2)
 
     def variance(self, points_m: Array, *, rough: bool = False) -> Array:
-        """The surface's variance at points of shape (q, 3), shape (q,); nothing is saved by a rough one."""
+        """The surface's variance at points of shape (q, 3), shape (q,); ``rough`` has no effect."""
         return np.full(len(points_m), self._sigma_m**2)
 
 
 class TabulatedSolid:
-    """A solid's field on a grid around it: twenty times faster to ask at some hundred places, a moment to make.
+    """A solid's field tabulated on a grid: twenty times faster to evaluate at some hundred points, and quick to make.
 
-    Edges are rounded by the spacing of the nodes: 2 mm for what a hand spans, more for larger objects.
+    Edges are rounded by the spacing of the nodes: 2 mm for objects within a hand's span, more for larger ones.
 
     Args:
-        mesh, sigma_m: as of a :class:`SolidField`.
+        mesh, sigma_m: as for :class:`SolidField`.
     """
 
     def __init__(self, mesh: TriangleMesh, sigma_m: float) -> None:
@@ -54,7 +54,7 @@ class TabulatedSolid:
         self._grid = FieldGrid.tabulate(self._solid, lower_m, upper_m, spacing_m, gradient=True)
 
     def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
-        """As :meth:`SolidField.predict`; beyond the grid it goes on as if straight away from it."""
+        """As :meth:`SolidField.predict`; beyond the grid the distance to the grid is added."""
         found = self._grid.predict(points_m, gradient=gradient)
         return Prediction(found.mean_m, found.gradient, self.variance(points_m) if variance else np.empty(0))
 

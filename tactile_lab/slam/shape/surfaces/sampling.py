@@ -1,4 +1,4 @@
-"""Even, repeatable samples of contours and meshes, and exact distances to them."""
+"""Uniform, reproducible samples of contours and meshes, and exact distances to them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _PAIRS_AT_ONCE = 1 << 20
 
 
 class TriangleMesh(Protocol):
-    """What is asked of a mesh: a :class:`SurfaceMesh` and trimesh's own meshes have it."""
+    """The required interface of a mesh; :class:`SurfaceMesh` and trimesh's own meshes have it."""
 
     @property
     def vertices(self) -> Any:
@@ -82,7 +82,7 @@ def distances_to_mesh(points_m: Array, mesh: TriangleMesh) -> Array:
 
 
 def nearest_on_mesh(points_m: Array, mesh: TriangleMesh) -> tuple[Array, Array]:
-    """Exact distances from points of shape (q, 3) to the surface of a mesh, and its nearest places, shape (q, 3)."""
+    """Exact distances from points of shape (q, 3) to the surface of a mesh, and its nearest points, shape (q, 3)."""
     import igl  # here, so that importing this module stays quick
 
     vertices, faces = mesh_arrays(mesh)

@@ -22,12 +22,12 @@ Mask: TypeAlias = NDArray[np.bool_]
 FIRST_MARGIN_m = 0.015
 _NEWTON_STEPS = 2
 _FLAT = 1e-3
-"""A vertex this close to the floor or ceiling, in grid spacings, is part of the flat end."""
+"""A vertex within this distance of the floor or ceiling, in grid spacings, is part of the flat end."""
 _RIM_STEPS, _LARGEST_RIM_STEP, _FLATTEST_WALL = 4, 1.7, 0.3
 LEVEL_SIGMA_m = 0.0002
-"""Standard deviation of the heights of flat ends: the table's, or one that many contacts agree on."""
+"""Standard deviation of the height of a flat end: the table, or a level determined by many contacts."""
 _FLATTEST_SLOPE = 1e-3
-"""Below this slope the field says nothing about where its surface is; sigma is computed as if it were this."""
+"""Below this slope the field does not determine its surface; sigma is then computed with this slope."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Contour:
     Attributes:
         points_m: shape (n, 2), metres.
         sigma_m: shape (n,), standard deviation of the contour along its normal.
-        is_closed: False where the field had no outline of its own and was cut at the largest margin.
+        is_closed: False if the field has no closed outline and was cut at the largest margin.
     """
 
     points_m: Array
@@ -54,7 +54,7 @@ class SurfaceMesh:
         faces: shape (m, 3), vertex indices.
         sigma_m: shape (n,), standard deviation of the surface along its normal.
         normals: shape (n, 3), outward unit normals at the vertices.
-        is_closed: False where the field had no surface of its own and was cut at the largest margin.
+        is_closed: False if the field has no closed surface and was cut at the largest margin.
     """
 
     vertices: Array
@@ -70,7 +70,7 @@ def extract_contour(gpis: Gpis, *, resolution_m: float = 0.001, largest_margin_m
     Args:
         gpis: a field fitted in two dimensions.
         resolution_m: spacing of the grid on which the outline is found, before it is refined to the zero level.
-        largest_margin_m: the grid grows around the contacts until the outline closes, at most by this.
+        largest_margin_m: the grid is extended around the contacts until the outline is closed, at most by this.
 
     Raises:
         ShapeError: no point near the contacts is inside, or the grid would be too large.
@@ -94,9 +94,9 @@ def extract_mesh(
 ) -> SurfaceMesh:
     """The object's surface in a spatial field, by marching cubes; arguments and errors as :func:`extract_contour`.
 
-    ``floor_m`` is the height of the table the object stands on, if it does: nothing of it is below, and where the
-    field would go on it ends in a flat foot. ``ceiling_m`` likewise is the height of a flat top, if it has one.
-    Both ends have sharp rims, and their sigma is :data:`LEVEL_SIGMA_m`.
+    ``floor_m`` is the height of the table on which the object stands, if any: the surface ends there in a flat foot,
+    even if the field continues below. ``ceiling_m`` likewise is the height of a flat top, if any. Both ends have sharp
+    rims, and their sigma is :data:`LEVEL_SIGMA_m`.
     """
     from skimage.measure import marching_cubes  # here, so that importing this module stays quick
 
@@ -125,7 +125,7 @@ class _Solid:
     is_closed: bool
 
     def between(self, floor_m: float | None, ceiling_m: float | None, spacing_m: float) -> _Solid:
-        """The same body without what is below or above a height. Raises ShapeError when nothing is left."""
+        """The same body without the parts below or above given heights. Raises ShapeError if nothing is left."""
         heights = self.lower_m[2] + spacing_m * np.arange(self.values_m.shape[2])
         below = -np.inf if floor_m is None else floor_m - heights
         above = -np.inf if ceiling_m is None else heights - ceiling_m
@@ -136,16 +136,16 @@ class _Solid:
 
 
 def _level(vertices: Array, rough: Array, flat: Mask, level_m: float, side: float) -> Array:
-    """Vertices of a flat end stay where the grid put them, at its level; no other vertex is beyond it."""
+    """Put vertices of a flat end exactly at its level; no other vertex may be beyond it."""
     levelled = np.where(flat[:, None], rough, vertices)
     levelled[:, 2] = side * np.minimum(side * levelled[:, 2], side * level_m)
     return levelled
 
 
 def _move_sideways(gpis: Gpis, points_m: Array, reach_m: float) -> Array:
-    """Points moved at their heights onto the zero level, so that a flat end meets the walls in a sharp rim.
+    """Move points horizontally onto the zero level, so that a flat end meets the walls in a sharp rim.
 
-    A point that would have to go farther than ``reach_m``, because the field has no wall there, stays.
+    A point that would move farther than ``reach_m``, because the field has no wall there, stays.
     """
     moved = points_m.copy()
     for _ in range(_RIM_STEPS):
@@ -157,7 +157,7 @@ def _move_sideways(gpis: Gpis, points_m: Array, reach_m: float) -> Array:
 
 
 def _solid(gpis: Gpis, resolution_m: float, largest_margin_m: float) -> _Solid:
-    """Tabulate the field around the contacts, farther on those sides where the object goes on."""
+    """Tabulate the field around the contacts, and farther on sides where the object continues."""
     contacts = gpis.contacts_m
     margins = np.full((2, contacts.shape[1]), min(FIRST_MARGIN_m, largest_margin_m))
     while True:
@@ -172,7 +172,7 @@ def _solid(gpis: Gpis, resolution_m: float, largest_margin_m: float) -> _Solid:
 
 
 def _body(grid: FieldGrid, contacts_m: Array) -> Mask:
-    """The connected inside region that most contacts are nearest to, its cavities filled."""
+    """The connected inside region nearest to most contacts, with its cavities filled."""
     labels, _ = ndimage.label(grid.values_m < 0)
     inside = np.argwhere(labels)
     if len(inside) == 0:
@@ -189,16 +189,16 @@ def _touched_sides(body: Mask) -> Mask:
 
 
 def _pad(grid: FieldGrid, body: Mask, *, is_closed: bool) -> _Solid:
-    """Values whose sign says body or not, with a positive layer around them."""
+    """Values whose signs distinguish the body from the rest, with a positive layer around them."""
     size = np.maximum(np.abs(grid.values_m), 1e-6 * grid.spacing_m)
     values = np.pad(np.where(body, -size, size), 1, constant_values=grid.spacing_m)
     return _Solid(grid.lower_m - grid.spacing_m, values, is_closed)
 
 
 def _refine(gpis: Gpis, points_m: Array, reach_m: float) -> tuple[Array, Array, Array]:
-    """Points moved onto the zero level by Newton steps, their outward normals and standard deviations.
+    """Move points onto the zero level by Newton steps; returns them with outward normals and standard deviations.
 
-    A point that would have to go farther than ``reach_m`` stays: it lies on a cut or on a filled cavity.
+    A point that would move farther than ``reach_m`` stays: it lies on a cut or on a filled cavity.
     """
     for _ in range(_NEWTON_STEPS):
         found = gpis.predict(points_m, gradient=True)
@@ -223,14 +223,14 @@ def _counter_clockwise(contour: Contour) -> Contour:
 
 
 def supported_pieces(contour: Contour, largest_sigma_m: float) -> list[Contour]:
-    """The parts of an outline known to ``largest_sigma_m`` or better, in order, as open lines.
+    """The parts of an outline with sigma up to ``largest_sigma_m``, in order, as open lines.
 
-    One piece with ``is_closed`` as it was if that is all of it; none if it is nothing.
+    One unchanged piece if that is the whole outline; none if no part qualifies.
     """
     good = contour.sigma_m <= largest_sigma_m
     if good.all():
         return [contour]
-    opening = int(np.argmin(good))  # begin at a gap, so that no piece is cut by the end of the arrays
+    opening = int(np.argmin(good))  # start at a gap, so that no piece is split at the end of the arrays
     order = np.roll(np.arange(len(good)), -opening)
     starts = np.flatnonzero(good[order] & ~good[np.roll(order, 1)])
     ends = np.flatnonzero(good[order] & ~good[np.roll(order, -1)])
@@ -239,7 +239,7 @@ def supported_pieces(contour: Contour, largest_sigma_m: float) -> list[Contour]:
 
 
 def supported_mesh(mesh: SurfaceMesh, largest_sigma_m: float) -> SurfaceMesh:
-    """The faces of a surface all of whose vertices are known to ``largest_sigma_m`` or better; open where it is cut."""
+    """The faces of a surface whose vertices all have sigma up to ``largest_sigma_m``; open where it is cut."""
     good = mesh.sigma_m <= largest_sigma_m
     if good.all():
         return mesh

@@ -233,3 +233,16 @@ def test_a_file_of_more_than_a_megabyte_is_not_even_parsed(tmp_path):
     (tmp_path / "rig.yaml").write_bytes(b"a: 1\n" * 300_000)
     with pytest.raises(ConfigurationError, match=r"is too large: 1,5\d\d,\d\d\d bytes, and at most 1,000,000 "):
         load(tmp_path / "rig.yaml")
+
+
+def test_of_very_many_problems_only_those_shown_are_explained(monkeypatch):
+    explained: list[str] = []
+
+    def explain(place, model):
+        explained.append(str(place[-1]))
+        return ""
+
+    monkeypatch.setattr("drivers.core.configuration._suggestion", explain)
+    with pytest.raises(ConfigurationError, match=r"k0: unknown key; .*; and 9995 more"):
+        validate({f"k{number}": number for number in range(10_000)}, StrictModel, where="many.yaml")
+    assert explained == ["k0", "k1", "k2", "k3", "k4"]

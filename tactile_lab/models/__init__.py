@@ -1,0 +1,1 @@
+"""The estimated shape as a model for simulators and CAD programs."""

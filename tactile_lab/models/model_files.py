@@ -1,0 +1,122 @@
+"""Writes a rigid body's files: meshes, descriptions for simulators, and what is known of it.
+
+==================  =========================================================================
+``surface.stl``     the surface, for CAD and printing
+``visual.obj``      the same, for simulators
+``surface.glb``     the same, coloured by its standard deviation
+``part_N.stl``      convex parts for collisions
+``NAME.urdf``       ROS, PyBullet, Drake, Isaac
+``NAME.sdf``        Gazebo, Drake
+``NAME.xml``        MuJoCo: the body on a floor
+``NAME.usda``       Isaac Sim, Omniverse, Blender
+``model.json``      mass, centre, inertia, friction and the uncertainty of the surface
+==================  =========================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from enum import StrEnum
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import MappingProxyType
+
+import trimesh
+
+from drivers.core.atomic_files import write_whole, writing_into
+from drivers.core.errors import ConfigurationError
+from tactile_lab.evaluation.files.mesh_io import write_glb
+from tactile_lab.evaluation.files.plain import json_text
+from tactile_lab.models.robot_files import VISUAL_FILE, mjcf, part_file, sdf, urdf
+from tactile_lab.models.solid_model import SolidModel
+from tactile_lab.models.usd_file import USD_INSTALLED, write_usd
+from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
+
+
+class Format(StrEnum):
+    """Kinds of files that a model can be written as."""
+
+    STL = "stl"
+    OBJ = "obj"
+    GLB = "glb"
+    URDF = "urdf"
+    SDF = "sdf"
+    MJCF = "mjcf"
+    USD = "usd"
+
+
+def formats_installed() -> tuple[Format, ...]:
+    """All formats that can be written with the packages installed here."""
+    return tuple(each for each in Format if each is not Format.USD or USD_INSTALLED)
+
+
+def write_model(folder: Path, model: SolidModel, formats: Sequence[Format]) -> list[Path]:
+    """Write a model's files to a new folder, all or none of them.
+
+    Returns:
+        The files, in the order of the table above.
+
+    Raises:
+        ConfigurationError: the folder exists, or a package for a format is missing.
+        WriteError: the disk is full, or the folder cannot be written.
+    """
+    if folder.exists():
+        raise ConfigurationError("exists already", where=str(folder), hint="Choose another folder, or remove it")
+    with writing_into(folder.parent):
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as unfinished:
+            place = Path(unfinished) / folder.name
+            place.mkdir()
+            for each in dict.fromkeys(formats):
+                _WRITERS[each](place, model)
+            write_whole(place / "model.json", json_text(model.as_json()))
+            place.rename(folder)
+    return sorted(folder.iterdir())
+
+
+def _stl(mesh: trimesh.Trimesh) -> bytes:
+    content = mesh.export(file_type="stl")
+    assert isinstance(content, bytes)  # of this format
+    return content
+
+
+def _write_stl(folder: Path, model: SolidModel) -> None:
+    write_whole(folder / "surface.stl", _stl(model.surface))
+
+
+def _write_obj(folder: Path, model: SolidModel) -> None:
+    text = model.surface.export(file_type="obj", include_normals=False, include_color=False, digits=9)
+    write_whole(folder / VISUAL_FILE, str(text))
+
+
+def _write_glb(folder: Path, model: SolidModel) -> None:
+    surface = model.surface
+    mesh = SurfaceMesh(surface.vertices, surface.faces, model.sigma_m, surface.vertex_normals, is_closed=True)
+    write_glb(folder / "surface.glb", mesh)
+
+
+def _write_simulator(name: str, text: Callable[[SolidModel], str]) -> Callable[[Path, SolidModel], None]:
+    def write(folder: Path, model: SolidModel) -> None:
+        _write_obj(folder, model)
+        for number, part in enumerate(model.parts):
+            write_whole(folder / part_file(number), _stl(part))
+        write_whole(folder / f"{model.name}.{name}", text(model))
+
+    return write
+
+
+def _write_usd(folder: Path, model: SolidModel) -> None:
+    write_usd(folder / f"{model.name}.usda", model)
+
+
+_WRITERS: Mapping[Format, Callable[[Path, SolidModel], None]] = MappingProxyType(
+    {
+        Format.STL: _write_stl,
+        Format.OBJ: _write_obj,
+        Format.GLB: _write_glb,
+        Format.URDF: _write_simulator("urdf", urdf),
+        Format.SDF: _write_simulator("sdf", sdf),
+        Format.MJCF: _write_simulator("xml", mjcf),
+        Format.USD: _write_usd,
+    }
+)
