@@ -35,7 +35,7 @@ from tactile_lab.experiments.data.silhouettes import places, silhouettes
 from tactile_lab.experiments.data.solids import MORE_YCB_NAMES, YCB_NAMES, YCB_PREFIX, ycb_path
 from tactile_lab.experiments.data.true_surface import true_outline
 from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
-from tactile_lab.experiments.touched_metrics import TouchedObject, touched_figures
+from tactile_lab.experiments.touched_metrics import NOTHING_TOUCHED, TouchedObject, touched_figures
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.slam.result import SlamResult
@@ -159,7 +159,7 @@ def judge_model(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch, 
     points = [grasp.points_world_m for grasp in done]
     shape = contour_figures(result.contour, true_outline(mesh)) if dimension == 2 else mesh_figures(result.mesh, mesh)
     registration = registration_rms_mm(points, poses[:count], truth, dimension) if count else None
-    figures = {**shape, "registration_mm": registration}
+    figures = {**shape, "registration_mm": registration, **NOTHING_TOUCHED}
     if dimension == 3 and any(grasp.contacts for grasp in done):
         return {**figures, **touched_figures(TouchedObject(mesh, truth, done), result), **_picture(result, done, watch)}
     return figures
