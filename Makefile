@@ -10,7 +10,7 @@ READY  := $(VENV)/ready
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help demo test test-long check bench results experiments coverage lock clean mutants
+.PHONY: help demo test suite test-long check bench results experiments coverage lock clean mutants
 
 help:  ## This list
 	@echo "make TARGET:"
@@ -19,7 +19,11 @@ help:  ## This list
 demo: $(READY)  ## A whole autonomous session on the simulated rig, evaluated, with its report
 	$(BIN)/tactile-lab run --rig sim --object box-10x6x4 --grasps 16 --seed 1 --out runs
 
-test: check  ## Linters, types, layers, then all tests but the long ones
+# The linters take one core for a minute: the tests take the others meanwhile.
+test: $(READY)  ## Linters, types, layers, and all tests but the long ones, side by side
+	$(MAKE) --no-print-directory --jobs=2 check suite
+
+suite: $(READY)  ## All tests but the long ones
 	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
 test-long: $(READY)  ## The long tests that make test leaves out: whole sessions in real time, studies over seeds
@@ -36,13 +40,13 @@ bench: $(READY)  ## Speed and memory, printed beside the reference
 
 results: $(READY)  ## Pages and plots in docs from the stored results (seconds)
 	$(BIN)/tactile-lab experiment pages
+
 MUTATIONS ?= 204
 SEED      ?= 1
 PROCESSES ?= 1
 
 mutants: $(READY)  ## Random single mutations of the packages: which of them do the nearest tests notice? (an hour or two)
 	$(BIN)/python -m tests.mutants --count $(MUTATIONS) --seed $(SEED) --processes $(PROCESSES) --out build/mutants.json
-
 
 experiments: $(READY)  ## The stored experiments again, by their commands, stored with their pages (days; goes on where it stopped)
 	$(BIN)/tactile-lab experiment commands | while read -r command; do eval "$(BIN)/$$command --store" </dev/null || exit 1; done
@@ -58,9 +62,11 @@ lock:  ## Resolve the dependencies again, with hashes
 clean:  ## Remove the environment, what was built, and caches
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 
-# pip of the system installs into the environment, so that a Python without ensurepip will do.
+# pip of the system installs into the environment, so that a Python without ensurepip will do. It would compile what it
+# installs on one core; some packages hold files that do not compile, which nobody imports.
 $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -m venv --without-pip $(VENV)
-	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check --require-hashes --no-deps -r requirements.lock
+	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check --no-compile --require-hashes --no-deps -r requirements.lock
+	$(BIN)/python -W ignore -m compileall -qq -j 0 $(VENV)/lib || true
 	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	touch $(READY)

@@ -22,6 +22,9 @@ from drivers.force.wire_settings import Port
 from drivers.hardware.udp import UdpTransport
 from drivers.positioner.positioner import Positioner
 from drivers.positioner.settings import PositionerCounters, PositionerSettings
+from drivers.positioner.ur.device import UrPositioner
+from drivers.positioner.ur.process import UrProcess
+from drivers.positioner.ur.settings import UrSettings, UrWiring
 
 
 class PlaceSample(Protocol):
@@ -62,6 +65,14 @@ class PositionerDevice(Protocol):
 
 
 @runtime_checkable
+class LedPositioner(Protocol):
+    """A positioner that a person can lead by hand."""
+
+    def lead_by_hand(self) -> None:
+        """From now on a person leads it, until ``stop`` or ``resume``."""
+
+
+@runtime_checkable
 class CountingPositioner(Protocol):
     """A positioner that counts its cycles and those that it lost."""
 
@@ -85,15 +96,15 @@ class PositionerKind:
         settings: model of what a rig file may say under ``base``; every value has a default.
         device: from a transport, a clock and settings.
         wiring: model of what a rig file says under ``wires.base``.
-        transport: from such wiring, the name in recordings and a clock.
-        emulator_host: the module that serves such a device in emulated laboratories, at ``host`` and ``port`` of the
-            wiring; empty where there is none.
+        transport: from such wiring, settings, the name in recordings and a clock.
+        emulator_host: the module that serves such a device in emulated laboratories, told the wiring, the settings and
+            where the mount stands; empty where there is none.
     """
 
     settings: type[StrictModel]
     device: Callable[[Transport, Clock, Any], PositionerDevice]
     wiring: type[StrictModel]
-    transport: Callable[[Any, str, Clock], Transport]
+    transport: Callable[[Any, Any, str, Clock], Transport]
     emulator_host: str = ""
 
 
@@ -101,8 +112,12 @@ POSITIONERS: Registry[PositionerKind] = Registry("positioner")
 """See ``docs/extending.md`` for adding one."""
 
 
-def _udp(wiring: UdpWiring, name: str, clock: Clock) -> Transport:
+def _udp(wiring: UdpWiring, settings: PositionerSettings, name: str, clock: Clock) -> Transport:
     return UdpTransport(name, wiring.host, wiring.port, clock)
+
+
+def _ur(wiring: UrWiring, settings: UrSettings, name: str, clock: Clock) -> Transport:
+    return UrProcess(wiring, settings, name)
 
 
 POSITIONERS.register(
@@ -113,5 +128,15 @@ POSITIONERS.register(
         wiring=UdpWiring,
         transport=_udp,
         emulator_host="drivers.emulators.laboratory.positioner_host",
+    ),
+)
+POSITIONERS.register(
+    "ur",
+    PositionerKind(
+        settings=UrSettings,
+        device=UrPositioner,
+        wiring=UrWiring,
+        transport=_ur,
+        emulator_host="drivers.emulators.ur.host",
     ),
 )

@@ -217,9 +217,9 @@ class Positioner:
             self._hold(f"stopped: {AXES[behind.argmax()]} does not follow, something may block it")
             self._sent = self._target = sample.q
 
-    def _hold(self, what: str) -> None:
+    def _hold(self, what: str, hint: str = "Find the cause, then resume") -> None:
         self._target = self._sent
-        self._fault = (what, "Find the cause, then resume")
+        self._fault = (what, hint)
 
     # --- state for people --------------------------------------------------------------------------------------
 

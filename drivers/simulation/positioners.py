@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from drivers.core.registry import Registry
 from drivers.core.transports import Peer
+from drivers.simulation.devices.arm_emulator import ArmEmulator
 from drivers.simulation.devices.positioner_emulator import PositionerEmulator
 from drivers.simulation.hand_plant import CarriedPlant
 
@@ -13,3 +14,4 @@ SIMULATED_POSITIONERS: Registry[Callable[[CarriedPlant], Peer]] = Registry("simu
 """Creates the far end of each kind's transport, for a plant that it moves."""
 
 SIMULATED_POSITIONERS.register("six-axis", PositionerEmulator)
+SIMULATED_POSITIONERS.register("ur", ArmEmulator)

@@ -71,7 +71,7 @@ def _copy_traffic(reader: TrafficReader, into: Path, source: str, piece: Piece) 
         into / TRAFFIC,
         {"session": into.name, "extracted_from": source},
         attachments=attached if piece.attachments else (),
-        settings=TrafficSettings(tell_streams=False),
+        settings=TrafficSettings(tell_streams=False, tail=False),
     )
     transports, first_ns = set[str](), None
     try:

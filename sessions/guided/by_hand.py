@@ -20,6 +20,8 @@ from sessions.recording.recorder import Level
 class GraspByHand:
     """The steps of a grasp as prompts; the hand has no demands, the positioner stays or is moved by hand.
 
+    A positioner that can be led is let go while the person guides, turns or opens, and holds still in between.
+
     Args:
         motion: supervised cycles that read the operator's requests; nothing is moved.
         settings: the length of a capture.
@@ -46,13 +48,15 @@ class GraspByHand:
 
     def descend(self, plan: GraspPlan) -> bool:
         self._plan = plan
-        self._motion.runtime.stop()
+        self._motion.runtime.lead_by_hand()
         prompt = "Guide the open hand around the object without touching it. SPACE: zero the fingertips"
         self._console.enter(Stage.GUIDE, prompt, Ask.NEXT, Ask.GIVE_UP)
         for request in self._motion.requests():
             if request.ask in (Ask.NEXT, Ask.GO) and self._zero():
+                self._motion.runtime.stop()
                 self._motion.supervisor.on_approach()
                 return True
+        self._motion.runtime.stop()
         return False
 
     def _zero(self) -> bool:
@@ -87,9 +91,11 @@ class GraspByHand:
         runtime = self._motion.runtime
         world_T_before = runtime.perception.world_T_palm
         runtime.begin_hold()
+        runtime.lead_by_hand()
         for request in self._motion.requests():
             if request.ask in (Ask.NEXT, Ask.GO):
                 break
+        runtime.stop()
         runtime.end_hold()
         return runtime.perception.world_T_palm * world_T_before.inverse()
 
@@ -97,8 +103,10 @@ class GraspByHand:
         self._console.enter(
             Stage.RELEASE, "Open the hand and move it away. SPACE: no finger touches any more", Ask.NEXT
         )
+        self._motion.runtime.lead_by_hand()
         for request in self._motion.requests():
             if request.ask in (Ask.NEXT, Ask.GO):
+                self._motion.runtime.stop()
                 return
 
     def lift(self) -> None:

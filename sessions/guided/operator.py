@@ -87,7 +87,7 @@ class Panel:
         grasp: number of the current grasp, from 1.
         stage: stage of the grasp.
         prompt: what to do now.
-        sight: current sensor readings.
+        view: current sensor readings.
         capture: what is missing for a capture.
         suggestion: the suggested next grasp.
         unknown: which part of the object is still unknown.

@@ -4,8 +4,8 @@ Live, every transport is tapped. The tap (:class:`Observer`) first records a dat
 device sees it, passes the same bytes to the :class:`Interpreter`, whose decoders and :class:`Perception` are separate
 from the live devices. A replay passes the recorded bytes to an equal Interpreter. In both cases the order of recording
 *is* the order of processing, for session events too, and the Interpreter's clock shows the newest stamp that is
-confirmed by more than one transport (:mod:`sessions.recording.session_clock`). So a live session cannot know anything
-that is not in its recording.
+confirmed by more than one transport (:mod:`sessions.recording.traffic.session_clock`). So a live session cannot know
+anything that is not in its recording.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from sessions.perception.event_outcomes import Outcome
 from sessions.perception.instruments import BaseReading, Decoder, FrameReading, HandReading
 from sessions.perception.perception import Perception
 from sessions.recording.recorder import Recorder
-from sessions.recording.session_clock import SessionClock
 from sessions.recording.session_events import SessionEvent
+from sessions.recording.traffic.session_clock import SessionClock
 
 HAND_LINK, BASE_LINK, CAMERA_LINK = "hand", "base", "camera"
 

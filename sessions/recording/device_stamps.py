@@ -33,8 +33,8 @@ def camera_stamp(payload: bytes) -> DeviceStamp:
 
 
 def positioner_stamp(payload: bytes) -> DeviceStamp:
-    """A status of the positioner: the number of the command it answers."""
-    if len(payload) != POSITIONER_STATUS_BYTES:
+    """A status of the positioner, an arm's too: the number of the command it answers."""
+    if len(payload) < POSITIONER_STATUS_BYTES:
         return UNSTAMPED
     return DeviceStamp(_POSITIONER_HEAD.unpack_from(payload)[0])
 
@@ -46,3 +46,4 @@ STAMPERS: Registry[Stamper] = Registry("stamper")
 STAMPERS.register("net-ft", rdt_stamp)
 STAMPERS.register("nano17", rdt_stamp)  # simulated ones send as behind a Net F/T box
 STAMPERS.register("six-axis", positioner_stamp)
+STAMPERS.register("ur", positioner_stamp)

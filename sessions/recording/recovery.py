@@ -164,7 +164,7 @@ def _result_folders(source: Path) -> tuple[str, ...]:
 def _copy_traffic(reader: TrafficReader, folder: Path) -> tuple[Counter[str], dict[str, TopicRecovery]]:
     attached = tuple(Attached(item.name, item.media_type, item.data) for item in reader.attachments())
     info = {key: value for key, value in reader.info.items() if key not in ("format", "segment")}
-    settings = TrafficSettings(tell_streams=False)
+    settings = TrafficSettings(tell_streams=False, tail=False)
     writer = TrafficWriter(folder / TRAFFIC, info, attachments=attached, settings=settings)
     rates = _Rates()
     try:

@@ -17,6 +17,7 @@ from drivers.core.clock import NANOSECONDS, Clock
 from drivers.core.contacts import FINGERS, Grasp
 from drivers.core.errors import DeviceError, SessionError, TactileLabError
 from drivers.core.fingertip import FingertipCalibration, FingertipSensor
+from drivers.positioner.kinds import LedPositioner
 from sessions.perception.event_outcomes import Outcome, TareReport, TruthFrame, Undone
 from sessions.perception.instruments import (
     BaseInstrument,
@@ -147,6 +148,12 @@ class RigRuntime:
         """Stop all motion: zero demands to the hand, the positioner holds. Never raises."""
         self.hand.stop()
         self.base.stop()
+
+    def lead_by_hand(self) -> None:
+        """Zero demands to the hand, and a positioner that can be led is let go, until :meth:`stop` or a resume."""
+        self.stop()
+        if isinstance(self.base, LedPositioner):
+            self.base.lead_by_hand()
 
     def restart_fingertip(self, finger: str) -> None:
         """Restart the sensor of a fingertip with its own transport. Raises DeviceError."""

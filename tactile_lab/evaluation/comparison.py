@@ -75,16 +75,16 @@ class MethodSummary:
     figures: tuple[Figure, ...]
 
 
-def compare(judged: Sequence[EvaluatedRun]) -> list[MethodSummary]:
+def compare(runs: Sequence[EvaluatedRun]) -> list[MethodSummary]:
     """One summary per method, in order of appearance.
 
     Several results of one method on one session are not independent runs: then each results folder is a separate group,
     with its name.
     """
-    counts = Counter((each.session, each.method) for each in judged)
+    counts = Counter((each.session, each.method) for each in runs)
     repeated = {method for (_, method), count in counts.items() if count > 1}
     groups: dict[str, list[EvaluatedRun]] = {}
-    for each in judged:
+    for each in runs:
         name = f"{each.method}, {each.results}" if each.method in repeated else each.method
         groups.setdefault(name, []).append(each)
     first = next(iter(groups.values()))
@@ -114,12 +114,12 @@ def _difference(keys: Sequence[str], group: Sequence[EvaluatedRun], first: Seque
     return Interval.of(differences) if differences else None
 
 
-def rows_csv(judged: Sequence[EvaluatedRun]) -> str:
+def rows_csv(runs: Sequence[EvaluatedRun]) -> str:
     """One line per evaluation; unknown metrics are empty."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(["session", "results", "object", "method", "seed", "grasps", "status", "failed", *_columns()])
-    for each in judged:
+    for each in runs:
         content = each.evaluation
         head = [each.session, each.results, content["object"], each.method, content["seed"], content["grasps"]]
         figures = ["" if (value := each.figure(keys)) is None else f"{value:.6g}" for _, keys in FIGURES]

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.core.errors import SessionError
+from tactile_lab.evaluation.estimate_with_truth import EstimateWithTruth, Truth
 from tactile_lab.evaluation.figures import (
     LoopFigures,
     SensingFigures,
@@ -23,7 +24,6 @@ from tactile_lab.evaluation.figures import (
 )
 from tactile_lab.evaluation.files.plain import json_text, plain
 from tactile_lab.evaluation.files.results import read_results
-from tactile_lab.evaluation.judged import Judged, Truth
 from tactile_lab.evaluation.result_warnings import result_warnings
 from tactile_lab.evaluation.trajectory import PoseErrors
 
@@ -95,13 +95,13 @@ def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
         SessionError: results are missing or unreadable, or do not belong to the truth.
         ShapeError: the true mesh or contour cannot be compared.
     """
-    judged = Judged(folder, read_results(folder), truth)
-    results, poses = judged.results, judged.poses
+    estimate = EstimateWithTruth(folder, read_results(folder), truth)
+    results, poses = estimate.results, estimate.poses
     if len(poses) != len(truth.world_T_object):
         counts = f"{len(poses)} grasps in the results, {len(truth.world_T_object)} in the session"
         raise SessionError(counts, where=str(folder), hint="Replay the session to update its results")
-    _, incomparable = judged.shape
-    figures, failures = computed(judged)
+    _, incomparable = estimate.shape
+    figures, failures = computed(estimate)
     ours = {each.name: figures.pop(each.name) for each in fields(Evaluation) if each.name in figures}
     return Evaluation(
         schema_version=SCHEMA_VERSION,

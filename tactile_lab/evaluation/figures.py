@@ -14,8 +14,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from drivers.core.registry import Registry
+from tactile_lab.evaluation.estimate_with_truth import EstimateWithTruth, seen_contacts
 from tactile_lab.evaluation.files.plain import plain
-from tactile_lab.evaluation.judged import Judged, seen_contacts
 from tactile_lab.evaluation.loops import wrong_loops
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
 from tactile_lab.evaluation.shape import contact_distances_m, outline_distances_m
@@ -90,20 +90,20 @@ class TruthFigures:
     mesh: bool
 
 
-Figure: TypeAlias = Callable[[Judged], Any]
+Figure: TypeAlias = Callable[[EstimateWithTruth], Any]
 """Computes a metric: a number, or anything else that :func:`tactile_lab.evaluation.files.plain.plain` can write."""
 
 FIGURES: Registry[Figure] = Registry("evaluation figure")
 """All metrics by their name in ``evaluation.json``. See ``docs/extending.md`` for adding one."""
 
 
-def computed(judged: Judged) -> tuple[dict[str, Any], tuple[str, ...]]:
+def computed(estimate: EstimateWithTruth) -> tuple[dict[str, Any], tuple[str, ...]]:
     """All registered metrics by name, None if one cannot be computed; and the reasons."""
     values: dict[str, Any] = {}
     warnings: list[str] = []
     for name in FIGURES:
         try:
-            values[name] = FIGURES[name](judged)
+            values[name] = FIGURES[name](estimate)
             plain(values[name])
             problem = "" if _is_finite(values[name]) else "is not a finite number"
         except Exception as error:
@@ -128,38 +128,38 @@ def _is_finite(value: Any) -> bool:
 # --- ours ----------------------------------------------------------------------------------------------------------
 
 
-def _shape(judged: Judged) -> ShapeFigures | None:
+def _shape(estimate: EstimateWithTruth) -> ShapeFigures | None:
     """Errors with the estimate aligned with the truth at the first grasp."""
-    compared, _ = judged.shape
+    compared, _ = estimate.shape
     return None if compared is None else ShapeFigures.of(compared.first_grasp)
 
 
-def _shape_best_fit(judged: Judged) -> ShapeFigures | None:
-    compared, _ = judged.shape
+def _shape_best_fit(estimate: EstimateWithTruth) -> ShapeFigures | None:
+    compared, _ = estimate.shape
     return None if compared is None else ShapeFigures.of(compared.best_fit)
 
 
-def _uncertainty(judged: Judged) -> UncertaintyFigures | None:
-    if (quantiles_m := judged.results.sigma_quantiles_m) is None:
+def _uncertainty(estimate: EstimateWithTruth) -> UncertaintyFigures | None:
+    if (quantiles_m := estimate.results.sigma_quantiles_m) is None:
         return None
     median, p95 = 1e3 * np.percentile(quantiles_m, [50, 95])
     return UncertaintyFigures(float(median), float(p95))
 
 
-def _pose(judged: Judged) -> PoseErrors | None:
-    return pose_errors(judged.poses, judged.truth.world_T_object)
+def _pose(estimate: EstimateWithTruth) -> PoseErrors | None:
+    return pose_errors(estimate.poses, estimate.truth.world_T_object)
 
 
-def _registration(judged: Judged) -> float | None:
-    return judged.registration_rms_mm
+def _registration(estimate: EstimateWithTruth) -> float | None:
+    return estimate.registration_rms_mm
 
 
-def _own_turns(judged: Judged) -> int | None:
-    return judged.symmetry_turns
+def _symmetry_turns(estimate: EstimateWithTruth) -> int | None:
+    return estimate.symmetry_turns
 
 
-def _sensing(judged: Judged) -> SensingFigures | None:
-    truth, seen = judged.truth, seen_contacts(judged.results, judged.truth)
+def _sensing(estimate: EstimateWithTruth) -> SensingFigures | None:
+    truth, seen = estimate.truth, seen_contacts(estimate.results, estimate.truth)
     if truth.mesh is not None:
         distances_m = contact_distances_m(*seen, truth.mesh)
     elif truth.outline_m is not None:
@@ -172,30 +172,30 @@ def _sensing(judged: Judged) -> SensingFigures | None:
     return SensingFigures(float(median), float(p95))
 
 
-def _failed(judged: Judged) -> bool | None:
-    if str(judged.results.slam["status"]) != "ok":
+def _failed(estimate: EstimateWithTruth) -> bool | None:
+    if str(estimate.results.slam["status"]) != "ok":
         return True
-    error_mm = judged.registration_rms_mm
+    error_mm = estimate.registration_rms_mm
     return None if error_mm is None else error_mm > FAILURE_LIMIT_MM
 
 
-def _loops(judged: Judged) -> LoopFigures:
-    loops = judged.results.slam["loops"]
-    wrong = wrong_loops(loops, judged.poses, judged.truth.world_T_object)
+def _loops(estimate: EstimateWithTruth) -> LoopFigures:
+    loops = estimate.results.slam["loops"]
+    wrong = wrong_loops(loops, estimate.poses, estimate.truth.world_T_object)
     return LoopFigures(len(loops), sum(bool(loop["accepted"]) for loop in loops), wrong)
 
 
-def _time(judged: Judged) -> TimeFigures:
-    if not (step_seconds := judged.results.step_seconds):
+def _time(estimate: EstimateWithTruth) -> TimeFigures:
+    if not (step_seconds := estimate.results.step_seconds):
         return TimeFigures(None, None, None)
     median, p95 = 1e3 * np.percentile(step_seconds, [50, 95])
     return TimeFigures(float(np.sum(step_seconds)), float(median), float(p95))
 
 
-def _truth(judged: Judged) -> TruthFigures:
-    seen = sum(pose is not None for pose in judged.truth.world_T_object)
-    shape_known = judged.truth.mesh is not None or judged.truth.outline_m is not None
-    return TruthFigures(seen, len(judged.poses) - seen, shape_known)
+def _truth(estimate: EstimateWithTruth) -> TruthFigures:
+    seen = sum(pose is not None for pose in estimate.truth.world_T_object)
+    shape_known = estimate.truth.mesh is not None or estimate.truth.outline_m is not None
+    return TruthFigures(seen, len(estimate.poses) - seen, shape_known)
 
 
 FIGURES.register("shape", _shape)
@@ -203,7 +203,7 @@ FIGURES.register("shape_best_fit", _shape_best_fit)
 FIGURES.register("uncertainty", _uncertainty)
 FIGURES.register("pose", _pose)
 FIGURES.register("registration_rms_mm", _registration)
-FIGURES.register("symmetry_turns", _own_turns)
+FIGURES.register("symmetry_turns", _symmetry_turns)
 FIGURES.register("sensing", _sensing)
 FIGURES.register("failed", _failed)
 FIGURES.register("loops", _loops)

@@ -24,7 +24,7 @@ def registration_verdict(error_mm: float, symmetry_turns: int | None) -> tuple[b
 
     Args:
         error_mm: its registration error.
-        own_turns: see :func:`tactile_lab.evaluation.truth.rotational_symmetry.symmetry_turns`.
+        symmetry_turns: see :func:`tactile_lab.evaluation.truth.rotational_symmetry.symmetry_turns`.
     """
     without = "" if symmetry_turns is None else ", ignoring rotations about its axis of symmetry"
     passed = error_mm <= FAILURE_LIMIT_MM

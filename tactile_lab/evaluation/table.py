@@ -104,7 +104,7 @@ def _sensing_note(sensing: Mapping[str, Any]) -> str:
 def _verdict(evaluation: Mapping[str, Any]) -> str:
     if evaluation.get("registration_rms_mm") is None:
         return NEEDS_TWO
-    return registration_verdict(evaluation["registration_rms_mm"], evaluation.get("own_turns"))[1]
+    return registration_verdict(evaluation["registration_rms_mm"], evaluation.get("symmetry_turns"))[1]
 
 
 def _loop_note(loops: Mapping[str, Any]) -> str:

@@ -13,11 +13,11 @@ from drivers.core.contacts import Array
 from drivers.core.poses import spatial, transform_points
 from sessions.recording.manifest import Manifest
 from sessions.recording.session import Session
+from tactile_lab.evaluation.estimate_with_truth import Truth, true_outline
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 from tactile_lab.evaluation.files.plain import read_json_object
 from tactile_lab.evaluation.files.results import Results, read_results
 from tactile_lab.evaluation.files.tables import read_contour
-from tactile_lab.evaluation.judged import Truth, true_outline
 from tactile_lab.evaluation.shape import horizontal_outline
 from tactile_lab.evaluation.trajectory import read_trajectory
 from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY, read_truth_mesh

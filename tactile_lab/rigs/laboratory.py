@@ -20,7 +20,7 @@ from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import Rig
 from tactile_lab.rigs.wired import emulation_plan, with_palm
-from tactile_lab.rigs.wired_runtime import build_wired_bench
+from tactile_lab.rigs.wired_runtime import build_wired_runtime
 
 
 class Laboratory(Protocol):
@@ -87,7 +87,7 @@ class WiredLaboratory:
     def runtime(self, recorder: Recorder, *, first_move: bool | None = None) -> RigRuntime:
         """See :class:`Laboratory`."""
         truth = None if self.emulators is None else self.emulators.truth
-        return build_wired_bench(self.rig, recorder, self.clock, truth=truth, first_move=first_move)
+        return build_wired_runtime(self.rig, recorder, self.clock, truth=truth, first_move=first_move)
 
     def remarks(self) -> tuple[str, ...]:
         """Whether the physics could not keep up with the clock; see :class:`Laboratory`."""

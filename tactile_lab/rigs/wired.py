@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from calibration.forearm.placement import load_forearm
 from drivers.ati.wires.wire import ForceWire
 from drivers.camera.calibration import load_camera
 from drivers.camera.markers import MarkerSettings
@@ -122,7 +124,7 @@ def emulation_plan(rig: Rig, seed: int, object_name: str) -> EmulationPlan:
         simulation=simulation_settings(rig, object_name),
         seed=seed,
         hand=_hand_place(rig),
-        base=_base_place(rig),
+        base=_base_start(rig),
         tips=rig.files["fingertips"].resolve(),
         wires={finger: _with_emulator(rig, finger, wiring) for finger, wiring in wires.fingertips.items()},
         camera=_camera_place(rig),
@@ -153,13 +155,17 @@ def _camera_place(rig: Rig) -> Place | None:
     return (camera.host, camera.port) if isinstance(camera, RemoteCamera) else None
 
 
-def _base_place(rig: Rig) -> Place:
+def _base_start(rig: Rig) -> dict[str, Any]:
     wiring, kind = wires_of(rig).base, rig.description.positioner_kind
     if not kind.emulator_host:
         what, hint = f"there is no emulator of the positioner {rig.description.positioner}", "Run it on a simulated rig"
         raise ConfigurationError(what, where=f"{rig.source}: wires.base", hint=hint)
-    place = wiring.model_dump()
-    return place["host"], place["port"]
+    mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
+    return {
+        "wiring": wiring.model_dump(mode="json"),
+        "settings": rig.description.base.model_dump(mode="json"),
+        "world_T_mount": mount.matrix().tolist(),
+    }
 
 
 def _with_emulator(rig: Rig, finger: str, wiring: WireSettings) -> WireSettings:

@@ -23,7 +23,7 @@ from tactile_lab.rigs.wired import camera_source, force_wire, hand_setup, wires_
 from tactile_lab.rigs.wires import RemoteCamera
 
 
-def build_wired_bench(
+def build_wired_runtime(
     rig: Rig,
     recorder: Recorder,
     clock: Clock,
@@ -48,7 +48,7 @@ def build_wired_bench(
         cycle_ns=round(description.cycle_s * NANOSECONDS),
         hand=HandProcess(hand_setup(rig), observer, patience_s=wires.hand.patience_s, check_map=check),
         base=positioner.device(
-            TappedTransport(positioner.transport(wires.base, BASE_LINK, clock), observer, clock),
+            TappedTransport(positioner.transport(wires.base, description.base, BASE_LINK, clock), observer, clock),
             clock,
             description.base,
         ),

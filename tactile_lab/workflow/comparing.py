@@ -33,14 +33,14 @@ class Comparison:
     """All evaluated results.
 
     Attributes:
-        judged: one per results folder, in order.
+        runs: one per results folder, in order.
         truths: what each session's truth was worth, by session; None without a camera.
         clocks: offset of the camera's clock to the hand's, by session.
         unread: what of a recording could not be read, by session, in words; empty when all was.
         summaries: by method.
     """
 
-    judged: tuple[EvaluatedRun, ...]
+    runs: tuple[EvaluatedRun, ...]
     truths: dict[str, TruthReport | None]
     clocks: dict[str, ClockOffset]
     unread: dict[str, str]
@@ -51,7 +51,7 @@ class Comparison:
         truths = {name: None if report is None else report_json(report) for name, report in self.truths.items()}
         return {
             "evaluations": [
-                {"session": each.session, "results": each.results, **each.evaluation} for each in self.judged
+                {"session": each.session, "results": each.results, **each.evaluation} for each in self.runs
             ],
             "truth": truths,
             "clock_offset": {name: asdict(offset) for name, offset in self.clocks.items()},
@@ -68,17 +68,17 @@ def compare_sessions(sessions: Sequence[Session], folders: Sequence[str], choice
         ConfigurationError: the chosen calibration cannot be used.
     """
     _check_different(sessions)
-    judged: list[EvaluatedRun] = []
+    runs: list[EvaluatedRun] = []
     truths, clocks, unread = dict[str, TruthReport | None](), dict[str, ClockOffset](), dict[str, str]()
     for session in sessions:
         for results in result_folders(session, folders):
             evaluation, truth, lost = evaluate_results(session, results, choice)
-            judged.append(EvaluatedRun(session.manifest.name, results.name, evaluation.as_json()))
+            runs.append(EvaluatedRun(session.manifest.name, results.name, evaluation.as_json()))
             truths[session.manifest.name] = truth
             if lost:
                 unread[session.manifest.name] = lost
         clocks[session.manifest.name] = session_clock_offset(session, choice)
-    return Comparison(tuple(judged), truths, clocks, unread, tuple(compare(judged)))
+    return Comparison(tuple(runs), truths, clocks, unread, tuple(compare(runs)))
 
 
 def _check_different(sessions: Sequence[Session]) -> None:
@@ -114,7 +114,7 @@ def write_comparison(comparison: Comparison, out: Path) -> list[Path]:
     """Write table, rows, all data and a plot. Returns the files. Raises WriteError."""
     texts = {
         "comparison.md": markdown(comparison.summaries),
-        "comparison.csv": rows_csv(comparison.judged),
+        "comparison.csv": rows_csv(comparison.runs),
         "comparison.json": json_text(comparison.as_json()),
         "comparison.svg": comparison_svg(comparison.summaries),
     }

@@ -20,10 +20,10 @@ from sessions.conductor.session_outcome import SessionOutcome
 from sessions.recording.session import RESULTS, Session
 from sessions.recording.traffic.reader import Loss
 from tactile_lab import report
+from tactile_lab.evaluation.estimate_with_truth import Truth
 from tactile_lab.evaluation.evaluation import Evaluation, evaluate
 from tactile_lab.evaluation.files.result_files import write_results
 from tactile_lab.evaluation.files.results import read_results
-from tactile_lab.evaluation.judged import Truth
 from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
 from tactile_lab.evaluation.truth.marker_truth import Basis, MarkerTruth, TruthReport
 from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY, camera_datagrams, session_truth

@@ -15,9 +15,9 @@ from drivers.core.errors import ConfigurationError, TactileLabError, given_by_a_
 from sessions.conductor.progress import NullProgress, Progress
 from sessions.exchange.contact_log import ContactLog, read_contact_log
 from sessions.recording.listing import find_session
+from tactile_lab.evaluation.estimate_with_truth import Truth
 from tactile_lab.evaluation.files.mesh_io import read_mesh
 from tactile_lab.evaluation.files.result_files import write_results
-from tactile_lab.evaluation.judged import Truth
 from tactile_lab.evaluation.prism import open_ring
 from tactile_lab.slam.shape.planar.outlines import is_simple
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam

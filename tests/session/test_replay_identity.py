@@ -60,7 +60,7 @@ def make_interpreter(world):
     )
 
 
-def make_bench(world, recorder):
+def make_runtime(world, recorder):
     observer, known = Observer(recorder, make_interpreter(world)), world.calibration
     transports = {
         name: TappedTransport(transport, observer, world.clock) for name, transport in world.transports().items()
@@ -150,7 +150,7 @@ def test_a_simulated_session_is_understood_the_same_from_its_bytes(tmp_path, fin
     start = ObjectStart(x_m=0.0, y_m=0.0, yaw_rad=1.5708)
     world = SimulatedWorld(SimulationSettings(fingertips=fingertips, start=start), seed=4)
     with create_session(tmp_path, rig="sim", rig_description={}, object_name=world.settings.object) as session:
-        live = grasp_twice(make_bench(world, session.recorder), stop_N)
+        live = grasp_twice(make_runtime(world, session.recorder), stop_N)
     replay = Replay(session, make_interpreter(world))
     outcomes = list(replay.outcomes())
     assert not replay.loss

@@ -2,7 +2,7 @@
 
     class TestTheBoxDriver(DriverSweep):
         layout = MessageLayout(...)
-        def rig runtime(self) -> SweptBench: ...
+        def runtime(self) -> SweptDevice: ...
 
 Each fault is injected into an otherwise healthy stream. The driver must either report it in its health, or stop with a
 proper error that names the transport and says what to do. Afterwards it must be possible to connect it again. Faults
@@ -40,7 +40,7 @@ def _nothing() -> None:
 
 
 @dataclass
-class SweptBench:
+class SweptDevice:
     """One driver with one device in memory.
 
     Attributes:
@@ -75,7 +75,7 @@ def _without_figures(text: str) -> str:
     return "".join(letter for letter in text if not letter.isdigit())
 
 
-def run(runtime: SweptBench, driver: SweptDriver) -> Outcome:
+def run(runtime: SweptDevice, driver: SweptDriver) -> Outcome:
     """Run a connected driver for the sweep's number of cycles, or until it stops."""
     words: dict[str, str] = {}
     samples = 0
@@ -120,7 +120,7 @@ class DriverSweep:
         """All faults of the sweep."""
         return sorted([*standard_faults(cls.layout), *cls.far_end])
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         """A new driver with its device."""
         raise NotImplementedError
 
@@ -189,7 +189,7 @@ class DriverSweep:
             assert new, "the fault went by in silence"
 
     @staticmethod
-    def _works_again(runtime: SweptBench, driver: SweptDriver) -> None:
+    def _works_again(runtime: SweptDevice, driver: SweptDriver) -> None:
         """Check that after closing, with the wire plugged in again, the same driver connects and receives samples."""
         driver.connect()
         runtime.clock.sleep_until_ns(runtime.clock.now_ns() + STEP_ns)

@@ -55,7 +55,9 @@ def make_recording(folder: Path, count: int = 400, *, whole: bool = True) -> Rec
     """Numbered messages on three topics, in chunks of 80 ms; truncated in the last chunk unless ``whole``."""
     path, random = folder / "made.mcap", np.random.default_rng(1)
     attached = (Attached("calibration/joints.yaml", "application/yaml", b"a: 1\n" * 20),)
-    writer = TrafficWriter(path, {"session": "s"}, attachments=attached, settings=TrafficSettings(tell_streams=False))
+    writer = TrafficWriter(
+        path, {"session": "s"}, attachments=attached, settings=TrafficSettings(tell_streams=False, tail=False)
+    )
     topics = [TOPICS[number % len(TOPICS)] for number in range(count)]
     for number, topic in enumerate(topics):
         writer.write(topic, number.to_bytes(4, "little") + random.bytes(20), number * _STEP_ns)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import random
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -28,12 +28,23 @@ from drivers.core.records import RecordKind, RecordReader, encode_record
 from drivers.core.transports import Datagram
 from drivers.emulators.ati.net_box_unit import NetBoxUnit
 from drivers.emulators.ati.sensor import emulated_calibration
+from drivers.emulators.ur.rtde_server import RtdeClient, package
 from drivers.ethercat import frames as ethercat
 from drivers.ethercat.registers import AlStatus
 from drivers.hardware.can_bus import CanFrame, decode_frame, encode_frame
 from drivers.hardware.tcp import MessageReader, frame
 from drivers.positioner import codec as positioner_codec
 from drivers.positioner.codec import PositionerCommand, PositionerStatus
+from drivers.positioner.ur.codec import (
+    ArmFlags,
+    ArmOrder,
+    ArmState,
+    ArmStatus,
+    decode_arm_command,
+    decode_arm_status,
+    encode_arm_command,
+    encode_arm_status,
+)
 from drivers.shadow.protocol.motor_can import MotorIdentifier
 from drivers.shadow.protocol.palm_codec import PalmCommand
 from drivers.shadow.protocol.palm_images import PALMS
@@ -51,6 +62,26 @@ _TELEGRAMS = (
 )
 _SEEN = Detection("DICT_4X4_50", (8, 8), {0: SeenMarker(np.arange(8.0).reshape(4, 2), 0.5)})
 _LOG = "Sensor: BT1\n\nBegin File\n0.000000 1 1 17 2602 0 2713 0\n0.000227 1 1 0 2040 0 2041 1\n"
+_ARM = ArmState(1.0, 7, 2, 1, 1.0, (0.0, 0.0, -3.0), ArmFlags.HEARD | ArmFlags.PROGRAM)
+
+
+class _EmptyBox:
+    """A control box with nothing to tell."""
+
+    version = (5, 12, 0, 0)
+
+    def output(self, name: str) -> float:
+        return 0.0
+
+    def claim(self, client: object, names: Sequence[str]) -> list[str]:
+        return ["INT32"] * len(names)
+
+    def on_inputs(self, values: object) -> None:
+        """Nothing happens."""
+
+
+def _read_rtde(payload: bytes) -> bytes:
+    return RtdeClient(_EmptyBox()).feed(payload)
 
 
 def _palm_statuses() -> dict[str, Codec]:
@@ -112,6 +143,9 @@ CODECS: dict[str, Codec] = {
         positioner_codec.decode_status,
         positioner_codec.encode_status(PositionerStatus(7, np.arange(6.0))),
     ),
+    "arm status": (decode_arm_status, encode_arm_status(ArmStatus(7, np.arange(6.0), _ARM))),
+    "arm command": (decode_arm_command, encode_arm_command(PositionerCommand(7, np.arange(6.0)), ArmOrder.FOLLOW)),
+    "arm's RTDE": (_read_rtde, package(ord("V"), b"\x00\x02") + package(ord("O"), bytes(8) + b"timestamp")),
     "positioner command": (
         positioner_codec.decode_command,
         positioner_codec.encode_command(PositionerCommand(7, np.arange(6.0))),

@@ -58,7 +58,7 @@ class EmulationPlan:
         simulation: the plant, and the errors of the devices.
         seed: for all random numbers.
         hand: the hand.
-        base: the positioner's address.
+        base: what the positioner's emulator is told: ``wiring``, ``settings`` and ``world_T_mount`` of the rig.
         tips: calibration file of the fingertips.
         wires: wires of fingertips with their own transports, by finger; each kind must have an emulator.
         camera: address and TCP port of the camera, if there is one.
@@ -67,7 +67,7 @@ class EmulationPlan:
     simulation: SimulationSettings
     seed: int
     hand: HandPlace
-    base: Place
+    base: Mapping[str, Any]
     tips: Path
     wires: Mapping[str, WireSettings] = field(default_factory=dict)
     camera: Place | None = None
@@ -144,7 +144,7 @@ class EmulatedLaboratory:
         world = {**_world(plan), "tips": str(plan.tips)}
         positioner = POSITIONERS[plan.simulation.positioner]
         self._add("plant", "plant", memory, **world)
-        self._add("base", positioner.emulator_host, memory, host=plan.base[0], port=plan.base[1])
+        self._add("base", positioner.emulator_host, memory, **plan.base)
         if plan.camera is not None:
             self._add("camera", "camera", memory, host=plan.camera[0], port=plan.camera[1], **world)
         for finger, wiring in plan.wires.items():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from drivers.core.child_process import ChildProcess
+from drivers.core.orders import Order
 
 _START_s = 60.0
 
@@ -39,6 +40,10 @@ class HostProcess:
     def running(self) -> bool:
         """Whether its process is running."""
         return self._child.running
+
+    def give(self, order: Order) -> None:
+        """Tell it what a person or the world does to its device, where it listens. Raises DeviceError if it is gone."""
+        self._child.give(order)
 
     def kill(self) -> None:
         """Kill it at once, like a power cut."""

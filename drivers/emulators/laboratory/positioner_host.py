@@ -38,8 +38,8 @@ class PositionerHost:
 
 
 def make(start: dict[str, Any], clock: Clock) -> PositionerHost:
-    """The positioner at ``host`` and ``port``."""
-    mirror = PlantMirror(Path(start["mirror"]), clock)
+    """The positioner at the wiring's ``host`` and ``port``."""
+    mirror, place = PlantMirror(Path(start["mirror"]), clock), start["wiring"]
     return PositionerHost(
-        PositionerEmulator(mirror), bind_socket(socket.SOCK_DGRAM, start["host"], start["port"], "base")
+        PositionerEmulator(mirror), bind_socket(socket.SOCK_DGRAM, place["host"], place["port"], "base")
     )

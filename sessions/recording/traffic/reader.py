@@ -35,6 +35,7 @@ from sessions.recording.traffic.files import END_RECORD, PROFILE, SEAL, is_seale
 from sessions.recording.traffic.mcap_frames import DAMAGE, Frames
 from sessions.recording.traffic.mcap_summary import Summary, read_summary
 from sessions.recording.traffic.raw_frames import UNSTAMPED, DeviceStamp
+from sessions.recording.traffic.tail import read_tail
 
 LARGEST_CHUNK_bytes = 16 << 20
 """A chunk is closed after 64 KiB: more is a picture. A small file may claim to hold gigabytes."""
@@ -139,7 +140,18 @@ class TrafficReader:
             self.loss.missing_messages += segment.lost_at_end
             expected += segment.lost_at_end
             self.end = segment.end
+        if not self.end:
+            yield from self._tail(expected)
         self.loss.truncated |= not self.end and self.info.get("format") != formats.TRAFFIC_FORMATS[0]
+
+    def _tail(self, expected: int) -> Iterator[TrafficMessage]:
+        """Of a recording that was cut off: the messages behind those of its file that are still in shared memory."""
+        for last in read_tail(self.path):
+            gap = (last.sequence - expected) & 0xFFFFFFFF
+            if gap < 1 << 31:  # else it is in the file
+                self.loss.missing_messages += gap
+                expected = last.sequence + 1
+                yield self._as_now(last.topic, Message(0, last.log_ns, last.data, last.stamp_ns, last.sequence))
 
     def streams(self) -> dict[str, dict[str, int]]:
         """The writer's counts of each stream, from its record at the end; empty if there is none."""

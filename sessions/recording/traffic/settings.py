@@ -21,6 +21,7 @@ class TrafficSettings:
             and counts their messages, for real time.
         patience_s: how long "wait" waits before the recording ends with an error.
         tell_streams: whether to write the losses so far once a second; not for a copy of a recording.
+        tail: whether the last moments are kept in shared memory as well; not for a copy of a recording.
         open_file: creates the files; replaceable to test a bad disk.
     """
 
@@ -29,6 +30,7 @@ class TrafficSettings:
     when_full: Literal["wait", "drop"] = "wait"
     patience_s: float = 10.0
     tell_streams: bool = True
+    tail: bool = True
     open_file: Callable[[Path], CutBackFile] = CutBackFile
 
 

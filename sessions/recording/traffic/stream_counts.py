@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 
-from sessions.recording.session_clock import SessionClock
 from sessions.recording.traffic import schemas
 from sessions.recording.traffic.raw_frames import DeviceStamp
+from sessions.recording.traffic.session_clock import SessionClock
 
 LATE_ns = 100_000_000
 """A message counts as late if its stamp is this far behind the session's time."""

@@ -3,7 +3,8 @@
 Messages are stored in the exact order in which they happened and are numbered across all topics, so that a gap shows.
 ``publish_time`` is a message's own stamp; ``log_time`` never decreases, so that readers that sort by it keep the order.
 A chunk is closed after 64 KiB, after 80 ms of session time or after 80 ms of real time, whichever comes first, which
-bounds what a killed process loses to a tenth of a second; once a second the file is flushed to disk in case of a power
+bounds what a killed process loses to a tenth of a second, and its last messages are in shared memory too (see
+:mod:`sessions.recording.traffic.tail`); once a second the file is flushed to disk in case of a power
 cut. Both happen in separate threads (see :mod:`sessions.recording.traffic.disk`). A recording that exceeds the size
 limit continues in ``traffic-2.mcap`` and so on; each of these files can be opened separately. The last one ends with a
 record of the losses.
@@ -28,6 +29,7 @@ from sessions.recording.traffic.mcap_writer import McapWriter, PendingChunk
 from sessions.recording.traffic.raw_frames import UNSTAMPED, DeviceStamp, Stamper
 from sessions.recording.traffic.settings import Attached, TrafficSettings
 from sessions.recording.traffic.stream_counts import StreamCounts
+from sessions.recording.traffic.tail import NullTail, TailMessage, open_tail
 
 CHUNK_BYTES = 64 * 1024
 FLUSH_PERIOD_ns = 80_000_000
@@ -76,6 +78,7 @@ class TrafficWriter:
         self._lock = threading.Lock()
         self._closed = False
         self._segment = self._make_segment()
+        self._tail = open_tail(path) if self._settings.tail else NullTail()
         self._disk = DiskThread(
             self._segment,
             self._make_segment,
@@ -144,9 +147,12 @@ class TrafficWriter:
             # the threads are left behind: they wait inside the operating system
             raise self._end(f"the disk has not answered for {CLOSE_TIMEOUT_s:g} s", "check the disk")
         self._close_files()
-        if known is None:
-            self._check()
-            self.complete = True
+        try:
+            if known is None:
+                self._check()
+                self.complete = True
+        finally:
+            self._tail.close(complete=self.complete)
 
     # --- one message -------------------------------------------------------------------------------------------
 
@@ -159,6 +165,7 @@ class TrafficWriter:
         self._log_ns = max(self._log_ns, stamp_ns)
         channel = self._channels.get(topic) or self._register(topic)
         self._segment.writer.add_message(channel, self._log_ns, content, stamp_ns, self._sequence)
+        self._tail.append(TailMessage(topic, self._sequence, self._log_ns, stamp_ns, content))
         self._sequence = (self._sequence + 1) & _SEQUENCE_MASK
 
     def _register(self, topic: str) -> int:

@@ -82,7 +82,7 @@ def _tell(comparison: Comparison, files: list[Path], as_json: bool) -> None:
         emit_json(comparison.as_json())
     else:
         head, *body = short_table(comparison.summaries)
-        show_table(f"{len(comparison.judged)} evaluations", head, body)
+        show_table(f"{len(comparison.runs)} evaluations", head, body)
     for session, report in comparison.truths.items():
         if report is None:
             warn(f"{session}: no camera, so no ground truth")

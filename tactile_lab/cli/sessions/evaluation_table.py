@@ -77,7 +77,7 @@ def _verdict(content: Mapping[str, Any]) -> Text:
     error_mm = content.get("registration_rms_mm")
     if error_mm is None:
         return Text("unknown without ground truth")
-    passed, words = registration_verdict(error_mm, content.get("own_turns"))
+    passed, words = registration_verdict(error_mm, content.get("symmetry_turns"))
     return Text(words, style="green" if passed else "bold red")
 
 

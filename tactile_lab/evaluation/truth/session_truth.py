@@ -18,8 +18,8 @@ from sessions.recording.session import Session
 from sessions.recording.session_events import EventKind, SessionEvent
 from sessions.recording.traffic.reader import TrafficMessage, TrafficReader
 from sessions.recording.traffic.schemas import SESSION_EVENTS_TOPIC, received_topic
+from tactile_lab.evaluation.estimate_with_truth import Truth
 from tactile_lab.evaluation.files.mesh_io import read_mesh
-from tactile_lab.evaluation.judged import Truth
 
 TRUTH_TRAJECTORY = "truth.csv"
 """The true poses in ``results/``, in the format of ``trajectory.csv``."""

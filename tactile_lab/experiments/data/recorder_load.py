@@ -35,6 +35,7 @@ STATE_TICKS = 80
 HAND_TX_BYTES, HAND_RX_BYTES, PICTURE_BYTES = 70, 232, 40_000
 STREAMS = ("hand/tx", "hand/rx", *(f"ft/{finger}/rx" for finger in FINGERS), "camera/rx")
 _STATUS = struct.Struct(f"<{4 + len(STREAMS)}Q")
+_TIME = struct.Struct("<q")
 _NUMBER = struct.Struct("<QI")
 _RDT = struct.Struct(">III6i")
 
@@ -88,9 +89,17 @@ class LoadStatus:
 
 def read_status(path: Path) -> LoadStatus:
     """The progress of a load, or its progress when it was killed."""
-    content = path.read_bytes()
-    ticks, longest, late, finished, *counts = _STATUS.unpack(content.ljust(_STATUS.size, b"\0")[: _STATUS.size])
+    with path.open("rb") as file:
+        content = file.read(_STATUS.size)
+    ticks, longest, late, finished, *counts = _STATUS.unpack(content.ljust(_STATUS.size, b"\0"))
     return LoadStatus(ticks, longest, late, bool(finished), dict(zip(STREAMS, counts, strict=True)))
+
+
+def read_tick_time_ns(path: Path, tick: int) -> int:
+    """When a tick really began, by the monotonic clock; 0 for one that did not begin."""
+    place = _STATUS.size + tick * _TIME.size
+    content = path.read_bytes()[place : place + _TIME.size]
+    return int(_TIME.unpack(content)[0]) if len(content) == _TIME.size else 0
 
 
 def payload(stream: str, number: int) -> bytes:
@@ -126,8 +135,8 @@ def run_load(root: Path, settings: LoadSettings, status_file: Path) -> None:
         SessionError: the recording cannot be started, or failed.
         WriteError: its folder cannot be written.
     """
-    status_file.write_bytes(bytes(_STATUS.size))
-    with status_file.open("r+b") as file, mmap.mmap(file.fileno(), _STATUS.size) as shared:
+    status_file.write_bytes(bytes(_STATUS.size + round(1000 * settings.seconds) * _TIME.size))
+    with status_file.open("r+b") as file, mmap.mmap(file.fileno(), 0) as shared:
         if not settings.record:
             _play(NullTraffic(), settings, shared)
             return
@@ -146,7 +155,7 @@ def run_load(root: Path, settings: LoadSettings, status_file: Path) -> None:
 
 
 class _Progress:
-    """The shared file: four numbers, then the number of messages of each stream."""
+    """The shared file: four numbers, the number of messages of each stream, then when each tick began."""
 
     def __init__(self, shared: mmap.mmap) -> None:
         self._shared = shared
@@ -155,12 +164,17 @@ class _Progress:
     def publish(self) -> None:
         _STATUS.pack_into(self._shared, 0, *self.figures)
 
+    def begin(self, tick: int) -> None:
+        """Note the real time of a tick."""
+        _TIME.pack_into(self._shared, _STATUS.size + tick * _TIME.size, time.monotonic_ns())
+
 
 def _play(sink: TrafficSink, settings: LoadSettings, shared: mmap.mmap) -> None:
     recorder, progress, begun_ns = Recorder(sink), _Progress(shared), time.monotonic_ns()
     joints = dict.fromkeys((f"J{n}" for n in range(24)), 0.1)
     for tick in range(round(1000 * settings.seconds)):
         _wait_until(begun_ns + tick * TICK_ns, progress)
+        progress.begin(tick)
         if settings.stall_s and tick == settings.stall_tick:
             StallingFile.stall(settings.stall_s)
         for place, stream in _due(tick):

@@ -32,21 +32,26 @@ from tactile_lab.experiments.data.recorder_load import (
     TICK_ns,
     number_of,
     read_status,
+    read_tick_time_ns,
     tick_of,
 )
 
-KILL, FULL, READ_ONLY, STALL, AHEAD, BACK = (
+KILL, KILL_LOADED, FULL, READ_ONLY, STALL, AHEAD, BACK = (
     "kill -9",
+    "kill -9, loaded machine",
     "full disk",
     "read-only folder",
     "disk stalled for 3 s",
     "clock 1 s ahead",
     "clock 1 s back",
 )
-FAULTS = (KILL, FULL, READ_ONLY, STALL, AHEAD, BACK)
+FAULTS = (KILL, KILL_LOADED, FULL, READ_ONLY, STALL, AHEAD, BACK)
 ALLOWED_LOSS_ms = 100.0
 
 _LONGEST_s = 60.0
+_PATIENCE_s = 1200.0
+"""On a machine with much to do a program takes minutes to load."""
+
 _TMPFS_BYTES = 3_000_000
 _JUMP_ns = 1_000_000_000
 
@@ -68,7 +73,8 @@ def crash_and_recover(cell: Cell) -> dict[str, Any]:
         SessionError: the recording could not be recovered, lost something from before the last flush, or more than
             a tenth of a second after it.
     """
-    fault, instant_s = cell["fault"], random.Random(cell.seed).uniform(0.3, 2.0)
+    fault = cell["fault"]
+    instant_s = random.Random(cell.seed).uniform(0.0 if fault == KILL_LOADED else 0.3, 2.0)
     with tempfile.TemporaryDirectory() as folder:
         return _TRIALS[fault](Path(folder), instant_s)
 
@@ -84,6 +90,33 @@ def _kill(folder: Path, instant_s: float) -> dict[str, Any]:
     finally:
         load.end()
     return _figures(load)
+
+
+def _kill_loaded(folder: Path, instant_s: float) -> dict[str, Any]:
+    """As :func:`_kill`, on a machine with more to do than it has cores, from the first tick on."""
+    load = _Load(folder, LoadSettings(seconds=_LONGEST_s))
+    with _busy_machine():
+        try:
+            load.wait_for_tick(max(1, round(1000 * instant_s)))
+            load.process.send_signal(signal.SIGKILL)
+            killed_ns = time.monotonic_ns()
+        finally:
+            load.end()
+    return _figures(load, killed_ns=killed_ns)
+
+
+@contextmanager
+def _busy_machine() -> Iterator[None]:
+    """Programs that only count, so that twice as many want to run as there are cores."""
+    cores = os.cpu_count() or 1
+    missing = max(0, 2 * cores - round(os.getloadavg()[0]))
+    busy = [subprocess.Popen(["sh", "-c", "while :; do :; done"]) for _ in range(missing)]
+    try:
+        yield
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
 
 
 def _full_disk(folder: Path, instant_s: float) -> dict[str, Any]:
@@ -120,6 +153,7 @@ def _jump(folder: Path, instant_s: float, jump_ns: int) -> dict[str, Any]:
 
 _TRIALS: dict[str, Callable[[Path, float], dict[str, Any]]] = {
     KILL: _kill,
+    KILL_LOADED: _kill_loaded,
     FULL: _full_disk,
     READ_ONLY: _read_only,
     STALL: _stall,
@@ -144,16 +178,16 @@ class _Load:
 
     def wait_for_tick(self, tick: int) -> None:
         """Wait until this many milliseconds of load are recorded. Raises SessionError."""
-        give_up = time.monotonic() + _LONGEST_s
+        give_up = time.monotonic() + _PATIENCE_s
         while self.status().ticks < tick:
             if self.process.poll() is not None or time.monotonic() > give_up:
                 raise SessionError(f"the load did not get under way: {self.end()}", where="full load")
-            time.sleep(0.0005)
+            time.sleep(0.002)
 
     def wait(self) -> None:
         """Wait until it ends by itself."""
         try:
-            self.told = self.process.communicate(timeout=2 * _LONGEST_s)[1]
+            self.told = self.process.communicate(timeout=_PATIENCE_s)[1]
         finally:
             self.end()
 
@@ -161,12 +195,17 @@ class _Load:
         """Make sure that it has ended; returns what it printed."""
         if self.process.poll() is None:
             self.process.kill()
-        self.told = self.told or self.process.communicate()[1] or ""
+        if self.process.stderr is not None and not self.process.stderr.closed:
+            self.told = self.process.communicate()[1] or ""
         return self.told
 
     def status(self) -> LoadStatus:
         """Its progress."""
         return read_status(self._status) if self._status.is_file() else LoadStatus(0, 0, 0, False, {})
+
+    def age_ms(self, tick: int, now_ns: int) -> float:
+        """Real time between the beginning of a tick and a later moment."""
+        return (now_ns - read_tick_time_ns(self._status, tick)) / 1e6
 
     def sessions(self) -> list[Path]:
         """Folders of its sessions."""
@@ -210,13 +249,24 @@ class _Found:
     late: int
 
 
-def _figures(load: _Load, recover_into: Path | None = None) -> dict[str, Any]:
-    """Recover the only session of a load and compare it message by message. Raises SessionError."""
+def _figures(load: _Load, recover_into: Path | None = None, killed_ns: int | None = None) -> dict[str, Any]:
+    """Recover the only session of a load and compare, message by message.
+
+    Args:
+        killed_ns: monotonic time of the kill; the loss is then counted in real time, by which a load on a busy machine
+            is late.
+
+    Raises:
+        SessionError: see :func:`crash_and_recover`.
+    """
     (session,) = load.sessions()
     recovery = recover(session, recover_into)
     found, status = _read(recovery.folder or session), load.status()
     losses = {stream: _lost_ms(load, status, stream, found.counts[stream]) for stream in STREAMS}
     worst = max(losses.values())
+    if killed_ns is not None and worst:
+        first = min(tick_of(one, found.counts[one]) for one, ms in losses.items() if ms)
+        worst = load.age_ms(first, killed_ns)
     full = "full" in load.told  # the lost end is then what did not fit, plus what arrived until this was noticed
     if worst > ALLOWED_LOSS_ms and not full:
         raise SessionError(f"{worst:.0f} ms lost at the end", where=str(session))

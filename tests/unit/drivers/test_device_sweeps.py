@@ -26,7 +26,7 @@ from drivers.shadow.ethercat.hand_transport import EthercatSettings, EthercatTra
 from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.protocol.palm_codec import PalmStatus
 from tactile_lab import rigs
-from tests.support.driver_sweep import DriverSweep, SweptBench
+from tests.support.driver_sweep import DriverSweep, SweptDevice
 from tests.support.faults import SLAVE_TO_SAFEOP, WORKING_COUNTER_LOW, MessageLayout
 from tests.support.memory_port import MemoryPort
 from tests.unit.drivers.shadow.device.test_hand import FakePalm
@@ -70,14 +70,14 @@ class TestHand(DriverSweep):
     blind: ClassVar[dict[str, str]] = {"flip a bit": ETHERNET_CHECKS}
     stops: ClassVar[frozenset[str]] = frozenset({"unplug", "delay", "stuck value"})
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         clock = VirtualClock()
         transport = MemoryTransport("hand", FakePalm(clock))
 
         def build(transport: Transport) -> SweptHand:
             return SweptHand(transport, clock)
 
-        return SweptBench(transport, clock, build, lambda: None, lambda swept: exchanged(swept.hand))
+        return SweptDevice(transport, clock, build, lambda: None, lambda swept: exchanged(swept.hand))
 
 
 # --- EtherCAT ------------------------------------------------------------------------------------------------------
@@ -137,14 +137,14 @@ class TestHandOnEtherCat(DriverSweep):
     }
     stops: ClassVar[frozenset[str]] = frozenset({"unplug", "delay", SLAVE_TO_SAFEOP, RING_OPENED})
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         clock = VirtualClock()
         ring = FaultyRing(emulated_hand(clock, CALIBRATION), clock)
 
         def build(transport: Transport) -> SweptHand:
             return SweptHand(transport, clock)
 
-        return SweptBench(ring, clock, build, lambda: None, lambda swept: exchanged(swept.hand), ring.repair)
+        return SweptDevice(ring, clock, build, lambda: None, lambda swept: exchanged(swept.hand), ring.repair)
 
 
 # --- fingertips in the palm ----------------------------------------------------------------------------------------
@@ -188,7 +188,7 @@ class TestBioTacInThePalm(DriverSweep):
     }
     stops: ClassVar[frozenset[str]] = frozenset({"unplug", "delay"})
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         clock = VirtualClock()
         transport = MemoryTransport("hand", PalmWithBioTacs(clock))
 
@@ -198,7 +198,7 @@ class TestBioTacInThePalm(DriverSweep):
                 swept.tip.update(sample)
             return samples
 
-        return SweptBench(transport, clock, lambda transport: SweptBioTac(transport, clock), lambda: None, use)
+        return SweptDevice(transport, clock, lambda transport: SweptBioTac(transport, clock), lambda: None, use)
 
 
 # --- CAN bridge ----------------------------------------------------------------------------------------------------
@@ -248,14 +248,14 @@ class TestCanBridge(DriverSweep):
     harmless: ClassVar[frozenset[str]] = frozenset({"counter wrap"})
     stops: ClassVar[frozenset[str]] = frozenset({"unplug", "delay", SLAVE_TO_SAFEOP, RING_OPENED})
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         clock = VirtualClock()
         ring = FaultyRing(emulated_hand(clock, CALIBRATION, can=MotorCanBuses()), clock)
 
         def build(transport: Transport) -> SweptBridge:
             return SweptBridge(transport, clock)
 
-        return SweptBench(ring, clock, build, lambda: None, SweptBridge.asked, ring.repair)
+        return SweptDevice(ring, clock, build, lambda: None, SweptBridge.asked, ring.repair)
 
 
 # --- camera --------------------------------------------------------------------------------------------------------
@@ -286,11 +286,11 @@ class TestCamera(DriverSweep):
     harmless: ClassVar[frozenset[str]] = frozenset()
     stops: ClassVar[frozenset[str]] = frozenset({"unplug", "drop", "truncate", "flip a bit", "delay", "reorder"})
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         clock = VirtualClock()
         transport = MemoryTransport("camera", StillLife(clock))
 
         def build(transport: Transport) -> Camera:
             return Camera(transport, clock, CameraDeviceSettings(timeout_ms=40.0))
 
-        return SweptBench(transport, clock, build, lambda: None, lambda camera: [camera.capture()])
+        return SweptDevice(transport, clock, build, lambda: None, lambda camera: [camera.capture()])

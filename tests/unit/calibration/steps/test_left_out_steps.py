@@ -25,7 +25,7 @@ class Walk(GuidedSteps[Place, str]):
         self._taken = []
 
 
-class Station:
+class Measurer:
     """Measures a place, or raises what it was told to raise there."""
 
     def __init__(self, **failing: Exception) -> None:
@@ -39,29 +39,29 @@ class Station:
 
 
 def test_steps_that_do_not_come_off_are_counted_and_the_others_are_kept() -> None:
-    walk, station = Walk(), Station(b=DeviceError("met nothing", where="touch"), d=DeviceError("lost", where="touch"))
-    assert walk.measure_all(station) == 2
-    assert station.asked == "abcd"
+    walk, measurer = Walk(), Measurer(b=DeviceError("met nothing", where="touch"), d=DeviceError("lost", where="touch"))
+    assert walk.measure_all(measurer) == 2
+    assert measurer.asked == "abcd"
     assert [(place.instruction, found) for place, found in walk.observations()] == [("a", "A"), ("c", "C")]
-    assert Walk().measure_all(Station()) == 0
+    assert Walk().measure_all(Measurer()) == 0
 
 
 def test_a_limit_that_was_passed_ends_the_steps() -> None:
-    walk, station = Walk(), Station(b=SafetyError("too strong", where="hand"))
+    walk, measurer = Walk(), Measurer(b=SafetyError("too strong", where="hand"))
     with pytest.raises(SafetyError):
-        walk.measure_all(station)
-    assert station.asked == "ab"
+        walk.measure_all(measurer)
+    assert measurer.asked == "ab"
     assert len(walk.observations()) == 1
 
 
 def test_a_step_done_again_replaces_its_observation_and_is_the_one_taken_back() -> None:
-    walk, station = Walk(), Station()
+    walk, measurer = Walk(), Measurer()
     first, second = walk.steps()[:2]
     assert (second.number, second.count) == (2, 4)
-    walk.measure(second, station)
-    walk.measure(first, station)
+    walk.measure(second, measurer)
+    walk.measure(first, measurer)
     assert [place.instruction for place, _ in walk.observations()] == ["a", "b"]
-    walk.measure(second, station)
+    walk.measure(second, measurer)
     assert len(walk.observations()) == 2
     assert walk.undo() == 2
     assert [place.instruction for place, _ in walk.observations()] == ["a"]

@@ -27,7 +27,7 @@ from drivers.emulators.ati.digital_unit import DigitalUnit
 from drivers.emulators.ati.net_box_unit import NetBoxUnit
 from drivers.emulators.ati.sensor import RANGES, EmulatedSensor
 from drivers.emulators.ati.unit import Unit
-from tests.support.driver_sweep import DriverSweep, SweptBench
+from tests.support.driver_sweep import DriverSweep, SweptDevice
 from tests.support.faults import Field, MessageLayout
 from tests.support.repository import SIMULATED_HAND
 from tests.support.unit_peer import UnitPeer
@@ -36,7 +36,7 @@ TIPS = SIMULATED_HAND / "fingertips.yaml"
 NO_CHECK = "bits of a reading carry no check of their own here; the wire below has one"
 
 
-def runtime_of(unit: Unit, wire: Callable[[], ForceWire]) -> SweptBench:
+def runtime_of(unit: Unit, wire: Callable[[], ForceWire]) -> SweptDevice:
     clock = VirtualClock()
     peer = _Waking(unit, clock)
     tips = load_fingertips(TIPS)
@@ -49,7 +49,7 @@ def runtime_of(unit: Unit, wire: Callable[[], ForceWire]) -> SweptBench:
         device.update(samples)
         return list(samples)
 
-    return SweptBench(MemoryTransport("ft/FF", peer), clock, build, peer.tick, use)
+    return SweptDevice(MemoryTransport("ft/FF", peer), clock, build, peer.tick, use)
 
 
 class _Waking(UnitPeer):
@@ -71,7 +71,7 @@ class TestNetBox(DriverSweep):
     )
     blind: ClassVar[dict[str, str]] = {"flip a bit": NO_CHECK}
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         return runtime_of(NetBoxUnit(rate_hz=100), lambda: RdtWire(1e6, 1e6))
 
 
@@ -89,7 +89,7 @@ class TestDigital(DriverSweep):
         ("drop", "duplicate", "reorder"), "the line has no counter: whole samples come and go unseen"
     )
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         return runtime_of(DigitalUnit(rate_hz=100.0), DigitalWire)
 
 
@@ -101,7 +101,7 @@ class TestControllerAscii(DriverSweep):
         "reorder": "as drop",
     }
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         return runtime_of(ControllerUnit(), lambda: ControllerWire("ascii", COUNTS_PER_N, COUNTS_PER_Nm))
 
 
@@ -111,7 +111,7 @@ class TestControllerBinary(DriverSweep):
         "duplicate": "an answer given twice carries no counter",
     }
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         return runtime_of(ControllerUnit(), lambda: ControllerWire("binary", COUNTS_PER_N, COUNTS_PER_Nm))
 
 
@@ -121,7 +121,7 @@ class TestCan(DriverSweep):
     )
     blind: ClassVar[dict[str, str]] = {"flip a bit": NO_CHECK}
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         return runtime_of(CanUnit(), CanWire)
 
 
@@ -154,5 +154,5 @@ class TestGaugeVolts(DriverSweep):
         saturate=lambda payload: payload[:4] + struct.pack("<d", 10.0) + payload[12:],
     )
 
-    def runtime(self) -> SweptBench:
+    def runtime(self) -> SweptDevice:
         return runtime_of(_Volts(), lambda: GaugeVoltsWire(volts_calibration()))

@@ -10,8 +10,18 @@ from drivers.core.clock import VirtualClock
 from drivers.core.transports import Datagram, MemoryTransport, Transport
 from drivers.positioner.codec import PositionerStatus, decode_command, encode_status
 from drivers.positioner.positioner import Positioner, PositionerSample
-from tests.support.driver_sweep import DriverSweep, SweptBench
+from drivers.positioner.ur.codec import (
+    ArmFlags,
+    ArmState,
+    ArmStatus,
+    decode_arm_command,
+    encode_arm_status,
+)
+from drivers.positioner.ur.device import UrPositioner
+from tests.support.driver_sweep import DriverSweep, SweptDevice
 from tests.support.faults import Field, MessageLayout
+
+_ARM = ArmState(0.0, 7, 2, 1, 1.0, (0.0, 0.0, 0.0), ArmFlags.HEARD | ArmFlags.PROGRAM)
 
 
 class Carriage:
@@ -32,6 +42,16 @@ class Carriage:
         return arrived
 
 
+class ArmCarriage(Carriage):
+    """An arm's process that is there at once."""
+
+    def write(self, payload: bytes) -> None:
+        command = decode_arm_command(payload)
+        self._q = self._q if command.targets is None else command.targets
+        status = encode_arm_status(ArmStatus(command.sequence, self._q, _ARM))
+        self._waiting.append(Datagram(status, self._clock.now_ns()))
+
+
 class TestPositioner(DriverSweep):
     layout = MessageLayout(counters=(Field(0, 4, "little"),), values=(4, 52))
     blind: ClassVar[dict[str, str]] = {
@@ -40,12 +60,15 @@ class TestPositioner(DriverSweep):
     harmless: ClassVar[frozenset[str]] = frozenset({"counter wrap", "duplicate"})
     stops: ClassVar[frozenset[str]] = frozenset({"unplug", "delay", "stuck value", "flip a bit"})
 
-    def runtime(self) -> SweptBench:
+    carriage: ClassVar[type[Carriage]] = Carriage
+    device: ClassVar[type[Positioner]] = Positioner
+
+    def runtime(self) -> SweptDevice:
         clock = VirtualClock()
-        transport = MemoryTransport("base", Carriage(clock))
+        transport = MemoryTransport("base", self.carriage(clock))
 
         def build(transport: Transport) -> Positioner:
-            return Positioner(transport, clock)
+            return self.device(transport, clock)
 
         def use(device: Positioner) -> list[PositionerSample]:
             turn = clock.now_ns() / 1e9
@@ -53,4 +76,10 @@ class TestPositioner(DriverSweep):
             sample = device.exchange()
             return [sample] if sample.fresh else []
 
-        return SweptBench(transport, clock, build, lambda: None, use)
+        return SweptDevice(transport, clock, build, lambda: None, use)
+
+
+class TestUrArm(TestPositioner):
+    layout = MessageLayout(counters=(Field(0, 4, "little"),), values=(4, 52))
+    carriage = ArmCarriage
+    device = UrPositioner

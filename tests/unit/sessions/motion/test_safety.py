@@ -19,7 +19,7 @@ CYCLE_ns = 10_000_000
 
 
 @dataclass
-class StoppableBench:
+class StoppableRuntime:
     """Counts stops and the cycles after them; can fail."""
 
     failure: Exception | None = None
@@ -39,7 +39,7 @@ class StoppableBench:
 
 
 def supervisor(**settings: object) -> SafetySupervisor:
-    return SafetySupervisor(StoppableBench(), SafetySettings(**settings), CYCLE_ns)  # type: ignore[arg-type]
+    return SafetySupervisor(StoppableRuntime(), SafetySettings(**settings), CYCLE_ns)  # type: ignore[arg-type]
 
 
 def palm_at(x: float, y: float, z: float) -> Array:
@@ -152,7 +152,7 @@ def test_a_hand_that_is_silent_for_a_moment_has_everything_wait() -> None:
 
 
 def test_stale_time_rules_on_fast_cycles() -> None:
-    watch = SafetySupervisor(StoppableBench(), SafetySettings(stale_s=0.010, stale_cycles=2), cycle_ns=1_000_000)
+    watch = SafetySupervisor(StoppableRuntime(), SafetySettings(stale_s=0.010, stale_cycles=2), cycle_ns=1_000_000)
     watch.check(snapshot(stamp_ns=10_000_000, hand_stamp_ns=0))
     with pytest.raises(SafetyError, match="no new status"):
         watch.check(snapshot(stamp_ns=11_000_000, hand_stamp_ns=0))
@@ -196,19 +196,19 @@ def test_first_approach_is_slow() -> None:
 
 
 def test_stop_sends_zero_demands_for_several_cycles() -> None:
-    runtime = StoppableBench()
+    runtime = StoppableRuntime()
     assert SafetySupervisor(runtime, SafetySettings(), CYCLE_ns).stop() == ()
     assert runtime.calls == ["stop", *["cycle"] * 5]
 
 
 def test_stop_tells_what_failed_and_never_raises() -> None:
-    runtime = StoppableBench(failure=DeviceError("link is down", where="hand"))
+    runtime = StoppableRuntime(failure=DeviceError("link is down", where="hand"))
     assert SafetySupervisor(runtime, SafetySettings(), CYCLE_ns).stop() == ("hand: link is down",)
     assert runtime.calls.count("cycle") == 5
 
 
 def test_the_cause_is_told_with_the_last_cycles() -> None:
-    runtime = StoppableBench()
+    runtime = StoppableRuntime()
     watch = SafetySupervisor(runtime, SafetySettings(), CYCLE_ns)
     for cycle in range(150):
         stamp_ns = cycle * CYCLE_ns

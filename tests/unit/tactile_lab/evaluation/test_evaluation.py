@@ -17,10 +17,10 @@ from drivers.core.contacts import Grasp
 from drivers.core.errors import SessionError, ShapeError
 from sessions.recording.session_events import EventKind, SessionEvent
 from sessions.recording.traffic.reader import TrafficMessage
+from tactile_lab.evaluation.estimate_with_truth import Truth, true_outline
 from tactile_lab.evaluation.evaluation import Evaluation, evaluate
 from tactile_lab.evaluation.files.result_files import write_results
 from tactile_lab.evaluation.files.results import read_results
-from tactile_lab.evaluation.judged import Truth, true_outline
 from tactile_lab.evaluation.shape import horizontal_outline
 from tactile_lab.evaluation.table import evaluation_rows
 from tactile_lab.evaluation.truth.session_truth import marked_pictures
@@ -238,3 +238,13 @@ def test_a_surface_that_can_not_be_compared_is_said_in_words(tmp_path: Path, rec
     found = evaluate(tmp_path / "results", full_truth(recorded), "box")
     assert found.shape is None
     assert any("cannot be compared" in warning for warning in found.warnings)
+
+
+def test_the_verdict_says_that_rotations_of_symmetry_are_ignored() -> None:
+    def verdict(evaluation):
+        (row,) = (row for row in evaluation_rows(evaluation) if row.label == "Registration error")
+        return row.note
+
+    assert verdict({"registration_rms_mm": 2.0, "symmetry_turns": None}) == "passed: at most 5 mm"
+    told = verdict({"registration_rms_mm": 9.0, "symmetry_turns": 6})
+    assert told == "failed: above 5 mm, ignoring rotations about its axis of symmetry"

@@ -23,7 +23,7 @@ from sessions.recording.traffic import schemas
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.wired import camera_source, emulation_plan, wires_of
-from tactile_lab.rigs.wired_runtime import build_wired_bench
+from tactile_lab.rigs.wired_runtime import build_wired_runtime
 from tactile_lab.rigs.wires import LocalCamera
 from tests.support.wire_rig import wire_rig
 
@@ -72,7 +72,7 @@ def test_pictures_beside_the_rig_file_reach_the_recording(tmp_path: Path, pictur
     check_calibration(rig)
     assert source_of(rig).source == str(pictures)
     clock, kept = MonotonicClock(), Kept()
-    camera = build_wired_bench(rig, Recorder(kept), clock).camera
+    camera = build_wired_runtime(rig, Recorder(kept), clock).camera
     assert isinstance(camera, Camera)
     camera.connect()
     try:
@@ -93,7 +93,7 @@ def test_pictures_beside_the_rig_file_reach_the_recording(tmp_path: Path, pictur
 
 
 def test_the_end_of_the_pictures_ends_the_session_in_words(tmp_path: Path, pictures: Path) -> None:
-    camera = build_wired_bench(rig_with(tmp_path, source="pictures"), Recorder(Kept()), MonotonicClock()).camera
+    camera = build_wired_runtime(rig_with(tmp_path, source="pictures"), Recorder(Kept()), MonotonicClock()).camera
     assert isinstance(camera, Camera)
     camera.connect()
     with pytest.raises(DeviceError, match="has ended"):

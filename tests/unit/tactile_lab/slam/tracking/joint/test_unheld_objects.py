@@ -15,7 +15,7 @@ from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
-from tactile_lab.slam.tracking.joint import deferred_association as late_placing
+from tactile_lab.slam.tracking.joint import deferred_association
 
 PALMS = [Pose2(0.0, 0.0, float(yaw)) for yaw in np.deg2rad([0, 60, -60, 30, -30, 90, 15, 75])]
 MOTION = {"translation_m": 0.007, "rotation_rad": 0.21, "unheld": 0.15}
@@ -50,8 +50,8 @@ def test_a_push_is_looked_for_only_where_a_grasp_on_an_object_left_lying_fits_ba
     slam = TactileSlam(SlamSettings.model_validate({"method": "joint", "dimension": 2, "motion": motion}), seed=4)
     for index, palm in enumerate(PALMS[:3]):
         slam.step(hand.grasp(index, palm, Pose2()))
-    asked, propose = [], late_placing.propose
-    monkeypatch.setattr(late_placing, "propose", lambda *given: asked.append(given) or propose(*given))
+    asked, propose = [], deferred_association.propose
+    monkeypatch.setattr(deferred_association, "propose", lambda *given: asked.append(given) or propose(*given))
     slam.step(hand.grasp(3, PALMS[3], Pose2(0.006, 0.002, float(np.deg2rad(turn_deg)))))
     assert bool(asked) is is_asked
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from drivers.core.transports import Datagram
 from sessions.recording.recorder import NullTraffic, Recorder
-from sessions.recording.session_clock import JUMP_ns, SessionClock
 from sessions.recording.traffic.raw_frames import UNSTAMPED
+from sessions.recording.traffic.session_clock import JUMP_ns, SessionClock
 from sessions.recording.traffic.stream_counts import StreamCounts
 from sessions.recording.traffic.writer import TrafficWriter
 from tests.support.session_fakes import make_rig

@@ -42,7 +42,7 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Judged:
+class EstimateWithTruth:
     """An estimate with its ground truth.
 
     Attributes:

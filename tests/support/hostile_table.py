@@ -1,0 +1,212 @@
+"""Hostile files of every kind that the program reads: what each costs, and what is said about it.
+
+    python -m tests.support.hostile_table --store
+    python -m tests.support.hostile_table --only mesh
+
+Each is read by the command line in a copy of one process that has loaded everything. Processor time is what counts: on
+a quiet core it is how long the command takes. The time that loading took is added to each.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import traceback
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.core.child_process import child_command, child_environment
+from tactile_lab.cli.main import main as main_of_program
+from tests.support.low_rig import low_rig
+from tests.support.stored_table import GrowingTable, Outline, parser
+from tests.support.warm_program import load
+
+MOST_s, MOST_MB = 5.0, 1000.0
+_ENOUGH_s = 60
+_SHOWN = 160
+OUTLINE = Outline(
+    "hostile-files",
+    "Files that nobody should have to read: what each costs, and what is said about it.",
+    ("python -m tests.support.hostile_table --store",),
+    f"The whole command, in seconds of processor time, loading the program included; largest resident memory. "
+    f"Asked for: at most {MOST_s:g} s and {MOST_MB:g} MB each, no traceback. Long messages are cut here.",
+    ("File", "What is wrong with it", "Command", "Exit code", "s", "MB", "Said"),
+    keys=2,
+)
+
+
+@dataclass(frozen=True)
+class Command:
+    """One file, and the words that have it read in its folder."""
+
+    kind: str
+    name: str
+    words: list[str]
+    shown: str
+    folder: Path
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Of its row."""
+        return self.kind, self.name
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command made of a file.
+
+    Attributes:
+        code: exit code; negative for a signal.
+        processor_s: processor time of its processes.
+        memory_MB: largest resident memory of one of them.
+        said: last line on standard error.
+        traceback: whether there was one.
+    """
+
+    code: int
+    processor_s: float
+    memory_MB: float
+    said: str
+    traceback: bool
+
+    @property
+    def wrong(self) -> str:
+        """What was asked for and is not so; "" if all is."""
+        found = {
+            "a traceback": self.traceback,
+            "ended by a signal": self.code < 0,
+            "no word": not self.said,
+            f"more than {MOST_s:g} s": self.processor_s > MOST_s,
+            f"more than {MOST_MB:g} MB": self.memory_MB > MOST_MB,
+        }
+        return ", ".join(words for words, is_so in found.items() if is_so)
+
+
+def read(command: Command, loaded_s: float) -> Outcome:
+    """Run a command in a copy of this process, on a processor time that it cannot use up honestly."""
+    told = command.folder / "said"
+    process = os.fork()
+    if process == 0:
+        _become(command, told)
+    _, status, used = os.wait4(process, 0)
+    text = told.read_text(errors="replace") if told.is_file() else ""
+    lines = [line for line in text.splitlines() if line.strip()]
+    shown = (lines[-1] if lines else "").replace(str(command.folder) + "/", "")
+    seconds = loaded_s + used.ru_utime + used.ru_stime
+    return Outcome(os.waitstatus_to_exitcode(status), seconds, used.ru_maxrss / 1e3, shown, "Traceback" in text)
+
+
+def _become(command: Command, told: Path) -> None:
+    """The program. Never returns."""
+    code = 70
+    try:
+        os.setsid()
+        resource.setrlimit(resource.RLIMIT_CPU, (_ENOUGH_s, _ENOUGH_s))
+        null, said = os.open(os.devnull, os.O_RDWR), os.open(told, os.O_WRONLY | os.O_CREAT)
+        for stream, descriptor in enumerate((null, null, said)):
+            os.dup2(descriptor, stream)
+        sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w"), open(2, "w", 1)  # noqa: SIM115
+        os.chdir(command.folder)
+        main_of_program(command.words)
+    except SystemExit as ended:
+        code = int(ended.code or 0)
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stderr.flush()
+        os._exit(code)
+
+
+def cells(command: Command, outcome: Outcome) -> tuple[str, ...]:
+    """One line of the table, behind its keys."""
+    said = outcome.said if len(outcome.said) <= _SHOWN else outcome.said[:_SHOWN] + " ..."
+    said = said.replace("|", "/").encode("ascii", "backslashreplace").decode()
+    return command.shown, str(outcome.code), f"{outcome.processor_s:.1f}", f"{outcome.memory_MB:.0f}", said
+
+
+# --- the files: made by another process, whose memory does not count ----------------------------------------------
+
+
+def make_all(root: Path, only: str, session: Path | None) -> list[Command]:
+    """Make all files, each in a folder of its own, and give the commands that read them."""
+    index, maker = root / "index.json", os.fork()
+    if maker == 0:
+        try:
+            index.write_text(json.dumps(list(_make(root, only, session or sound_session(root)))))
+        except BaseException:
+            traceback.print_exc()
+            os._exit(1)
+        os._exit(0)
+    if os.waitpid(maker, 0)[1]:
+        raise AssertionError("the files could not be made")
+    return [
+        Command(kind, name, list(words), shown, Path(folder))
+        for kind, name, words, shown, folder in json.loads(index.read_text())
+    ]
+
+
+def _make(root: Path, only: str, session: Path) -> Iterator[tuple[str, str, list[str], str, str]]:
+    from tests.support.hostile.recordings import recording_cases
+    from tests.support.hostile.shapes import shape_cases
+    from tests.support.hostile.texts import text_cases
+
+    for number, case in enumerate([*text_cases(), *shape_cases(), *recording_cases(session)]):
+        if only not in f"{case.kind} {case.name}":
+            continue
+        folder = root / f"{number:03d}"
+        folder.mkdir()
+        words = [word.replace("SESSION", str(session)) for word in case.command(case.write(folder))]
+        shown = " ".join(word for word in case.words if not word.startswith("--no-"))
+        yield case.kind, case.name, words, shown, str(folder)
+
+
+def sound_session(folder: Path) -> Path:
+    """A session of one grasp, for cases to spoil."""
+    words = (
+        "run",
+        "--rig",
+        str(low_rig(folder)),
+        "--grasps",
+        "1",
+        "--method",
+        "odometry",
+        "--out",
+        str(folder / "runs"),
+    )
+    subprocess.run(
+        child_command("tactile_lab.cli.main", *words), env=child_environment(), check=True, capture_output=True
+    )
+    (session,) = (folder / "runs").iterdir()
+    return session
+
+
+def main() -> None:
+    """Print the table, and store it where that is asked for; exit code 1 if a bound was passed."""
+    options = parser(__doc__)
+    options.add_argument("--only", default="", help="Part of the kind's and the case's name.")
+    options.add_argument("--session", type=Path, help="A sound session to spoil copies of; else one is recorded.")
+    chosen = options.parse_args()
+    wrong: list[str] = []
+    load()
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    loaded_s = used.ru_utime + used.ru_stime
+    with tempfile.TemporaryDirectory() as root:
+        commands = make_all(Path(root), chosen.only, chosen.session)
+        table = GrowingTable(chosen.docs, OUTLINE, [command.key for command in commands])
+        for command in commands:
+            outcome = read(command, loaded_s)
+            table.put(command.key, cells(command, outcome))
+            if outcome.wrong:
+                wrong.append(f"{', '.join(command.key)}: {outcome.wrong}")
+    table.publish()
+    print("\n".join([f"{len(commands)} files, {len(wrong)} outside of the bounds:", *wrong]))
+    raise SystemExit(bool(wrong))
+
+
+if __name__ == "__main__":
+    main()
