@@ -21,7 +21,7 @@ _ROWS: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     (
         "at the end",
         (
-            ("7 second opinions", "backwards, spliced, second look"),
+            ("7 second opinions", "backwards, spliced, deferred"),
             ("8 faces", "poses and flat faces together"),
             ("9 relocalize", "grasps driven onto the object"),
             ("10 shape and sigma", "model chosen by evidence"),

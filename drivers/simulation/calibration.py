@@ -64,16 +64,17 @@ class SimulatedCalibration:
             return cls.load(folder)
 
     @classmethod
-    def with_tips(cls, kind: str, file: Path) -> SimulatedCalibration:
-        """The same hand, with fingertips from a file if the program has none of their kind.
+    def of_hand(cls, kind: str, tips: Path, motors: Path) -> SimulatedCalibration:
+        """The same with a motor map of its own, and fingertips of a file where the program has none of their kind.
 
         Raises:
-            ConfigurationError: there is no such kind, or the file does not fit it.
+            ConfigurationError: no such kind, or a file that cannot be used.
         """
         packaged = cls.from_package()
+        packaged = replace(packaged, motors=MotorMap.load(motors))
         if FINGERTIPS[kind].packaged:
             return packaged
-        return replace(packaged, tips={**packaged.tips, kind: FINGERTIPS[kind].load({"fingertips": file})})
+        return replace(packaged, tips={**packaged.tips, kind: FINGERTIPS[kind].load({"fingertips": tips})})
 
     def tip_body(self, finger: str, kind: str) -> TipBody:
         """The body of one fingertip.

@@ -1,4 +1,4 @@
-"""The physics model of the simulated rig: positioner, Shadow right hand, fingertips, table and object.
+"""The physics model of the simulated rig: positioner, Shadow hand, fingertips, table and object.
 
 Built in code from primitives, without mesh files. Names inside the model: links are named after their joint (``FFJ3``
 is the link behind joint FFJ3, ``WRJ1`` the palm), fingertips ``FF tip``, sensors ``FF force`` and ``FF moment``. Hand
@@ -14,11 +14,11 @@ import mujoco
 import numpy as np
 from gtsam import Pose3, Rot3
 
-from drivers.core.contacts import FINGERS, Array
+from drivers.core.contacts import Array
 from drivers.core.fingertip import TipBody
-from drivers.shadow.model.bodies import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Ellipsoid, Shape
-from drivers.shadow.model.kinematics import JOINT_TABLE, Joint, JOINT_LIMITS_rad
-from drivers.shadow.model.motors import DRIVEN_JOINTS
+from drivers.shadow.model.bodies import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Ellipsoid, Shape, mirror_shape
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
+from drivers.shadow.model.kinematics import JOINT_TABLE, Joint, JOINT_LIMITS_rad, joint_table
 from drivers.simulation.devices.geared_motors import DISTAL_COUPLING, motor_class
 from drivers.simulation.objects import Hull, ObjectModel, Piece
 from drivers.simulation.surfaces import GLASS, HAND, OBJECT, RUBBER, TABLE, TIP, WOOD, surface
@@ -58,24 +58,29 @@ _TRAIL_Nm_rad, _TRAIL_Nms_rad = 0.25, 0.01  # elastic coupling of J1 to J2
 
 
 def build_model(
-    target: ObjectModel, object_mass_kg: float, tips: Mapping[str, TipBody], world_T_mount: Pose3
+    target: ObjectModel,
+    object_mass_kg: float,
+    tips: Mapping[str, TipBody],
+    world_T_mount: Pose3,
+    form: HandForm = RIGHT_HAND,
 ) -> mujoco.MjModel:
     """Compile the rig with one object lying at the world's origin.
 
     Args:
         target: the object on the table.
         object_mass_kg: its mass, spread evenly over its volume.
-        tips: the fingertip of each of the five fingers.
+        tips: the fingertip of each of the hand's fingers.
         world_T_mount: pose of the positioner when its six joints are zero.
+        form: of the hand; a joint that it does not have is rigid, a finger is not there.
     """
     spec = mujoco.MjSpec()
     _set_options(spec)
     _add_table(spec, rolling=target.rolls)
     forearm = _add_positioner(spec, world_T_mount)
-    links = _add_links(forearm)
-    for finger in FINGERS:
+    links = _add_links(forearm, form)
+    for finger in form.fingers:
         _add_tip(spec, links[f"{finger}J1"], finger, tips[finger])
-    _add_motors(spec)
+    _add_motors(spec, form)
     _add_object(spec, target, object_mass_kg)
     return spec.compile()
 
@@ -124,12 +129,13 @@ def _add_servo(spec: Any, joint: str, axis: _Axis) -> None:
     servo.ctrlrange = [axis.lower, axis.upper]
 
 
-def _add_links(forearm: Any) -> dict[str, Any]:
+def _add_links(forearm: Any, form: HandForm) -> dict[str, Any]:
     """The hand's links by the name of their joint, parents before children."""
     links = {"forearm": forearm}
     limits_rad = {joint.name: limits for joint, limits in zip(JOINT_TABLE, JOINT_LIMITS_rad, strict=True)}
-    for joint in sorted(JOINT_TABLE, key=_depth):
-        links[joint.name] = _add_hand_link(links[_parent(joint)], joint, limits_rad[joint.name])
+    for joint in sorted(joint_table(form.side), key=_depth):
+        if joint.name[:2] in ("WR", *form.fingers):
+            links[joint.name] = _add_hand_link(links[_parent(joint)], joint, limits_rad[joint.name], form)
     return links
 
 
@@ -142,9 +148,17 @@ def _depth(joint: Joint) -> int:
     return 1 + (_depth(parents[_parent(joint)]) if _parent(joint) in parents else 0)
 
 
-def _add_hand_link(parent: Any, joint: Joint, limits_rad: Any) -> Any:
+def _add_hand_link(parent: Any, joint: Joint, limits_rad: Any, form: HandForm) -> Any:
     roll, pitch, yaw = joint.rpy_rad
     link = _add_link(parent, joint.name, joint.origin_m, _quaternion(Rot3.Ypr(yaw, pitch, roll)))
+    if joint.name in form.joints:
+        _add_hinge(link, joint, limits_rad)
+    shapes = LINK_SHAPES[joint.name]
+    _add_shapes(link, tuple(map(mirror_shape, shapes)) if form.is_left else shapes)
+    return link
+
+
+def _add_hinge(link: Any, joint: Joint, limits_rad: Any) -> None:
     wrist = joint.name.startswith("WR")
     link.add_joint(
         name=joint.name,
@@ -155,8 +169,6 @@ def _add_hand_link(parent: Any, joint: Joint, limits_rad: Any) -> Any:
         armature=0.002 if wrist else 0.0004,
         frictionloss=0.0 if wrist else 0.005,
     )
-    _add_shapes(link, LINK_SHAPES[joint.name])
-    return link
 
 
 def _add_link(parent: Any, name: str, position_m: Any, quaternion: Any) -> Any:
@@ -205,10 +217,10 @@ def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody) -> None:
         spec.add_sensor(name=f"{finger} {quantity}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=name)
 
 
-def _add_motors(spec: Any) -> None:
-    for finger in FINGERS[:4]:
+def _add_motors(spec: Any, form: HandForm) -> None:
+    for finger in form.long_fingers:
         _add_distal_tendons(spec, finger)
-    for joint in DRIVEN_JOINTS:
+    for joint in form.driven:
         motor = motor_class(joint)
         coupled = joint.endswith("J0")
         kind = mujoco.mjtTrn.mjTRN_TENDON if coupled else mujoco.mjtTrn.mjTRN_JOINT

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import FINGERS, Array
-from drivers.shadow.model.kinematics import JOINTS, joint_vector
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
+from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS, joint_vector
 from drivers.shadow.model.motors import DRIVEN_JOINTS
 from drivers.simulation.hand_plant import TrueContact
 from drivers.simulation.model import BASE_JOINTS, BASE_LIMITS, TIMESTEP_s
@@ -32,18 +33,22 @@ class Plant:
     Args:
         model: from :func:`drivers.simulation.model.build_model`.
         start: initial pose of the object: position of its frame's origin and its rotation on the table.
+        form: of the model's hand. Arrays have the places of a full hand; what this one lacks reads zero.
     """
 
-    def __init__(self, model: mujoco.MjModel, start: Pose2) -> None:
+    def __init__(self, model: mujoco.MjModel, start: Pose2, form: HandForm = RIGHT_HAND) -> None:
         self._model, self._data = model, mujoco.MjData(model)
         self._steps = 0
-        self._joints = _addresses(model, JOINTS)
+        self._joints = _addresses(model, form.joints)
+        self._joint_places = [JOINT_INDEX[name] for name in form.joints]
         self._base = _addresses(model, BASE_JOINTS)
-        self._motors = np.array([model.actuator(name).id for name in DRIVEN_JOINTS])
+        self._motors = np.array([model.actuator(name).id for name in form.driven])
+        self._motor_places = [DRIVEN_JOINTS.index(name) for name in form.driven]
         self._servos = np.array([model.actuator(name).id for name in BASE_JOINTS])
-        self._wrench = _sensor_addresses(model)
-        self._distal = [model.site(f"{finger} distal").id for finger in FINGERS]
-        self._tips = {model.geom(f"{finger} tip").id: finger for finger in FINGERS}
+        self._finger_places = [FINGERS.index(finger) for finger in form.fingers]
+        self._wrench = _sensor_addresses(model, form.fingers)
+        self._distal = {finger: model.site(f"{finger} distal").id for finger in form.fingers}
+        self._tips = {model.geom(f"{finger} tip").id: finger for finger in form.fingers}
         self._table = model.geom("table").id
         self._object, self._palm = model.body("object").id, model.body("WRJ1").id
         self._place(start)
@@ -58,7 +63,7 @@ class Plant:
 
     def pose_hand(self, joints_rad: Array) -> None:
         """Put the hand into a posture at once, shape (24,), without advancing time."""
-        self._data.qpos[self._joints] = joints_rad
+        self._data.qpos[self._joints] = joints_rad[self._joint_places]
         mujoco.mj_forward(self._model, self._data)
 
     @property
@@ -78,7 +83,7 @@ class Plant:
 
     def drive(self, duty: Array) -> None:
         """Set the duty of each motor, shape (20,), -1 to 1, order of :data:`DRIVEN_JOINTS`."""
-        self._data.ctrl[self._motors] = np.minimum(np.maximum(duty, -1.0), 1.0)
+        self._data.ctrl[self._motors] = np.minimum(np.maximum(duty[self._motor_places], -1.0), 1.0)
 
     def move_base(self, target: Array) -> None:
         """Set the positioner's targets, shape (6,), metres and radians; clipped to its range."""
@@ -87,7 +92,9 @@ class Plant:
     @property
     def joints_rad(self) -> Array:
         """True joint angles, shape (24,), order of :data:`~drivers.shadow.model.kinematics.JOINTS`."""
-        return np.asarray(self._data.qpos[self._joints])
+        joints_rad = np.zeros(len(JOINTS))
+        joints_rad[self._joint_places] = self._data.qpos[self._joints]
+        return joints_rad
 
     @property
     def base(self) -> Array:
@@ -97,7 +104,9 @@ class Plant:
     @property
     def motor_torque_Nm(self) -> Array:
         """Torque that each motor exerts on its joint, shape (20,), order of :data:`DRIVEN_JOINTS`."""
-        return np.asarray(self._data.actuator_force[self._motors])
+        torque_Nm = np.zeros(len(DRIVEN_JOINTS))
+        torque_Nm[self._motor_places] = self._data.actuator_force[self._motors]
+        return torque_Nm
 
     @property
     def wrenches(self) -> Array:
@@ -106,11 +115,14 @@ class Plant:
         Includes the tip's own weight and inertia. The engine reports the load of the tip on the link with the opposite
         sign.
         """
-        return np.asarray(-self._data.sensordata[self._wrench])
+        wrenches = np.zeros((len(FINGERS), 6))
+        wrenches[self._finger_places] = -self._data.sensordata[self._wrench]
+        return wrenches
 
     def world_T_distal(self, finger: str) -> Pose3:
-        """True pose of a finger's distal frame."""
-        site = self._distal[FINGERS.index(finger)]
+        """True pose of a finger's distal frame; the world's for a finger that is not there."""
+        if (site := self._distal.get(finger)) is None:
+            return Pose3()
         return Pose3(Rot3(self._data.site_xmat[site].reshape(3, 3)), self._data.site_xpos[site])
 
     @property
@@ -152,6 +164,6 @@ def _addresses(model: mujoco.MjModel, joints: Sequence[str]) -> NDArray[np.intp]
     return np.array([model.joint(name).qposadr[0] for name in joints])
 
 
-def _sensor_addresses(model: mujoco.MjModel) -> NDArray[np.intp]:
-    starts = [[model.sensor(f"{finger} {kind}").adr[0] for kind in ("force", "moment")] for finger in FINGERS]
+def _sensor_addresses(model: mujoco.MjModel, fingers: Sequence[str]) -> NDArray[np.intp]:
+    starts = [[model.sensor(f"{finger} {kind}").adr[0] for kind in ("force", "moment")] for finger in fingers]
     return np.array([[start + axis for start in pair for axis in range(3)] for pair in starts])

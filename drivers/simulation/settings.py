@@ -10,6 +10,7 @@ from drivers.camera.boards import GridBoard
 from drivers.camera.rendering.settings import CameraSettings
 from drivers.core.configuration import StrictModel
 from drivers.core.fingertip import RigidTransform
+from drivers.shadow.protocol.palm_images import Side
 
 
 class ObjectStart(StrictModel):
@@ -88,6 +89,7 @@ class SimulationSettings(StrictModel):
             uniform.
         fingertips: the kind on all five fingers.
         positioner: the kind that carries the hand.
+        side: of the hand.
         hand_board: the board that the hand carries for the camera; None for no board.
         world_T_mount: true pose of the positioner; a rig's forearm-to-world calibration may differ from it.
     """
@@ -98,6 +100,7 @@ class SimulationSettings(StrictModel):
     start_sigma_m: float = Field(default=0.01, ge=0.0, le=0.1)
     fingertips: str = "nano17"
     positioner: str = "six-axis"
+    side: Side = "right"
     hand_board: HandBoard | None = None
     world_T_mount: RigidTransform = RigidTransform(translation_m=(0.0, 0.0, 0.0))
     joint_sensors: JointSensorSettings = JointSensorSettings()

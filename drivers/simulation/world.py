@@ -16,11 +16,12 @@ from gtsam import Pose2, Pose3, Rot3
 from drivers.camera.markers import MarkerSettings
 from drivers.camera.rendering.table_camera import Placed, PrintedMarker, TableCamera
 from drivers.core.clock import VirtualClock
-from drivers.core.contacts import FINGERS, Contact
+from drivers.core.contacts import Contact
 from drivers.core.fingertip import RigidTransform
 from drivers.core.transports import Datagram, MemoryTransport, Peer, Transport
 from drivers.fingertips.kind import LinkedKind
 from drivers.fingertips.kinds import FINGERTIPS
+from drivers.shadow.model.hand_form import HandForm
 from drivers.simulation.calibration import SimulatedCalibration
 from drivers.simulation.devices.camera_emulator import CameraEmulator
 from drivers.simulation.devices.motor_bank import MotorBank
@@ -180,9 +181,10 @@ class SimulatedWorld:
 
     def _build_plant(self) -> Plant:
         settings = self.settings
-        tips = {finger: self.calibration.tip_body(finger, settings.fingertips) for finger in FINGERS}
+        form = HandForm(settings.side, self.calibration.motors.driven)
+        tips = {finger: self.calibration.tip_body(finger, settings.fingertips) for finger in form.fingers}
         mount = settings.world_T_mount.pose()
-        plant = Plant(build_model(self.object_model, settings.object_mass_kg, tips, mount), self._start())
+        plant = Plant(build_model(self.object_model, settings.object_mass_kg, tips, mount, form), self._start(), form)
         plant.settle(_SETTLING_s if self.object_model.scanned else 0.0)
         return plant
 

@@ -7,7 +7,7 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.closing import closing
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.guided.console import OperatorConsole
 from sessions.guided.motion import GuidedMotion
 from sessions.guided.operator import Ask, Stage
@@ -26,13 +26,13 @@ class GraspByHand:
         motion: supervised cycles that read the operator's requests; nothing is moved.
         settings: the length of a capture.
         console: the operator's console.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
     """
 
     def __init__(
-        self, motion: GuidedMotion, settings: CycleSettings, console: OperatorConsole, tip: TipEllipsoid
+        self, motion: GuidedMotion, settings: CycleSettings, console: OperatorConsole, hand: HandShape
     ) -> None:
-        self._motion, self.settings, self._console, self._tip = motion, settings, console, tip
+        self._motion, self.settings, self._console, self._hand = motion, settings, console, hand
         self._plan: GraspPlan | None = None
         self.landings_world_m: list[Array] = []
         self.jammed: tuple[str, ...] = ()
@@ -41,7 +41,7 @@ class GraspByHand:
     def plan(self) -> GraspPlan:
         """The grasp as the person does it: its frame follows from the palm's pose."""
         assert self._plan is not None
-        table = closing(self._plan.closing, self._plan.height_m, self._tip)
+        table = closing(self._plan.closing, self._plan.height_m, self._hand)
         world_T_grasp = self._motion.runtime.perception.world_T_palm * table.grasp_T_palm.inverse()
         frame = GraspFrame(float(world_T_grasp.x()), float(world_T_grasp.y()), float(world_T_grasp.rotation().yaw()))
         return GraspPlan(frame, self._plan.closing, self._plan.height_m, "led by hand")

@@ -12,7 +12,7 @@ import numpy as np
 from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.guided.console import OperatorConsole
 from sessions.guided.motion import GuidedMotion
 from sessions.guided.operator import Ask, Request, Stage
@@ -32,7 +32,7 @@ class GraspByKeys(GraspCycle):
         motion: supervised motion that reads the operator's requests.
         settings: speeds, forces, times.
         console: the operator's console.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
         yaw_window_rad: yaws the arm can reach.
     """
 
@@ -41,10 +41,10 @@ class GraspByKeys(GraspCycle):
         motion: GuidedMotion,
         settings: CycleSettings,
         console: OperatorConsole,
-        tip: TipEllipsoid,
+        hand: HandShape,
         yaw_window_rad: tuple[float, float],
     ) -> None:
-        super().__init__(motion, settings, tip, yaw_window_rad)
+        super().__init__(motion, settings, hand, yaw_window_rad)
         self._guided, self._console = motion, console
         self._above_m: float | None = None
         """Height above the grasp height; None if the hand has not been sent to this grasp."""
@@ -133,7 +133,8 @@ class GraspByKeys(GraspCycle):
         """Close or open fingers by steps along their paths; each stops when it touches."""
         table = self._table()
         way_m = self._console.settings.finger_step_m * request.steps
-        moving = set(request.fingers)
+        asked = [finger for finger in request.fingers if finger in self._fingers]
+        moving = set(asked)
         cycles = self._motion.cycles(abs(way_m) / (self.settings.closing_m_s * self._motion.supervisor.speed_scale))
         for _ in range(cycles):
             if way_m > 0.0:
@@ -144,7 +145,7 @@ class GraspByKeys(GraspCycle):
                 self._progress[finger] = float(np.clip(self._progress[finger] + step, *table.path(finger).valid))
             self._motion.set_fingers(table, self._progress)
             self._motion.tick()
-        stopped = [finger for finger in request.fingers if finger not in moving]
+        stopped = [finger for finger in asked if finger not in moving]
         if stopped and way_m > 0.0:
             self._console.tell(f"{', '.join(stopped)} stopped")
 

@@ -34,7 +34,7 @@ _BEYOND_m = -0.040
 """From the front to the grasp frame in which the open fingers stand 25 mm clear of it."""
 
 _THUMB_ASIDE_m = 0.014
-"""Offset of the thumb's path from the middle of the grasp frame, toward its +y."""
+"""Offset of the thumb's path from the middle of the grasp frame, toward the first finger's side."""
 
 _SHORT_OF_ENDS_m = 0.005
 """Least distance of the thumb from the ends of the width: nearer, it would pass beside the object."""
@@ -164,8 +164,9 @@ class BoxProber:
         """
         front_m = max((float(points[:, 0].max()) for points in found.values()), default=_ASSUMED_m)
         landed, met = 0, []
+        aside_m = self._toucher.first_finger_side * _THUMB_ASIDE_m
         for lane_m in self._thumb_lanes_m(found):
-            place = self._axes.transformFrom(np.array([front_m + _BEYOND_m, lane_m - _THUMB_ASIDE_m]))
+            place = self._axes.transformFrom(np.array([front_m + _BEYOND_m, lane_m - aside_m]))
             frame = GraspFrame(float(place[0]), float(place[1]), float(self._axes.theta()))
             points = self._toucher.close_thumb(frame)
             if points is None:

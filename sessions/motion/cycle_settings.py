@@ -30,7 +30,7 @@ class TouchSettings(StrictModel):
         below_top_m: a tap without a grasp goes no farther below the top: what stands between the fingers, a neck or a
             rim, must not reach the knuckles.
         side_m_s: speed toward an object's side, palm upright; a stiff fingertip reaches 0.45 N at 20 mm/s.
-        side_heights_m: height of the lowest fingertip in such a touch, the palm on the left and on the right. The
+        side_heights_m: height of the lowest fingertip in such a touch, the first finger down and up. The
             forearm lets it come no lower; from higher up it would tip objects over.
     """
 

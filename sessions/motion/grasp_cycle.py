@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from gtsam import Pose3
 
-from drivers.core.contacts import FINGERS, Array, Grasp
+from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.closing import SIDES, Closing, closing
 from drivers.shadow.closing.hand_envelope import open_hand
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_plan import GraspPlan, evade
 from sessions.motion.guard import Guard
@@ -28,7 +28,7 @@ class GraspCycle:
     Args:
         motion: supervised motion.
         settings: speeds, forces, times.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
         yaw_window_rad: yaws the arm can reach.
     """
 
@@ -36,22 +36,26 @@ class GraspCycle:
         self,
         motion: Motion,
         settings: CycleSettings,
-        tip: TipEllipsoid | None = None,
+        hand: HandShape | None = None,
         yaw_window_rad: tuple[float, float] = (-np.pi, np.pi),
     ) -> None:
         self._motion, self.settings = motion, settings
-        self._toucher = Toucher(motion, settings, tip or TipEllipsoid())
+        self._toucher = Toucher(motion, settings, hand or HandShape())
         self._guard = Guard(motion, settings.touch.met_N, settings.held_up_rad)
         self._landing = Guard(motion, settings.landing_force_N, settings.held_up_rad)
-        self._tip, self._yaw_window_rad = tip or TipEllipsoid(), yaw_window_rad
+        self._hand, self._yaw_window_rad = hand or HandShape(), yaw_window_rad
         self._plan: GraspPlan | None = None
-        self._progress = dict.fromkeys(FINGERS, 0.0)
+        self._progress = dict.fromkeys(self._fingers, 0.0)
         self._touching: frozenset[str] = frozenset()
         self.landings_world_m: list[Array] = []
         """Centres of the tips, (3,) each, at each landing on the object in the last approach."""
 
         self.jammed: tuple[str, ...] = ()
         """The fingertips that were pressed so hard in the last re-orientation that it stopped early."""
+
+    @property
+    def _fingers(self) -> tuple[str, ...]:
+        return self._hand.form.fingers
 
     @property
     def plan(self) -> GraspPlan:
@@ -86,7 +90,7 @@ class GraspCycle:
                 self._motion.supervisor.on_approach()
                 return True
             self.lift()
-            if not (fingers := [finger for finger in hit if finger in FINGERS]):
+            if not (fingers := [finger for finger in hit if finger in self._fingers]):
                 return False  # a link above the fingertips: a little aside it would land again
             landed.update(fingers)
             shift_m, window = self.settings.landing_shift_m, self._yaw_window_rad
@@ -121,7 +125,7 @@ class GraspCycle:
     def _above(self) -> Array:
         """Where the hand may travel, above the grasp or, from the side, above where it comes down beside the object."""
         table = self._table()
-        above_m = travel_height_m(table, self._motion, self.settings, self._tip)
+        above_m = travel_height_m(table, self._motion, self.settings, self._hand)
         return self._motion.base_joints(self.plan.frame, table, above_m, self._away_m)
 
     @property
@@ -161,9 +165,9 @@ class GraspCycle:
 
     def _note_landing(self, guard: Guard) -> None:
         """Remember where the hand met something: at the fingertip that did, or, not knowing better, at the foremost."""
-        fingers = [finger for finger in guard.met if finger in FINGERS] or list(FINGERS)
+        fingers = [finger for finger in guard.met if finger in self._fingers] or list(self._fingers)
         ahead = np.asarray(self.plan.frame.pose.rotation().rotate(np.array(self._table().approach)))
-        places = [self._motion.tip_centre_world_m(finger, self._tip) for finger in fingers]
+        places = [self._motion.tip_centre_world_m(finger, self._hand) for finger in fingers]
         self.landings_world_m.append(max(places, key=lambda place: float(place @ ahead)))
 
     def _come_down(self) -> tuple[str, ...]:
@@ -173,7 +177,7 @@ class GraspCycle:
             What landed on something: fingers, or links that cannot tell which they are.
         """
         s, guard, motion, table = self.settings, self._landing, self._motion, self._table()
-        to_top_m = motion.tallest_m + s.touch.near_m - open_hand(table.name, table.height_m, self._tip).lowest_m
+        to_top_m = motion.tallest_m + s.touch.near_m - open_hand(table.name, table.height_m, self._hand).lowest_m
         top, down = (motion.base_joints(self.plan.frame, table, above_m) for above_m in (max(0.0, to_top_m), 0.0))
         guard.restart()
         if motion.probe_base(top, s.descent_m_s, guard.is_met):
@@ -195,7 +199,7 @@ class GraspCycle:
         """
         s, table = self.settings, self._table()
         step_m = s.closing_m_s * self._motion.supervisor.speed_scale * self._motion.cycle_s
-        moving, touched = set(FINGERS), dict.fromkeys(FINGERS, 0)
+        moving, touched = set(self._fingers), dict.fromkeys(self._fingers, 0)
         self._motion.runtime.begin_closing()
         while moving and not self._pressed_fingers(s.closing_most_N):
             loads_N = self._motion.loads_N()
@@ -207,15 +211,15 @@ class GraspCycle:
                 self._progress[finger] += step_m / table.path(finger).length_m
             self._motion.set_fingers(table, self._progress)
             self._motion.tick()
-        self._touching = frozenset(finger for finger in FINGERS if touched[finger] >= s.touch_cycles)
+        self._touching = frozenset(finger for finger in self._fingers if touched[finger] >= s.touch_cycles)
 
     def _may_close(self, finger: str) -> bool:
         return self._progress[finger] < self._table().path(finger).valid[1] and not self._meets_thumb(finger)
 
     def _meets_thumb(self, finger: str) -> bool:
         """Whether this tip and the thumb's (any other's, for the thumb) are about to touch each other."""
-        centres = {f: self._table().path(f).centre_m(self._progress[f]) for f in FINGERS}
-        others = [f for f in FINGERS if f != "TH"] if finger == "TH" else ["TH"]
+        centres = {f: self._table().path(f).centre_m(self._progress[f]) for f in self._fingers}
+        others = self._hand.form.long_fingers if finger == "TH" else ("TH",)
         gap_m = min(float(np.linalg.norm(centres[finger] - centres[other])) for other in others)
         return gap_m < self.settings.finger_gap_m
 
@@ -327,8 +331,8 @@ class GraspCycle:
         """
         table, closed, opened = self._table(), self._progress, self._open_progress()
         step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))
-        shares = dict.fromkeys(FINGERS, 0.0)
-        while closed_still := {finger for finger in FINGERS if shares[finger] < 1.0}:
+        shares = dict.fromkeys(self._fingers, 0.0)
+        while closed_still := {finger for finger in self._fingers if shares[finger] < 1.0}:
             for finger in closed_still & self._overloaded_fingers() or closed_still:
                 shares[finger] = min(1.0, shares[finger] + step)
             self._progress = {finger: u + shares[finger] * (opened[finger] - u) for finger, u in closed.items()}
@@ -348,7 +352,7 @@ class GraspCycle:
 
     def _open_progress(self) -> dict[str, float]:
         """Progress of the open hand."""
-        return {finger: self._table().path(finger).valid[0] for finger in FINGERS}
+        return {finger: self._table().path(finger).valid[0] for finger in self._fingers}
 
     def _table(self) -> Closing:
-        return closing(self.plan.closing, self.plan.height_m, self._tip)
+        return closing(self.plan.closing, self.plan.height_m, self._hand)

@@ -18,16 +18,16 @@ from drivers.core.contacts import FINGERS, Array, Grasp
 from drivers.positioner.positioner import mount_joints
 from drivers.shadow.closing.closing import Closing
 from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.model.hand_form import HandForm
 from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm
 from sessions.motion.safety import SafetySupervisor
 from sessions.recording.recorder import Level
 from sessions.rig_runtime.rig_runtime import RigRuntime
 
-_STRAIGHT_WRIST = forearm_T_palm(np.zeros(len(JOINTS)))
+_STRAIGHT_WRIST = forearm_T_palm(np.zeros(len(JOINTS)))  # in the plane that a left hand is mirrored in
 _TARES = 5  # a fingertip that still swings is given so many rests
 _WITHDRAW_s = 0.15  # a positioner follows its targets late: back by more than it is behind
 _LEVEL_m = 0.001
-_HOLD_WRIST = {"WRJ1": 0.0, "WRJ2": 0.0}
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,16 @@ class Motion:
         """The positioner's last target, shape (6,); before the first one, its position."""
         return self.runtime.perception.base_q.copy()
 
+    @property
+    def form(self) -> HandForm:
+        """Which hand moves."""
+        return self.runtime.perception.form
+
+    @property
+    def _straight_wrist(self) -> dict[str, float]:
+        """Targets of the wrist's motors, where the hand has them."""
+        return {name: 0.0 for name in self.form.driven if name.startswith("WR")}
+
     # --- time --------------------------------------------------------------------------------------------------
 
     @property
@@ -119,10 +129,11 @@ class Motion:
         for _ in range(self.cycles(duration_s)):
             self.tick()
 
-    def tare(self, rest_s: float, fingers: Sequence[str] = FINGERS, tries: int = _TARES) -> Mapping[str, str]:
+    def tare(self, rest_s: float, fingers: Sequence[str] | None = None, tries: int = _TARES) -> Mapping[str, str]:
         """Rest, and tare the fingertips; retry if one refuses because the hand still moves.
 
-        The reading of a fingertip that keeps refusing is subtracted from now on: see :meth:`loads_N`.
+        The reading of a fingertip that keeps refusing is subtracted from now on: see :meth:`loads_N`. All are meant
+        where ``fingers`` is not given.
 
         Returns:
             The reasons of those that kept refusing, by finger.
@@ -130,7 +141,7 @@ class Motion:
         self._resting_N, refused = {}, dict[str, str]()
         for _ in range(tries):
             self.wait(rest_s)
-            if not (refused := dict(self.runtime.tare(fingers).refused)):
+            if not (refused := dict(self.runtime.tare(self.form.fingers if fingers is None else fingers).refused)):
                 break
         self._resting_N = {finger: self._loads_N[finger] for finger in refused}
         return refused
@@ -268,8 +279,8 @@ class Motion:
             progress: of each finger.
             aside_rad: additional angles of single motors.
         """
-        targets = dict(_HOLD_WRIST)
-        for finger in FINGERS:
+        targets = self._straight_wrist
+        for finger in closing.fingers:
             targets.update(closing.joints(finger, progress[finger]))
         for motor, angle in (aside_rad or {}).items():
             targets[motor] += angle
@@ -295,7 +306,11 @@ class Motion:
     def finger_time_s(self, closing: Closing, progress: Mapping[str, float], speed_rad_s: float) -> float:
         """Time that the joint with the longest travel needs to reach the targets at ``progress``."""
         start = self._present_targets(closing, progress)
-        end = {name: angle for finger in FINGERS for name, angle in closing.joints(finger, progress[finger]).items()}
+        end = {
+            name: angle
+            for finger in closing.fingers
+            for name, angle in closing.joints(finger, progress[finger]).items()
+        }
         return max(abs(angle - start[name]) for name, angle in end.items()) / speed_rad_s
 
     def _present_targets(self, closing: Closing, progress: Mapping[str, float]) -> dict[str, float]:
@@ -304,8 +319,8 @@ class Motion:
     def _measured_targets(self, closing: Closing, progress: Mapping[str, float]) -> dict[str, float]:
         """Present angles of the motors that ``progress`` will command."""
         measured = self._measured_rad()
-        names = [*_HOLD_WRIST, *(name for finger in FINGERS for name in closing.joints(finger, progress[finger]))]
-        return {name: measured[name] for name in names}
+        fingers = [name for finger in closing.fingers for name in closing.joints(finger, progress[finger])]
+        return {name: measured[name] for name in (*self._straight_wrist, *fingers)}
 
     def _measured_rad(self) -> dict[str, float]:
         """Present joint angles, and the sums of the coupled ones."""
@@ -318,7 +333,7 @@ class Motion:
         """
         measured = self._measured_rad()
         off = [name for name, angle in self._targets_rad.items() if abs(measured[name] - angle) > least_rad]
-        return tuple(finger for finger in FINGERS if any(name.startswith(finger) for name in off))
+        return tuple(finger for finger in self.form.fingers if any(name.startswith(finger) for name in off))
 
     def loads_N(self) -> dict[str, float]:
         """Contact force on each fingertip at the end of the last cycle, minus its reading at rest if it could not be

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from drivers.core.contacts import FINGERS, Array
-from drivers.shadow.closing.closing import SIDES, Closing, closing, sideways
+from drivers.core.contacts import Array
+from drivers.shadow.closing.closing import Closing, closing, side_with_first_finger_down, sideways
 from drivers.shadow.closing.hand_envelope import open_hand
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.closing.tip_motion import motor_rates
 from sessions.motion.cycle_settings import CycleSettings, TouchSettings
 from sessions.motion.guard import Guard
@@ -81,12 +81,12 @@ TAP_HEIGHT_m = 0.022
 """Height of the closing's table; the positioner adds the rest."""
 
 
-def travel_height_m(table: Closing, motion: Motion, cycle: CycleSettings, tip: TipEllipsoid) -> float:
+def travel_height_m(table: Closing, motion: Motion, cycle: CycleSettings, hand: HandShape) -> float:
     """How far above a grasp the hand travels, all of it above the tallest thing that may stand on the table.
 
     A palm that is upright turns over on its way to other grasps: the fingers then hang below it.
     """
-    lowest_m = open_hand(table.name, table.height_m, tip).lowest_m
+    lowest_m = open_hand(table.name, table.height_m, hand).lowest_m
     if table.is_sideways:
         lowest_m = min(lowest_m, float(table.grasp_T_palm.z()) - _FINGERS_HANG_m)
     return max(cycle.lift_m, motion.tallest_m + cycle.clearance_m - lowest_m)
@@ -98,11 +98,11 @@ class Toucher:
     Args:
         motion: supervised motion.
         cycle: speeds, forces and times.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
     """
 
-    def __init__(self, motion: Motion, cycle: CycleSettings, tip: TipEllipsoid) -> None:
-        self._motion, self._cycle, self._tip = motion, cycle, tip
+    def __init__(self, motion: Motion, cycle: CycleSettings, hand: HandShape) -> None:
+        self._motion, self._cycle, self._hand = motion, cycle, hand
         self.guard = Guard(motion, cycle.touch.met_N, cycle.held_up_rad)
         """Ends approaches, and tells what met something in the last."""
 
@@ -110,6 +110,11 @@ class Toucher:
     def settings(self) -> TouchSettings:
         """Speeds and forces of touching."""
         return self._cycle.touch
+
+    @property
+    def first_finger_side(self) -> float:
+        """1 where the first finger is toward +y of the grasp frame, -1 on a left hand."""
+        return -1.0 if self._hand.form.is_left else 1.0
 
     def expect_tallest(self, height_m: float) -> None:
         """From here on the hand travels above this height: nothing on the table is taller, as far as is known."""
@@ -132,9 +137,9 @@ class Toucher:
         Returns:
             Where fingertips touched something, shape (n, 3), world frame.
         """
-        s, table, motion = self.settings, closing(TAP.closing, TAP_HEIGHT_m, self._tip), self._motion
+        s, table, motion = self.settings, closing(TAP.closing, TAP_HEIGHT_m, self._hand), self._motion
         self._poise(table, TAP, frame)
-        touching_m = self._tip.semi_axes_m[2] - TAP_HEIGHT_m
+        touching_m = self._hand.semi_axes_m[2] - TAP_HEIGHT_m
         lowest_m = max(s.lowest_m, motion.tallest_m - below_top_m)
         near_m = max(lowest_m, motion.tallest_m + s.near_m)
         motion.runtime.begin_closing()
@@ -165,7 +170,8 @@ class Toucher:
             What was touched, perhaps nothing; None where the hand could not come down.
         """
         s, motion = self.settings, self._motion
-        table = closing(sideways(COLUMN.closing, side), height_m or s.side_heights_m[SIDES.index(side)], self._tip)
+        lowest_m = s.side_heights_m[0 if side == side_with_first_finger_down(self._hand.form) else 1]
+        table = closing(sideways(COLUMN.closing, side), height_m or lowest_m, self._hand)
         lane = frame.shifted_inside(np.array([-s.row_m, 0.0]))
         known = len(motion.runtime.perception.probed)
         self._poise(table, COLUMN, lane, from_m)
@@ -196,7 +202,7 @@ class Toucher:
 
     def _above_m(self, table: Closing) -> float:
         """How far above its touch the hand may travel."""
-        return travel_height_m(table, self._motion, self._cycle, self._tip)
+        return travel_height_m(table, self._motion, self._cycle, self._hand)
 
     def rake(self, frame: GraspFrame, from_m: float) -> Array | None:
         """Come toward the middle of a grasp frame from its +x side, fingers in a row, until they touch something.
@@ -209,7 +215,7 @@ class Toucher:
             Where fingertips touched something, shape (n, 3), world frame; None if they could not descend.
         """
         s, motion = self.settings, self._motion
-        table = closing(ROW.closing, s.rake_height_m, self._tip)
+        table = closing(ROW.closing, s.rake_height_m, self._hand)
         begin, end = (frame.shifted_inside(np.array([x - s.row_m, 0.0])) for x in (from_m, -s.beyond_m))
         self._poise(table, ROW, begin)
         self.guard.restart()
@@ -235,13 +241,13 @@ class Toucher:
             another finger could not descend.
         """
         s, motion = self.settings, self._motion
-        table = closing(ROW.closing, s.rake_height_m, self._tip)
-        progress = {finger: table.path(finger).valid[0] for finger in FINGERS}
+        table = closing(ROW.closing, s.rake_height_m, self._hand)
+        progress = {finger: table.path(finger).valid[0] for finger in table.fingers}
         self._poise(table, Pattern(ROW.closing, progress), frame)
         self.guard.restart()
         if not motion.probe_base(motion.base_joints(frame, table), self._cycle.descent_m_s, self.guard.is_met):
             stands = "TH" in self.guard.met
-            met_m = motion.tip_centre_world_m("TH", self._tip)
+            met_m = motion.tip_centre_world_m("TH", self._hand)
             self._rise()
             return met_m[None] if stands else None
         motion.wait(self._cycle.rest_s)
@@ -268,7 +274,7 @@ class Toucher:
         """The foremost points of the fingertips that touch something, shape (n, 3), world frame."""
         ahead = np.asarray(frame.pose.rotation().rotate(direction_grasp))
         met = [finger for finger, load_N in self._motion.loads_N().items() if load_N > self.settings.met_N / 2]
-        surface = TipSurface.upright(self._tip.semi_axes_m, self._tip.centre_distal_m)
+        surface = TipSurface.upright(self._hand.semi_axes_m, self._hand.centre_distal_m)
         frames = self._motion.runtime.perception.world_T_distal
         return np.array([surface.leading_point(frames[f].matrix(), ahead) for f in met]).reshape(-1, 3)
 
@@ -313,7 +319,7 @@ class Toucher:
         itself. While a fingertip is pressed hard the hand draws back.
         """
         s, motion = self.settings, self._motion
-        rates = motor_rates(table, pattern.progress, direction_grasp, self._tip)
+        rates = motor_rates(table, pattern.progress, direction_grasp, self._hand)
         rates = {f: motors for f, motors in rates.items() if f in self.guard.met or self._height_m(f) <= up_to_m}
         gone_m = dict.fromkeys(rates, 0.0)
         start, sunk_m, step_m = motion.runtime.perception.base_q.copy(), 0.0, 2.0 * sink_m / motion.cycles(s.press_s)
@@ -333,7 +339,7 @@ class Toucher:
             motion.tick()
 
     def _height_m(self, finger: str) -> float:
-        return float(self._motion.tip_centre_world_m(finger, self._tip)[2])
+        return float(self._motion.tip_centre_world_m(finger, self._hand)[2])
 
     def capture(self) -> None:
         """Keep what the fingertips feel now for the next grasp."""

@@ -19,6 +19,7 @@ import numpy as np
 from drivers.core.contacts import FINGERS, Array, Contact
 from drivers.core.fingertip import TipContact
 from drivers.shadow.model.kinematics import JOINTS, palm_T_distal_matrices
+from drivers.shadow.protocol.palm_images import Side
 
 _STEP_rad = 1e-4
 """Step of the central differences: error about 1e-9 of a link's length."""
@@ -61,17 +62,18 @@ class HandGeometry:
     Args:
         joints_rad: joint angles, shape (24,), radians.
         world_T_palm: homogeneous matrix, shape (4, 4).
+        side: of the hand.
     """
 
-    def __init__(self, joints_rad: Array, world_T_palm: Array) -> None:
-        self._joints_rad, self.world_T_palm = joints_rad, world_T_palm
-        self.world_T_distal: Array = world_T_palm @ palm_T_distal_matrices(joints_rad)
+    def __init__(self, joints_rad: Array, world_T_palm: Array, side: Side = "right") -> None:
+        self._joints_rad, self.world_T_palm, self._side = joints_rad, world_T_palm, side
+        self.world_T_distal: Array = world_T_palm @ palm_T_distal_matrices(joints_rad, side)
         """Distal frames, shape (5, 4, 4), order of :data:`FINGERS`."""
 
     def joint_derivatives(self) -> Array:
         """Derivatives of ``world_T_distal`` by J1 .. J5 of the finger itself, shape (5 joints, 5 fingers, 4, 4)."""
-        ahead = palm_T_distal_matrices(self._joints_rad + _STEP_rad * _GROUPS)
-        behind = palm_T_distal_matrices(self._joints_rad - _STEP_rad * _GROUPS)
+        ahead = palm_T_distal_matrices(self._joints_rad + _STEP_rad * _GROUPS, self._side)
+        behind = palm_T_distal_matrices(self._joints_rad - _STEP_rad * _GROUPS, self._side)
         return np.asarray(self.world_T_palm @ ((ahead - behind) / (2 * _STEP_rad)))
 
     def contacts(

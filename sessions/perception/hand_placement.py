@@ -10,6 +10,7 @@ from gtsam import Pose3
 from drivers.core.contacts import Array
 from drivers.core.errors import DeviceError
 from drivers.shadow.model.kinematics import forearm_T_palm_matrix
+from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.contact_world import HandGeometry
 
 
@@ -19,10 +20,11 @@ class HandPlacement:
     Args:
         mount_T_forearm: the positioner's kinematics, from its joint vector (6,).
         world_T_mount: the forearm-to-world calibration.
+        side: of the hand.
     """
 
-    def __init__(self, mount_T_forearm: Callable[[Array], Pose3], world_T_mount: Pose3) -> None:
-        self._mount_T_forearm, self._world_T_mount = mount_T_forearm, world_T_mount
+    def __init__(self, mount_T_forearm: Callable[[Array], Pose3], world_T_mount: Pose3, side: Side = "right") -> None:
+        self._mount_T_forearm, self._world_T_mount, self._side = mount_T_forearm, world_T_mount, side
         self._joints_rad: Array | None = None
         self._base_q: Array | None = None
         self._geometry: HandGeometry | None = None
@@ -59,4 +61,5 @@ class HandPlacement:
     def place(self, joints_rad: Array, base_q: Array) -> HandGeometry:
         """Geometry from these joints."""
         world_T_forearm = self._world_T_mount * self._mount_T_forearm(base_q)
-        return HandGeometry(joints_rad, world_T_forearm.matrix() @ forearm_T_palm_matrix(joints_rad))
+        world_T_palm = world_T_forearm.matrix() @ forearm_T_palm_matrix(joints_rad, self._side)
+        return HandGeometry(joints_rad, world_T_palm, self._side)

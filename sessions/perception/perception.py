@@ -19,6 +19,7 @@ from drivers.core.configuration import StrictModel
 from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact, Grasp
 from drivers.core.errors import DeviceError, SessionError
 from drivers.core.fingertip import FingertipSensor
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from sessions.perception.approach_paths import TipSurface, approach_paths
 from sessions.perception.contact_world import HandGeometry, MountUncertainty
 from sessions.perception.event_outcomes import Outcome, TareReport, TruthFrame, Undone
@@ -51,6 +52,7 @@ class Perception:
         world_T_mount: the forearm-to-world calibration.
         mount_covariance: its covariance, see :class:`MountUncertainty`; None if unknown.
         tip_surfaces: of the fingertips whose approach paths are computed, by finger.
+        form: of the hand.
     """
 
     def __init__(
@@ -63,13 +65,16 @@ class Perception:
         mount_covariance: Array | None = None,
         tip_surfaces: Mapping[str, TipSurface] | None = None,
         settings: PerceptionSettings | None = None,
+        form: HandForm = RIGHT_HAND,
     ) -> None:
+        self.form = form
+        """Which hand it is."""
         self._wrench = dict(wrench_fingertips or {})
         self._slots = dict(slot_fingertips or {})
         everyone: dict[str, FingertipSensor] = {**self._wrench, **self._slots}
         self.fingertips: dict[str, FingertipSensor] = {f: everyone[f] for f in FINGERS if f in everyone}
         self.world_T_mount, self.settings = world_T_mount, settings or PerceptionSettings()
-        self._placement = HandPlacement(mount_T_forearm, world_T_mount)
+        self._placement = HandPlacement(mount_T_forearm, world_T_mount, form.side)
         self._selection = TouchSelection(self.fingertips, self.settings.minimum_force_N)
         self._mount = (
             None if mount_covariance is None else MountUncertainty(world_T_mount.matrix(), np.asarray(mount_covariance))
@@ -159,7 +164,8 @@ class Perception:
     @property
     def world_T_distal(self) -> dict[str, Pose3]:
         """The distal frame of each finger, from the newest samples. Raises DeviceError before the first."""
-        return {finger: Pose3(self._placement.current().world_T_distal[i]) for i, finger in enumerate(FINGERS)}
+        frames = self._placement.current().world_T_distal
+        return {finger: Pose3(frames[FINGERS.index(finger)]) for finger in self.form.fingers}
 
     def world_R_distal(self, finger: str) -> Array:
         """Orientation of one distal frame, shape (3, 3). Raises DeviceError before the first sample."""

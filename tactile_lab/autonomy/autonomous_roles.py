@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.decisions import SessionRoles
 from sessions.conductor.policy_decisions import Approve, PolicyDecisions, approve_everything, record_choices
 from sessions.motion.box_prober import BoxProber
@@ -50,21 +50,21 @@ def autonomous_roles(
         ConfigurationError: the policy in the settings does not exist.
     """
     supervisor = SafetySupervisor(runtime, settings.safety, runtime.cycle_ns)
-    tip, window = tip_shape(runtime), settings.plan.yaw_window_rad
-    solve_closings(runtime.clock, settings, tip, dimension)
+    hand, window = hand_shape(runtime), settings.plan.yaw_window_rad
+    solve_closings(runtime.clock, settings, hand, dimension)
     motion = Motion(runtime, supervisor)
-    cycle = GraspCycle(motion, settings.cycle, tip, window)
-    planner = planner_for(slam, settings, tip, seed, dimension)
+    cycle = GraspCycle(motion, settings.cycle, hand, window)
+    planner = planner_for(slam, settings, hand, seed, dimension)
     client = client_for(runtime.clock, SlamService(slam, planner), cycle.idle)
     guard = InterruptGuard()
     decisions = PolicyDecisions(client, record_choices(runtime), approve, guard)
     if not settings.probing.is_wanted:
         return SessionRoles(supervisor, cycle, decisions, client, guard=guard)
-    prober = BoxProber(Toucher(motion, settings.cycle, tip), settings.probing, window, settings.plan.start_m)
+    prober = BoxProber(Toucher(motion, settings.cycle, hand), settings.probing, window, settings.plan.start_m)
     return SessionRoles(supervisor, cycle, decisions, client, prober.feel, guard)
 
 
-def planner_for(slam: TactileSlam, settings: SessionSettings, tip: TipEllipsoid, seed: int, dimension: int) -> Planner:
+def planner_for(slam: TactileSlam, settings: SessionSettings, hand: HandShape, seed: int, dimension: int) -> Planner:
     """The planner of a session, with the policy of its settings.
 
     Raises:
@@ -74,13 +74,13 @@ def planner_for(slam: TactileSlam, settings: SessionSettings, tip: TipEllipsoid,
     chooser = None
     if policy := settings.exploration.policy:
         limits = settings.plan, settings.exploration, settings.cycle, settings.safety
-        chooser = chooser_for(policy, limits, tip, dimension, slam.settings.motion, seed)
+        chooser = chooser_for(policy, limits, hand, dimension, slam.settings.motion, seed)
     return Planner(
         slam,
         rule,
         settings.exploration,
         settings.fixed_grasps,
-        tip,
+        hand,
         dimension,
         chooser,
         settings.grasps,
@@ -89,22 +89,23 @@ def planner_for(slam: TactileSlam, settings: SessionSettings, tip: TipEllipsoid,
     )
 
 
-def tip_shape(runtime: RigRuntime) -> TipEllipsoid:
-    """The fingertip's shape by calibration; the default one if a rig has none."""
+def hand_shape(runtime: RigRuntime) -> HandShape:
+    """The hand of a rig: its form, and its fingertips' shape by calibration; the default one if the rig has none."""
+    form = runtime.perception.form
     for calibration in runtime.fingertip_calibrations.values():
-        return TipEllipsoid(calibration.semi_axes_m, calibration.centre_distal_m)
-    return TipEllipsoid()
+        return HandShape(calibration.semi_axes_m, calibration.centre_distal_m, form)
+    return HandShape(form=form)
 
 
 def chooser_for(
     policy: str,
     settings: tuple[PlanSettings, ExplorationSettings, CycleSettings, SafetySettings],
-    tip: TipEllipsoid,
+    hand: HandShape,
     dimension: int,
     noise: MotionNoise,
     seed: int,
 ) -> PolicyChooser:
     """The policy named ``policy`` with the hand's candidates. Raises ConfigurationError if there is none."""
     plan, exploration, cycle, safety = settings
-    limits = HandLimits(plan, exploration, cycle, safety, tip, dimension)
+    limits = HandLimits(plan, exploration, cycle, safety, hand, dimension)
     return PolicyChooser(make_policy(policy, exploration.information), limits, noise, np.random.default_rng([seed, 1]))

@@ -6,12 +6,12 @@ from itertools import product
 
 from drivers.core.clock import Clock, VirtualClock
 from drivers.shadow.closing.closing import SIDEWAYS, closing
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.touching import ROW, TAP, TAP_HEIGHT_m
 from tactile_lab.autonomy.settings import SessionSettings
 
 
-def solve_closings(clock: Clock, settings: SessionSettings, tip: TipEllipsoid, dimension: int) -> None:
+def solve_closings(clock: Clock, settings: SessionSettings, hand: HandShape, dimension: int) -> None:
     """Compute every table that the session may need; with simulated time they are computed on demand.
 
     A table takes up to a second, in which no cycle would run: the planning process has its own tables.
@@ -30,4 +30,4 @@ def solve_closings(clock: Clock, settings: SessionSettings, tip: TipEllipsoid, d
     if settings.probing.enabled:
         wanted.add((ROW.closing, settings.cycle.touch.rake_height_m))
     for name, height_m in sorted(wanted):
-        closing(name, height_m, tip)
+        closing(name, height_m, hand)

@@ -15,10 +15,10 @@ import numpy as np
 from gtsam import Pose2
 from scipy.spatial import KDTree
 
-from drivers.core.contacts import FINGERS, Array
+from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.collision_spheres import Verdicts, link_balls
-from drivers.shadow.closing.posture import PROGRESS, TipEllipsoid
+from drivers.shadow.closing.posture import PROGRESS, HandShape
 from sessions.motion.grasp_plan import GraspPlan
 from tactile_lab.autonomy.variance_planner import KnownShape
 from tactile_lab.slam.exploration.policy import Surface
@@ -77,23 +77,23 @@ def standing(known: KnownShape, world_T_object: Pose2, contour_top_m: float) -> 
     return StandingObject(known.surface, world_T_object, known.origin_height_m, contour_top_m)
 
 
-def links_are_clear(plans: Sequence[GraspPlan], tip: TipEllipsoid, target: StandingObject) -> Verdicts:
+def links_are_clear(plans: Sequence[GraspPlan], hand: HandShape, target: StandingObject) -> Verdicts:
     """For each plan, whether every finger descends and closes with no link in the object until its tip touches."""
     verdicts = np.empty(len(plans), dtype=bool)
     for kind in {(plan.closing, plan.height_m) for plan in plans}:
         alike = [index for index, plan in enumerate(plans) if (plan.closing, plan.height_m) == kind]
-        verdicts[alike] = _are_clear([plans[index] for index in alike], tip, target)
+        verdicts[alike] = _are_clear([plans[index] for index in alike], hand, target)
     return verdicts
 
 
-def _are_clear(plans: Sequence[GraspPlan], tip: TipEllipsoid, target: StandingObject) -> Verdicts:
+def _are_clear(plans: Sequence[GraspPlan], hand: HandShape, target: StandingObject) -> Verdicts:
     """The same for plans that differ only in the grasp frame."""
     name, height_m = plans[0].closing, plans[0].height_m
-    balls, paths = link_balls(name, height_m, tip), closing(name, height_m, tip).paths
-    tips_m = np.array([[paths[finger].centre_m(u) for finger in FINGERS] for u in PROGRESS[_POSTURES]])
+    balls, table = link_balls(name, height_m, hand), closing(name, height_m, hand)
+    tips_m = np.array([[table.path(finger).centre_m(u) for finger in table.fingers] for u in PROGRESS[_POSTURES]])
     places_m = np.concatenate([balls.centres_m[_POSTURES], tips_m], axis=1)
     frames = np.array([plan.frame.pose.matrix() for plan in plans])[:, None, None]
     distances_m = target.distances_m((frames[..., :3, :3] @ places_m[..., None])[..., 0] + frames[..., :3, 3])
-    links_m, tips_m = np.split(distances_m, [-len(FINGERS)], axis=-1)
-    touching = (tips_m < tip.radius_m) & balls.usable[_POSTURES]
+    links_m, tips_m = np.split(distances_m, [-len(table.fingers)], axis=-1)
+    touching = (tips_m < hand.radius_m) & balls.usable[_POSTURES]
     return ~balls.collides(links_m - _MARGIN_m, ~np.logical_or.accumulate(touching, axis=1), _POSTURES)

@@ -17,7 +17,7 @@ from sessions.guided.operator import Operator
 from sessions.motion.safety import InterruptGuard, SafetySupervisor
 from sessions.recording.attachments import Attachments
 from sessions.rig_runtime.rig_runtime import RigRuntime
-from tactile_lab.autonomy.autonomous_roles import tip_shape
+from tactile_lab.autonomy.autonomous_roles import hand_shape
 from tactile_lab.autonomy.closing_tables import solve_closings
 from tactile_lab.autonomy.estimator_process import client_for
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner
@@ -51,16 +51,16 @@ def guided_roles(
         pace: see :class:`OperatorConsole`.
     """
     supervisor, guard = SafetySupervisor(runtime, settings.safety, runtime.cycle_ns), InterruptGuard()
-    tip, cycle, guided = tip_shape(runtime), settings.cycle, settings.guided
-    solve_closings(runtime.clock, settings, tip, dimension)
+    hand, cycle, guided = hand_shape(runtime), settings.cycle, settings.guided
+    solve_closings(runtime.clock, settings, hand, dimension)
     console = OperatorConsole(runtime, operator, guided, Attachments(session_folder), cycle.touch_force_N, guard, pace)
     motion = GuidedMotion(runtime, supervisor, console)
     performer: Performer = (
-        GraspByHand(motion, cycle, console, tip)
+        GraspByHand(motion, cycle, console, hand)
         if guided.led_by == "hand"
-        else GraspByKeys(motion, cycle, console, tip, settings.plan.yaw_window_rad)
+        else GraspByKeys(motion, cycle, console, hand, settings.plan.yaw_window_rad)
     )
     rule = HeuristicPlanner(settings.plan, np.random.default_rng(seed), dimension)
-    planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, tip, dimension)
+    planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, hand, dimension)
     client = client_for(runtime.clock, SlamService(slam, planner), performer.idle)
     return SessionRoles(supervisor, performer, GuidedDecisions(client, console), client, guard=guard)

@@ -18,10 +18,10 @@ from typing import TypeAlias
 import numpy as np
 from gtsam import Pose2
 
-from drivers.core.contacts import FINGERS, Array
+from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import Closing, closing
 from drivers.shadow.closing.collision_spheres import Verdicts
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import GraspFrame
@@ -81,7 +81,7 @@ class HandLimits:
     exploration: ExplorationSettings
     cycle: CycleSettings
     safety: SafetySettings
-    tip: TipEllipsoid
+    hand: HandShape
     dimension: int
 
     @property
@@ -155,14 +155,14 @@ def _plans(limits: HandLimits, centre_world_m: Array) -> Iterator[GraspPlan]:
                     yield GraspPlan(frame, name, height_m)
 
 
-def table_of(plan: GraspPlan, tip: TipEllipsoid) -> Closing:
+def table_of(plan: GraspPlan, hand: HandShape) -> Closing:
     """The closing of a plan."""
-    return closing(plan.closing, plan.height_m, tip)
+    return closing(plan.closing, plan.height_m, hand)
 
 
 def _reachable(plan: GraspPlan, limits: HandLimits) -> bool:
     """Whether the palm stays in the workspace that the safety supervisor watches."""
-    palm = plan.frame.pose * table_of(plan, limits.tip).grasp_T_palm
+    palm = plan.frame.pose * table_of(plan, limits.hand).grasp_T_palm
     centre = np.array(limits.safety.workspace_centre_m)
     return float(np.linalg.norm(np.asarray(palm.translation())[:2] - centre)) < limits.safety.workspace_radius_m
 
@@ -170,7 +170,7 @@ def _reachable(plan: GraspPlan, limits: HandLimits) -> bool:
 def _palm_is_clear(plan: GraspPlan, limits: HandLimits, known: KnownShape) -> bool:
     if known.top_height_m is None:
         return True
-    return float(table_of(plan, limits.tip).grasp_T_palm.z()) - _PALM_THICKNESS_m > known.top_height_m
+    return float(table_of(plan, limits.hand).grasp_T_palm.z()) - _PALM_THICKNESS_m > known.top_height_m
 
 
 def _is_below_top(plan: GraspPlan, known: KnownShape) -> bool:
@@ -179,7 +179,7 @@ def _is_below_top(plan: GraspPlan, known: KnownShape) -> bool:
 
 def _tips_are_clear(plans: Sequence[GraspPlan], limits: HandLimits, known: KnownShape, pose: Pose2) -> Verdicts:
     """Whether the open fingertips come down clear of the estimated surface, all the way, and of its uncertainty."""
-    starts_m = np.array([_open_tips_m(plan, limits.tip) for plan in plans])
+    starts_m = np.array([_open_tips_m(plan, limits.hand) for plan in plans])
     turn, place = planar_rotation(float(pose.theta())), np.array([pose.x(), pose.y()])
     flat_m = (starts_m[..., :2] - place) @ turn
     if known.dimension == 2:
@@ -210,13 +210,13 @@ def _pushing(plans: Sequence[GraspPlan], limits: HandLimits, known: KnownShape, 
     target = standing(known, world_T_object, limits.plan.contour_top_m)
     if target is None:
         return np.zeros(len(plans), dtype=bool)
-    return ~links_are_clear(plans, limits.tip, target)
+    return ~links_are_clear(plans, limits.hand, target)
 
 
-def _open_tips_m(plan: GraspPlan, tip: TipEllipsoid) -> Array:
-    """Centres of the open hand's tips, world frame, shape (5, 3)."""
-    paths = table_of(plan, tip).paths
-    return np.array([plan.frame.pose.transformFrom(paths[f].centre_m(paths[f].valid[0])) for f in FINGERS])
+def _open_tips_m(plan: GraspPlan, hand: HandShape) -> Array:
+    """Centres of the open hand's tips, world frame, shape (fingers, 3)."""
+    paths = table_of(plan, hand).paths
+    return np.array([plan.frame.pose.transformFrom(paths[f].centre_m(paths[f].valid[0])) for f in paths])
 
 
 # --- what policies see ---------------------------------------------------------------------------------------------
@@ -231,20 +231,20 @@ def _as_candidate(
 
 
 def _rays(limits: HandLimits, tap_from_m: float, name: str, height_m: float, tap: bool) -> ClosingRays:
-    rays = closing_rays(closing(name, height_m, limits.tip))
-    return _with_tap(rays, tap, tap_from_m, limits.tip) if limits.dimension == 3 else rays
+    rays = closing_rays(closing(name, height_m, limits.hand))
+    return _with_tap(rays, tap, tap_from_m, limits.hand) if limits.dimension == 3 else rays
 
 
-def _with_tap(rays: ClosingRays, taps: bool, from_m: float, tip: TipEllipsoid) -> ClosingRays:
+def _with_tap(rays: ClosingRays, taps: bool, from_m: float, hand: HandShape) -> ClosingRays:
     """The rays followed by those of a tap; without a tap these have length zero, for equal numbers."""
-    table = closing(TAP.closing, TAP_HEIGHT_m, tip)
-    above_m = np.array([table.path(finger).centre_m(TAP.progress[finger]) for finger in FINGERS])
+    table = closing(TAP.closing, TAP_HEIGHT_m, hand)
+    above_m = np.array([table.path(finger).centre_m(TAP.progress[finger]) for finger in table.fingers])
     above_m[:, 2] = from_m
     return ClosingRays(
-        fingers=(*rays.fingers, *FINGERS),
+        fingers=(*rays.fingers, *table.fingers),
         starts_m=np.vstack([rays.starts_m, above_m]),
-        directions=np.vstack([rays.directions, np.tile([0.0, 0.0, -1.0], (len(FINGERS), 1))]),
-        lengths_m=np.append(rays.lengths_m, np.full(len(FINGERS), from_m if taps else 0.0)),
+        directions=np.vstack([rays.directions, np.tile([0.0, 0.0, -1.0], (len(above_m), 1))]),
+        lengths_m=np.append(rays.lengths_m, np.full(len(above_m), from_m if taps else 0.0)),
         radius_m=rays.radius_m,
     )
 

@@ -16,6 +16,7 @@ from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import transform_points
 from drivers.shadow.closing.closing import PRESHAPES
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from sessions.motion.grasp_plan import ContactHeight, GraspPlan
 from sessions.motion.motion import GraspFrame
 
@@ -64,17 +65,17 @@ _TYPICAL_HALF_WIDTH_m = 0.030  # between one side's contacts and the middle, whe
 _MISSED_SIDE_m = {"FF": -0.012, "MF": -0.004, "RF": 0.004, "LF": 0.012}  # a finger that met nothing: object is aside
 
 
-def contact_centre(grasp: Grasp, plan: GraspPlan) -> Array:
+def contact_centre(grasp: Grasp, plan: GraspPlan, form: HandForm = RIGHT_HAND) -> Array:
     """Centre of the object, world x, y, from one grasp's contacts alone.
 
-    Across the hand it is midway between thumb and fingers; along it, midway between first and little finger if they
-    close from the sides, otherwise away from the fingers that met nothing.
+    Across the hand it is midway between thumb and fingers; along it, midway between the outer fingers if they close
+    from the sides, otherwise away from the fingers that met nothing.
     """
     frame = plan.frame.pose
     closed = [contact for contact in grasp.contacts if not contact.probed]
     points_m = transform_points(frame.inverse(), np.array([c.point_world_m for c in closed]).reshape(-1, 3))[:, :2]
     touched = dict(zip((contact.finger for contact in closed), points_m, strict=True))
-    centre_m = np.array([_across(touched), _along(touched, plan.closing), 0.0])
+    centre_m = np.array([_across(touched), _along(touched, plan.closing, form), 0.0])
     return np.asarray(transform_points(frame, centre_m[None])[0, :2])
 
 
@@ -91,12 +92,14 @@ def _across(touched: dict[str, Array]) -> float:
             return 0.0
 
 
-def _along(touched: dict[str, Array], closing: str) -> float:
+def _along(touched: dict[str, Array], closing: str, form: HandForm) -> float:
     if not touched:
         return 0.0
-    if closing == "radial" and {"FF", "LF"} <= set(touched):
-        return float(touched["FF"][1] + touched["LF"][1]) / 2
-    return sum(shift for finger, shift in _MISSED_SIDE_m.items() if finger not in touched)
+    outer = {form.long_fingers[0], form.long_fingers[-1]}
+    if closing == "radial" and len(outer) == 2 and outer <= set(touched):
+        return float(sum(touched[finger][1] for finger in outer)) / 2
+    missed_m = sum(_MISSED_SIDE_m[finger] for finger in form.long_fingers if finger not in touched)
+    return -missed_m if form.is_left else missed_m
 
 
 class HeuristicPlanner:

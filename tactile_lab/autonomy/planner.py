@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from gtsam import Pose2, Pose3
 
-from drivers.core.contacts import FINGERS, Array, Grasp
+from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import planar, spatial, transform_points
 from drivers.shadow.closing.closing import Closing, closing
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.estimator import Reorientation
 from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.cycle_settings import TouchSettings
@@ -51,7 +51,7 @@ class Planner:
         rule: plans where there is no estimate.
         exploration: the candidates of the estimate.
         fixed_grasps: this many first grasps follow the rule.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
         dimension: the estimation's, 2 or 3.
         chooser: the policy that chooses if there is an estimate; None for the reward of equation 4.20 alone.
         grasps: number of grasps of the session, for the policy.
@@ -65,7 +65,7 @@ class Planner:
         rule: HeuristicPlanner,
         exploration: ExplorationSettings,
         fixed_grasps: int,
-        tip: TipEllipsoid,
+        hand: HandShape,
         dimension: int,
         chooser: PolicyChooser | None = None,
         grasps: int | None = None,
@@ -73,7 +73,7 @@ class Planner:
         touches: TouchSettings | None = None,
     ) -> None:
         self._slam, self._rule, self._exploration = slam, rule, exploration
-        self._fixed_grasps, self._tip, self._dimension = fixed_grasps, tip, dimension
+        self._fixed_grasps, self._hand, self._dimension = fixed_grasps, hand, dimension
         self._known: tuple[Gpis, KnownShape] | None = None
         self._hand_motion = Pose3()
         self._landings_m: list[Array] = []
@@ -135,7 +135,7 @@ class Planner:
         felt = FeltObject(box) if box is not None else self._felt_object()
         window_rad = self._rule.settings.yaw_window_rad
         return StandingPlanner(
-            felt, self._tip, window_rad, self._reach, self._touches if self._dimension == 3 else None
+            felt, self._hand, window_rad, self._reach, self._touches if self._dimension == 3 else None
         )
 
     def _felt_object(self) -> FeltObject:
@@ -213,7 +213,7 @@ class Planner:
         height_m, settings = self._rule.height_m(index), self._rule.settings
 
         def table(name: str) -> Closing:
-            return closing(name, height_m, self._tip)
+            return closing(name, height_m, self._hand)
 
         return choose_grasp(
             known, expected, settings.closings, table, settings.yaw_window_rad, self._exploration, self._has_room
@@ -227,8 +227,8 @@ class Planner:
     def _has_room(self, plan: GraspPlan) -> bool:
         if not self._landings_m and self._box is None:
             return True
-        paths = closing(plan.closing, plan.height_m, self._tip).paths
-        open_m = np.array([plan.frame.pose.transformFrom(paths[f].centre_m(paths[f].valid[0])) for f in FINGERS])
+        paths = closing(plan.closing, plan.height_m, self._hand).paths
+        open_m = np.array([plan.frame.pose.transformFrom(paths[f].centre_m(paths[f].valid[0])) for f in paths])
         if self._box is not None and not self._box.is_clear(open_m[:, :2]):
             return False
         apart_m = open_m[:, None, :2] - np.array(self._landings_m).reshape(-1, 3)[None, :, :2]
@@ -248,7 +248,7 @@ class Planner:
         least = self._exploration.least_contacts if self._chooser is None else _LEAST_BY_POLICY
         self._doubted = self._by_estimate and len(grasp.touching) < least
         if grasp.touching and (self._doubted or not self._by_estimate):
-            self._rule.centre_m = contact_centre(grasp, plan)
+            self._rule.centre_m = contact_centre(grasp, plan, self._hand.form)
         if tops_m := [float(c.point_world_m[2]) for c in grasp.contacts if c.probed and c.normal_world[2] > _UPWARD]:
             self._rule.top_m = max(tops_m)
         turn_rad = self._turn(grasp, plan)

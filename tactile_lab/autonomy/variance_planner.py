@@ -16,7 +16,7 @@ from gtsam import Pose2
 from pydantic import Field, field_validator
 
 from drivers.core.configuration import StrictModel
-from drivers.core.contacts import FINGERS, Array
+from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from drivers.core.observability import planar_observability
 from drivers.shadow.closing.closing import LEANING, Closing
@@ -143,9 +143,9 @@ def _as_far_as_felt(mesh: SurfaceMesh, field: Gpis) -> SurfaceMesh:
 
 def closing_rays(table: Closing) -> ClosingRays:
     """The usable parts of a closing's paths as rays in the grasp frame."""
-    paths = [table.path(finger) for finger in FINGERS]
+    paths = [table.path(finger) for finger in table.fingers]
     return ClosingRays(
-        fingers=FINGERS,
+        fingers=table.fingers,
         starts_m=np.array([path.centre_m(path.valid[0]) for path in paths]),
         directions=np.array([path.direction for path in paths]),
         lengths_m=np.array([path.length_m * (path.valid[1] - path.valid[0]) for path in paths]),

@@ -75,7 +75,11 @@ def _run_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
         ),
         EvaluationRow("Contact error", _text(sensing.get("median_mm"), 2), "mm", _sensing_note(sensing)),
         EvaluationRow("Contacts", _text(evaluation.get("contacts"), 0), "", f"in {_of('grasp', grasps)}"),
-        EvaluationRow("Loops accepted", _text(loops.get("accepted"), 0), "", _loop_note(loops)),
+        *(
+            [EvaluationRow("Loops accepted", _text(loops["accepted"], 0), "", _loop_note(loops))]
+            if loops.get("tested")
+            else []
+        ),
         EvaluationRow("Marker sightings", _text(truth.get("seen"), 0), "", f"{_of('grasp', missing)} without one"),
         EvaluationRow("Step time", _text(time.get("step_ms_median"), 0), "ms", spread),
         EvaluationRow("Tracking", str(evaluation.get("status", UNKNOWN)), "", "ok or lost"),

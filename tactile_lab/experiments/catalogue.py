@@ -31,6 +31,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         exploration.EXPLORATION_HAND,
         exploration.EXPLORATION_KINEMATIC,
         everyday.EVERYDAY_OBJECTS,
+        everyday.HANDS,
         laboratory.CAMERA_TRUTH,
         laboratory.GRAPH_STRESS,
         laboratory.CALIBRATE_FOREARM,

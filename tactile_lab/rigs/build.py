@@ -12,7 +12,6 @@ from drivers.camera.camera import Camera
 from drivers.camera.markers import MarkerSettings
 from drivers.core.clock import NANOSECONDS, Clock, VirtualClock
 from drivers.core.configuration import load_model
-from drivers.core.contacts import FINGERS
 from drivers.core.errors import ConfigurationError
 from drivers.core.fingertip import FingertipCalibration
 from drivers.core.transports import ReplayTransport, TappedTransport, Transport
@@ -21,7 +20,6 @@ from drivers.positioner.kinematics import mount_T_forearm
 from drivers.shadow.closing.posture import TipEllipsoid
 from drivers.shadow.device.hand import ShadowHand
 from drivers.shadow.device.hand_samples import HandDecoder
-from drivers.shadow.model.hand_info import check_modelled
 from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_images import PALMS
@@ -34,8 +32,10 @@ from sessions.recording.recorder import Recorder
 from sessions.rig_runtime.rig_runtime import RigRuntime
 from sessions.rig_runtime.sensor_stream import SensorStream
 from tactile_lab.rigs.description import Rig
-from tactile_lab.rigs.wired import camera_source, force_wire, hand_setup, simulation_settings, tactile_of
+from tactile_lab.rigs.wired import camera_source, force_wire, hand_form, hand_setup, simulation_settings, tactile_of
 from tactile_lab.rigs.wires import LocalCamera
+
+_LEAST_FINGERS = 3
 
 
 def check_calibration(rig: Rig) -> None:
@@ -44,17 +44,30 @@ def check_calibration(rig: Rig) -> None:
     Raises:
         ConfigurationError: an invalid file, with its name.
     """
+    _check_fingers(rig)
     build_interpreter(rig)
-    MotorMap.load(rig.files["motors"])
     if rig.description.wires is not None:
-        setup = hand_setup(rig)
-        setup.check_files()
-        check_modelled(setup.motors, setup.infos())
+        hand_setup(rig).check_files()
     if "camera" in rig.files:
         load_camera(rig.files["camera"])
         load_model(rig.files["markers"], MarkerSettings)
         if rig.description.wires is not None and isinstance(camera := rig.description.wires.camera, LocalCamera):
             camera_source(rig, camera)
+
+
+def _check_fingers(rig: Rig) -> None:
+    """Raises ConfigurationError where the hand has too few fingers for a grasp, or lacks one that has a wire."""
+    form, wires = hand_form(rig), rig.description.wires
+    if len(form.fingers) < _LEAST_FINGERS:
+        what = f"is of a hand with {' and '.join(form.fingers)} only: a grasp needs three fingers"
+        hint = "A rig of kind hand can check it, joint by joint"
+        raise ConfigurationError(what, where=str(rig.files["motors"]), hint=hint)
+    wired = () if wires is None else wires.fingertips
+    if strange := [finger for finger in wired if finger not in form.fingers]:
+        what = f"names {', '.join(strange)}, but the hand has {', '.join(form.fingers)}"
+        raise ConfigurationError(
+            what, where=f"{rig.source}: wires.fingertips", hint="Remove what the hand does not have"
+        )
 
 
 def simulated_world(rig: Rig, seed: int, object_name: str) -> SimulatedWorld:
@@ -64,7 +77,9 @@ def simulated_world(rig: Rig, seed: int, object_name: str) -> SimulatedWorld:
         ConfigurationError: no such object, a mesh that cannot be used, or no calibration of the fingertips for it.
     """
     settings = simulation_settings(rig, object_name)
-    return SimulatedWorld(settings, seed, SimulatedCalibration.with_tips(settings.fingertips, rig.files["fingertips"]))
+    files = rig.files
+    calibration = SimulatedCalibration.of_hand(settings.fingertips, files["fingertips"], files["motors"])
+    return SimulatedWorld(settings, seed, calibration)
 
 
 def build_runtime(rig: Rig, world: SimulatedWorld, recorder: Recorder) -> RigRuntime:
@@ -102,7 +117,7 @@ def build_interpreter(rig: Rig) -> Interpreter:
     linked = {f: _decoder(rig, kind, f, tip, clock) for f, tip in tips.items()} if isinstance(kind, LinkedKind) else {}
     settings = description.fingertip_settings
     slots = {f: kind.sensor(f, tip, settings) for f, tip in tips.items()} if isinstance(kind, PalmKind) else {}
-    forearm = load_forearm(rig.files["forearm"])
+    forearm, form = load_forearm(rig.files["forearm"]), hand_form(rig)
     perception = Perception(
         wrench_fingertips=linked,
         slot_fingertips=slots,
@@ -111,10 +126,11 @@ def build_interpreter(rig: Rig) -> Interpreter:
         mount_covariance=forearm.covariance(),
         tip_surfaces={finger: _tip_surface(kind, tip) for finger, tip in tips.items()},
         settings=description.perception,
+        form=form,
     )
     return Interpreter(
         perception,
-        hand=HandDecoder(JointCalibration.load(rig.files["joints"]), PALMS[description.hand.palm]),
+        hand=HandDecoder(JointCalibration.load(rig.files["joints"], form.joints), PALMS[description.hand.palm]),
         base=description.positioner_kind.device(_silent(BASE_LINK), clock, description.base),
         wrenches=linked,
         camera=Camera(_silent(CAMERA_LINK), clock) if "camera" in rig.files else None,
@@ -125,7 +141,8 @@ def build_interpreter(rig: Rig) -> Interpreter:
 def _hand(rig: Rig, transport: Transport, clock: Clock) -> ShadowHand:
     description = rig.description
     settings = description.hand.model_copy(update={"cycle_s": description.cycle_s, "tactile": tactile_of(rig)})
-    joints, motors = JointCalibration.load(rig.files["joints"]), MotorMap.load(rig.files["motors"])
+    motors = MotorMap.load(rig.files["motors"])
+    joints = JointCalibration.load(rig.files["joints"], hand_form(rig).joints)
     return ShadowHand(transport, clock, joints, settings, motors)
 
 
@@ -143,7 +160,7 @@ def fitted_tips(rig: Rig) -> dict[str, Any]:
         raise ConfigurationError(
             what, where=rig.source, hint="Calibrate the finger, or remove it from wires.fingertips"
         )
-    return {finger: known[finger] for finger in FINGERS if finger in fitted}
+    return {finger: known[finger] for finger in hand_form(rig).fingers if finger in fitted}
 
 
 def force_tips(rig: Rig) -> dict[str, FingertipCalibration]:

@@ -92,10 +92,11 @@ def emulated_hand(rig: HandRig) -> Iterator[dict[str, str]]:
         raise ConfigurationError(
             "far_end is missing, so there is no interface for the emulator", where=rig.source, hint=hint
         )
-    serial = _EMULATED_SERIAL if description.ethercat.serial is None else description.ethercat.serial
-    palm, tactile = rig.setup.stated_palm or USUAL_PALM, description.hand.tactile
+    setup = rig.setup
+    serial = _EMULATED_SERIAL if (told := setup.wiring().serial) is None else told
+    palm, tactile = setup.stated_palm or USUAL_PALM, description.hand.tactile
     settings = ChainSettings(palm=palm, serial=serial, eeprom="mapped", tactile=tactile)
-    with EmulatedHandProcess(description.far_end, rig.folder / description.calibration.joints, settings):
+    with EmulatedHandProcess(description.far_end, setup.joints, settings, setup.motors, setup.gains):
         yield {"hand": f"hand {serial} at {description.far_end}"}
 
 

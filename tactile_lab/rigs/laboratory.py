@@ -19,7 +19,7 @@ from sessions.recording.recorder import Recorder, TrafficSink
 from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import Rig
-from tactile_lab.rigs.wired import emulation_plan, with_palm
+from tactile_lab.rigs.wired import emulation_plan, with_form, with_palm
 from tactile_lab.rigs.wired_runtime import build_wired_runtime
 
 
@@ -27,7 +27,8 @@ class Laboratory(Protocol):
     """A place with devices.
 
     Attributes:
-        rig: what is there, with the palm that was found on the hand's cable where the file leaves that open.
+        rig: what is there: with the hand's side and fingers, and the palm that was found on its cable, where the file
+            leaves them open.
         markers: of the rig with this object, for the truth.
         target: the object, where its shape is known.
     """
@@ -107,6 +108,7 @@ def open_laboratory(rig: Rig, seed: int, object_name: str) -> Iterator[Simulated
         DeviceError: a emulator cannot be started, or the rig leaves it to the hand's cable which palm there is, and
             none that can be driven is found.
     """
+    rig = with_form(rig)
     if rig.description.kind == "simulated":
         yield SimulatedLaboratory(rig, simulated_world(rig, seed, object_name))
     elif rig.description.emulated:

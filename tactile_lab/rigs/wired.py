@@ -20,11 +20,15 @@ from drivers.fingertips.kinds import WIRES
 from drivers.fingertips.wiring import make_wire
 from drivers.force.wire_settings import WireSettings
 from drivers.shadow.device.hand_setup import HandSetup
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
+from drivers.shadow.model.hand_info import HandStatement, load_infos, told_form
 from drivers.shadow.protocol.palm_images import USUAL_PALM
 from drivers.simulation.settings import SimulationSettings
 from sessions.perception.interpreter import HAND_LINK
 from tactile_lab.rigs.description import Rig, wire_role
 from tactile_lab.rigs.wires import LocalCamera, RemoteCamera, Wires
+
+_HAND_FILES = ("joints", "motors", "boards", "rates", "gains")
 
 
 def wires_of(rig: Rig) -> Wires:
@@ -38,7 +42,7 @@ def hand_setup(rig: Rig) -> HandSetup:
     description, files, wiring = rig.description, rig.files, wires_of(rig).hand
     return HandSetup(
         name=HAND_LINK,
-        ethercat=wiring.ethercat.model_copy(update={"side": "right"}),  # the side that the kinematics are of
+        ethercat=wiring.ethercat,
         master=wiring.master,
         hand=description.hand.on_wire.model_copy(update={"tactile": tactile_of(rig)}),
         joints=files["joints"].resolve(),
@@ -59,7 +63,49 @@ def simulation_settings(rig: Rig, object_name: str) -> SimulationSettings:
     """The simulated world of a rig, with the rig's own settings."""
     description = rig.description
     changes = {"object": object_name, "fingertips": description.fingertips, "positioner": description.positioner}
+    if "side" not in description.simulation.model_fields_set:
+        changes["side"] = hand_form(rig).side
     return description.simulation.model_copy(update=changes)
+
+
+def hand_form(rig: Rig) -> HandForm:
+    """Which hand a rig has, by the hand's own files and the rig's.
+
+    Raises:
+        ConfigurationError: they contradict each other.
+    """
+    stated = rig.description.hand
+    where = f"{rig.source}: hand"
+    infos = load_infos(rig.files[role] for role in _HAND_FILES if role in rig.files)
+    return told_form(rig.files["motors"], infos, HandStatement(where, stated.side, stated.fingers))
+
+
+def require_right_hand(rig: Rig) -> None:
+    """Refuse to calibrate with a hand of another form: the calibrations' plans and problems are the full right hand's.
+
+    Raises:
+        ConfigurationError: it is a left hand, or one with fewer joints.
+    """
+    if (form := hand_form(rig)) != RIGHT_HAND:
+        what = f"has a {form}: calibrations that move the hand are made for right hands with five fingers and a wrist"
+        hint = (
+            "Measure the forearm's pose (calibrate forearm --method manual); keep the delivered joints and fingertips"
+        )
+        raise ConfigurationError(what, where=rig.source, hint=hint)
+
+
+def with_form(rig: Rig) -> Rig:
+    """A rig with its hand's side and fingers named, so that a session keeps which hand it was.
+
+    A simulated hand is of that side too, unless the rig says otherwise.
+    """
+    form, description = hand_form(rig), rig.description
+    changes: dict[str, object] = {
+        "hand": description.hand.model_copy(update={"side": form.side, "fingers": form.fingers})
+    }
+    if "side" not in description.simulation.model_fields_set:
+        changes["simulation"] = description.simulation.model_copy(update={"side": form.side})
+    return replace(rig, description=description.model_copy(update=changes))
 
 
 def with_palm(rig: Rig, clock: Clock) -> Rig:
@@ -136,13 +182,15 @@ def _hand_place(rig: Rig) -> HandPlace:
     if wiring.far_end is None:
         hint = "Give the other end of the virtual cable, as in the built-in rig sim-wire"
         raise ConfigurationError("emulators need wires.hand.far_end", where=rig.source, hint=hint)
+    setup = hand_setup(rig)
+    serial = setup.wiring().serial
     return HandPlace(
         near=wiring.ethercat.interface,
         far=wiring.far_end,
         joints=rig.files["joints"].resolve(),
         motors=rig.files["motors"].resolve(),
-        palm=hand_setup(rig).stated_palm or USUAL_PALM,
-        serial=SERIAL if wiring.ethercat.serial is None else wiring.ethercat.serial,
+        palm=setup.stated_palm or USUAL_PALM,
+        serial=SERIAL if serial is None else serial,
     )
 
 

@@ -109,7 +109,6 @@ class TactileSlam:
             back_end = back_end.model_copy(update={"enabled": False})
         self._back_end = BackEnd(
             back_end,
-            each_grasp=self._settings.method != "joint",
             as_printed=self._settings.method in THESIS_METHODS,
             noise=self._settings.motion,
         )

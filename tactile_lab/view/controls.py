@@ -109,7 +109,7 @@ def status_html(scene: Scene) -> str:
 def forces_html(scene: Scene) -> str:
     """A bar for the force on each fingertip."""
     cells = []
-    for finger in FINGERS:
+    for finger in [finger for finger in FINGERS if finger in scene.loads_N] or FINGERS:
         load_N = scene.loads_N.get(finger, 0.0)
         share = 0.0 if load_N is None else min(1.0, load_N / 1.5)
         colour = "#f0aa1e" if load_N is None else "#2ea043" if load_N > 0.1 else "#969eaa"

@@ -9,12 +9,13 @@ import numpy as np
 import viser
 from gtsam import Pose3
 
-from drivers.core.contacts import FINGERS, Array
+from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import CLOSINGS, closing
+from drivers.shadow.closing.posture import HandShape
 from sessions.recording.traffic import foxglove
 from tactile_lab.colours import viridis
 from tactile_lab.view.scene import Scene, ShownSurface, SIGMA_FULL_m, ellipse
-from tactile_lab.view.skeleton import TIP_CENTRE_m, bones
+from tactile_lab.view.skeleton import TIP_CENTRE_m, bones, shown_form
 
 TIP_RADIUS_m = 0.0085
 _BONE, _IDLE, _TOUCHING, _SILENT = (120, 126, 138), (150, 158, 170), (46, 160, 67), (240, 170, 30)
@@ -185,11 +186,12 @@ class Drawing:
         if plan.get("closing") not in CLOSINGS:
             self._replace("plan", [])
             return
-        table = closing(plan["closing"], float(plan["height_m"]))
+        form = shown_form(scene.world_T_palm, scene.world_T_distal)
+        table = closing(plan["closing"], float(plan["height_m"]), HandShape(form=form))
         c, s = np.cos(plan["yaw_rad"]), np.sin(plan["yaw_rad"])
         turn, place = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([plan["x_m"], plan["y_m"], 0.0])
         ways = []
-        for finger in FINGERS:
+        for finger in table.fingers:
             path = table.path(finger)
             ends = np.array([path.centre_m(path.valid[1]), path.centre_m(path.valid[0])])
             ways.append((ends @ turn.T + place)[::-1])

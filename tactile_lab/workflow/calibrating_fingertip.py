@@ -22,6 +22,7 @@ from sessions.recording.recorder import TrafficSink
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.laboratory import connected_runtime
+from tactile_lab.rigs.wired import require_right_hand
 from tactile_lab.workflow.calibrating_forearm import clear_table, tip_shapes
 
 
@@ -75,6 +76,7 @@ def fingertip_wizard(
         DeviceError: the rig is not ready.
     """
     rig = load_rig(request.rig)
+    require_right_hand(rig)
     check_calibration(rig)
     before = force_fingertips(rig, request.finger)[request.finger]
     if request.finger not in LONG_FINGERS:

@@ -33,6 +33,7 @@ from sessions.recording.recorder import TrafficSink
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.laboratory import connected_runtime
+from tactile_lab.rigs.wired import require_right_hand
 from tactile_lab.workflow.calibrating_forearm import clear_table, tip_shapes
 
 BLOCK = "box-12x6x6"
@@ -109,6 +110,7 @@ def from_file(source: Path, rig: Rig, settings: JointSettings) -> FoundJoints:
     here = rig.installation
     if not _holds_touches(source):
         return from_known(load_poses(source, here).poses)
+    require_right_hand(rig)
     data = load_data(source)
     check_origin(data, here, str(source))
     if not data.touches:
@@ -185,6 +187,7 @@ def joint_wizard(request: JointRequest, onlooker: TrafficSink) -> Iterator[tuple
         DeviceError: the rig is not ready.
     """
     rig = load_rig(request.rig)
+    require_right_hand(rig)
     check_calibration(rig)
     block, tips = _block(rig, request), tip_shapes(rig)
     if unknown := sorted(set(request.fingers) - (set(LONG_FINGERS) & set(tips))):

@@ -14,7 +14,7 @@ from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import GraspFrame, Motion
 from sessions.motion.safety import SafetySettings, SafetySupervisor
 from sessions.recording.recorder import Recorder
-from tactile_lab.autonomy.autonomous_roles import tip_shape
+from tactile_lab.autonomy.autonomous_roles import hand_shape
 from tactile_lab.autonomy.collision_check import links_are_clear, standing
 from tactile_lab.rigs.build import build_runtime
 from tactile_lab.rigs.description import load_rig
@@ -39,7 +39,7 @@ def test_the_hand_comes_down_over_a_cube_of_6_cm_only_where_its_links_are_clear(
     runtime.connect()
     try:
         motion = Motion(runtime, SafetySupervisor(runtime, SafetySettings(), runtime.cycle_ns))
-        cycle = GraspCycle(motion, CycleSettings(), tip_shape(runtime))
+        cycle = GraspCycle(motion, CycleSettings(), hand_shape(runtime))
         before = world.truth().world_T_object
         assert cycle.descend(plan) is clear
         if clear:
@@ -50,5 +50,5 @@ def test_the_hand_comes_down_over_a_cube_of_6_cm_only_where_its_links_are_clear(
         runtime.close()
     known = standing(solid_box(0.060, 0.030, 0.030), Pose2(), 0.060)
     assert known is not None
-    assert bool(links_are_clear([plan], tip_shape(runtime), known)[0]) is clear
+    assert bool(links_are_clear([plan], hand_shape(runtime), known)[0]) is clear
     assert moved_m < 0.002

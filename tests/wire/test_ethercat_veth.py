@@ -64,7 +64,7 @@ def fresh(hand: ShadowHand) -> bool:
     return hand.exchange().fresh
 
 
-@pytest.mark.parametrize("palm", ["0220", "0230", "0240"])
+@pytest.mark.parametrize("palm", ["0220", "0230", "0240", "0250"])
 def test_a_bare_hand_reaches_op_and_exchanges_its_image(ends: tuple[str, str], palm: Any) -> None:
     runtime = RigRuntime(ends[0])
     with EmulatedHandProcess(ends[1], JOINTS, ChainSettings(palm=palm)) as emulator:

@@ -16,6 +16,7 @@ from tactile_lab.rigs.checks.check import check_rig
 from tactile_lab.rigs.emulate import emulated_hand
 from tactile_lab.rigs.hand_rig import load_hand_rig
 from tests.support.ethercat_wire import JOINTS, cable
+from tests.support.hand_folders import FOLDERS, write_folder
 
 CALIBRATIONS = ("calibration joints", "calibration motors")
 
@@ -60,6 +61,19 @@ def test_a_motor_map_is_checked_by_moving_when_asked(tmp_path: Path) -> None:
         findings = {finding.device: finding for finding in check_rig(str(file), move=True)}
     assert not findings["motor map"].ok
     assert "moves MFJ3, but the motor map says FFJ3" in findings["motor map"].detail
+
+
+def test_a_lite_hand_is_emulated_by_its_own_folder_and_moves_motor_by_motor(tmp_path: Path) -> None:
+    folder = write_folder(tmp_path / "4711", next(kind for kind in FOLDERS if kind.name == "rh_extra_lite_v1"))
+    files = {"joints": str(folder.joints), "motors": str(folder.motors), "gains": str(folder.gains)}
+    with cable("r") as (near, far):
+        file = rig_file(tmp_path, near, far_end=far, hand={"palm": "0250"}, calibration=files)
+        with emulated_hand(load_hand_rig(file)):
+            findings = {finding.device: finding for finding in check_rig(str(file), move=True)}
+    assert findings["ring"].detail.startswith("hand 4711, palm 0250 revision 1, in operation")
+    assert "10 of 10 answer" in findings["motors"].detail
+    assert findings["joint sensors"].detail == "all 14 within their range"
+    assert findings["motor map"].detail == "each of 10 motors moves its own joint"
 
 
 def test_a_simulated_rig_has_no_motors_to_nudge() -> None:

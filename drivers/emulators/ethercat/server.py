@@ -25,7 +25,10 @@ from drivers.emulators.ethercat.shadow_chain import ChainSettings, EmulatedHand,
 from drivers.emulators.ethercat.stamped_port import StampedPort
 from drivers.ethercat.registers import AlState
 from drivers.shadow.device.real_time import request_real_time
+from drivers.shadow.model.gains import load_gains
+from drivers.shadow.model.hand_form import HandForm
 from drivers.shadow.model.joint_calibration import JointCalibration
+from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_codec import CanFrame
 
 _IDLE_s, _LOOK_ns = 0.02, 5_000_000
@@ -120,14 +123,20 @@ def main() -> None:
     clock = MonotonicClock()
     with errors_said():
         start = json.loads(sys.stdin.readline())
-        calibration = JointCalibration.load(Path(start["joints"]))
+        motors = _motor_map(start)
+        calibration = JointCalibration.load(Path(start["joints"]), HandForm(driven=motors.driven).joints)
         can = MotorCanBuses()
         time, port = VirtualClock(clock.now_ns()), StampedPort(start["interface"], clock)
-        hand = emulated_hand(time, calibration, ChainSettings(**start["settings"]), can=can)
+        hand = emulated_hand(time, calibration, ChainSettings(**start["settings"]), motors, can)
         port.open()
         say({"ready": True})
         request_real_time()
         HandServer(hand, time, port, can, clock).run()
+
+
+def _motor_map(start: dict[str, Any]) -> MotorMap:
+    motors = MotorMap.load(Path(start["motors"]) if start["motors"] else None)
+    return motors.reverse(load_gains(Path(start["gains"]), motors.driven).backwards) if start["gains"] else motors
 
 
 class EmulatedHandProcess:
@@ -137,12 +146,23 @@ class EmulatedHandProcess:
         interface: network interface that it serves.
         joints: joint calibration file, used in reverse.
         settings: the kind of hand.
+        motors: motor map; the simulated hand's unless given.
+        gains: Shadow's gains, whose signs tell which motors turn backwards; none does unless given.
     """
 
-    def __init__(self, interface: str, joints: Path, settings: ChainSettings | None = None) -> None:
+    def __init__(
+        self,
+        interface: str,
+        joints: Path,
+        settings: ChainSettings | None = None,
+        motors: Path | None = None,
+        gains: Path | None = None,
+    ) -> None:
         self._start = {
             "interface": interface,
             "joints": str(joints),
+            "motors": str(motors or ""),
+            "gains": str(gains or ""),
             "settings": dataclasses.asdict(settings or ChainSettings()),
         }
         self._child = ChildProcess("drivers.emulators.ethercat.server", "emulated hand")

@@ -68,7 +68,7 @@ class CameraHost:
 def make(start: dict[str, Any], clock: Clock) -> CameraHost:
     """The camera at ``host`` and ``port``, in a simulated rig with these settings and this seed."""
     settings = SimulationSettings.model_validate(start["simulation"])
-    tips = SimulatedCalibration.with_tips(settings.fingertips, Path(start["tips"]))
+    tips = SimulatedCalibration.of_hand(settings.fingertips, Path(start["tips"]), Path(start["motors"]))
     world = SimulatedWorld(settings, start["seed"], tips)
     emulator = world.build_camera(PlantMirror(Path(start["mirror"]), clock))
     return CameraHost(emulator, bind_socket(socket.SOCK_STREAM, start["host"], start["port"], "camera"))

@@ -141,7 +141,7 @@ class EmulatedLaboratory:
         self._open.enter_context(virtual_cable(plan.hand.near, plan.hand.far))
         memory = Path(self._open.enter_context(tempfile.TemporaryDirectory(prefix="tactile-lab-"))) / "plant"
         self._mirror = PlantMirror.create(memory, self._clock, START_BASE)
-        world = {**_world(plan), "tips": str(plan.tips)}
+        world = {**_world(plan), "tips": str(plan.tips), "motors": str(plan.hand.motors)}
         positioner = POSITIONERS[plan.simulation.positioner]
         self._add("plant", "plant", memory, **world)
         self._add("base", positioner.emulator_host, memory, **plan.base)
@@ -169,7 +169,6 @@ def _hand(hand: HandPlace) -> dict[str, Any]:
     return {
         "far_end": hand.far,
         "joints": str(hand.joints),
-        "motors": str(hand.motors),
         "palm": hand.palm,
         "serial": hand.serial,
     }

@@ -17,6 +17,7 @@ from drivers.emulators.laboratory.plant_mirror import PlantMirror
 from drivers.fingertips.kind import PalmKind
 from drivers.fingertips.kinds import FINGERTIPS
 from drivers.shadow.device.real_time import request_real_time
+from drivers.shadow.model.hand_form import HandForm
 from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.model.motors import MotorMap
 from drivers.simulation.fingertips import tactile_section
@@ -48,12 +49,12 @@ def make(start: dict[str, Any], clock: Clock) -> HandHost:
         ConfigurationError: a file cannot be used.
     """
     can, time = MotorCanBuses(), VirtualClock(clock.now_ns())
-    mirror = PlantMirror(Path(start["mirror"]), time)
+    mirror, motors = PlantMirror(Path(start["mirror"]), time), MotorMap.load(Path(start["motors"]))
     hand = emulated_hand(
         time,
-        JointCalibration.load(Path(start["joints"])),
+        JointCalibration.load(Path(start["joints"]), HandForm(driven=motors.driven).joints),
         ChainSettings(palm=start["palm"], eeprom="mapped", serial=start["serial"], seed=start["seed"]),
-        MotorMap.load(Path(start["motors"])),
+        motors,
         can,
         mirror,
         SimulationSettings.model_validate(start["simulation"]).joint_sensors,

@@ -73,13 +73,13 @@ class PlantHost:
             plant.world_T_object,
         )
         if self._touches:
-            self._mirror.publish_touches(plant.contacts(), [plant.world_T_distal(finger) for finger in FINGERS])
+            self._mirror.publish_touches(plant.contacts(), [plant.world_T_distal(f) for f in FINGERS])
 
 
 def make(start: dict[str, Any], clock: Clock) -> PlantHost:
     """The plant of a simulated rig with these settings and this seed, published in the memory at ``mirror``."""
     settings = SimulationSettings.model_validate(start["simulation"])
-    tips = SimulatedCalibration.with_tips(settings.fingertips, Path(start["tips"]))
+    tips = SimulatedCalibration.of_hand(settings.fingertips, Path(start["tips"]), Path(start["motors"]))
     world = SimulatedWorld(settings, start["seed"], tips)
     mirror = PlantMirror(Path(start["mirror"]), clock)
     mirror.move_base(world.plant.base)

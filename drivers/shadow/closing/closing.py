@@ -2,8 +2,9 @@
 
 A closing is described in the *grasp frame*: origin on the table below the middle of the grasp, z up, the four fingers
 on the +x side and the thumb on the -x side, the first finger towards +y. Every fingertip's centre runs along a
-straight line, horizontal where the hand is upright; the palm stands still above. The whole grasp is then three numbers
-(x, y, yaw of the grasp frame in the world) and one progress ``u`` in 0..1 for each finger, so that a contact is
+straight line, horizontal where the hand is upright; the palm stands still above. A left hand closes as the mirror
+image in the frame's x-z plane: its first finger is towards -y. The whole grasp is then three numbers (x, y, yaw of the
+grasp frame in the world) and one progress ``u`` in 0..1 for each finger, so that a contact is
 predicted by intersecting a line with a surface.
 
 The postures are solved once for each closing and height (:mod:`drivers.shadow.closing.posture`, a fraction of a second)
@@ -19,9 +20,10 @@ from functools import lru_cache
 import numpy as np
 from gtsam import Pose3, Rot3
 
-from drivers.core.contacts import FINGERS, Array
+from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
-from drivers.shadow.closing.posture import LONG_FINGERS, NODES, TipEllipsoid, finger_joints, solve_postures
+from drivers.shadow.closing.posture import LONG_FINGERS, NODES, HandShape, moved_joints, solve_postures
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 
 Point = tuple[float, float]
 
@@ -72,8 +74,9 @@ class Closing:
         grasp_T_palm: the palm in the grasp frame, wrist straight.
         paths: each finger's line.
         tables: each finger's joint angles along its line, shape (NODES, joints of the finger), radians, in the order
-            of :func:`finger_joints`.
+            of :func:`moved_joints`.
         approach: unit direction in which the open hand comes to the grasp, grasp frame.
+        form: of the hand.
     """
 
     name: str
@@ -83,6 +86,12 @@ class Closing:
     paths: Mapping[str, TipPath]
     tables: Mapping[str, Array]
     approach: tuple[float, float, float] = (0.0, 0.0, -1.0)
+    form: HandForm = RIGHT_HAND
+
+    @property
+    def fingers(self) -> tuple[str, ...]:
+        """The fingers that close, in the order of :data:`~drivers.core.contacts.FINGERS`."""
+        return self.form.fingers
 
     @property
     def is_sideways(self) -> bool:
@@ -101,7 +110,7 @@ class Closing:
         fraction = position - index
         table = self.tables[finger]
         row = (1 - fraction) * table[index] + fraction * table[index + 1]
-        return dict(zip(finger_joints(finger), row.tolist(), strict=True))
+        return dict(zip(moved_joints(finger, self.form), row.tolist(), strict=True))
 
     def joints(self, finger: str, u: float) -> dict[str, float]:
         """Targets of one finger's motors at progress ``u``: the coupled distal pair as J0 = J1 + J2, radians."""
@@ -153,6 +162,25 @@ PRESHAPES: Mapping[str, Preshape] = {
 """The closings: four parallel fingers against the thumb, and first and little finger coming in from the sides."""
 
 
+NARROW_PRESHAPES: Mapping[str, Preshape] = {
+    "pinch": Preshape(
+        starts_m={finger: (x, y - 0.010) for finger, (x, y) in PRESHAPES["pinch"].starts_m.items()},
+        ends_m={finger: (x, y - 0.010) for finger, (x, y) in PRESHAPES["pinch"].ends_m.items()},
+    ),
+    "radial": Preshape(
+        starts_m={**PRESHAPES["radial"].starts_m, "RF": (0.062, -0.042)},
+        ends_m={**PRESHAPES["radial"].ends_m, "RF": (0.012, -0.014)},
+    ),
+}
+"""The same for hands without a little finger: the others stand about the middle, and the ring finger comes in from the
+side in its place."""
+
+
+def preshape_of(name: str, form: HandForm) -> Preshape:
+    """The lines of an upright closing's fingertips."""
+    return (PRESHAPES if "LF" in form.fingers else NARROW_PRESHAPES)[name]
+
+
 @dataclass(frozen=True)
 class Leaning:
     """A hand that comes from the side: an upright closing turned about the grasp frame's x axis, first finger down.
@@ -179,9 +207,9 @@ SIDEWAYS: Mapping[str, Leaning] = {
     for upright, height_m in _LOW_m.items()
     for side, lean_rad in (("left", np.pi / 2), ("right", -np.pi / 2))
 }
-"""Closings with the palm upright, the fingertips one above the other. The hand comes along the grasp frame's -y axis
-from its left, first finger down, or along +y from its right, first finger up (decision 45). The forearm, 100 mm thick,
-keeps the lowest fingertip at 18 mm from the left and at 30 mm from the right."""
+"""Closings of a right hand with the palm upright, the fingertips one above the other. The hand comes along the grasp
+frame's -y axis from its left, first finger down, or along +y from its right, first finger up (decision 45). The
+forearm, 100 mm thick, keeps the lowest fingertip at 18 mm with the first finger down and at 30 mm with it up."""
 
 SIDES = ("left", "right")
 """Where the palm may stand in a closing of :data:`SIDEWAYS`, seen along the grasp frame's x axis."""
@@ -195,11 +223,31 @@ def sideways(upright: str, side: str) -> str:
     return f"{upright}-from-{side}"
 
 
+def side_with_first_finger_down(form: HandForm) -> str:
+    """From which of :data:`SIDES` the hand comes lowest."""
+    return "right" if form.is_left else "left"
+
+
+def mirrored_closing(name: str) -> str:
+    """The closing of the other hand whose mirror image has that name: what comes from the left comes from the right."""
+    upright, found, side = name.rpartition("-from-")
+    return sideways(upright, SIDES[1 - SIDES.index(side)]) if found else name
+
+
+MIRROR = np.array([1.0, -1.0, 1.0])
+"""What mirrors places in the grasp frame's x-z plane, one hand's into the other's."""
+
+
 @lru_cache(maxsize=64)
-def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Closing:
+def closing(name: str, height_m: float, hand: HandShape | None = None) -> Closing:
     """The closing path table of one preshape at one height of the fingertip centres; kept in memory.
 
     Where the hand leans it is the height of the lowest fingertip's centre.
+
+    Args:
+        name: one of :data:`CLOSINGS`.
+        height_m: see above.
+        hand: that closes; the right one with five usual fingertips unless given.
 
     Raises:
         ConfigurationError: no such closing, or a height the hand cannot work at.
@@ -212,25 +260,44 @@ def closing(name: str, height_m: float, tip: TipEllipsoid | None = None) -> Clos
         raise ConfigurationError(
             f"contact height {height_m * 1e3:.0f} mm is outside {allowed}", hint="Choose a height in that range"
         )
+    hand = hand or HandShape()
+    if hand.form.is_left:
+        return _mirror(name, closing(mirrored_closing(name), height_m, hand.mirrored))
     if name in LEANING:
-        return _leaning(name, LEANING[name], height_m, tip)
+        return _leaning(name, LEANING[name], height_m, hand)
     if name in SIDEWAYS:
         side = 1.0 if SIDEWAYS[name].lean_rad > 0.0 else -1.0
-        return replace(_leaning(name, SIDEWAYS[name], height_m, tip), approach=(0.0, -side, 0.0))
+        return replace(_leaning(name, SIDEWAYS[name], height_m, hand), approach=(0.0, -side, 0.0))
+    return _upright(name, height_m, hand)
+
+
+def _upright(name: str, height_m: float, hand: HandShape) -> Closing:
+    fingers, preshape = hand.form.fingers, preshape_of(name, hand.form)
     starts_m, ends_m = (
-        np.array([(*points[finger], height_m) for finger in FINGERS])
-        for points in (PRESHAPES[name].starts_m, PRESHAPES[name].ends_m)
+        np.array([(*points[finger], height_m) for finger in fingers]) for points in (preshape.starts_m, preshape.ends_m)
     )
-    tip = tip or TipEllipsoid()
-    postures = solve_postures(starts_m, ends_m, tip)
+    postures = solve_postures(starts_m, ends_m, hand)
     paths = {
-        finger: TipPath(starts_m[index], ends_m[index], postures.valid[finger]) for index, finger in enumerate(FINGERS)
+        finger: TipPath(starts_m[index], ends_m[index], postures.valid[finger]) for index, finger in enumerate(fingers)
     }
-    return Closing(name, height_m, tip.radius_m, postures.grasp_T_palm, paths, postures.tables_rad)
+    return Closing(name, height_m, hand.radius_m, postures.grasp_T_palm, paths, postures.tables_rad, form=hand.form)
 
 
-def _leaning(name: str, leaning: Leaning, height_m: float, tip: TipEllipsoid | None) -> Closing:
-    upright = closing(leaning.upright, leaning.height_m, tip)
+def _mirror(name: str, table: Closing) -> Closing:
+    """A right hand's closing as the left hand does it."""
+    x, y, z = table.approach
+    turn, place = table.grasp_T_palm.rotation().matrix(), table.grasp_T_palm.translation()
+    grasp_T_palm = Pose3(Rot3(MIRROR[:, None] * turn * _PALM_MIRROR), MIRROR * place)
+    paths = {f: TipPath(MIRROR * path.start_m, MIRROR * path.end_m, path.valid) for f, path in table.paths.items()}
+    form = table.form.mirrored
+    return replace(table, name=name, grasp_T_palm=grasp_T_palm, paths=paths, approach=(x, -y, z), form=form)
+
+
+_PALM_MIRROR = np.array([-1.0, 1.0, 1.0])  # a left palm is the mirror image in x = 0 of its own frame
+
+
+def _leaning(name: str, leaning: Leaning, height_m: float, hand: HandShape) -> Closing:
+    upright = closing(leaning.upright, leaning.height_m, hand)
     turn, middle_m = Rot3.Rx(-leaning.lean_rad), np.array([0.0, 0.0, upright.height_m])
     lowest_m = min(float(turn.rotate(path.start_m - middle_m)[2]) for path in upright.paths.values())
     lean = Pose3(turn, np.array([0.0, 0.0, height_m - lowest_m]) - turn.rotate(middle_m))
@@ -238,7 +305,7 @@ def _leaning(name: str, leaning: Leaning, height_m: float, tip: TipEllipsoid | N
         finger: TipPath(lean.transformFrom(path.start_m), lean.transformFrom(path.end_m), path.valid)
         for finger, path in upright.paths.items()
     }
-    return Closing(name, height_m, upright.radius_m, lean * upright.grasp_T_palm, paths, upright.tables)
+    return replace(upright, name=name, height_m=height_m, grasp_T_palm=lean * upright.grasp_T_palm, paths=paths)
 
 
 _COUPLED = {f"{finger}{joint}": f"{finger}J0" for finger in LONG_FINGERS for joint in ("J1", "J2")}

@@ -6,18 +6,18 @@ tells; so geometry has to keep them off.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
 
 import numpy as np
 from gtsam import Pose3
 
-from drivers.core.contacts import FINGERS, Array
+from drivers.core.contacts import Array
 from drivers.core.poses import transform_points
-from drivers.shadow.closing.closing import Closing, closing
+from drivers.shadow.closing.closing import MIRROR, Closing, closing, mirrored_closing
 from drivers.shadow.closing.collision_spheres import link_balls
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.model.bodies import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Shape
 from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS, forearm_T_palm, link_T_matrices
 
@@ -44,19 +44,22 @@ class HandEnvelope:
 
 
 @lru_cache(maxsize=128)
-def open_hand(name: str, height_m: float, tip: TipEllipsoid) -> HandEnvelope:
+def open_hand(name: str, height_m: float, hand: HandShape) -> HandEnvelope:
     """The open hand in the closing of that name and height; kept in memory.
 
     Raises:
         ConfigurationError: no such closing, or a height the hand cannot work at.
     """
-    table, links = closing(name, height_m, tip), link_balls(name, height_m, tip)
+    if hand.form.is_left:
+        right = open_hand(mirrored_closing(name), height_m, hand.mirrored)
+        return replace(right, centres_m=right.centres_m * MIRROR)
+    table, links = closing(name, height_m, hand), link_balls(name, height_m, hand)
     first = np.argmax(links.usable, axis=0)[links.fingers]
-    tips_m = np.array([table.path(finger).centre_m(table.path(finger).valid[0]) for finger in FINGERS])
+    tips_m = np.array([table.path(finger).centre_m(table.path(finger).valid[0]) for finger in table.fingers])
     palm_m, palm_radii_m = _palm_and_forearm(table)
     return HandEnvelope(
         np.concatenate([palm_m, links.centres_m[first, np.arange(len(first))], tips_m]),
-        np.concatenate([palm_radii_m, links.radii_m, np.full(len(FINGERS), max(tip.semi_axes_m))]),
+        np.concatenate([palm_radii_m, links.radii_m, np.full(len(tips_m), max(hand.semi_axes_m))]),
     )
 
 

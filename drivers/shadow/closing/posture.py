@@ -10,14 +10,15 @@ Frame: the grasp frame of :mod:`drivers.shadow.closing.closing`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from gtsam import Pose3, Rot3
 from scipy.optimize import least_squares
 
 from drivers.core.contacts import FINGERS, Array
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS, JOINT_LIMITS_rad, palm_T_distal_matrices
 
 NODES = 16
@@ -51,13 +52,29 @@ class TipEllipsoid:
 
 
 @dataclass(frozen=True)
+class HandShape(TipEllipsoid):
+    """All that the way a hand closes depends on: its fingertips and its form.
+
+    Attributes:
+        form: side, fingers and joints.
+    """
+
+    form: HandForm = RIGHT_HAND
+
+    @property
+    def mirrored(self) -> HandShape:
+        """The same hand of the other side."""
+        return replace(self, form=self.form.mirrored)
+
+
+@dataclass(frozen=True)
 class Postures:
-    """Solved postures along five lines.
+    """Solved postures along the lines of a right hand's fingers.
 
     Attributes:
         grasp_T_palm: the palm in the grasp frame, wrist straight.
         tables_rad: each finger's joint angles along its line, shape (NODES, joints of the finger), in the order of
-            :func:`finger_joints`.
+            :func:`moved_joints`.
         valid: part of each line, as progress in 0..1, on which the tip keeps to it.
     """
 
@@ -66,20 +83,30 @@ class Postures:
     valid: Mapping[str, tuple[float, float]]
 
 
-def solve_postures(starts_m: Array, ends_m: Array, tip: TipEllipsoid) -> Postures:
-    """Postures with the tip centres on the lines from ``starts_m`` to ``ends_m``, both (5, 3), grasp frame."""
-    return _Solver(starts_m, ends_m, tip).solve()
+def solve_postures(starts_m: Array, ends_m: Array, hand: HandShape) -> Postures:
+    """Postures of a right hand with the tip centres on the lines from ``starts_m`` to ``ends_m``, grasp frame.
+
+    Args:
+        starts_m, ends_m: shape (n, 3), of the fingers that the hand has.
+        hand: a right one.
+    """
+    return _Solver(starts_m, ends_m, hand).solve()
 
 
 def finger_joints(finger: str) -> tuple[str, ...]:
-    """Joints of one finger that a closing moves, from the palm outward."""
+    """Joints of one finger, from the palm outward."""
     numbers = (5, 4, 3, 2, 1) if finger in ("LF", "TH") else (4, 3, 2, 1)
     return tuple(f"{finger}J{number}" for number in numbers)
 
 
+def moved_joints(finger: str, form: HandForm) -> tuple[str, ...]:
+    """Those of them that a hand has, and a closing moves."""
+    return tuple(joint for joint in finger_joints(finger) if joint in form.joints)
+
+
 @dataclass(frozen=True)
 class _Tips:
-    """Tips of a batch of postures, grasp frame: centres (b, 5, 3), rotations (b, 5, 3, 3), lowest points (b, 5)."""
+    """Tips of a batch of postures, grasp frame: centres (b, n, 3), rotations (b, n, 3, 3), lowest points (b, n)."""
 
     centres_m: Array
     rotations: Array
@@ -101,24 +128,25 @@ _REST_rad = {"J4": 0.0, "J3": 0.7, "J2": 0.7, "J1": 0.4, "LFJ5": 0.1}
 _REST_THUMB_rad = {"THJ5": 0.9, "THJ4": 1.0, "THJ3": 0.0, "THJ2": 0.3, "THJ1": 0.5}
 _PALM_DOWN = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # palm down, fingers along +x
 
-_MOVED = tuple(joint for finger in FINGERS for joint in finger_joints(finger))
-_COLUMNS = np.array([JOINT_INDEX[name] for name in _MOVED])
-_LOW, _HIGH = JOINT_LIMITS_rad[_COLUMNS].T + np.array([[1e-4], [-1e-4]])
-_J1 = np.array([_MOVED.index(f"{finger}J1") for finger in LONG_FINGERS])
-_J2 = np.array([_MOVED.index(f"{finger}J2") for finger in LONG_FINGERS])
-
 
 class _Solver:
     """First the palm with the hand half closed, then every node of the lines."""
 
-    def __init__(self, starts_m: Array, ends_m: Array, tip: TipEllipsoid) -> None:
-        self._starts_m, self._ends_m, self._tip = starts_m, ends_m, tip
+    def __init__(self, starts_m: Array, ends_m: Array, hand: HandShape) -> None:
+        self._starts_m, self._ends_m, self._hand = starts_m, ends_m, hand
         self._raised_m = max(0.0, float(np.mean(starts_m[:, 2])) - _LOW_HEIGHT_m)
+        self._fingers = hand.form.fingers
+        self._finger_rows = [FINGERS.index(finger) for finger in self._fingers]
+        self._moved = [joint for finger in self._fingers for joint in moved_joints(finger, hand.form)]
+        self._columns = np.array([JOINT_INDEX[name] for name in self._moved])
+        self._low, self._high = JOINT_LIMITS_rad[self._columns].T + np.array([[1e-4], [-1e-4]])
+        long_fingers = hand.form.long_fingers
+        self._j1, self._j2 = ([self._moved.index(f"{f}J{number}") for f in long_fingers] for number in (1, 2))
 
     def solve(self) -> Postures:
         palm, joints = self._middle_posture()
         middle = int(np.rint(np.mean(self._middle_progress()) * (NODES - 1)))
-        table = np.empty((NODES, len(_MOVED)))
+        table = np.empty((NODES, len(self._moved)))
         for order in (range(middle, NODES), range(middle, -1, -1)):
             previous = joints
             for node in order:
@@ -127,16 +155,16 @@ class _Solver:
 
     def _middle_progress(self) -> Array:
         """Progress of each finger when the tips touch an object of typical width."""
-        touch_m = np.where(np.array(FINGERS) == "TH", -1.0, 1.0) * (_MID_WIDTH_m / 2 + self._tip.radius_m)
+        touch_m = np.where(np.array(self._fingers) == "TH", -1.0, 1.0) * (_MID_WIDTH_m / 2 + self._hand.radius_m)
         progress = (self._starts_m[:, 0] - touch_m) / (self._starts_m[:, 0] - self._ends_m[:, 0])
         return np.asarray(np.clip(progress, 0.0, 1.0))
 
     def _middle_posture(self) -> tuple[Array, Array]:
         """Palm (x, y, z, tilt, roll) and joint angles that put all tips at the middle of their lines."""
         targets_m = self._starts_m + self._middle_progress()[:, None] * (self._ends_m - self._starts_m)
-        outward = np.array([[-1.0 if f == "TH" else 1.0, 0.0, 0.0] for f in FINGERS])
+        outward = np.array([[-1.0 if f == "TH" else 1.0, 0.0, 0.0] for f in self._fingers])
         axes = _leaning(-outward[:, :2])
-        start = np.concatenate([_PALM_START, _rest_posture()])
+        start = np.concatenate([_PALM_START, _rest_posture(self._moved)])
 
         def residuals(batch: Array) -> Array:
             palm, joints = batch[:, :5], batch[:, 5:]
@@ -145,7 +173,7 @@ class _Solver:
                 _flat(tips.centres_m - targets_m),
                 _AXIS * _flat(tips.rotations[..., 2] - axes),
                 _PAD * (1.0 - np.sum(tips.rotations[..., 1] * outward, axis=-1)),
-                _COUPLING * (joints[:, _J1] - 0.6 * joints[:, _J2]),
+                _COUPLING * (joints[:, self._j1] - 0.6 * joints[:, self._j2]),
                 _ROLL * palm[:, 4:5],
                 _REST * (joints - start[5:]),
                 _PALM_HEIGHT * np.minimum(0.0, palm[:, 2:3] - _PALM_MIN_m - self._raised_m),
@@ -153,7 +181,7 @@ class _Solver:
             return np.concatenate(parts, axis=1)
 
         solution = _minimise(
-            residuals, start, np.concatenate([_PALM_LOW, _LOW]), np.concatenate([_PALM_HIGH, _HIGH]), 200
+            residuals, start, np.concatenate([_PALM_LOW, self._low]), np.concatenate([_PALM_HIGH, self._high]), 200
         )
         return solution[:5], solution[5:]
 
@@ -171,11 +199,11 @@ class _Solver:
                 np.maximum(0.0, spare_m - _CLEARANCE_SPAN_m - self._raised_m),
                 _SMOOTH * (joints - previous),
                 _PATH_AXIS * _flat(tips.rotations[..., 2] - axes),
-                _COUPLING * (joints[:, _J1] - 0.6 * joints[:, _J2]),
+                _COUPLING * (joints[:, self._j1] - 0.6 * joints[:, self._j2]),
             ]
             return np.concatenate(parts, axis=1)
 
-        return _minimise(residuals, previous, _LOW, _HIGH, 60)
+        return _minimise(residuals, previous, self._low, self._high, 60)
 
     def _check(self, palm: Array, table: Array) -> Postures:
         """The solved table with the part of each line that is kept to :data:`_TOLERANCE_m`."""
@@ -183,22 +211,23 @@ class _Solver:
         tips = self._tips(np.broadcast_to(palm, (NODES, 5)), table)
         error_m = np.abs(tips.centres_m - targets_m) * [1.0, 0.5, 0.0]
         good = (error_m.max(axis=-1) < _TOLERANCE_m) & (tips.lowest_m > _CLEARANCE_m - 0.003)
-        columns = {finger: [_MOVED.index(joint) for joint in finger_joints(finger)] for finger in FINGERS}
+        fingers, form = self._fingers, self._hand.form
+        columns = {finger: [self._moved.index(joint) for joint in moved_joints(finger, form)] for finger in fingers}
         return Postures(
             Pose3(Rot3(_palm_rotations(palm[None])[0]), palm[:3]),
-            {finger: table[:, columns[finger]] for finger in FINGERS},
-            {finger: _longest_run(good[:, index]) for index, finger in enumerate(FINGERS)},
+            {finger: table[:, columns[finger]] for finger in fingers},
+            {finger: _longest_run(good[:, index]) for index, finger in enumerate(fingers)},
         )
 
     def _tips(self, palm: Array, joints: Array) -> _Tips:
         vectors = np.zeros((len(joints), len(JOINTS)))
-        vectors[:, _COLUMNS] = joints
-        palm_T_distal = palm_T_distal_matrices(vectors)
+        vectors[:, self._columns] = joints
+        palm_T_distal = palm_T_distal_matrices(vectors)[:, self._finger_rows]
         palm_rotation = _palm_rotations(palm)[:, None]
         rotations = palm_rotation @ palm_T_distal[..., :3, :3]
         origins_m = (palm_rotation @ palm_T_distal[..., :3, 3, None])[..., 0] + palm[:, None, :3]
-        centres_m = origins_m + rotations @ np.array(self._tip.centre_distal_m)
-        reach_m = np.linalg.norm(rotations[..., 2, :] * np.array(self._tip.semi_axes_m), axis=-1)
+        centres_m = origins_m + rotations @ np.array(self._hand.centre_distal_m)
+        reach_m = np.linalg.norm(rotations[..., 2, :] * np.array(self._hand.semi_axes_m), axis=-1)
         return _Tips(centres_m, rotations, centres_m[..., 2] - reach_m)
 
 
@@ -231,9 +260,9 @@ def _palm_rotations(palm: Array) -> Array:
     return np.asarray(np.moveaxis(np.array(rows), -1, 0) @ _PALM_DOWN)
 
 
-def _rest_posture() -> Array:
+def _rest_posture(joints: Sequence[str]) -> Array:
     return np.array(
-        [_REST_THUMB_rad.get(joint, _REST_rad.get(joint, _REST_rad.get(joint[2:], 0.0))) for joint in _MOVED]
+        [_REST_THUMB_rad.get(joint, _REST_rad.get(joint, _REST_rad.get(joint[2:], 0.0))) for joint in joints]
     )
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from drivers.core.contacts import FINGERS, Array
 from drivers.shadow.closing.closing import Closing
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.model.kinematics import joint_vector, palm_T_distal_matrices
+from drivers.shadow.protocol.palm_images import Side
 
 _STEP_rad = 1e-4
 _DAMPING_m = 0.004
@@ -27,7 +28,7 @@ _SHARE_J1 = 0.375  # of the coupled tendon's travel, as the postures have it (J1
 
 
 def motor_rates(
-    table: Closing, progress: Mapping[str, float], direction_grasp: Array, tip: TipEllipsoid
+    table: Closing, progress: Mapping[str, float], direction_grasp: Array, hand: HandShape
 ) -> dict[str, dict[str, float]]:
     """How the motors of each finger turn when its tip's centre moves along one direction, radians a metre.
 
@@ -37,18 +38,21 @@ def motor_rates(
         table: the closing whose posture the hand has taken up.
         progress: of each finger on its line.
         direction_grasp: unit vector in the grasp frame, shape (3,).
-        tip: shape of the fingertips.
+        hand: that has it.
     """
-    angles = {name: a for finger in FINGERS for name, a in table.angles_rad(finger, progress[finger]).items()}
+    angles = {name: a for finger in table.fingers for name, a in table.angles_rad(finger, progress[finger]).items()}
     direction_palm = table.grasp_T_palm.rotation().matrix().T @ direction_grasp
-    centre_m = np.append(np.array(tip.centre_distal_m), 1.0)
-    return {finger: _rates(finger, angles, direction_palm, centre_m) for finger in FINGERS}
+    centre_m = np.append(np.array(hand.centre_distal_m), 1.0)
+    side = hand.form.side
+    return {finger: _rates(finger, angles, direction_palm, centre_m, side) for finger in table.fingers}
 
 
-def _rates(finger: str, angles: Mapping[str, float], direction_palm: Array, centre_m: Array) -> dict[str, float]:
+def _rates(
+    finger: str, angles: Mapping[str, float], direction_palm: Array, centre_m: Array, side: Side
+) -> dict[str, float]:
     motors = [f"{finger}{joint}" for joint in (_FREE_THUMB if finger == "TH" else _FREE)]
     turned = [angles, *(_turn(angles, motor) for motor in motors)]
-    frames = palm_T_distal_matrices(np.array([joint_vector(each) for each in turned]))
+    frames = palm_T_distal_matrices(np.array([joint_vector(each) for each in turned]), side)
     centres_m = (frames[:, FINGERS.index(finger)] @ centre_m)[:, :3]
     jacobian = (centres_m[1:] - centres_m[0]).T / _STEP_rad
     damped = jacobian @ jacobian.T + _DAMPING_m**2 * np.eye(3)

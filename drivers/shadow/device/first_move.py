@@ -20,7 +20,7 @@ from drivers.core.errors import DeviceError
 from drivers.shadow.device.hand import ShadowHand
 from drivers.shadow.device.hand_motion import LARGEST_NUDGE
 from drivers.shadow.device.hand_samples import HandSample
-from drivers.shadow.model.motors import DRIVEN_JOINTS, MotorMap
+from drivers.shadow.model.motors import MotorMap
 
 
 class FirstMoveSettings(StrictModel):
@@ -76,7 +76,7 @@ def check_motor_map(
     motors: MotorMap,
     cycle: Callable[[], HandSample],
     clock: Clock,
-    joints: Sequence[str] = DRIVEN_JOINTS,
+    joints: Sequence[str] | None = None,
     settings: FirstMoveSettings | None = None,
 ) -> list[MoveFinding]:
     """Nudge motor after motor; the first that moves another joint than its own, or the wrong way, ends the check.
@@ -86,7 +86,7 @@ def check_motor_map(
         motors: the map to check; the hand's own.
         cycle: one cycle of the hand: exchange, and wait for the next.
         clock: the hand's.
-        joints: driven joints to check.
+        joints: driven joints to check; all that the hand has unless given.
         settings: how far.
 
     Returns:
@@ -97,7 +97,7 @@ def check_motor_map(
     """
     findings = []
     check = _MotorCheck(hand, motors, cycle, clock, settings or FirstMoveSettings())
-    for finding in map(check.find, joints):
+    for finding in map(check.find, motors.driven if joints is None else joints):
         findings.append(finding)
         if finding.moved is not None and not finding.ok:
             break

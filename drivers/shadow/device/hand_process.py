@@ -17,7 +17,6 @@ from drivers.core.records import Record, RecordKind
 from drivers.core.transports import Tap
 from drivers.shadow.device.first_move import MoveFinding, require_motor_map
 from drivers.shadow.device.hand_setup import HandSetup
-from drivers.shadow.model.motors import DRIVEN_JOINTS
 
 PATIENCE_s = 1.0
 """So long the hand's process goes on without any order before it takes the demands away."""
@@ -66,7 +65,7 @@ class HandProcess:
         patience_s: float = PATIENCE_s,
         check_map: bool = False,
     ) -> None:
-        self.name, self._tap = setup.name, tap
+        self.name, self._setup, self._tap = setup.name, setup, tap
         self._check_map = check_map
         self._start = {"setup": setup.model_dump(mode="json"), "patience_s": patience_s}
         self._child = RecordProcess("drivers.shadow.device.hand_worker", setup.name)
@@ -116,13 +115,13 @@ class HandProcess:
         """Take back a stop or a fault; nothing moves before new targets are set."""
         self._child.give({"resume": True})
 
-    def first_move(self, joints: Sequence[str] = DRIVEN_JOINTS) -> list[MoveFinding]:
+    def first_move(self, joints: Sequence[str] | None = None) -> list[MoveFinding]:
         """Nudge motor after motor, as :func:`drivers.shadow.device.first_move.check_motor_map`.
 
         Raises:
             DeviceError: the hand stopped itself, or its process is gone.
         """
-        self._child.give({"first_move": list(joints)})
+        self._child.give({"first_move": list(self._setup.motor_map().driven if joints is None else joints)})
         answer = self._await(RecordKind.MOVES, _MOVES_s)
         if "error" in answer:
             raise DeviceError(answer["error"])

@@ -15,7 +15,7 @@ from drivers.shadow.device.tactile_requests import TactileKind
 from drivers.shadow.model.gains import GainTable
 from drivers.shadow.model.motors import DRIVEN_JOINTS
 from drivers.shadow.protocol.motor_data import MAX_PWM, MOTOR_PATIENCE_s
-from drivers.shadow.protocol.palm_images import USUAL_PALM, PalmName
+from drivers.shadow.protocol.palm_images import USUAL_PALM, PalmName, Side
 
 WIRE_CYCLE_s = 0.002
 """Period of a hand on its cable that nobody has stated; Shadow's own host has 1 ms."""
@@ -26,6 +26,8 @@ class HandSettings(StrictModel):
 
     Attributes:
         palm: which palm the hand has; on a cable the product code tells where this is left out (:attr:`palm_stated`).
+        side: which hand it is; its own files tell where this is left out, and must not contradict it.
+        fingers: that it has; the same.
         cycle_s: period of the exchanges, seconds; below the 20 ms after which motors halt for want of a demand. On a
             cable it is :data:`WIRE_CYCLE_s` where it is left out (:attr:`on_wire`).
         demand: what the motors are told: a duty cycle, or a torque that they keep by themselves at 5 kHz.
@@ -48,6 +50,8 @@ class HandSettings(StrictModel):
     retired: ClassVar[tuple[str, ...]] = ("lost_limit",)
 
     palm: PalmName = USUAL_PALM
+    side: Side | None = None
+    fingers: tuple[str, ...] | None = None
     cycle_s: float = Field(default=0.01, gt=0.0, lt=MOTOR_PATIENCE_s)
     demand: Literal["pwm", "torque"] = "pwm"
     gains: GainTable = GainTable()

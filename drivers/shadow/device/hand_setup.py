@@ -15,7 +15,8 @@ from drivers.shadow.device.motor_polling import load_rates
 from drivers.shadow.ethercat.hand_transport import EthercatSettings, EthercatTransport, find_palm
 from drivers.shadow.ethercat.pysoem_transport import PysoemTransport
 from drivers.shadow.model.gains import load_gains
-from drivers.shadow.model.hand_info import HandInfo, check_map, load_infos
+from drivers.shadow.model.hand_form import HandForm
+from drivers.shadow.model.hand_info import HandInfo, HandStatement, check_map, load_infos, told_form, told_serial
 from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.motor_configuration import load_configurations
@@ -55,7 +56,7 @@ class HandSetup(StrictModel):
         Raises:
             DeviceError: what is missing on the ring or wrong, and what to do.
         """
-        palm = self.stated_palm or find_palm(self.ethercat, clock)
+        palm = self.stated_palm or find_palm(self.wiring(), clock)
         return self.model_copy(update={"hand": self.hand.model_copy(update={"palm": palm})})
 
     @property
@@ -67,7 +68,7 @@ class HandSetup(StrictModel):
         """How the hand is driven, with the polling rates and gains of the files. Raises ConfigurationError."""
         changes: dict[str, object] = {} if self.rates is None else {"polling": load_rates(self.rates)}
         if self.gains is not None:
-            changes["gains"] = load_gains(self.gains).table
+            changes["gains"] = load_gains(self.gains, self.form().driven).table
         return self.hand.model_copy(update=changes)
 
     def transport(self, clock: Clock) -> EthercatTransport | PysoemTransport:
@@ -80,27 +81,47 @@ class HandSetup(StrictModel):
             raise ConfigurationError(
                 "hand.palm and the cable's palm differ", where=self.name, hint="Give the palm under hand only"
             )
-        settings = self.ethercat.model_copy(update={"palm": self.hand.palm})
+        settings = self.wiring().model_copy(update={"palm": self.hand.palm})
         return (EthercatTransport if self.master == "own" else PysoemTransport)(self.name, settings, clock)
 
     def check_files(self) -> None:
         """Read every file that is named, and compare them with what stands beside them. Raises ConfigurationError."""
+        check_map(self.motors, self.infos())
+        self.wiring()
         self.settings()
         self.motor_map()
-        JointCalibration.load(self.joints)
-        check_map(self.motors, self.infos())
+        self.calibration()
         if self.boards is not None:
-            load_configurations(self.boards)
+            load_configurations(self.boards, self.form().driven)
 
     def infos(self) -> dict[Path, HandInfo]:
         """What the hand's own folders say of it, by file. Raises ConfigurationError."""
         files = (self.joints, self.motors, self.boards, self.rates, self.gains)
         return load_infos(file for file in files if file is not None)
 
+    def form(self) -> HandForm:
+        """Which hand it is, by its files and the rig's. Raises ConfigurationError."""
+        stated = HandStatement(f"{self.name} in the rig file", self.hand.side or self.ethercat.side, self.hand.fingers)
+        return told_form(self.motors, self.infos(), stated)
+
+    def wiring(self) -> EthercatSettings:
+        """How the hand is reached, with the side and the serial number that it must have. Raises ConfigurationError."""
+        serial, stated = told_serial(self.infos()), self.ethercat.serial
+        if None not in (serial, stated) and serial != stated:
+            what = f"names hand {stated}, but its files are those of hand {serial}"
+            hint = "Use the files of the connected hand; its serial number is the folder's name"
+            raise ConfigurationError(what, where=f"{self.name} in the rig file", hint=hint)
+        side = self.form().side
+        return self.ethercat.model_copy(update={"side": side, "serial": serial if stated is None else stated})
+
+    def calibration(self) -> JointCalibration:
+        """The calibration of the hand's joints. Raises ConfigurationError."""
+        return JointCalibration.load(self.joints, self.form().joints)
+
     def motor_map(self) -> MotorMap:
         """Which motor pulls which joint. Raises ConfigurationError."""
         motors = MotorMap.load(self.motors)
-        return motors if self.gains is None else motors.reverse(load_gains(self.gains).backwards)
+        return motors if self.gains is None else motors.reverse(load_gains(self.gains, motors.driven).backwards)
 
     def device(self, transport: Transport, clock: Clock, *, set_up_boards: bool = True) -> ShadowHand:
         """The hand, not connected.
@@ -113,8 +134,5 @@ class HandSetup(StrictModel):
         Raises:
             ConfigurationError: a file that cannot be used.
         """
-        boards = load_configurations(self.boards) if self.boards else None
-        joints = JointCalibration.load(self.joints)
-        return ShadowHand(
-            transport, clock, joints, self.settings(), self.motor_map(), boards if set_up_boards else None
-        )
+        boards = load_configurations(self.boards, self.form().driven) if self.boards and set_up_boards else None
+        return ShadowHand(transport, clock, self.calibration(), self.settings(), self.motor_map(), boards)

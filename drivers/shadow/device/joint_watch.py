@@ -63,10 +63,13 @@ class JointWatch:
         self._motors, self._limits, self._where = motors, limits, where
         self._calibrated = calibration.range_counts
         span = limits.margin * np.diff(self._calibrated, axis=1)[:, 0]
-        self._low = np.maximum(self._calibrated[:, 0] - span, _RAIL)
-        self._high = np.minimum(self._calibrated[:, 1] + span, FULL_SCALE - _RAIL)
+        here = calibration.has_joint
+        self._low = np.where(here, np.maximum(self._calibrated[:, 0] - span, _RAIL), -np.inf)
+        self._high = np.where(here, np.minimum(self._calibrated[:, 1] + span, FULL_SCALE - _RAIL), np.inf)
+        self._sensor = np.flatnonzero(SENSOR_HAS_JOINT)[here[JOINT_OF_SENSOR]]
+        self._joint_of_sensor = JOINT_OF_SENSOR[here[JOINT_OF_SENSOR]]
         self._pushing_from = limits.frozen_share * largest
-        pairs = [angles_of_driven(name) for name in motors.names]
+        pairs = [angles_of_driven(name) if name else JOINTS[:1] for name in motors.names]  # no motor, no demand
         self._joints_of_motor = np.array([[JOINT_INDEX[pair[0]], JOINT_INDEX[pair[-1]]] for pair in pairs])
         self.restart()
 
@@ -84,10 +87,10 @@ class JointWatch:
         counts = joint_counts(sensors)
         elapsed_s = np.inf if self._stamp_ns is None else (stamp_ns - self._stamp_ns) / NANOSECONDS
         self._outside, self._broken = (counts < self._low) | (counts > self._high), {}
-        own = sensors[SENSOR_HAS_JOINT]
+        own = sensors[self._sensor]
         if (rail := (own < _RAIL) | (own > FULL_SCALE - _RAIL)).any():  # one of two is hidden in their average
-            self._broken = dict(zip(JOINT_OF_SENSOR[rail].tolist(), own[rail].tolist(), strict=True))
-            self._outside[JOINT_OF_SENSOR[rail]] = True
+            self._broken = dict(zip(self._joint_of_sensor[rail].tolist(), own[rail].tolist(), strict=True))
+            self._outside[self._joint_of_sensor[rail]] = True
         if elapsed_s > _LONGEST_STEP_s:
             self._jumped.fill(False)
             self._same_since_ns.fill(stamp_ns)

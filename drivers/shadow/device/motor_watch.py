@@ -132,7 +132,8 @@ class MotorWatch:
         for motor in np.flatnonzero(sample.motor.temperature_C >= self._heat.warm_C).tolist():
             problems.append(f"{self._name(motor)}: warm, {sample.motor.temperature_C[motor]:.0f} C")
         silent_ns = sample.stamp_ns - np.maximum(sample.motor.torque_stamps_ns, connected_ns)
-        for motor in np.flatnonzero(silent_ns > _TOLD_SILENT_s * NANOSECONDS).tolist():
+        silent = self._motors.is_fitted & (silent_ns > _TOLD_SILENT_s * NANOSECONDS)
+        for motor in np.flatnonzero(silent).tolist():
             problems.append(f"{self._name(motor)}: silent")
         return problems
 

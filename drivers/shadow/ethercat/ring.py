@@ -11,7 +11,7 @@ from drivers.ethercat.frames import Command, Telegram
 from drivers.ethercat.master import EtherCatMaster, Slave
 from drivers.ethercat.registers import FMMU_BYTES, SYNC_MANAGER_BYTES, AlState, Register
 from drivers.shadow.ethercat.hand_identity import SERIAL_WORD, BoardIdentity, HandIdentity, checked_image
-from drivers.shadow.protocol.palm_images import IMAGE_BASE, PalmImage, PalmName, Side
+from drivers.shadow.protocol.palm_images import BRIDGE_PRODUCT, IMAGE_BASE, PalmImage, PalmName, Side
 
 _VENDOR, _PRODUCT, _REVISION = 0x08, 0x0A, 0x0C
 _ALL_REGISTERS = bytes(256)
@@ -88,6 +88,9 @@ class HandRing:
 
     def _check_ring(self) -> None:
         count = self._master.count_slaves()
+        if count == 4 and all(self._identify(place).product == BRIDGE_PRODUCT for place in (0, 2)):
+            serials = " and ".join(str(self._identify(place).serial) for place in (1, 3))
+            raise self._wrong(f"two hands on one cable, {serials}", "Connect each hand to an interface of its own")
         if count != 2:
             hint = "Only the hand may be on this interface: check its cable, its power, and the name of the interface"
             raise self._wrong(f"{count} EtherCAT slaves instead of the hand's bridge and palm", hint)

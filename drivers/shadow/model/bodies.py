@@ -1,12 +1,13 @@
 """Bodies of the hand: outer shapes and masses of every link but the fingertips, capsules, balls and one box.
 
 Lengths in metres, masses in kilograms. Shapes follow the outer dimensions of Shadow's E-series hand; they only have to
-touch what the real links would touch. Kinematics come from :mod:`drivers.shadow.model.kinematics`.
+touch what the real links would touch. Kinematics come from :mod:`drivers.shadow.model.kinematics`. They are those of a
+right hand; :func:`mirror_shape` makes a left hand's of them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from drivers.core.contacts import FINGERS
@@ -90,3 +91,14 @@ LINK_SHAPES: dict[str, tuple[Shape, ...]] = {
     "THJ1": (_along_z(0.0, 0.005, 0.0078, 0.006),),
 }
 """Shapes of each joint's child link, in that link's frame."""
+
+
+def mirror_shape(shape: Shape) -> Shape:
+    """A shape as the other hand has it, mirrored in x = 0 of its link."""
+    if isinstance(shape, Capsule):
+        return replace(shape, start_m=_mirror(shape.start_m), end_m=_mirror(shape.end_m))
+    return replace(shape, centre_m=_mirror(shape.centre_m))
+
+
+def _mirror(place_m: Vector) -> Vector:
+    return (-place_m[0], *place_m[1:])

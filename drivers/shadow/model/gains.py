@@ -98,8 +98,12 @@ class _Controller(StrictModel):
     type: str = "sr_mechanism_controllers/SrhJointPositionController"
 
 
-def load_gains(path: Path) -> PublishedGains:
+def load_gains(path: Path, driven: tuple[str, ...] = DRIVEN_JOINTS) -> PublishedGains:
     """Read a hand's ``sr_edc_joint_position_controllers_PWM.yaml``, or its like for torque demands.
+
+    Args:
+        path: the file.
+        driven: the joints that the hand has; gains of others are left out.
 
     Raises:
         ConfigurationError: the file cannot be used, a joint is missing or named twice, or the gains of one joint
@@ -111,13 +115,13 @@ def load_gains(path: Path) -> PublishedGains:
         raise ConfigurationError("contains no position controllers", where=str(path), hint=hint)
     controllers = [strict_yaml.validate(entry, _Controller, where=f"{path}, {name}") for name, entry in content.items()]
     named = {controller.joint.rpartition("_")[2].upper(): controller.pid for controller in controllers}
-    wrong = sorted(set(DRIVEN_JOINTS) ^ set(named))
+    wrong = sorted(set(driven) - set(named) | set(named) - set(DRIVEN_JOINTS))
     if wrong or len(named) != len(controllers):
-        hint = f"It must name each of {', '.join(DRIVEN_JOINTS)} once"
+        hint = f"It must name each of {', '.join(driven)} once"
         what = f"missing or unknown: {', '.join(wrong)}" if wrong else "a joint is named twice"
         raise ConfigurationError(what, where=str(path), hint=hint)
-    gains = {joint: _gains(pid, joint, path) for joint, pid in named.items()}
-    backwards = tuple(joint for joint in DRIVEN_JOINTS if named[joint].p < 0.0)
+    gains = {joint: _gains(pid, joint, path) for joint, pid in named.items() if joint in driven}
+    backwards = tuple(joint for joint in driven if named[joint].p < 0.0)
     return PublishedGains(GainTable(exceptions=gains), backwards)
 
 

@@ -1,14 +1,14 @@
-"""What a hand's own configuration folder says of it: its side, its fingers, its motor map.
+"""Which hand it is, by everything that tells: its own configuration folder, its motor map, and the rig file.
 
-Shadow's folder for a serial number holds ``general_info.yaml`` beside the calibration (protocols: Joint calibration
-files). The kinematics here are those of a right hand with five fingers: a left hand's contacts would be mirrored, and a
-hand with fewer fingers would be asked for joints that it does not have. So what the files say is compared before
-anything moves.
+Shadow's folder for a serial number holds ``general_info.yaml`` above the calibration (protocols: Joint calibration
+files). A left hand that is taken for a right one has all its contacts mirrored, and a hand with fewer fingers would be
+asked for joints that it does not have. So all that is told is compared before anything moves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import ConfigDict
@@ -17,11 +17,13 @@ from drivers.core import configuration
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import FINGERS
 from drivers.core.errors import ConfigurationError
+from drivers.shadow.model.hand_form import HandForm
+from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_images import Side
 
 INFO_FILE = "general_info.yaml"
-_SIDES: dict[str, Side] = {"lh_": "left", "rh_": "right"}
-"""Beginnings of the names of Shadow's motor maps."""
+_LEVELS = 5
+"""Published folders keep the calibration up to four levels below that file."""
 
 
 class _MapPlace(StrictModel):
@@ -46,21 +48,50 @@ class HandInfo(StrictModel):
     mapping_path: _MapPlace | None = None
 
 
+@dataclass(frozen=True)
+class HandStatement:
+    """What a rig file says of its hand; None where it leaves that to the hand's files.
+
+    Attributes:
+        where: the rig file, for messages.
+        side: of the hand.
+        fingers: that it has.
+    """
+
+    where: str
+    side: Side | None = None
+    fingers: tuple[str, ...] | None = None
+
+
 def load_infos(files: Iterable[Path]) -> dict[Path, HandInfo]:
-    """What stands beside the files of a hand, by its path; nothing where there is no such file.
+    """What stands beside or above the files of a hand, by its path; nothing where there is no such file.
 
     Raises:
         ConfigurationError: such a file cannot be used.
     """
-    places = dict.fromkeys(file.resolve().parent / INFO_FILE for file in files)
-    return {
-        place: configuration.validate(configuration.load(place), HandInfo, where=str(place))
-        for place in places
-        if place.is_file()
-    }
+    places = dict.fromkeys(place for file in files if (place := _info_place(file.resolve())) is not None)
+    return {place: configuration.validate(configuration.load(place), HandInfo, where=str(place)) for place in places}
 
 
-def check_map(motors: Path, infos: dict[Path, HandInfo]) -> None:
+def _info_place(file: Path) -> Path | None:
+    return next((place for folder in [*file.parents][:_LEVELS] if (place := folder / INFO_FILE).is_file()), None)
+
+
+def told_serial(infos: Iterable[Path]) -> int | None:
+    """The hand's serial number by the names of its folders, which are Shadow's; None where they tell none.
+
+    Raises:
+        ConfigurationError: the files are of two hands.
+    """
+    told = {int(place.parent.name): place for place in infos if place.parent.name.isdecimal()}
+    if len(told) > 1:
+        (one, place), (other, _) = list(told.items())[:2]
+        what = f"belongs to hand {one}, but other files of the rig to hand {other}"
+        raise ConfigurationError(what, where=str(place), hint="Name the files of one hand, the connected one")
+    return next(iter(told), None)
+
+
+def check_map(motors: Path, infos: Mapping[Path, HandInfo]) -> None:
     """Compare a motor map of Shadow's with what the hand's own folder names.
 
     Raises:
@@ -68,23 +99,45 @@ def check_map(motors: Path, infos: dict[Path, HandInfo]) -> None:
     """
     for place, info in infos.items():
         named = "" if info.mapping_path is None else info.mapping_path.relative_path.name
-        if named and motors.name[:3] in _SIDES and motors.name != named:
+        if named and motors.name[:3] in ("lh_", "rh_") and motors.name != named:
             what = f"says that the hand's motor map is {named}, but the rig names {motors.name}"
             raise ConfigurationError(what, where=str(place), hint=f"Set calibration.motors to {named}")
 
 
-def check_modelled(motors: Path, infos: dict[Path, HandInfo]) -> None:
-    """Refuse a hand of which there are no kinematics here.
+def told_form(motors: Path, infos: Mapping[Path, HandInfo], stated: HandStatement) -> HandForm:
+    """The form of the hand that all these files tell, a right hand's where nothing tells the side.
+
+    Args:
+        motors: its motor map, which tells the joints.
+        infos: see :func:`load_infos`.
+        stated: what the rig file says.
 
     Raises:
-        ConfigurationError: it is a left hand, or misses fingers.
+        ConfigurationError: the map cannot be used, or two places contradict each other.
     """
-    sides = {place: info.side for place, info in infos.items()} | {motors: _SIDES.get(motors.name[:3], "right")}
-    hint = "Sessions need a right hand with five fingers. A rig of kind hand can check a left one, joint by joint"
-    for place, side in sides.items():
-        if side != "right":
-            raise ConfigurationError("is of a left hand, whose contacts would be mirrored", where=str(place), hint=hint)
+    motor_map = MotorMap.load(motors)
+    told: dict[str, Side | None] = {str(place): info.side for place, info in infos.items()}
+    told |= {str(motors): motor_map.told_side, stated.where: stated.side}
+    form = HandForm(_agreed_side({place: side for place, side in told.items() if side is not None}), motor_map.driven)
     for place, info in infos.items():
-        if missing := [finger for finger in FINGERS if finger.lower() not in info.fingers]:
-            what = f"is of a hand without {', '.join(missing)}"
-            raise ConfigurationError(what, where=str(place), hint=hint)
+        _check_fingers(form, tuple(map(str.upper, info.fingers)), str(place), motors)
+    if stated.fingers is not None:
+        _check_fingers(form, stated.fingers, stated.where, motors)
+    return form
+
+
+def _agreed_side(told: Mapping[str, Side]) -> Side:
+    if len(set(told.values())) > 1:
+        place, side = next(iter(told.items()))
+        other, its = next((where, said) for where, said in told.items() if said != side)
+        what = f"is of a {side} hand, but {other} of a {its} one: contacts would be mirrored"
+        raise ConfigurationError(what, where=place, hint="Name the files of the connected hand, and its side")
+    return next(iter(told.values()), "right")
+
+
+def _check_fingers(form: HandForm, fingers: tuple[str, ...], where: str, motors: Path) -> None:
+    if set(fingers) == set(form.fingers):
+        return
+    named, driven = (", ".join(finger for finger in FINGERS if finger in some) for some in (fingers, form.fingers))
+    what = f"says that the hand's fingers are {named}, but {motors} has motors for {driven}"
+    raise ConfigurationError(what, where=where, hint="Name the motor map of this very hand, and its fingers")

@@ -5,13 +5,14 @@ degrees) a joint, read piecewise linearly and continued with the end pair. ``sr_
 joints whose two sensors both depend on both angles (the thumb's THJ1 and THJ2): points ((countsA, countsB), degreesA,
 degreesB), read by linear interpolation on the Delaunay triangulation of the counts plane. THJ5 and WRJ1 have two
 sensors each, averaged before the table is read. Every joint's own sensor is read, so J1 and J2 of a finger are both
-known although one tendon drives their sum.
+known although one tendon drives their sum. What a hand does not have (a Lite hand's wrist) is not read: it stays at
+zero.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -46,22 +47,31 @@ class JointCalibration:
 
     Args:
         tables: table of each joint that has its own.
-        coupled: tables of pairs of joints. Together every one of the 24 joints appears exactly once.
+        coupled: tables of pairs of joints. Together every joint of the hand appears exactly once.
         where: the file, for error messages.
+        joints: that the hand has, all 24 unless given; tables of others are not read.
 
     Attributes:
+        has_joint: which of the 24 joints the hand has, shape (24,).
         range_counts: smallest and largest calibrated count of each joint, shape (24, 2), order of
             :data:`~drivers.shadow.model.kinematics.JOINTS`; of a joint with two sensors their average.
-        range_rad: the same for the angles, radians.
+        range_rad: the same for the angles, radians. Zero for a joint that the hand does not have.
 
     Raises:
         ConfigurationError: a joint is missing, unknown or given twice, or a table cannot be used.
     """
 
     def __init__(
-        self, tables: Mapping[str, Table], coupled: Mapping[tuple[str, str], CoupledTable], where: str = "calibration"
+        self,
+        tables: Mapping[str, Table],
+        coupled: Mapping[tuple[str, str], CoupledTable],
+        where: str = "calibration",
+        joints: Collection[str] = JOINTS,
     ) -> None:
-        _check_complete([*tables, *(joint for pair in coupled for joint in pair)], where)
+        _check_complete([*tables, *(joint for pair in coupled for joint in pair)], where, joints)
+        tables = {joint: table for joint, table in tables.items() if joint in joints}
+        coupled = {pair: points for pair, points in coupled.items() if set(pair) <= set(joints)}
+        self.has_joint: NDArray[np.bool_] = np.isin(JOINTS, list(joints))
         self._plain = np.array([JOINT_INDEX[joint] for joint in tables], dtype=np.intp)
         self._curves = Curves([_checked_table(joint, table, where) for joint, table in tables.items()])
         self._pairs = [
@@ -74,13 +84,13 @@ class JointCalibration:
             ends |= {
                 joint: _ends([(counts[at], angles[at]) for counts, *angles in points]) for at, joint in enumerate(pair)
             }
-        in_order = np.array([ends[joint] for joint in JOINTS])
+        in_order = np.array([ends.get(joint, ((0.0, 0.0), (0.0, 0.0))) for joint in JOINTS])
         self.range_counts: Array = in_order[:, 0]
         self.range_rad: Array = np.radians(in_order[:, 1])
 
     @classmethod
-    def load(cls, path: Path) -> JointCalibration:
-        """Read a ``calibration.yaml``.
+    def load(cls, path: Path, joints: Collection[str] = JOINTS) -> JointCalibration:
+        """Read a ``calibration.yaml``, of a hand with these joints.
 
         Raises:
             ConfigurationError: the file or one of its tables cannot be used; names the joint.
@@ -88,7 +98,7 @@ class JointCalibration:
         content = load_parameters(path, _CalibrationFile)
         _refuse_repeats([joint for joint, _ in content.sr_calibrations], str(path))
         _refuse_repeats([joint for pair, _ in content.sr_calibrations_coupled for joint in pair], str(path))
-        return cls(dict(content.sr_calibrations), dict(content.sr_calibrations_coupled), str(path))
+        return cls(dict(content.sr_calibrations), dict(content.sr_calibrations_coupled), str(path), joints)
 
     def angles_rad(self, sensors: NDArray[np.uint16] | Array) -> Array:
         """Joint angles from one set of readings.
@@ -100,7 +110,7 @@ class JointCalibration:
             Angles, shape (24,), order of :data:`~drivers.shadow.model.kinematics.JOINTS`, radians.
         """
         counts = joint_counts(sensors)
-        angles_deg = np.empty(len(JOINTS))
+        angles_deg = np.zeros(len(JOINTS))
         angles_deg[self._plain] = self._curves(counts[self._plain])
         for joints, plane in self._pairs:
             angles_deg[joints] = plane(counts[joints])
@@ -114,7 +124,7 @@ class JointCalibration:
 
         Returns:
             ADC counts before rounding and clipping, shape (37,). Channels without a joint read as in a palm
-            without the optional sensors: their own index, or zero.
+            without the optional sensors: their own index, or zero, which is what those of a missing joint read too.
 
         Raises:
             ConfigurationError: a coupled table does not determine both angles.
@@ -126,7 +136,7 @@ class JointCalibration:
                 hint="Use another calibration for an emulated hand",
             )
         angles_deg = np.degrees(joints_rad)
-        counts = np.empty(len(JOINTS))
+        counts = np.zeros(len(JOINTS))
         counts[self._plain] = self._curves.inverse(angles_deg[self._plain])
         for joints, plane in self._pairs:
             counts[joints] = plane.inverse(angles_deg[joints])
@@ -168,15 +178,15 @@ def _plane(pair: tuple[str, str], points: CoupledTable, where: str) -> Plane:
         raise ConfigurationError(f"the table of {pair[0]} and {pair[1]} {error}", where=where) from error
 
 
-def _check_complete(joints: Sequence[str], where: str) -> None:
+def _check_complete(joints: Sequence[str], where: str, needed: Collection[str]) -> None:
     _refuse_repeats(joints, where)
-    missing, unknown = sorted(set(JOINTS) - set(joints)), sorted(set(joints) - set(JOINTS))
+    missing, unknown = sorted(set(needed) - set(joints)), sorted(set(joints) - set(JOINTS))
     if missing or unknown:
         problems = [
             f"{word} {', '.join(names)}" for word, names in (("misses", missing), ("has unknown", unknown)) if names
         ]
         raise ConfigurationError(
-            " and ".join(problems), where=where, hint="A hand's calibration must name each of the 24 joints once"
+            " and ".join(problems), where=where, hint="A hand's calibration must name each of its joints once"
         )
 
 

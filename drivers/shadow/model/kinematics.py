@@ -1,10 +1,13 @@
-"""Forward kinematics of the right Shadow Dexterous Hand.
+"""Forward kinematics of the Shadow Dexterous Hand, right and left.
 
 Link origins and axes are those of Shadow's published model ``shadowhand_motor.urdf``. The lower limit of -15 deg of
 the fingers' J3 and of THJ1 is the one of Shadow's manual and current xacro; the URDF stops at 0.
 
-The palm frame has z along the fingers, x to the thumb's side and -y out of the palm. A finger's distal frame sits on
-its J1 axis with z along the fingertip. Flexion is a positive rotation about x.
+The palm frame of a right hand has z along the fingers, x to the thumb's side and -y out of the palm. A finger's distal
+frame sits on its J1 axis with z along the fingertip. Flexion is a positive rotation about x. A left hand is the right
+one mirrored in the planes x = 0 of forearm and palm: its palm has the thumb on the side of -x, and every frame is the
+mirror image of the right hand's at the same angles. So joint angles, limits and calibrations mean the same on both
+sides.
 
 Every function takes joint vectors of shape (..., 24) in the order of :data:`JOINTS`, radians; the ``*_matrices``
 functions work on whole batches without building pose objects.
@@ -13,7 +16,7 @@ functions work on whole batches without building pose objects.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -21,6 +24,7 @@ from gtsam import Pose3
 
 from drivers.core.contacts import FINGERS, Array
 from drivers.core.errors import ConfigurationError
+from drivers.shadow.protocol.palm_images import Side
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,10 @@ JOINT_INDEX: Mapping[str, int] = {name: index for index, name in enumerate(JOINT
 JOINT_LIMITS_rad: Array = np.radians([[joint.lower_deg, joint.upper_deg] for joint in JOINT_TABLE])
 """Lower and upper limits, shape (24, 2), radians."""
 
+_SIGNS = np.array([-1.0, 1.0, 1.0, 1.0])
+_MIRROR: Mapping[Side, Array] = {"right": np.ones((4, 4)), "left": np.outer(_SIGNS, _SIGNS)}
+"""Factors of a homogeneous matrix's entries that mirror the frame in x = 0."""
+
 _Terms: TypeAlias = tuple[Array, Array, Array]
 """Factors of 1, sin q and cos q in a joint's transform, each (..., 4, 4)."""
 
@@ -103,11 +111,22 @@ def joint_vector(joints_rad: Mapping[str, float]) -> Array:
     return np.array([joints_rad.get(name, 0.0) for name in JOINTS], dtype=float)
 
 
-def palm_T_distal_matrices(joints_rad: Array) -> Array:
+def joint_table(side: Side) -> tuple[Joint, ...]:
+    """The hand's joints, :data:`JOINT_TABLE` or its mirror image: a turn about the mirrored axis goes the other way."""
+    return JOINT_TABLE if side == "right" else tuple(map(_mirror_joint, JOINT_TABLE))
+
+
+def _mirror_joint(joint: Joint) -> Joint:
+    (x, y, z), (roll, pitch, yaw), (ax, ay, az) = joint.origin_m, joint.rpy_rad, joint.axis
+    return replace(joint, origin_m=(-x, y, z), rpy_rad=(roll, -pitch, -yaw), axis=(ax, -ay, -az))
+
+
+def palm_T_distal_matrices(joints_rad: Array, side: Side = "right") -> Array:
     """Distal frames of the five fingers in the palm frame.
 
     Args:
         joints_rad: joint angles, shape (..., 24), radians.
+        side: of the hand.
 
     Returns:
         Homogeneous matrices, shape (..., 5, 4, 4), in the order FF, MF, RF, LF, TH, metres.
@@ -116,28 +135,32 @@ def palm_T_distal_matrices(joints_rad: Array) -> Array:
     frames = links[..., 0, :, :, :]
     for number in range(1, len(_CHAINS)):
         frames = frames @ links[..., number, :, :, :]
-    return np.asarray(frames)
+    return np.asarray(_MIRROR[side] * frames)
 
 
-def forearm_T_palm_matrix(joints_rad: Array) -> Array:
+def forearm_T_palm_matrix(joints_rad: Array, side: Side = "right") -> Array:
     """The palm in the forearm frame, shape (..., 4, 4), from WRJ2 and WRJ1 of joint vectors (..., 24)."""
     local = _rotate(joints_rad[..., _WRIST], _WRIST_TERMS)
-    return np.asarray(local[..., 0, :, :] @ local[..., 1, :, :])
+    return np.asarray(_MIRROR[side] * (local[..., 0, :, :] @ local[..., 1, :, :]))
 
 
 def link_T_matrices(joints_rad: Array) -> Array:
-    """Every joint's child link in its parent link's frame, shape (..., 24, 4, 4), order of :data:`JOINTS`."""
+    """Every joint's child link in its parent link's frame, shape (..., 24, 4, 4), order of :data:`JOINTS`.
+
+    Those of a right hand.
+    """
     return _parent_T_child(joints_rad)[..., : len(JOINTS), :, :]
 
 
-def palm_T_distal(joints_rad: Array) -> dict[str, Pose3]:
+def palm_T_distal(joints_rad: Array, side: Side = "right") -> dict[str, Pose3]:
     """The distal frame of each finger in the palm frame, for one joint vector of shape (24,)."""
-    return {finger: Pose3(matrix) for finger, matrix in zip(FINGERS, palm_T_distal_matrices(joints_rad), strict=True)}
+    frames = palm_T_distal_matrices(joints_rad, side)
+    return {finger: Pose3(matrix) for finger, matrix in zip(FINGERS, frames, strict=True)}
 
 
-def forearm_T_palm(joints_rad: Array) -> Pose3:
+def forearm_T_palm(joints_rad: Array, side: Side = "right") -> Pose3:
     """The palm in the forearm frame, for one joint vector of shape (24,)."""
-    return Pose3(forearm_T_palm_matrix(joints_rad))
+    return Pose3(forearm_T_palm_matrix(joints_rad, side))
 
 
 def _parent_T_child(joints_rad: Array) -> Array:

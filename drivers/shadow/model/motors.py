@@ -1,4 +1,4 @@
-"""The 20 motors: which joint each one pulls."""
+"""The motors, 20 in a full hand: which joint each one pulls."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from drivers.core.errors import ConfigurationError
 from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS, JOINT_LIMITS_rad
 from drivers.shadow.protocol.palm_codec import MOTORS
+from drivers.shadow.protocol.palm_images import Side
 
 DRIVEN_JOINTS: tuple[str, ...] = (
     *("FFJ0", "FFJ3", "FFJ4", "MFJ0", "MFJ3", "MFJ4", "RFJ0", "RFJ3", "RFJ4", "LFJ0", "LFJ3", "LFJ4", "LFJ5"),
@@ -31,6 +32,7 @@ def angles_of_driven(name: str) -> tuple[str, ...]:
 
 
 class _MotorFile(StrictModel):
+    side: Side | None = None
     motors: dict[str, int]
     reversed: tuple[str, ...] = ()
 
@@ -48,17 +50,25 @@ _SHADOW_JOINTS = (
 """The 28 joints in the order of Shadow's own map files; -1 stands for one that no motor drives by itself."""
 
 
+_MAP_SIDES: dict[str, Side] = {"lh_": "left", "rh_": "right"}
+"""Beginnings of the names of Shadow's motor maps."""
+
+
 class MotorMap:
     """Which motor pulls which joint.
 
     Args:
-        numbers: motor number 0 to 19 of each of :data:`DRIVEN_JOINTS`.
+        numbers: motor number 0 to 19 of each driven joint that the hand has, of :data:`DRIVEN_JOINTS`.
         backwards: driven joints that a positive duty cycle turns towards smaller angles.
         where: the file, for error messages.
+        told_side: the side of the hand, where the file tells it.
 
     Attributes:
-        names: driven joint of each motor, by motor number.
+        names: driven joint of each motor, by motor number; empty for a place without a motor.
         numbers: motor number of each driven joint.
+        driven: the driven joints that the hand has, in the order of :data:`DRIVEN_JOINTS`.
+        told_side: as given.
+        is_fitted: whether there is a motor, by motor number, shape (20,).
         sign: +1 or -1 by motor number, shape (20,).
         from_joints: matrix, shape (20, 24), that takes joint angles to those of the driven joints by motor number.
         limits_rad: lower and upper limit by motor number, shape (20, 2), radians.
@@ -67,10 +77,20 @@ class MotorMap:
         ConfigurationError: a joint or a motor is missing, unknown or named twice.
     """
 
-    def __init__(self, numbers: Mapping[str, int], backwards: tuple[str, ...] = (), where: str = "motor map") -> None:
+    def __init__(
+        self,
+        numbers: Mapping[str, int],
+        backwards: tuple[str, ...] = (),
+        where: str = "motor map",
+        told_side: Side | None = None,
+    ) -> None:
         _check_one_to_one(numbers, backwards, where)
         self.numbers: Mapping[str, int] = dict(numbers)
-        self.names: tuple[str, ...] = tuple(sorted(numbers, key=lambda name: numbers[name]))
+        self.driven: tuple[str, ...] = tuple(name for name in DRIVEN_JOINTS if name in numbers)
+        self.told_side = told_side
+        by_motor = {motor: name for name, motor in numbers.items()}
+        self.names: tuple[str, ...] = tuple(by_motor.get(motor, "") for motor in range(MOTORS))
+        self.is_fitted: NDArray[np.bool_] = np.array([bool(name) for name in self.names])
         self.sign: NDArray[np.int64] = np.array([-1 if name in backwards else 1 for name in self.names])
         self.from_joints = self._matrix()
         self.limits_rad: Array = self.from_joints @ JOINT_LIMITS_rad
@@ -94,17 +114,19 @@ class MotorMap:
         if isinstance(content, dict) and "joint_to_motor_mapping" in content:
             listed = strict_yaml.validate(content, _ShadowMapFile, where=str(path)).joint_to_motor_mapping
             named = dict(zip(_SHADOW_JOINTS, listed, strict=True))
-            return cls({joint: motor for joint, motor in named.items() if motor >= 0}, where=str(path))
+            numbers = {joint: motor for joint, motor in named.items() if motor >= 0}
+            return cls(numbers, where=str(path), told_side=_MAP_SIDES.get(path.name[:3]))
         own = strict_yaml.validate(content, _MotorFile, where=str(path))
-        return cls(own.motors, own.reversed, str(path))
+        return cls(own.motors, own.reversed, str(path), own.side)
 
     def reverse(self, backwards: tuple[str, ...]) -> MotorMap:
         """The same map with other joints turning backwards, as a file of gains tells by their signs."""
-        return MotorMap(self.numbers, backwards, "motor map")
+        own = tuple(name for name in backwards if name in self.numbers)
+        return MotorMap(self.numbers, own, "motor map", self.told_side)
 
     def _matrix(self) -> Array:
         matrix = np.zeros((MOTORS, len(JOINTS)))
-        for motor, name in enumerate(self.names):
+        for name, motor in self.numbers.items():
             matrix[motor, [JOINT_INDEX[joint] for joint in angles_of_driven(name)]] = 1.0
         return matrix
 
@@ -129,10 +151,31 @@ def drivable_range_rad(motors: MotorMap, calibration: JointCalibration, margin: 
 
 
 def _check_one_to_one(numbers: Mapping[str, int], backwards: tuple[str, ...], where: str) -> None:
-    hint = f"Name each of the {MOTORS} motors once: {', '.join(DRIVEN_JOINTS)}"
-    if missing := sorted(set(DRIVEN_JOINTS) - set(numbers)):
-        raise ConfigurationError(f"no motor for {', '.join(missing)}", where=where, hint=hint)
+    hint = f"Name each of the hand's motors once: {', '.join(DRIVEN_JOINTS)}"
     if unknown := sorted((set(numbers) | set(backwards)) - set(DRIVEN_JOINTS)):
         raise ConfigurationError(f"unknown driven joints {', '.join(unknown)}", where=where, hint=hint)
-    if sorted(numbers.values()) != list(range(MOTORS)):
-        raise ConfigurationError(f"the motor numbers must be 0 to {MOTORS - 1}, each once", where=where, hint=hint)
+    if missing := _missing_motors(set(numbers)):
+        raise ConfigurationError(f"no motor for {', '.join(missing)}", where=where, hint=hint)
+    if backwards_only := sorted(set(backwards) - set(numbers)):
+        raise ConfigurationError(f"reverses {', '.join(backwards_only)} without a motor", where=where, hint=hint)
+    if len(set(numbers.values())) < len(numbers) or not set(numbers.values()) <= set(range(MOTORS)):
+        raise ConfigurationError(
+            f"the motor numbers must be among 0 to {MOTORS - 1}, each once", where=where, hint=hint
+        )
+
+
+def _missing_motors(named: set[str]) -> list[str]:
+    """Motors that a hand with those named must have too.
+
+    A finger is there as a whole or not at all. Lite hands have neither wrist nor THJ3, and never a little finger.
+    """
+    of_finger = {
+        finger: {name for name in DRIVEN_JOINTS if name.startswith(finger)} for finger in ("FF", "MF", "RF", "LF")
+    }
+    groups = [*of_finger.values(), {"WRJ1", "WRJ2"}]
+    if named & of_finger["LF"]:
+        return sorted(set(DRIVEN_JOINTS) - named)
+    needed = {"THJ1", "THJ2", "THJ4", "THJ5"}.union(*(group for group in groups if group & named))
+    if not any(group & named for group in of_finger.values()):
+        needed |= of_finger["FF"]
+    return sorted(needed - named)

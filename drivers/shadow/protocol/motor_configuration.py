@@ -75,8 +75,8 @@ class MotorConfiguration(StrictModel):
     pos_filter: _Filter | None = None
 
 
-def load_configurations(path: Path) -> dict[str, MotorConfiguration]:
-    """Read a hand's ``motor_board_effort_controllers.yaml``; by driven joint.
+def load_configurations(path: Path, driven: tuple[str, ...] = DRIVEN_JOINTS) -> dict[str, MotorConfiguration]:
+    """Read a hand's ``motor_board_effort_controllers.yaml``; by driven joint, of those that the hand has.
 
     Raises:
         ConfigurationError: the file cannot be used, or a motor is missing.
@@ -85,12 +85,12 @@ def load_configurations(path: Path) -> dict[str, MotorConfiguration]:
     if not isinstance(content, dict):
         raise ConfigurationError("contains no motors", where=str(path), hint="Use motor_board_effort_controllers.yaml")
     named = {str(name).upper(): value for name, value in content.items()}
-    if wrong := sorted(set(DRIVEN_JOINTS) ^ set(named)):
-        hint = f"It must name {', '.join(DRIVEN_JOINTS)}"
+    if wrong := sorted(set(driven) - set(named) | set(named) - set(DRIVEN_JOINTS)):
+        hint = f"It must name {', '.join(driven)}"
         raise ConfigurationError(f"missing or unknown: {', '.join(wrong)}", where=str(path), hint=hint)
     return {
         joint: strict_yaml.validate(named[joint], MotorConfiguration, where=f"{path}, {joint.lower()}")
-        for joint in DRIVEN_JOINTS
+        for joint in driven
     }
 
 
@@ -113,7 +113,7 @@ def configure_motors(
         for joint, configuration in waiting.items():
             for kind, word in config_upload(configuration.pid.words):
                 _insist(exchange, kind, _alone(motors.numbers[joint], word), where)
-        flags = _fresh_flags(exchange, where)
+        flags = _fresh_flags(exchange, where, motors.is_fitted)
         waiting = {joint: each for joint, each in waiting.items() if flags[motors.numbers[joint]] & _REFUSED}
         if not waiting:
             _insist(exchange, ToMotor.SYSTEM_CONTROLS, _backlash(motors, configurations), where)
@@ -152,13 +152,13 @@ def _insist(exchange: Exchange, kind: ToMotor, words: NDArray[np.int16], where: 
     raise DeviceError(what, where=where, hint="Check the cable and the hand's power, then connect again")
 
 
-def _fresh_flags(exchange: Exchange, where: str) -> NDArray[np.int64]:
+def _fresh_flags(exchange: Exchange, where: str, fitted: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Flags that all motors sent after now; a motor that stays silent keeps what it said before."""
     idle = np.zeros(MOTORS, dtype=np.int16)
     readings = _insist(exchange, ToMotor.DEMAND_PWM, idle, where)
     before_ns = readings.stamps_ns[FromMotor.FLAGS].copy()
     for _ in range(_CYCLES_FOR_FLAGS):
         readings = _insist(exchange, ToMotor.DEMAND_PWM, idle, where)
-        if (readings.stamps_ns[FromMotor.FLAGS] > before_ns).all():
+        if (readings.stamps_ns[FromMotor.FLAGS] > before_ns)[fitted].all():
             break
     return readings.flags

@@ -10,7 +10,7 @@ from drivers.ethercat.registers import Fmmu, Register, SyncManager
 from drivers.shadow.protocol import palm_codec, palm_variants
 from drivers.shadow.protocol.palm_codec import PalmCommand, PalmStatus
 
-PalmName = Literal["0220", "0230", "0240"]
+PalmName = Literal["0220", "0230", "0240", "0250"]
 
 SHADOW_VENDOR = 0x530
 BRIDGE_PRODUCT = 0
@@ -95,6 +95,16 @@ PALMS: dict[PalmName, PalmImage] = {
         palm_codec.encode_status,
         palm_codec.decode_status,
     ),
+    "0250": PalmImage(
+        "0250",
+        (0x0000000A,),
+        74,
+        542,
+        palm_variants.encode_command_0240,
+        palm_variants.decode_command_0240,
+        palm_variants.encode_status_0250,
+        palm_variants.decode_status_0250,
+    ),
 }
 """The palms that can be driven."""
 
@@ -106,7 +116,7 @@ SIDES: dict[int, Side] = {0x01000000: "right", 0x01000001: "left"}
 USUAL_PALM: PalmName = "0220"
 """That of most hands, and of emulated ones that nobody wants otherwise."""
 
-WHICH_PALMS = "Palms 0220, 0230 and 0240 are supported; ask Shadow Robot which of their process images this board has"
+WHICH_PALMS = "Palms 0220, 0230, 0240 and 0250 are supported; ask Shadow Robot which process image this board has"
 """Advice for a product code that is none of theirs."""
 
 _OTHER_PRODUCTS = {

@@ -1,7 +1,8 @@
-"""Process images of the rarer palms: 0240 with its motion sensor, 0230 with tactile links.
+"""Process images of the rarer palms: 0240 with its motion sensor, 0230 with tactile links, 0250 with magnetic tips.
 
-Layouts follow Shadow's ``0240_palm_edc_IMU`` and ``0230_palm_edc_TS`` headers (protocols: Palm images); each ends with
-the CAN bridge's 12 bytes. The 0240's status is that of the 0220.
+Layouts follow Shadow's headers (protocols: Palm images; Palm 0250); each ends with the CAN bridge's 12 bytes. The
+0240's status is that of the 0220, the 0250's command that of the 0240. What a magnetic fingertip's 78 bytes mean is not
+known: they are kept as they come.
 """
 
 from __future__ import annotations
@@ -25,7 +26,10 @@ from drivers.shadow.protocol.palm_codec import (
 _COMMAND_0240 = struct.Struct("<IIhI20hI H2B BBH8s")
 _COMMAND_0230 = struct.Struct("<IIhI II 20h BBH8s")
 _STATUS_0230 = struct.Struct(f"<I37H 40H IH160s I16H IhII {'hH' * MOTORS_PER_STATUS} H BBH8s")
+_STATUS_0250 = struct.Struct(f"<I37H IH390s IhII {'hH' * MOTORS_PER_STATUS} H BBH8s")
 _FINGERS, _TIP_BYTES, _LINK_WORDS, _AUX_WORDS = 5, 32, 8, 16
+MAGNETIC_TIP_BYTES = 78
+"""Of each fingertip in the status of a 0250 palm."""
 
 
 def encode_command_0240(command: PalmCommand) -> bytes:
@@ -133,6 +137,59 @@ def decode_status_0230(payload: bytes) -> PalmStatus:
     )
 
 
+def encode_status_0250(status: PalmStatus) -> bytes:
+    """The 542 bytes of a 0250 palm's status, as an emulated one sends them.
+
+    Raises:
+        CodecError: a value does not fit its field.
+    """
+    packets = [word for packet in zip(_words(status.torque), _words(status.misc), strict=True) for word in packet]
+    return _pack(
+        _STATUS_0250,
+        "0250",
+        status.edc_command,
+        *_words(status.sensors),
+        status.tactile_data_type,
+        status.tactile_valid,
+        np.asarray(status.tactile, np.uint8).tobytes(),
+        status.motor_data_type,
+        status.which_motors,
+        status.arrived,
+        status.had_errors,
+        *packets,
+        status.idle_time_us,
+        *_can(status.can),
+    )
+
+
+def decode_status_0250(payload: bytes) -> PalmStatus:
+    """Read the 542 bytes of a 0250 palm's status.
+
+    Raises:
+        CodecError: wrong length.
+    """
+    edc, *rest = _unpack(_STATUS_0250, payload, "0250", "status")
+    sensors, rest = rest[: len(SENSORS)], rest[len(SENSORS) :]
+    (tactile_type, valid, tips), rest = rest[:3], rest[3:]
+    (kind, which_motors, arrived, had_errors), rest = rest[:4], rest[4:]
+    packets, (idle_us, *can) = rest[: 2 * MOTORS_PER_STATUS], rest[2 * MOTORS_PER_STATUS :]
+    return PalmStatus(
+        edc_command=edc,
+        sensors=np.array(sensors, np.uint16),
+        motor_data_type=kind,
+        which_motors=which_motors,
+        arrived=arrived,
+        had_errors=had_errors,
+        torque=np.array(packets[::2], np.int16),
+        misc=np.array(packets[1::2], np.uint16),
+        tactile_data_type=tactile_type,
+        tactile_valid=valid,
+        tactile=np.frombuffer(tips, np.uint8).reshape(_FINGERS, MAGNETIC_TIP_BYTES),
+        idle_time_us=idle_us,
+        can=CanFrame(*can),
+    )
+
+
 def _head(command: PalmCommand) -> tuple[int, int, int, int]:
     return command.edc_command, command.from_motor_data_type, command.which_motors, command.to_motor_data_type
 
@@ -166,6 +223,7 @@ def _pack(image: struct.Struct, palm: str, *fields: int | bytes) -> bytes:
 
 def _check_bytes(image: struct.Struct, palm: str, fields: tuple[int | bytes, ...]) -> None:
     """:mod:`struct` cuts or fills byte strings in silence."""
-    sizes = {8, _FINGERS * _TIP_BYTES} if image is _STATUS_0230 else {8}
+    tips = {_STATUS_0230: _TIP_BYTES, _STATUS_0250: MAGNETIC_TIP_BYTES}
+    sizes = {8, _FINGERS * tips[image]} if image in tips else {8}
     if any(isinstance(field, bytes) and len(field) not in sizes for field in fields):
         raise CodecError("a byte field has a wrong length", where=f"palm {palm}")

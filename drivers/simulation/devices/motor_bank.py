@@ -1,4 +1,4 @@
-"""The emulated hand's 20 motor boards: demands, halts, flags, answers (protocols: Motor demands; Motor answers)."""
+"""The emulated hand's motor boards: demands, halts, flags, answers (protocols: Motor demands; Motor answers)."""
 
 from __future__ import annotations
 
@@ -51,14 +51,16 @@ class MotorBank:
         rng: noise of the strain gauges.
 
     Attributes:
+        is_fitted: which motors there are, shape (20,); the others never answer.
         backlash_compensated: which motors have the compensation switched on, shape (20,).
     """
 
     def __init__(self, plant: HandPlant, motor_map: MotorMap, rng: np.random.Generator) -> None:
         self._plant, self._rng = plant, rng
         self._sign = motor_map.sign
-        self._motor_of_row = np.array([motor_map.numbers[joint] for joint in DRIVEN_JOINTS])
-        self._row_of_motor = np.argsort(self._motor_of_row)
+        self.is_fitted = motor_map.is_fitted
+        pulls = [motor_map.numbers.get(joint) for joint in DRIVEN_JOINTS]
+        self._joint_from_motor = np.array([[float(motor == own) for motor in range(MOTORS)] for own in pulls])
         classes = [motor_class(joint) for joint in motor_map.names]
         self._stall_Nm = np.array([motor.stall_Nm for motor in classes])
         self._stall_mA = np.array([motor.stall_current_mA for motor in classes])
@@ -137,7 +139,7 @@ class MotorBank:
 
     @property
     def _torque_Nm(self) -> Array:
-        return np.asarray(self._sign * self._plant.motor_torque_Nm.take(self._row_of_motor))
+        return np.asarray(self._sign * (self._plant.motor_torque_Nm @ self._joint_from_motor))
 
     @property
     def _load(self) -> Array:
@@ -161,7 +163,7 @@ class MotorBank:
 
     def _turn(self, pwm: Array | NDArray[np.int_]) -> None:
         self._pwm = np.where(self._flags & _OVER_TEMPERATURE, 0.0, pwm)
-        self._plant.drive((self._sign * self._pwm).take(self._motor_of_row) / MAX_PWM)
+        self._plant.drive(self._joint_from_motor @ (self._sign * self._pwm) / MAX_PWM)
 
     def _reset(self, words: NDArray[np.int_]) -> None:
         """Reset a motor, addressed by its number on its bus; it restarts halted and with its stored settings."""

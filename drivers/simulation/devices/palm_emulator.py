@@ -29,6 +29,7 @@ from drivers.shadow.protocol.palm_codec import (
     PalmStatus,
 )
 from drivers.shadow.protocol.palm_images import PALMS, PalmImage
+from drivers.shadow.protocol.palm_variants import MAGNETIC_TIP_BYTES
 from drivers.simulation.devices.motor_bank import MotorBank
 from drivers.simulation.hand_plant import HandPlant
 from drivers.simulation.sections import TactileSection
@@ -37,6 +38,7 @@ from drivers.simulation.settings import JointSensorSettings
 _ADC_FULL_SCALE = 4095
 _ALL_OF = tuple(sum(1 << motor for motor in range(parity, MOTORS, 2)) for parity in (0, 1))
 _IDLE_us, _IDLE_SPREAD_us = 410, 20
+_TIP_BYTES = {"0230": 32, "0250": MAGNETIC_TIP_BYTES}  # other palms have what a fingertip of theirs sends
 
 
 class JointSensors:
@@ -128,6 +130,7 @@ class PalmEmulator:
         self._outbox: list[Datagram] = []
         self._last_packet = (np.int16(0), np.uint16(0))
         self._shown = np.zeros(len(SENSORS), np.uint16)
+        self._absent = set(np.flatnonzero(~motors.is_fitted).tolist())
         self.faults = PalmFaults()
 
     def write(self, payload: bytes) -> None:
@@ -195,7 +198,7 @@ class PalmEmulator:
             return 0, 0, torque, misc
         arrived, had_errors = _ALL_OF[parity], 0
         for motor in range(parity, MOTORS, 2):
-            if motor in self.faults.silent:
+            if motor in self.faults.silent or motor in self._absent:
                 arrived &= ~(1 << motor)
                 torque[motor >> 1], misc[motor >> 1] = self._last_packet if motor >> 1 == 9 else (0, 0)
             elif motor in self.faults.wrong_type:
@@ -206,9 +209,8 @@ class PalmEmulator:
         return arrived, had_errors, torque, misc
 
     def _tips(self, slots: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        if self._image.name != "0230":
-            return slots
-        return np.hstack((slots, np.zeros_like(slots)))
+        size = _TIP_BYTES.get(self._image.name, slots.shape[1])
+        return np.hstack((slots, np.zeros((len(slots), size - slots.shape[1]), np.uint8)))
 
     def _auxiliary(self, command: PalmCommand) -> PalmAuxiliary | None:
         if self._image.name != "0230":

@@ -27,18 +27,15 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.records import Attachment, Channel, Chunk, Header, McapRecord, Message, MessageIndex, Metadata
-from mcap.stream_reader import breakup_chunk
 
 from drivers.core.errors import SessionError
 from sessions.recording.traffic import formats, raw_frames, schemas
 from sessions.recording.traffic.files import END_RECORD, PROFILE, SEAL, is_sealed, segment_path
+from sessions.recording.traffic.mcap_chunks import split_chunk
 from sessions.recording.traffic.mcap_frames import DAMAGE, Frames
 from sessions.recording.traffic.mcap_summary import Summary, read_summary
 from sessions.recording.traffic.raw_frames import UNSTAMPED, DeviceStamp
 from sessions.recording.traffic.tail import read_tail
-
-LARGEST_CHUNK_bytes = 16 << 20
-"""A chunk is closed after 64 KiB: more is a picture. A small file may claim to hold gigabytes."""
 
 _UNREADABLE = (McapError, zstandard.ZstdError, struct.error, ValueError, OverflowError, MemoryError)
 """What the mcap package raises on damaged content."""
@@ -239,7 +236,7 @@ class _SegmentMessages:
         self._topics: dict[int, str] = {}
         self._read: Counter[int] = Counter()
         self._indexed: Counter[int] = Counter()
-        self._times: dict[int, list[int]] = {}
+        self._last_chunk: list[McapRecord] = []
         self._chunk_is_read = False
         self._gaps, self._expected = 0, expected
 
@@ -278,12 +275,12 @@ class _SegmentMessages:
                 self._loss.damaged_records += 1
                 self._chunk_is_read = False  # it may have been a chunk, or an index of the one before
             elif opcode == Opcode.CHUNK:
-                self._times, self._chunk_is_read = {}, False  # until it is read
+                self._last_chunk, self._chunk_is_read = [], False  # until it is read
                 return self._chunk(content)
-            elif opcode == Opcode.MESSAGE_INDEX:
+            elif opcode == Opcode.MESSAGE_INDEX and not self._chunk_is_read:
                 index = MessageIndex.read(ReadDataStream(BytesIO(content)))
                 times = [stamp_ns for stamp_ns, _ in index.records]
-                if not self._chunk_is_read and times != self._times.get(index.channel_id):
+                if times != self._times_in_last_chunk(index.channel_id):
                     self._indexed[index.channel_id] += len(times)  # of a chunk that could not be read
             elif opcode == Opcode.METADATA:
                 found = Metadata.read(ReadDataStream(BytesIO(content)))
@@ -296,22 +293,13 @@ class _SegmentMessages:
         return []
 
     def _chunk(self, content: bytes) -> list[McapRecord]:
-        chunk = Chunk.read(ReadDataStream(BytesIO(content)))
-        _check_size(chunk)
-        records = breakup_chunk(chunk, validate_crc=True)
-        times: dict[int, list[int]] = {}
-        for record in records:
-            if isinstance(record, Message):
-                times.setdefault(record.channel_id, []).append(record.log_time)
-        self._times, self._chunk_is_read = times, True
-        return records
+        self._last_chunk = split_chunk(Chunk.read(ReadDataStream(BytesIO(content))))
+        self._chunk_is_read = True
+        return self._last_chunk
 
-
-def _check_size(chunk: Chunk) -> None:
-    """No recorder makes a chunk larger than this, and unpacking one takes no more. Raises ValueError."""
-    packed = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else len(chunk.data)
-    if chunk.compression not in ("", "zstd") or max(chunk.uncompressed_size, packed) > LARGEST_CHUNK_bytes:
-        raise ValueError(f"a chunk of {max(chunk.uncompressed_size, packed)} bytes, packed by {chunk.compression!r}")
+    def _times_in_last_chunk(self, channel: int) -> list[int]:
+        messages = (record for record in self._last_chunk if isinstance(record, Message))
+        return [message.log_time for message in messages if message.channel_id == channel]
 
 
 def _open(path: Path) -> BinaryIO:

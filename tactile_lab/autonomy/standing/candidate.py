@@ -9,7 +9,7 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import closing
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.grasp_plan import GraspPlan
 
 
@@ -27,18 +27,18 @@ class SideReach:
     centre_m: tuple[float, float] = (0.0, 0.0)
     standoff_m: float = 0.13
 
-    def holds(self, plan: GraspPlan, tip: TipEllipsoid) -> bool:
+    def holds(self, plan: GraspPlan, hand: HandShape) -> bool:
         """Whether the palm stays in the workspace, where the hand comes down beside the object too."""
-        table = closing(plan.closing, plan.height_m, tip)
+        table = closing(plan.closing, plan.height_m, hand)
         palm = np.asarray((plan.frame.pose * table.grasp_T_palm).translation())[:2]
-        back_m = self.standoff_m * approach_of(plan, tip) if table.is_sideways else np.zeros(2)
+        back_m = self.standoff_m * approach_of(plan, hand) if table.is_sideways else np.zeros(2)
         places = np.array([palm, palm - back_m])
         return bool(np.linalg.norm(places - np.array(self.centre_m), axis=1).max() < self.radius_m)
 
 
-def approach_of(plan: GraspPlan, tip: TipEllipsoid) -> Array:
+def approach_of(plan: GraspPlan, hand: HandShape) -> Array:
     """Direction in which a hand with its palm upright comes, world x, y, shape (2,)."""
-    approach = np.array(closing(plan.closing, plan.height_m, tip).approach)
+    approach = np.array(closing(plan.closing, plan.height_m, hand).approach)
     return np.asarray(plan.frame.pose.rotation().rotate(approach))[:2]
 
 

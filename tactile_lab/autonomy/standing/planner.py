@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from drivers.core.contacts import Array, Grasp
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_plan import GraspPlan
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate
@@ -42,14 +42,14 @@ class StandingPlanner:
 
     Attributes:
         felt: what is known of it.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
         yaw_window_rad: of the arm.
         reach: of the palm.
         settings: of touches; None for none.
     """
 
     felt: FeltObject
-    tip: TipEllipsoid
+    hand: HandShape
     yaw_window_rad: tuple[float, float]
     reach: SideReach
     settings: TouchSettings | None = None
@@ -60,7 +60,7 @@ class StandingPlanner:
     _touching: TouchPlanner | None = field(init=False)
 
     def __post_init__(self) -> None:
-        where = (self.felt, self.tip, self.yaw_window_rad, self.reach)
+        where = (self.felt, self.hand, self.yaw_window_rad, self.reach)
         self._grasping = SidePlanner(*where)
         self._touching = None if self.settings is None else TouchPlanner(*where, self.settings)
 

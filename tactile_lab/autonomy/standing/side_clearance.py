@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivers.core.contacts import FINGERS, Array
+from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.collision_spheres import link_balls
 from drivers.shadow.closing.hand_envelope import open_hand
-from drivers.shadow.closing.posture import PROGRESS, TipEllipsoid
+from drivers.shadow.closing.posture import PROGRESS, HandShape
 from sessions.motion.grasp_plan import GraspPlan
 
 _APPROACH_m = (0.0, 0.02, 0.05, 0.09, 0.13)
@@ -65,41 +65,41 @@ class StandingBox:
         return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(axis=-1), 0.0))
 
 
-def is_way_clear(plan: GraspPlan, tip: TipEllipsoid, box: StandingBox) -> bool:
+def is_way_clear(plan: GraspPlan, hand: HandShape, box: StandingBox) -> bool:
     """Whether the open hand comes along its approach with nothing of it in the box or the table."""
-    hand, table = open_hand(plan.closing, plan.height_m, tip), closing(plan.closing, plan.height_m, tip)
-    if hand.lowest_m < _CLEAR_m:
+    opened, table = open_hand(plan.closing, plan.height_m, hand), closing(plan.closing, plan.height_m, hand)
+    if opened.lowest_m < _CLEAR_m:
         return False
     offsets_m = -np.array(_APPROACH_m)[:, None, None] * np.array(table.approach)
-    return bool((box.distances_m(_to_world(plan, hand.centres_m + offsets_m)) - hand.radii_m).min() >= _CLEAR_m)
+    return bool((box.distances_m(_to_world(plan, opened.centres_m + offsets_m)) - opened.radii_m).min() >= _CLEAR_m)
 
 
-def expected_touches(plan: GraspPlan, tip: TipEllipsoid, box: StandingBox, surely: StandingBox) -> dict[str, Array]:
+def expected_touches(plan: GraspPlan, hand: HandShape, box: StandingBox, surely: StandingBox) -> dict[str, Array]:
     """Where fingertips would meet the box, world, shape (3,), by finger; none where a link would meet it first.
 
     Args:
         plan: of the grasp.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
         box: nothing but fingertips may meet it.
         surely: a fingertip counts only if it meets this smaller box too.
     """
-    table, links = closing(plan.closing, plan.height_m, tip), link_balls(plan.closing, plan.height_m, tip)
-    tips_m = np.array([[table.path(finger).centre_m(u) for finger in FINGERS] for u in PROGRESS])
+    table, links = closing(plan.closing, plan.height_m, hand), link_balls(plan.closing, plan.height_m, hand)
+    tips_m = np.array([[table.path(finger).centre_m(u) for finger in table.fingers] for u in PROGRESS])
     tips_world_m = _to_world(plan, tips_m)
-    meets = (box.distances_m(tips_world_m) < tip.radius_m) & links.usable
-    surely_meets = (surely.distances_m(tips_world_m) < tip.radius_m) & links.usable
+    meets = (box.distances_m(tips_world_m) < hand.radius_m) & links.usable
+    surely_meets = (surely.distances_m(tips_world_m) < hand.radius_m) & links.usable
     link_places_m = _to_world(plan, links.centres_m)
     in_something = box.distances_m(link_places_m) < links.radii_m + _CLEAR_CLOSING_m
     in_something |= link_places_m[..., 2] < links.radii_m + _CLEAR_CLOSING_m
     found = {}
-    for index, finger in enumerate(FINGERS):
+    for index, finger in enumerate(table.fingers):
         stops = int(np.argmax(meets[:, index])) if meets[:, index].any() else len(PROGRESS) - 1
         passed = links.usable[: stops + 1, index]
         if in_something[: stops + 1][:, links.fingers == index][passed].any():
             return {}
         if surely_meets[:, index].any():
             way = plan.frame.pose.rotation().rotate(table.path(finger).direction)
-            found[finger] = tips_world_m[stops, index] + tip.radius_m * np.asarray(way)
+            found[finger] = tips_world_m[stops, index] + hand.radius_m * np.asarray(way)
     return found if "TH" in found and len(found) >= _LEAST_FINGERS else {}
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES, LOWEST_m, closing, sideways
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import GraspFrame
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate, approach_of
@@ -54,13 +54,13 @@ class SidePlanner:
 
     Attributes:
         felt: what is known of the object; who uses the planner keeps it up to date.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
         yaw_window_rad: of the arm.
         reach: of the palm.
     """
 
     felt: FeltObject
-    tip: TipEllipsoid
+    hand: HandShape
     yaw_window_rad: tuple[float, float]
     reach: SideReach
     blocked: list[StandingCandidate] = field(default_factory=list)
@@ -91,18 +91,18 @@ class SidePlanner:
     def _deepest(
         self, name: str, yaw_rad: float, height_m: float, box: StandingBox, surely: StandingBox
     ) -> StandingCandidate | None:
-        approach = np.array(closing(name, height_m, self.tip).approach[:2])
+        approach = np.array(closing(name, height_m, self.hand).approach[:2])
         c, s = np.cos(yaw_rad), np.sin(yaw_rad)
         way = np.array([[c, -s], [s, c]]) @ approach
         half_m = box.half_along_m(way)
         for depth_m in np.arange(_DEEPEST_m, _SHALLOWEST_m - 1e-9, -_DEPTH_STEP_m):
             x, y = np.array([box.x_m, box.y_m]) - (half_m - depth_m) * way
             plan = GraspPlan(GraspFrame(float(x), float(y), yaw_rad), name, height_m)
-            if self._was_blocked(plan, float(depth_m)) or not self.reach.holds(plan, self.tip):
+            if self._was_blocked(plan, float(depth_m)) or not self.reach.holds(plan, self.hand):
                 continue
-            if not is_way_clear(plan, self.tip, box):
+            if not is_way_clear(plan, self.hand, box):
                 continue
-            if touches := expected_touches(plan, self.tip, box, surely):
+            if touches := expected_touches(plan, self.hand, box, surely):
                 score_m = self.felt.novelty_m(np.array(list(touches.values()))) - _LOW_FIRST * height_m
                 return StandingCandidate(plan, touches, score_m, float(depth_m))
         return None
@@ -119,7 +119,7 @@ class SidePlanner:
 
     def _is_near_side_new(self, plan: GraspPlan) -> bool:
         """Whether the side that the hand comes from is worth a touch there, and is not tipped over by it."""
-        box, way = self.felt.standing_box, approach_of(plan, self.tip)
+        box, way = self.felt.standing_box, approach_of(plan, self.hand)
         half_m = box.half_along_m(way)
         heights_m = np.arange(plan.height_m, min(plan.height_m + _ROW_m, box.size_m[2]), _ROW_m / 3)
         front = np.array([box.x_m, box.y_m]) - half_m * way

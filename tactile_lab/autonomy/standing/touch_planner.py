@@ -14,7 +14,7 @@ import numpy as np
 
 from drivers.core.contacts import FINGERS, Array
 from drivers.shadow.closing.closing import SIDES, closing, sideways
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import GraspFrame
@@ -42,14 +42,14 @@ class TouchPlanner:
 
     Attributes:
         felt: what is known of the object; who uses the planner keeps it up to date.
-        tip: shape of the fingertips.
+        hand: its form, and the shape of its fingertips.
         yaw_window_rad: of the arm.
         reach: of the palm.
         settings: of touches.
     """
 
     felt: FeltObject
-    tip: TipEllipsoid
+    hand: HandShape
     yaw_window_rad: tuple[float, float]
     reach: SideReach
     settings: TouchSettings = field(default_factory=TouchSettings)
@@ -59,7 +59,7 @@ class TouchPlanner:
     def best(self) -> StandingCandidate | None:
         """The next touch; None where nothing is left that would tell anything new."""
         new = (one for one in (*self._taps(), *self._sides()) if self.felt.is_new(one.touches_m))
-        rated = [one for one in new if not self._was_blocked(one.plan) and self.reach.holds(one.plan, self.tip)]
+        rated = [one for one in new if not self._was_blocked(one.plan) and self.reach.holds(one.plan, self.hand)]
         return max(rated, key=lambda one: one.score_m, default=None)
 
     def _was_blocked(self, plan: GraspPlan) -> bool:
@@ -91,9 +91,9 @@ class TouchPlanner:
 
     def _tapped(self, frame: GraspFrame, box: StandingBox) -> dict[str, Array]:
         """Where fingertips meet the top, by finger."""
-        table, shrunk = closing(TAP.closing, TAP_HEIGHT_m, self.tip), box.grow(-_INSIDE_m / 2, 0.0)
+        table, shrunk = closing(TAP.closing, TAP_HEIGHT_m, self.hand), box.grow(-_INSIDE_m / 2, 0.0)
         found = {}
-        for finger in FINGERS:
+        for finger in table.fingers:
             place = np.asarray(frame.pose.transformFrom(table.path(finger).centre_m(TAP.progress[finger])))
             place[2] = box.size_m[2]
             if shrunk.distances_m(place) <= 1e-9:
@@ -110,7 +110,7 @@ class TouchPlanner:
 
     def _on_side(self, yaw_rad: float, name: str, lowest_m: float) -> Iterator[StandingCandidate]:
         box, across = self.felt.standing_box, np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
-        way = approach_of(GraspPlan(GraspFrame(0.0, 0.0, yaw_rad), name, lowest_m), self.tip)
+        way = approach_of(GraspPlan(GraspFrame(0.0, 0.0, yaw_rad), name, lowest_m), self.hand)
         half_m = box.half_along_m(way)
         for lane_m in _places(box.half_along_m(across), _LANES_APART_m):
             lane = np.array([box.x_m, box.y_m]) + lane_m * across

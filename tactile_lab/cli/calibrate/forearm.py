@@ -87,6 +87,7 @@ def forearm(
     from tactile_lab.cli.calibrate.steps import store_result
     from tactile_lab.cli.calibrate.wizard import may_write, wizard
     from tactile_lab.rigs.description import load_rig
+    from tactile_lab.rigs.wired import require_right_hand
 
     here, page = load_rig(rig).installation, PageAddress.if_wanted(view, listen, view_port, token)
     file = out or Path("calibrations") / here.rig / "forearm.yaml"
@@ -97,6 +98,7 @@ def forearm(
             pose = transform_of([value / 1e3 for value in translation_mm], rpy_deg)
             found = manual_record(pose, *sigmas, here, notes=notes, valid_days=valid_days)
         else:
+            require_right_hand(load_rig(rig))
             wanted = _settings(settings)
             if source is not None:
                 data = _load_recorded(source, here)

@@ -68,7 +68,7 @@ def _fact(name: str, value: str) -> Text:
 def _forces(panel: Panel) -> RenderableType:
     grid = Table.grid(padding=(0, 1))
     cells = []
-    for finger in FINGERS:
+    for finger in [finger for finger in FINGERS if finger in panel.view.forces_N] or FINGERS:
         grid.add_column(no_wrap=True)
         cells.append(_force(finger, panel))
     grid.add_row(*cells)

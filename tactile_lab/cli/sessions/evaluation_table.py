@@ -59,12 +59,13 @@ def _rest(content: Mapping[str, Any]) -> Table:
     sensing, loops, time, truth = (content.get(key) or {} for key in ("sensing", "loops", "time", "truth"))
     share = f"from the true surface, 95 % below {_figure(sensing.get('p95_mm'), 'mm')}"
     spread = f"95 % below {_figure(time.get('step_ms_p95'), 'ms', 0)}; {_figure(time.get('total_s'), 's', 1)} in all"
-    wrong = f"accepted of {_count(loops.get('tested'))} tested, {_count(loops.get('wrong'))} of them wrong"
     seen = f"of {count(content['grasps'], 'grasp')} known"
     grid = _grid(("other metrics", ""), "")
     grid.add_row("Registration error", _figure(content.get("registration_rms_mm"), "mm"), _verdict(content))
     grid.add_row("Contact error, median", _figure(sensing.get("median_mm"), "mm"), share)
-    grid.add_row("Loops", _figure(loops.get("accepted"), "  ", 0), wrong)
+    if loops.get("tested"):
+        wrong = f"accepted of {_count(loops['tested'])} tested, {_count(loops.get('wrong'))} of them wrong"
+        grid.add_row("Loops", _figure(loops.get("accepted"), "  ", 0), wrong)
     grid.add_row("True poses", _figure(truth.get("seen"), "  ", 0), seen)
     grid.add_row("Time per step, median", _figure(time.get("step_ms_median"), "ms", 0), spread)
     grid.add_row("Tracking", f"{content.get('status', UNKNOWN)}   ", "")

@@ -18,7 +18,7 @@ from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact, Grasp
 from drivers.core.poses import rotate, spatial, transform_points
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.collision_spheres import Verdicts, link_balls
-from drivers.shadow.closing.posture import PROGRESS, TipEllipsoid
+from drivers.shadow.closing.posture import PROGRESS, HandShape
 from sessions.conductor.conductor import holds
 from sessions.conductor.estimator import Reorientation
 from sessions.motion.cycle_settings import CycleSettings
@@ -69,7 +69,7 @@ class KinematicHand:
     Args:
         solid: the object; it stands near the world's origin with any yaw.
         cycle: speeds and times of the rig.
-        tip: shape of its fingertips.
+        hand: its form, and the shape of its fingertips.
         yaw_window_rad: range of yaw of its arm.
         rng: all random numbers.
     """
@@ -78,12 +78,12 @@ class KinematicHand:
         self,
         solid: Solid,
         cycle: CycleSettings,
-        tip: TipEllipsoid,
+        hand: HandShape,
         yaw_window_rad: tuple[float, float],
         rng: np.random.Generator,
     ) -> None:
-        self._solid, self._cycle, self._tip, self._window_rad, self._rng = solid, cycle, tip, yaw_window_rad, rng
-        self._radius_m = tip.radius_m
+        self._solid, self._cycle, self._hand, self._window_rad, self._rng = solid, cycle, hand, yaw_window_rad, rng
+        self._radius_m = hand.radius_m
         place = planar_pose(rng.normal(0.0, PLACE_SIGMA_m, 2), rng.uniform(-np.pi, np.pi))
         self.world_T_body = spatial(place, -solid.foot_m)
         self.elapsed_s = 0.0
@@ -101,7 +101,7 @@ class KinematicHand:
             return Attempt(plan, landings, None)
         self.world_T_body = self._push(reached) * self.world_T_body
         contacts, lines = self._close(reached)
-        palm = reached.frame.pose * table_of(reached, self._tip).grasp_T_palm
+        palm = reached.frame.pose * table_of(reached, self._hand).grasp_T_palm
         stamp_ns = round(1e9 * self.elapsed_s)
         grasp = Grasp(self._count, stamp_ns, (*contacts, *probed), palm, self._motion, lines)
         self._count, self._motion = self._count + 1, Pose3()
@@ -139,7 +139,7 @@ class KinematicHand:
         """The plan with which the open hand reached the table, and the landings before; None if there was no way
         down.
         """
-        table, now, landings = table_of(plan, self._tip), plan, list[Array]()
+        table, now, landings = table_of(plan, self._hand), plan, list[Array]()
         landed: set[str] = set()
         for _ in range(self._cycle.landing_tries):
             open_m = np.array([table.path(f).centre_m(table.path(f).valid[0]) for f in FINGERS])
@@ -155,7 +155,7 @@ class KinematicHand:
 
     def _tap(self, frame: GraspFrame) -> list[Contact]:
         """Lay the fingertips on what is below: all fingers that reach it when the first one has met it."""
-        table, touch = closing(TAP.closing, TAP_HEIGHT_m, self._tip), self._cycle.touch
+        table, touch = closing(TAP.closing, TAP_HEIGHT_m, self._hand), self._cycle.touch
         above_m = np.array([table.path(finger).centre_m(TAP.progress[finger]) for finger in FINGERS])
         above_m = self._beside(transform_points(frame.pose, above_m))
         places, met = self._coming_down(above_m, touch.lowest_m + self._radius_m)
@@ -200,7 +200,7 @@ class KinematicHand:
         """Positions (n, 5, 3) that the fingertips' centres would pass, step by step, and their directions (5, 3),
         world.
         """
-        paths = [table_of(plan, self._tip).path(finger) for finger in FINGERS]
+        paths = [table_of(plan, self._hand).path(finger) for finger in FINGERS]
         starts = self._beside(transform_points(plan.frame.pose, np.array([p.centre_m(p.valid[0]) for p in paths])))
         ways = rotate(plan.frame.pose, np.array([path.direction for path in paths]))
         lengths = np.array([path.length_m * float(np.ptp(path.valid)) for path in paths])
@@ -209,8 +209,8 @@ class KinematicHand:
 
     def _links_meet(self, plan: GraspPlan) -> bool:
         """Whether a link above the fingertips enters the object before all of them have come to rest."""
-        balls = link_balls(plan.closing, plan.height_m, self._tip)
-        paths = [table_of(plan, self._tip).path(finger) for finger in FINGERS]
+        balls = link_balls(plan.closing, plan.height_m, self._hand)
+        paths = [table_of(plan, self._hand).path(finger) for finger in FINGERS]
         ways_m = _STEP_m * self._stops(self._closing(plan)[0])[0]
         ends = [path.valid[0] + way_m / path.length_m for path, way_m in zip(paths, ways_m, strict=True)]
         distances_m = self._distances(transform_points(plan.frame.pose, balls.centres_m))

@@ -12,8 +12,12 @@ from functools import lru_cache, partial
 from types import MappingProxyType
 from typing import Any, TypeAlias, TypeVar
 
+import numpy as np
+from gtsam import Pose3, Rot3
+
 from tactile_lab.experiments.cells import Cell, Row, Setting, grid
 from tactile_lab.experiments.data import planar_data, spatial_data
+from tactile_lab.experiments.data.carried_off import carried_off
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.experiments.run_metrics import slam_figures
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
@@ -22,16 +26,19 @@ Overlay: TypeAlias = Mapping[str, Mapping[str, Any]]
 _Result = TypeVar("_Result")
 
 NOTHING = "nothing"
-PLANE, WRONG, LONG, SPACE = "in the plane", "wrong contacts", "long session", "in space"
+PLANE, WRONG, CARRIED, LONG, SPACE = "in the plane", "wrong contacts", "carried off", "long session", "in space"
 SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         PLANE: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
         WRONG: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
+        CARRIED: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
         LONG: ("L", "ellipse"),
         SPACE: ("box-12x6x6", "triangular-prism", "ellipsoid", "cylinder", "hexagonal-prism", "l-block"),
     }
 )
-GRASPS: Mapping[str, int] = MappingProxyType({PLANE: 12, WRONG: 12, LONG: 36, SPACE: 12})
+GRASPS: Mapping[str, int] = MappingProxyType({PLANE: 12, WRONG: 12, CARRIED: 12, LONG: 60, SPACE: 12})
+CARRIED_BEFORE, FARTHEST_m = 8, 0.15
+"""Grasp before which somebody puts the object elsewhere, and by how much at most per axis; it is also turned."""
 CHECK_EVERY = 5
 """Seeds that are divisible by this are run again even where a mechanism changed nothing."""
 
@@ -49,20 +56,16 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         NOTHING: {},
         "backward reading": {"joint": {"backwards": False}},
         "several trajectories": {"joint": {"hypotheses": 1}},
-        "aside branch": _joint("aside branch"),
         "valleys": _joint("valleys"),
         "stiff slips": {"motion": {"gripped": False}},
         "free space": _joint("free space"),
         "splicing": _joint("splicing"),
         "relocation": _joint("relocation"),
-        "second look": _joint("second look"),
         "deferred association": _joint("deferred association"),
         "faces": _joint("faces"),
         "doubts": _joint("doubts"),
         "without one": _joint("without one"),
-        "released contacts": _joint("released contacts"),
         "placing on the object": _joint("placing on the object"),
-        "placing from several": _joint("placing from several"),
         "regular faces": _joint("regular faces"),
         "right angles": _shape("right angles"),
         "face extents": _shape("face extents"),
@@ -76,7 +79,6 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         "standing field": _shape("standing field"),
         "strays": _shape("strays"),
         "pose uncertainty": _joint("pose uncertainty"),
-        "loops": {"back_end": {"enabled": False}},
         "fixed lag": {"joint": {"window": 1000}},
     }
 )
@@ -85,20 +87,18 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
 _IN_SPACE_ONLY = ("polyhedron", "prism", "standing field", "strays", "held-out contacts", "pose uncertainty")
 _IN_PLANE_ONLY = ("corners", "without one")
 _LONG_ONLY = ("fixed lag",)
-_LONG_TOO = (NOTHING, "fixed lag", "loops")
+_LONG_TOO = (NOTHING, "fixed lag")
+_CARRIED_TOO = (NOTHING, "relocation", "deferred association", "backward reading")
 _TELLING: Mapping[str, frozenset[str]] = MappingProxyType(
     {
         name: frozenset({name, *further})
         for name, further in {
             "splicing": (),
             "relocation": ("deferred association",),
-            "second look": (),
             "deferred association": (),
             "doubts": (),
             "without one": (),
-            "released contacts": (),
             "placing on the object": (),
-            "placing from several": (),
             "regular faces": (),
         }.items()
     }
@@ -128,8 +128,8 @@ def settings(grasps: int) -> list[Setting]:
 
 
 def _left_out_in(condition: str) -> list[str]:
-    if condition == LONG:
-        return list(_LONG_TOO)
+    if condition in (LONG, CARRIED):
+        return list(_LONG_TOO if condition == LONG else _CARRIED_TOO)
     impossible = (*_LONG_ONLY, *(_IN_PLANE_ONLY if condition == SPACE else _IN_SPACE_ONLY))
     return [name for name in WITHOUT if name not in impossible]
 
@@ -163,7 +163,14 @@ def _full(condition: str, shape: str, grasps: int, seed: int) -> tuple[dict[str,
 def _data(condition: str, shape: str, grasps: int, seed: int) -> SimulatedGrasps:
     if condition == SPACE:
         return spatial_data.simulate(shape, seed, count=grasps)
-    return planar_data.simulate(shape, seed, count=grasps, outlier_share=0.1 if condition == WRONG else 0.0)
+    data = planar_data.simulate(shape, seed, count=grasps, outlier_share=0.1 if condition == WRONG else 0.0)
+    return carried_off(data, CARRIED_BEFORE, _jump(seed)) if condition == CARRIED else data
+
+
+def _jump(seed: int) -> Pose3:
+    rng = np.random.default_rng([seed, 5021])
+    x, y = rng.uniform(-FARTHEST_m, FARTHEST_m, 2)
+    return Pose3(Rot3.Rz(rng.uniform(-np.pi, np.pi)), np.array([x, y, 0.0]))
 
 
 def _tracked(data: SimulatedGrasps, overlay: Overlay, cell: Cell) -> tuple[dict[str, Any], frozenset[str]]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.decisions import DoGrasp, Veto
 from sessions.conductor.estimator_client import LocalClient
 from tactile_lab.autonomy.autonomous_roles import planner_for
@@ -40,12 +40,12 @@ def explore_by_kinematics(cell: Cell) -> dict[str, Any]:
     rig, dimension, body = load_rig(RIG), int(cell["dimension"]), solid(cell["object"])
     slam, settings = estimation(rig, cell), conductor_settings(rig, cell)
     calibration = next(iter(force_tips(rig).values()))
-    tip = TipEllipsoid(calibration.semi_axes_m, calibration.centre_distal_m)
-    planner = planner_for(slam, settings, tip, cell.seed, dimension)
+    shape = HandShape(calibration.semi_axes_m, calibration.centre_distal_m)
+    planner = planner_for(slam, settings, shape, cell.seed, dimension)
     monitor = CoverageMonitor(body.mesh, slam, planner.known_shape, dimension, int(cell["actions"]))
     decisions = UntilExplored(LocalClient(SlamService(slam, planner)), monitor)
     rng = np.random.default_rng([cell.seed, 52183])
-    hand = KinematicHand(body, settings.cycle, tip, settings.plan.yaw_window_rad, rng)
+    hand = KinematicHand(body, settings.cycle, shape, settings.plan.yaw_window_rad, rng)
     ending = _session(hand, decisions, planner, slam, monitor, settings)
     return {**monitor.figures(slam.finish()), "status": monitor.status(ending)}
 

@@ -24,6 +24,23 @@ def _panel(cell: Cell) -> str:
     return f"{cell['pose']}, {cell['dimension']}-D"
 
 
+HANDS = Experiment(
+    "hands",
+    "Whole sessions of a left hand and of a Lite hand beside those of the right hand with five fingers.",
+    everyday_sessions.settings_of_hands,
+    everyday_sessions.explore_everyday,
+    (
+        Column("ended complete or partial", "in_order", 0, kind="percent"),
+        Column("contacts", "contacts", 0, kind="median"),
+        HAUSDORFF,
+        MEAN_DISTANCE,
+        REGISTRATION,
+        Column("highest force outside a grasp, N", "outside_N", 2),
+    ),
+    ranges("rig", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: str(cell["object"]), columns=1),
+    grasps=6,
+)
+
 EVERYDAY_OBJECTS = Experiment(
     "everyday-objects",
     "Sessions on everyday objects, standing and lying: how they end, with what force, and what model.",

@@ -51,6 +51,9 @@ SCANS = tuple(YCB_PREFIX + name for name in (*YCB_NAMES, *MORE_YCB_NAMES))
 LAID = ("bottle", "cup")
 """Our own models that lie in another pose than they stand."""
 
+HAND_RIGS = {"sim": "right hand, five fingers", "sim-left": "left hand", "sim-lite": "Lite hand"}
+"""Rigs that differ in their hand, and which it is."""
+
 
 def settings(grasps: int) -> list[Setting]:
     """Every object in space, scans also lying and in the plane."""
@@ -59,6 +62,11 @@ def settings(grasps: int) -> list[Setting]:
         *grid(object=[*LAID, *SCANS], pose=["lying"], dimension=[3], grasps=[grasps]),
         *grid(object=[LOW, *SCANS], pose=["standing"], dimension=[2], grasps=[grasps]),
     ]
+
+
+def settings_of_hands(grasps: int) -> list[Setting]:
+    """A box on the rigs of a right hand with five fingers, a left one, and a Lite hand."""
+    return grid(rig=list(HAND_RIGS), object=["box-10x6x4"], pose=["standing"], dimension=[2], grasps=[grasps])
 
 
 @contextmanager
@@ -79,9 +87,10 @@ def object_name(cell: Cell) -> Iterator[str]:
 
 
 def explore_everyday(cell: Cell) -> dict[str, Any]:
-    """One session. Cell: object, pose, dimension, grasps."""
+    """One session. Cell: object, pose, dimension, grasps; the rig, where it is not :data:`RIG`."""
+    rig = load_rig(str(dict(cell.setting).get("rig", RIG)))
     with object_name(cell) as name:
-        world = simulated_world(rig := load_rig(RIG), cell.seed, name)
+        world = simulated_world(rig, cell.seed, name)
     dimension, began_s = int(cell["dimension"]), time.process_time()
     runtime, watch = build_runtime(rig, world, NullRecorder()), ForceWatch(world)
     runtime.observer.interpreter.listener = watch.on_sample

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from drivers.core.clock import MonotonicClock
-from drivers.core.contacts import FINGERS
 from drivers.core.errors import ConfigurationError, DeviceError
 from drivers.positioner.kinds import CountingPositioner
 from drivers.shadow.device.hand import ShadowHand
@@ -143,7 +142,7 @@ def _findings(
 ) -> list[Finding]:
     runtime.tare()
     findings = [_hand(runtime, watch, shares.get(HAND_LINK, 0.0)), _base(runtime, watch, shares.get(BASE_LINK, 0.0))]
-    findings += [_fingertip(finger, runtime, watch, names, rig) for finger in FINGERS]
+    findings += [_fingertip(finger, runtime, watch, names, rig) for finger in runtime.perception.form.fingers]
     if runtime.camera is not None:
         findings.append(_camera(runtime, watch))
     return findings

@@ -16,6 +16,7 @@ from drivers.shadow.device.motor_polling import PollingRates
 from drivers.shadow.device.real_time import PRIORITY, prefer
 from drivers.shadow.ethercat.hand_transport import EthercatTransport
 from drivers.shadow.ethercat.pysoem_transport import PysoemTransport
+from drivers.shadow.model.hand_form import HandForm
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.motor_data import SlowData
 from drivers.shadow.protocol.palm_codec import SENSORS
@@ -66,9 +67,15 @@ def _findings(setup: HandSetup, clock: Clock, *, move: bool) -> list[Finding]:
 def _hear(
     setup: HandSetup, transport: EthercatTransport | PysoemTransport, hand: ShadowHand, clock: Clock, *, move: bool
 ) -> list[Finding]:
-    tips, motors = TactileLook(setup.hand.tactile), setup.motor_map()
+    form, motors = setup.form(), setup.motor_map()
+    tips = TactileLook(setup.hand.tactile, form.fingers)
     sample, statistics = _listen(hand, tips, clock, round(setup.hand.cycle_s * NANOSECONDS))
-    found = [_ring(transport), _cycle(hand, transport, statistics), _motors(hand, sample, motors), _joints(sample)]
+    found = [
+        _ring(transport),
+        _cycle(hand, transport, statistics),
+        _motors(hand, sample, motors),
+        _joints(sample, form),
+    ]
     found += tips.findings()
     return [*found, _motor_map(hand, motors, clock, setup.hand.cycle_s)] if move else found
 
@@ -133,11 +140,11 @@ def _cycle(hand: ShadowHand, transport: EthercatTransport | PysoemTransport, sta
 def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
     problems = [words for words in hand.health() if "cycles lost" not in words and not words.endswith(_HALTED)]
     temperature, supply = sample.motor.temperature_C, sample.motor.voltage_V
-    heard = np.isfinite(temperature)
+    heard = np.isfinite(temperature)[motors.is_fitted]
     if not heard.any():
         return Finding("motors", False, "; ".join((*problems, "no motor has reported its temperature")))
     hottest = int(np.nanargmax(temperature))
-    figures = f"{int(heard.sum())} of 20 answer, warmest {motors.names[hottest]} {temperature[hottest]:.0f} C"
+    figures = f"{int(heard.sum())} of {heard.size} answer, warmest {motors.names[hottest]} {temperature[hottest]:.0f} C"
     if np.isfinite(supply).any():
         figures += f", supply {np.nanmin(supply):.1f} V"
     revisions = firmware(sample)
@@ -157,8 +164,9 @@ def firmware(sample: HandSample) -> str:
     return ", ".join(f"{revision:.0f}" for revision in np.unique(revisions[np.isfinite(revisions)]))
 
 
-def _joints(sample: HandSample) -> Finding:
+def _joints(sample: HandSample, form: HandForm) -> Finding:
     """A joint sensor at the end of its range has lost its magnet or its cable."""
-    counts = sample.status.sensors[:_JOINT_CHANNELS].tolist()
-    dead = [f"{name} reads {count}" for name, count in zip(SENSORS, counts, strict=False) if count not in _COUNTS]
-    return Finding("joint sensors", not dead, "; ".join(dead) or "all 26 within their range")
+    counts = zip(SENSORS, sample.status.sensors[:_JOINT_CHANNELS].tolist(), strict=False)
+    own = [(name, count) for name, count in counts if str(name)[:4] in form.joints]  # THJ5 and WRJ1 have two each
+    dead = [f"{name} reads {count}" for name, count in own if count not in _COUNTS]
+    return Finding("joint sensors", not dead, "; ".join(dead) or f"all {len(own)} within their range")

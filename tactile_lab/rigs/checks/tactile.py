@@ -18,14 +18,16 @@ class TactileLook:
 
     Args:
         tactile: what the palm requests from them, from the rig file.
+        fingers: that the hand has.
     """
 
-    def __init__(self, tactile: TactileKind) -> None:
+    def __init__(self, tactile: TactileKind, fingers: tuple[str, ...] = FINGERS) -> None:
+        self._fingers = fingers
         self._names, self._tips = TactileNames(), dict[str, PalmFingertip]()
         self._kind = None if (name := palm_kind(tactile)) is None else as_palm_kind(name)
         if self._kind is not None and (usual := self._kind.usual()) is not None:
             settings = self._kind.settings()
-            self._tips = {finger: self._kind.sensor(finger, usual, settings) for finger in FINGERS}
+            self._tips = {finger: self._kind.sensor(finger, usual, settings) for finger in fingers}
 
     def take(self, sample: HandSample) -> None:
         """Take one sample of the hand."""
@@ -35,7 +37,7 @@ class TactileLook:
 
     def findings(self) -> list[Finding]:
         """One finding for each finger that must send, or that identifies itself."""
-        named = [finger for finger in FINGERS if self._names.kind(finger) not in (None, TactileProtocol.NONE)]
+        named = [finger for finger in self._fingers if self._names.kind(finger) not in (None, TactileProtocol.NONE)]
         return [self._finding(finger) for finger in (self._tips or named)]
 
     def _finding(self, finger: str) -> Finding:

@@ -46,18 +46,16 @@ class BackEnd:
         self,
         settings: BackEndSettings,
         *,
-        each_grasp: bool = True,
         as_printed: bool = False,
         noise: MotionNoise | None = None,
     ) -> None:
         """
         Args:
             settings: see there.
-            each_grasp: correct after every grasp; without, only at the end (trackers that smooth by themselves).
             as_printed: the thesis's variant: loops are tested one by one against the filter's poses only.
             noise: of the object's motion in the hand; the thesis's 100 % if not given.
         """
-        self._settings, self._each_grasp, self._as_printed = settings, each_grasp, as_printed
+        self._settings, self._as_printed = settings, as_printed
         self._noise = noise or MotionNoise()
         self._loops: list[Loop] = []
 
@@ -69,8 +67,7 @@ class BackEnd:
     def close_loops(self, contact_map: ContactMap) -> ContactMap:
         """Look for loops of the latest grasp; the corrected map if one was found and it explains the contacts."""
         latest = len(contact_map.placed) - 1
-        idle = not (self._settings.enabled and self._each_grasp)
-        if idle or not contact_map.placed[latest].used:
+        if not self._settings.enabled or not contact_map.placed[latest].used:
             return contact_map
         found = find_loops(contact_map, self._faces(contact_map), self._settings.graph, [latest])
         self._loops += found

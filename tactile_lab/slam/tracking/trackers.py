@@ -42,7 +42,7 @@ Method: TypeAlias = Literal["joint", "particle", "thesis-pf", "thesis-pf-graph",
 
 THESIS_METHODS: tuple[Method, ...] = ("thesis-pf", "thesis-pf-graph")
 PLANAR_METHODS: tuple[Method, ...] = ("thesis-pf", "thesis-pf-graph", "particle")
-GRAPH_METHODS: tuple[Method, ...] = ("joint", "particle", "thesis-pf-graph")
+GRAPH_METHODS: tuple[Method, ...] = ("particle", "thesis-pf-graph")
 """Methods whose poses the pose graph corrects."""
 
 THESIS_SHAPE = GpisSettings(observations="offsurface", kernel="squared_exponential", prior_mean="zero")

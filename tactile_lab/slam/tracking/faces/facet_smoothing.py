@@ -34,9 +34,6 @@ _LARGEST_FOLD = float(np.cos(np.deg2rad(35.0)))
 _REGULAR_rad = 3e-4
 """Standard deviation of regularities: far below the contacts' resolution, and loose enough for the iteration."""
 
-_LEAST_FREEDOM = 1e-6
-"""Keeps the leverage of a contact below one, if it alone determines something."""
-
 
 @dataclass(frozen=True)
 class FacetedTrajectory:
@@ -130,23 +127,6 @@ class FacetSmoother:
         """Gauss-Newton information by all poses but the first, then by each face's tilt and offset."""
         at = self._rate(rows, faces)
         return self._information(at, self._jacobian(at))
-
-    def pulls(self, rows: Array, faces: FlatFaces) -> Array:
-        """Chi-square saved by leaving out each contact, with poses and faces fitted to the others, shape (n,).
-
-        A contact that alone determines a pose or a face draws it towards itself: its own residual is small, and its
-        cost is in the others' (the leave-one-out statistics of linear regression, here for all residuals of a contact).
-
-        Args:
-            rows, faces: as fitted, the faces without regularities.
-        """
-        at = self._rate(rows, faces)
-        count, jacobian = len(self._grasp_of), self._jacobian(at)
-        residuals = self._residuals(rows, faces).reshape(-1, count).T
-        by_contact = jacobian.reshape(residuals.shape[1], count, -1).swapaxes(0, 1)
-        leverage = by_contact @ np.linalg.solve(self._information(at, jacobian), by_contact.swapaxes(1, 2))
-        freely = np.eye(residuals.shape[1]) * (1 + _LEAST_FREEDOM) - leverage
-        return np.asarray(np.einsum("na,na->n", residuals, np.linalg.solve(freely, residuals[:, :, None])[:, :, 0]))
 
     def _rate(self, rows: Array, faces: FlatFaces) -> FacetedTrajectory:
         chi_square = float(np.sum(self._residuals(rows, faces) ** 2))

@@ -44,11 +44,6 @@ _MOST_DOUBTS = 12
 _HOPELESS_nats = 100.0
 """Flat faces that are less likely than the field by more than this are rejected, whichever contacts are left out."""
 
-
-_LEAST_PULL_nats = 4.0
-_MOST_PULLS = 4
-"""Contacts that are left out on trial: number at a time, and least expected gain."""
-
 _SAME_nats = 1e-6
 _SETTLING_STEPS = 15
 _FIELD_STEPS = 10
@@ -77,19 +72,6 @@ class FacetedScorer:
             settled = _likelier(settled, self.smooth_with_facets(settled.map))
         return _likelier(smooth, settled)
 
-    def release(self, best: Hypothesis) -> Hypothesis:
-        """A faceted hypothesis without the contacts that it is more likely without, poses and faces fitted again.
-
-        A wrong contact that alone determines a pose is explained by turning the whole grasp, or by tilting a face, and
-        then fits: its own residual does not reveal it.
-        """
-        while found := [each for each in map(self.smooth_with_facets, self._without_pulls(best)) if each is not None]:
-            freed = min(found, key=cost)
-            if freed.cost >= best.cost:
-                break
-            best = _likelier(freed, self.smooth_with_facets(self._restore(freed).map))
-        return best
-
     def without_errors(self, contact_map: ContactMap) -> ContactMap:
         """The map at its poses, without the contacts that neither a field nor flat faces explain."""
         cleaned, _ = self._scorer.clean(contact_map)
@@ -97,15 +79,6 @@ class FacetedScorer:
         if sharp is None:
             return cleaned
         return _likelier(self._scorer.score(cleaned), self._mechanisms.improve("doubts", sharp, self._reconsider)).map
-
-    def _without_pulls(self, best: Hypothesis) -> list[ContactMap]:
-        """The map without each of the most influential contacts; empty for an object without flat faces."""
-        if not self._is_sharp(best):
-            return []
-        faces, _ = flat_faces(best.map)
-        pulls = 0.5 * FacetSmoother(best.map, self._noise).pulls(best.map.rows, faces)
-        strongest = [int(each) for each in np.argsort(-pulls)[:_MOST_PULLS] if pulls[each] > _LEAST_PULL_nats]
-        return [best.map.without_contact(*best.map.origins[each]) for each in strongest]
 
     def solid(self, best: Hypothesis) -> SurfaceMesh | None:
         """The surface of a faceted hypothesis in space; None for others."""

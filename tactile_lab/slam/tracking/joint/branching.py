@@ -14,7 +14,6 @@ from tactile_lab.slam.tracking.contacts.free_space import free_space_costs
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.contacts.pose_vectors import PoseVectors
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, likeliest
-from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
 from tactile_lab.slam.tracking.joint.proposals import propose
 from tactile_lab.slam.tracking.joint.settings import JointSettings
 
@@ -30,7 +29,6 @@ class Branching:
         scorer: scores the result.
         settings: of the search.
         space: kind of the pose vectors.
-        mechanisms: those that are on.
     """
 
     contacts: ContactSet
@@ -39,14 +37,10 @@ class Branching:
     scorer: HypothesisScorer
     settings: JointSettings
     space: PoseVectors
-    mechanisms: Mechanisms
 
     def branches(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """All hypotheses with the grasp left out, and the most likely ones with the grasp placed."""
-        placed = self._place(hypotheses)
-        if placed and not self.mechanisms.has("aside branch"):
-            return placed
-        return [self._leave_unplaced(hypothesis) for hypothesis in hypotheses] + placed
+        """The most likely hypotheses with the grasp placed; if it fits none of them, all with the grasp left out."""
+        return self._place(hypotheses) or [self._leave_unplaced(hypothesis) for hypothesis in hypotheses]
 
     def _leave_unplaced(self, hypothesis: Hypothesis) -> Hypothesis:
         """All contacts of the grasp left out: the motion model alone says where the object is."""

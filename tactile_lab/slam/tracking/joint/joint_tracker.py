@@ -3,8 +3,8 @@
 The filter of algorithm 3.1 commits to one map grasp by grasp and cannot take a wrong pose back. Here a
 hypothesis is a whole trajectory, and its evidence (:mod:`hypotheses`) replaces a particle's weight. At each grasp the
 best hypotheses branch into the poses that the measurement proposes, are smoothed, compared, and the best are kept. A
-contact that fits worse than an unexplained one is left out; one more branch always leaves out all contacts of a grasp.
-It wins if every placement contradicts the shape or the motion, and is dropped when later grasps show a better one.
+contact that fits worse than an unexplained one is left out; a grasp whose contacts mostly fit nowhere is put aside as a
+whole, until the object is better known.
 """
 
 from __future__ import annotations
@@ -46,9 +46,6 @@ _LEAST_FOR_FACES = 3
 
 _MOST_REGROUPINGS = 3
 """A trajectory with several wrong turns is repaired at one after the other."""
-
-_PLACED, _HOPEFUL_nats = 3, 30.0
-"""Hypotheses whose grasps are relocalized: number, and largest difference of likelihood to the best."""
 
 _BACKWARD_SPREAD = {2: (4, 8), 3: (3, 4)}
 """Hypotheses kept, and branches smoothed, when a session is read backwards, by the dimension of the contacts: the
@@ -128,7 +125,7 @@ class JointTracker:
     def weigh(self, contacts: ContactSet) -> bool:
         """Branch every hypothesis into the poses proposed for this grasp, smooth the most likely ones and rank them."""
         contacts = contacts if self.mechanisms.has("free space") else contacts.without_free_places()
-        given = self._motion, self._noise, self._scorer, self._settings, self._space, self.mechanisms
+        given = self._motion, self._noise, self._scorer, self._settings, self._space
         step = Branching(contacts, *given)
         branches = likeliest(step.branches(self._hypotheses), self._settings.smoothed, self._settings.branch_gap)
         smoothed = [self._scorer.smooth(branch.map, self._settings.iterations) for branch in branches]
@@ -173,14 +170,8 @@ class JointTracker:
             self._hypotheses = [self._scorer.condense(one, lag.window, lag.remembered) for one in self._hypotheses]
 
     def adopt(self, corrected: ContactMap) -> None:
-        """Accept a corrected map; other poses only if grasps were settled before.
-
-        Loops between grasps that were smoothed together are made of contacts that count already; counted
-        twice, they made registration worse (decision 26).
-        """
-        if corrected is self.map:
-            return
-        if self._has_settled or np.array_equal(corrected.rows, self.map.rows):
+        """Accept other kernel parameters; the poses are smoothed already."""
+        if corrected is not self.map:
             self._hypotheses[0] = replace(self._hypotheses[0], map=corrected)
 
     def finish(self) -> None:
@@ -197,8 +188,7 @@ class JointTracker:
             smoothed = [self._scorer.smooth(one.map, iterations) for one in self._hypotheses]
             self._hypotheses = self._likeliest(self._scorer.different(smoothed), self._settings.hypotheses)
             self._share_best_kernel()
-        looked = [self.mechanisms.improve("second look", one, self._readmit) for one in self._hypotheses]
-        self._hypotheses = [self._associate_deferred(one) for one in looked]
+        self._hypotheses = [self._associate_deferred(one) for one in self._hypotheses]
         faceted = self._score_with_facets()
         faceted[0] = replace(faceted[0], map=self._scorer.with_covariances(faceted[0].map))
         self._hypotheses = [replace(one, map=unfold(one.map)) for one in faceted]
@@ -208,8 +198,7 @@ class JointTracker:
         """The hypotheses scored by flat faces, most likely first.
 
         If splicing the most likely one makes it more likely without faces, the result is tested too. Faces decide again
-        which contacts are left out, so that trajectories that differ only in these are tested once. Grasps are
-        relocalized on a few objects: a wrong turn may be repairable in one hypothesis and not in another.
+        which contacts are left out, so that trajectories that differ only in these are tested once.
         """
         sharp = FacetedScorer(self._scorer, self._noise, self.mechanisms)
         known = self._scorer.different(self._hypotheses, by_contacts=False)
@@ -218,16 +207,8 @@ class JointTracker:
         limit = self._scorer.score(best.map).cost
         likelier = self.mechanisms.add("splicing", lambda: self._spliced_below(limit, best, known))
         ranked = sorted(found + [sharp.better(one.map) for one in likelier], key=cost)
-        hopeful = [one for one in self._scorer.different(ranked) if one.cost < ranked[0].cost + _HOPEFUL_nats][:_PLACED]
-        hopeful = hopeful if self.mechanisms.has("placing from several") else hopeful[:1]
-        placing = [self._relocalize(one, sharp) for one in hopeful]
-        best, *placed = sorted(placing, key=cost)
-        if best is not placing[0]:
-            self.mechanisms.changed.add("placing from several")
-        return [
-            self.mechanisms.improve("regular faces", best, sharp.regular),
-            *self._scorer.unlike(placed + ranked, [best]),
-        ]
+        best = self.mechanisms.improve("regular faces", self._relocalize(ranked[0], sharp), sharp.regular)
+        return [best, *self._scorer.unlike(ranked[1:], [best])]
 
     def _spliced_below(self, limit: float, best: Hypothesis, known: list[Hypothesis]) -> list[Hypothesis]:
         """Other splices of a hypothesis that are more likely than a limit and differ from all known trajectories."""
@@ -235,11 +216,10 @@ class JointTracker:
         return [one for one in others if one.cost < limit]
 
     def _relocalize(self, hypothesis: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
-        """The hypothesis cleaned of contacts, and with grasps relocalized on its object."""
-        freed = self._retry_unplaced(self.mechanisms.improve("released contacts", hypothesis, sharp.release), sharp)
+        """The hypothesis with grasps relocalized on its object."""
         return self.mechanisms.improve(
             "placing on the object",
-            freed,
+            self._retry_unplaced(hypothesis, sharp),
             lambda given: relocalize(given, sharp, self._noise, self._settings.proposals),
         )
 
@@ -247,13 +227,6 @@ class JointTracker:
         """The hypothesis with grasps placed that did not fit the shape with a wrong contact, if more likely."""
         again = self._associate_deferred(self._scorer.score(best.map))
         return best if again.map is best.map else min(best, sharp.better(again.map), key=cost)
-
-    def _readmit(self, hypothesis: Hypothesis) -> Hypothesis:
-        """The hypothesis after testing all contacts again: some were left out while the object was little known."""
-        looked, _ = self._scorer.clean(hypothesis.map.with_all_contacts())
-        if looked.left_out_count == hypothesis.map.left_out_count:
-            return hypothesis
-        return min(self._scorer.smooth(looked, self._settings.final_iterations), hypothesis, key=cost)
 
     def _associate_deferred(self, hypothesis: Hypothesis) -> Hypothesis:
         relocate = self._relocate if self.mechanisms.has("relocation") else None

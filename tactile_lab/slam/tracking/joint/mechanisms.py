@@ -12,21 +12,17 @@ Mechanism: TypeAlias = Literal[
     "splicing",
     "relocation",
     "pushes",
-    "aside branch",
     "valleys",
     "free space",
-    "second look",
     "deferred association",
     "faces",
     "doubts",
     "without one",
-    "released contacts",
     "placing on the object",
-    "placing from several",
     "regular faces",
     "pose uncertainty",
 ]
-"""Backward reading, the beam, the fixed lag and the loops have settings of their own, shape models theirs."""
+"""Backward reading, the beam and the fixed lag have settings of their own, shape models theirs."""
 
 _Value = TypeVar("_Value")
 

@@ -35,7 +35,7 @@ class JointSettings(StrictModel):
     iterations: int = Field(default=15, ge=1)
     final_iterations: int = Field(default=80, ge=1)
     backwards: bool = True
-    window: int = Field(default=12, ge=2)
+    window: int = Field(default=24, ge=2)
     estimate_motion: bool = False
     remembered: int = Field(default=50, ge=10)
     without: frozenset[Mechanism] = frozenset()

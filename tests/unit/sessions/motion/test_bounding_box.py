@@ -7,7 +7,7 @@ import pytest
 from gtsam import Pose2, Pose3, Rot3
 
 from drivers.shadow.closing.closing import closing
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.motion.bounding_box import SIDES, BoundingBox
@@ -25,7 +25,7 @@ from tactile_lab.experiments.data.outlines import first_crossing
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tests.support.disc_world import Disc, DiscWorld, TIP_CENTRE_m
 
-TIP = TipEllipsoid((0.0085, 0.0085, 0.0085), tuple(TIP_CENTRE_m))
+TIP = HandShape((0.0085, 0.0085, 0.0085), tuple(TIP_CENTRE_m))
 QUICK = CycleSettings(finger_rad_s=20.0, travel_m_s=1.0, turn_rad_s=5.0)
 ONE_LANE = ProbingSettings(lanes_m=(0.0,), enabled=True)
 WINDOW_rad = (-1.31, 1.31)
@@ -103,6 +103,8 @@ class TurnedBoxToucher:
         c, s = np.cos(turn_rad), np.sin(turn_rad)
         self.outline_m = corners @ np.array([[c, s], [-s, c]])
 
+    first_finger_side = 1.0
+
     def expect_tallest(self, height_m: float) -> None:
         """Nothing is in the way here."""
 
@@ -173,19 +175,19 @@ class NoEstimate:
 def test_grasps_span_the_short_side_of_the_box() -> None:
     """The hand opens 140 mm less its fingertips: around a box of 120 x 60 mm and its margin only across."""
     rule = HeuristicPlanner(PlanSettings(), np.random.default_rng(0))
-    planner = Planner(NoEstimate(), rule, ExplorationSettings(), 2, TipEllipsoid(), 2)  # type: ignore[arg-type]
+    planner = Planner(NoEstimate(), rule, ExplorationSettings(), 2, HandShape(), 2)  # type: ignore[arg-type]
     box = felt(half_x_m=0.03, half_y_m=0.06)
     planner.on_bounding_box(box)
     for index in range(4):
         plan = planner.plan(index)
-        paths = closing(plan.closing, plan.height_m, TipEllipsoid()).paths
+        paths = closing(plan.closing, plan.height_m, HandShape()).paths
         tips = np.array([plan.frame.pose.transformFrom(p.centre_m(p.valid[0])) for p in paths.values()])
         assert box.is_clear(tips[:, :2])
 
 
 def test_box_is_carried_with_the_object() -> None:
     rule = HeuristicPlanner(PlanSettings(), np.random.default_rng(0))
-    planner = Planner(NoEstimate(), rule, ExplorationSettings(), 2, TipEllipsoid(), 2)  # type: ignore[arg-type]
+    planner = Planner(NoEstimate(), rule, ExplorationSettings(), 2, HandShape(), 2)  # type: ignore[arg-type]
     planner.on_bounding_box(felt())
     planner.on_carry(Pose3(Rot3(), np.array([0.05, 0.0, 0.0])))
     np.testing.assert_allclose(planner.centre_m, [0.05, 0.0], atol=1e-9)

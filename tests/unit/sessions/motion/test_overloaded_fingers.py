@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.core.contacts import FINGERS
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.model.kinematics import JOINT_INDEX
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_cycle import GraspCycle
@@ -17,7 +17,7 @@ from sessions.motion.motion import GraspFrame, Motion
 from sessions.motion.safety import SafetySettings, SafetySupervisor
 from tests.support.disc_world import Disc, DiscWorld, TIP_CENTRE_m
 
-TIP = TipEllipsoid((0.0085, 0.0085, 0.0085), tuple(TIP_CENTRE_m))
+TIP = HandShape((0.0085, 0.0085, 0.0085), tuple(TIP_CENTRE_m))
 QUICK = CycleSettings(finger_rad_s=20.0, travel_m_s=1.0, turn_rad_s=5.0)
 PLAN = GraspPlan(GraspFrame(0.0, 0.0, 0.3), "pinch", 0.022)
 TURN_rad = 0.4

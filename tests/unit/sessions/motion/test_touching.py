@@ -7,7 +7,7 @@ import pytest
 
 from drivers.core.contacts import FINGERS, Array, Grasp
 from drivers.shadow.closing.closing import closing
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.closing.tip_motion import motor_rates
 from drivers.shadow.model.kinematics import joint_vector, palm_T_distal_matrices
 from sessions.motion.cycle_settings import CycleSettings
@@ -21,7 +21,7 @@ from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSetting
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tests.support.disc_world import Disc, DiscWorld, TIP_CENTRE_m
 
-TIP = TipEllipsoid((0.0085, 0.0085, 0.0085), tuple(TIP_CENTRE_m))
+TIP = HandShape((0.0085, 0.0085, 0.0085), tuple(TIP_CENTRE_m))
 QUICK = CycleSettings(finger_rad_s=20.0, travel_m_s=1.0, turn_rad_s=5.0)
 LONG_FINGERS = ("FF", "MF", "RF", "LF")
 
@@ -177,14 +177,14 @@ def tips_m(angles_rad: dict[str, float]) -> Array:
     """Tip centres in the grasp frame of the tap's closing, shape (5, 3)."""
     table = closing(TAP.closing, TAP_HEIGHT_m)
     frames = table.grasp_T_palm.matrix() @ palm_T_distal_matrices(joint_vector(angles_rad))
-    return np.asarray((frames @ np.append(TipEllipsoid().centre_distal_m, 1.0))[:, :3])
+    return np.asarray((frames @ np.append(HandShape().centre_distal_m, 1.0))[:, :3])
 
 
 def test_fingertips_move_where_the_rates_say() -> None:
     table, down = closing(TAP.closing, TAP_HEIGHT_m), np.array([0.0, 0.0, -1.0])
     angles = {name: a for finger in FINGERS for name, a in table.angles_rad(finger, TAP.progress[finger]).items()}
     moved, way_m = dict(angles), 0.004
-    for motors in motor_rates(table, TAP.progress, down, TipEllipsoid()).values():
+    for motors in motor_rates(table, TAP.progress, down, HandShape()).values():
         for motor, rate in motors.items():
             pair = {f"{motor[:2]}J1": 0.375, f"{motor[:2]}J2": 0.625} if motor.endswith("J0") else {motor: 1.0}
             for joint, share in pair.items():
@@ -194,7 +194,7 @@ def test_fingertips_move_where_the_rates_say() -> None:
 
 
 def test_thumb_is_not_moved_up_and_down() -> None:
-    rates = motor_rates(closing(TAP.closing, TAP_HEIGHT_m), TAP.progress, np.array([0.0, 0.0, -1.0]), TipEllipsoid())
+    rates = motor_rates(closing(TAP.closing, TAP_HEIGHT_m), TAP.progress, np.array([0.0, 0.0, -1.0]), HandShape())
     assert rates["TH"] == {}
     assert all(rates[finger] for finger in LONG_FINGERS)
 

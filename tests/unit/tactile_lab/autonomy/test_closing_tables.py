@@ -9,7 +9,7 @@ import pytest
 from drivers.core.clock import Clock, MonotonicClock, VirtualClock
 from drivers.core.configuration import validate
 from drivers.core.errors import ConfigurationError
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from tactile_lab.autonomy import closing_tables
 from tactile_lab.autonomy.closing_tables import solve_closings
 from tactile_lab.autonomy.settings import SessionSettings
@@ -26,7 +26,7 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, float]]:
 def solve(clock: Clock, dimension: int, **settings: Any) -> None:
     """Of a session that begins at once, unless its settings say what is felt first."""
     content = {"probing": {"top": False}, **settings}
-    solve_closings(clock, validate(content, SessionSettings, where="test"), TipEllipsoid(), dimension)
+    solve_closings(clock, validate(content, SessionSettings, where="test"), HandShape(), dimension)
 
 
 def test_a_contour_needs_every_closing_at_its_height(solved: list[tuple[str, float]]) -> None:

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from drivers.core.contacts import FINGERS, Contact, Grasp
 from drivers.core.poses import planar
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.surface_message import surface_message
@@ -47,7 +47,7 @@ def touched(points_m: np.ndarray, normals: np.ndarray, shape_model: str = "auto"
 
 def planned_with(slam: TactileSlam) -> KnownShape:
     rule = HeuristicPlanner(PlanSettings(), np.random.default_rng(0), 3)
-    known = Planner(slam, rule, ExplorationSettings(), 1, TipEllipsoid(), 3).known_shape()
+    known = Planner(slam, rule, ExplorationSettings(), 1, HandShape(), 3).known_shape()
     assert known is not None
     return known
 

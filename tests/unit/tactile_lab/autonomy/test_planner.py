@@ -11,7 +11,7 @@ from gtsam import Pose2, Pose3, Rot3
 
 from drivers.core.contacts import FINGERS, Array, Contact, Grasp
 from drivers.shadow.closing.closing import Closing, closing
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.grasp_plan import GraspPlan
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner
@@ -127,7 +127,7 @@ class KnownSlam:
 
 def planner(slam: KnownSlam, fixed_grasps: int = 1) -> Planner:
     rule = HeuristicPlanner(PlanSettings(), np.random.default_rng(0))
-    return Planner(slam, rule, SETTINGS, fixed_grasps, TipEllipsoid(), dimension=2)  # type: ignore[arg-type]
+    return Planner(slam, rule, SETTINGS, fixed_grasps, HandShape(), dimension=2)  # type: ignore[arg-type]
 
 
 def known_slam(x: float = 0.0, y: float = 0.0) -> KnownSlam:

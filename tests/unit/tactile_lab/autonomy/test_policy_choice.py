@@ -12,7 +12,7 @@ from gtsam import Pose2, Pose3, Rot3
 
 from drivers.core.contacts import Contact, Grasp
 from drivers.shadow.closing.closing import closing
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.decisions import DoGrasp, End, Pause
 from sessions.conductor.estimator_client import LocalClient
 from sessions.conductor.policy_decisions import PolicyDecisions, Proposal, approve_everything
@@ -53,9 +53,7 @@ IN_PLANE = YAWS * SHIFTS * CLOSINGS
 
 
 def limits(dimension: int = 2, **changes: object) -> HandLimits:
-    made = HandLimits(
-        PlanSettings(), ExplorationSettings(), CycleSettings(), SafetySettings(), TipEllipsoid(), dimension
-    )
+    made = HandLimits(PlanSettings(), ExplorationSettings(), CycleSettings(), SafetySettings(), HandShape(), dimension)
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
@@ -140,7 +138,7 @@ def test_places_the_hand_has_landed_at_are_ruled_out() -> None:
 def test_fingers_come_down_clear_of_what_bulges_above_them() -> None:
     """On a sphere's equator higher than the fingertips there is less room than at their own height."""
     for one in offer(limits(3), SOLID_BOX, Pose2()).usable:
-        paths = closing(one.plan.closing, one.plan.height_m, TipEllipsoid()).paths
+        paths = closing(one.plan.closing, one.plan.height_m, HandShape()).paths
         tips = np.array([one.plan.frame.pose.transformFrom(p.centre_m(p.valid[0])) for p in paths.values()])
         outside = np.linalg.norm(np.maximum(np.abs(tips[:, :2]) - [0.05, 0.03], 0.0), axis=1)
         assert outside.min() > 0.008
@@ -397,7 +395,7 @@ def planner(policy: str = "variance", grasps: int = 10, slam: KnownSlam | None =
         rule,
         ExplorationSettings(),
         1,
-        TipEllipsoid(),
+        HandShape(),
         2,
         chooser(policy),
         grasps,

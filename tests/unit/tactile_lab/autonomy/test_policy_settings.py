@@ -15,7 +15,7 @@ from gtsam import Pose2
 from typer.testing import CliRunner
 
 from drivers.core.errors import ConfigurationError
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from tactile_lab.autonomy.autonomous_roles import chooser_for
 from tactile_lab.autonomy.policy_choice import Knowledge
 from tactile_lab.cli.app import app
@@ -72,7 +72,7 @@ def decision(dimension: int, information: Content) -> Decision:
     own = description(information).conductor
     assert own.exploration.policy is not None
     limits = own.plan, own.exploration, own.cycle, own.safety
-    chooser = chooser_for(own.exploration.policy, limits, TipEllipsoid(), dimension, MotionNoise(), 0)
+    chooser = chooser_for(own.exploration.policy, limits, HandShape(), dimension, MotionNoise(), 0)
     known = FLAT_BOX if dimension == 2 else TALL_BOX
     grasps = np.arange(len(known.field.contacts_m)) // 5
     return chooser.choose(3, Knowledge(known, Pose2(0.0, 0.0, 0.2), COVARIANCE, grasps)).decision

@@ -36,6 +36,7 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "table-4.3": ({"tracking": ["joint"], "policy": ["det"]}, 5),
     "exploration-hand": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
     "exploration-kinematic": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
+    "hands": ({"rig": ["sim-lite"]}, 1),
     "everyday-objects": ({"object": ["cube-6"], "dimension": ["2"]}, 1),
     "camera-truth": ({"condition": ["sharp"]}, None),
     "calibrate-forearm": ({"method": ["touch"], "poses": ["20"]}, None),

@@ -21,9 +21,9 @@ from drivers.emulators.laboratory.plant_mirror import PlantMirror
 from drivers.emulators.laboratory.virtual_cable import virtual_cable
 from drivers.shadow.device.hand_settings import HandSettings
 from tactile_lab.rigs.build import build_interpreter, check_calibration
-from tactile_lab.rigs.description import load_rig
+from tactile_lab.rigs.description import Rig, load_rig, shipped_rigs
 from tactile_lab.rigs.laboratory import WiredLaboratory
-from tactile_lab.rigs.wired import emulation_plan, hand_setup
+from tactile_lab.rigs.wired import emulation_plan, hand_form, hand_setup, require_right_hand, with_form
 from tests.support.wire_rig import SHIPPED, wire_rig
 
 SIMULATED = SHIPPED / "calibrations" / "simulated-hand"
@@ -66,13 +66,53 @@ def test_descriptions_that_contradict_themselves(tmp_path: Path, changes: dict[s
         load_rig(changed(tmp_path, **changes))
 
 
-def test_a_left_hand_by_its_own_folder_is_refused_before_anything_is_connected(tmp_path: Path) -> None:
-    joints = tmp_path / "calibration.yaml"
+def left_rig(folder: Path, **hand: Any) -> Rig:
+    """A rig with the files of a left hand, and what it says of the hand itself."""
+    joints = folder / "calibration.yaml"
     joints.write_bytes(Path(CALIBRATION["joints"]).read_bytes())
-    (tmp_path / "general_info.yaml").write_text("side: left\nfingers: [th, ff, mf, rf, lf]\n")
-    rig = load_rig(changed(tmp_path, calibration=CALIBRATION | {"joints": str(joints)}, wires=without_camera(tmp_path)))
-    assert hand_setup(rig).ethercat.side == "right"
-    with pytest.raises(ConfigurationError, match=r"general_info\.yaml: is of a left hand"):
+    (folder / "general_info.yaml").write_text("side: left\nfingers: [th, ff, mf, rf, lf]\n")
+    calibration = CALIBRATION | {"joints": str(joints)}
+    return load_rig(changed(folder, calibration=calibration, wires=without_camera(folder), hand=hand))
+
+
+def test_a_left_hand_is_told_by_its_own_folder_and_a_session_keeps_that(tmp_path: Path) -> None:
+    rig = left_rig(tmp_path)
+    check_calibration(rig)
+    assert hand_setup(rig).wiring().side == emulation_plan(rig, 1, "cube-6").simulation.side == "left"
+    assert build_interpreter(rig).perception.form.is_left
+    kept = with_form(rig)
+    (tmp_path / "general_info.yaml").unlink()
+    assert hand_form(kept).is_left
+    assert kept.description.simulation.side == "left"
+
+
+def test_a_left_hands_files_are_refused_on_a_right_hand_before_anything_is_connected(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match=r"general_info\.yaml: is of a left hand, but .*: hand of a right one"):
+        check_calibration(left_rig(tmp_path, side="right"))
+
+
+def test_calibrations_that_move_the_hand_are_refused_for_other_hands() -> None:
+    require_right_hand(load_rig("sim"))
+    with pytest.raises(ConfigurationError, match="has a left hand with FF, MF, RF, LF, TH: calibrations that move"):
+        require_right_hand(load_rig("sim-left"))
+    with pytest.raises(ConfigurationError, match="has a right hand with FF, MF, RF, TH: calibrations that move"):
+        require_right_hand(load_rig("sim-lite"))
+
+
+def test_a_hand_with_two_fingers_cannot_grasp(tmp_path: Path) -> None:
+    motors = tmp_path / "motors.yaml"
+    motors.write_text("motors: {FFJ0: 0, FFJ3: 1, FFJ4: 2, THJ1: 6, THJ2: 5, THJ4: 9, THJ5: 19}")
+    calibration = CALIBRATION | {"motors": str(motors)}
+    rig = load_rig(changed(tmp_path, calibration=calibration, wires=without_camera(tmp_path)))
+    with pytest.raises(ConfigurationError, match=r"motors\.yaml: is of a hand with FF and TH only"):
+        check_calibration(rig)
+
+
+def test_a_wire_of_a_finger_that_the_hand_does_not_have_is_told(tmp_path: Path) -> None:
+    lite = str(shipped_rigs()["sim-lite"].parent / "calibrations" / "simulated-hand" / "motors-lite.yaml")
+    calibration = CALIBRATION | {"motors": lite}
+    rig = load_rig(changed(tmp_path, calibration=calibration, wires=without_camera(tmp_path)))
+    with pytest.raises(ConfigurationError, match=r"wires\.fingertips: names LF, but the hand has FF, MF, RF, TH"):
         check_calibration(rig)
 
 

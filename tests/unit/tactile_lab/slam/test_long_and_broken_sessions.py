@@ -2,48 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from gtsam import Pose3, Rot3
 
-from drivers.core.contacts import Grasp
 from tactile_lab.experiments.data import planar_data, spatial_data
+from tactile_lab.experiments.data.carried_off import carried_off
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tests.support.simulated_contacts import registration_mm
-
-
-def moved(grasp: Grasp, jump: Pose3) -> Grasp:
-    turn = jump.rotation()
-    contacts = tuple(
-        replace(one, point_world_m=jump.transformFrom(one.point_world_m), normal_world=turn.rotate(one.normal_world))
-        for one in grasp.contacts
-    )
-    lines = tuple(
-        replace(
-            line,
-            start_world_m=jump.transformFrom(line.start_world_m),
-            end_world_m=jump.transformFrom(line.end_world_m),
-        )
-        for line in grasp.approach_paths
-    )
-    motion = jump * grasp.hand_motion_world * jump.inverse()
-    return replace(grasp, contacts=contacts, approach_paths=lines, hand_motion_world=motion)
-
-
-def with_jump(data: planar_data.PlanarGrasps, at: int, jump: Pose3) -> planar_data.PlanarGrasps:
-    """The object is carried off before a grasp, and the hand does not know."""
-    later = [moved(grasp, jump) for grasp in data.grasps[at:]]
-    later[0] = replace(later[0], hand_motion_world=data.grasps[at].hand_motion_world)
-    poses = [jump * pose for pose in data.world_T_body[at:]]
-    return replace(data, grasps=(*data.grasps[:at], *later), world_T_body=(*data.world_T_body[:at], *poses))
 
 
 @pytest.mark.parametrize("shape", ["rectangle", "hexagon"])
 def test_an_object_that_was_carried_off_is_found_again(shape: str) -> None:
     jump = Pose3(Rot3.Rz(1.0), np.array([0.1, 0.02, 0.0]))
-    data = with_jump(planar_data.simulate(shape, 2, count=12), 8, jump)
+    data = carried_off(planar_data.simulate(shape, 2, count=12), 8, jump)
     slam = TactileSlam(SlamSettings.model_validate({"joint": {"backwards": False}}), 0)
     for grasp in data.grasps:
         slam.add_grasp(grasp)

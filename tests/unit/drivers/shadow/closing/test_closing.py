@@ -10,7 +10,7 @@ from drivers.core.contacts import FINGERS, Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.poses import transform_points
 from drivers.shadow.closing.closing import LEANING, PRESHAPES, Closing, TipPath, closing, motor_targets
-from drivers.shadow.closing.posture import NODES, LEAN_rad, TipEllipsoid, finger_joints
+from drivers.shadow.closing.posture import NODES, HandShape, LEAN_rad, finger_joints
 from drivers.shadow.model.kinematics import JOINT_INDEX, JOINT_LIMITS_rad, joint_vector, palm_T_distal
 
 HEIGHTS_m = (0.016, 0.022, 0.033, 0.048)
@@ -24,7 +24,7 @@ def grasp_T_tip(table: Closing, finger: str, u: float) -> Pose3:
 
 
 def tip_centre_m(table: Closing, finger: str, u: float) -> Array:
-    return transform_points(grasp_T_tip(table, finger, u), np.array([TipEllipsoid().centre_distal_m]))[0]
+    return transform_points(grasp_T_tip(table, finger, u), np.array([HandShape().centre_distal_m]))[0]
 
 
 @pytest.mark.parametrize(("name", "height_m"), EVERY_TABLE)
@@ -50,7 +50,7 @@ def test_most_of_every_line_can_be_used(name: str, height_m: float) -> None:
 @pytest.mark.parametrize(("name", "height_m"), EVERY_TABLE)
 def test_tips_stay_above_the_table(name: str, height_m: float) -> None:
     table = closing(name, height_m)
-    semi_axes_m = np.array(TipEllipsoid().semi_axes_m)
+    semi_axes_m = np.array(HandShape().semi_axes_m)
     for finger in FINGERS:
         for u in np.linspace(*table.path(finger).valid, 15):
             tip = grasp_T_tip(table, finger, u)
@@ -133,7 +133,7 @@ def test_same_question_same_table() -> None:
 
 
 def test_a_longer_tip_raises_the_palm() -> None:
-    long_tip = TipEllipsoid(semi_axes_m=(0.0095, 0.0095, 0.016), centre_distal_m=(0.0, 0.0, 0.025))
+    long_tip = HandShape(semi_axes_m=(0.0095, 0.0095, 0.016), centre_distal_m=(0.0, 0.0, 0.025))
     assert (
         np.linalg.norm(
             closing("pinch", 0.022, long_tip).grasp_T_palm.translation()
@@ -168,7 +168,7 @@ def test_a_hand_that_leans_has_its_fingers_one_above_the_other_and_clear_of_the_
     assert starts_m[0] == pytest.approx(height_m)
     assert np.all(np.diff(starts_m) > 0.008)
     assert starts_m[0] < table.path("TH").start_m[2] < starts_m[2]
-    semi_axes_m = np.array(TipEllipsoid().semi_axes_m)
+    semi_axes_m = np.array(HandShape().semi_axes_m)
     for finger in FINGERS:
         for u in np.linspace(*table.path(finger).valid, 15):
             tip = grasp_T_tip(table, finger, u)

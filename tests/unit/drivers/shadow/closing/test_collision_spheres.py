@@ -8,10 +8,10 @@ import pytest
 from drivers.core.contacts import FINGERS
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.collision_spheres import link_balls
-from drivers.shadow.closing.posture import NODES, TipEllipsoid, finger_joints
+from drivers.shadow.closing.posture import NODES, HandShape, finger_joints
 from drivers.shadow.model.kinematics import joint_vector, palm_T_distal
 
-TIP = TipEllipsoid()
+TIP = HandShape()
 KINDS = pytest.mark.parametrize(("name", "height_m"), [("pinch", 0.018), ("radial", 0.034), ("aside", 0.026)])
 DISTAL_END_m = np.array([0.0, 0.0, 0.005])
 """Of the distal link's own shape, where the fingertip's begins; distal frame."""

@@ -8,9 +8,9 @@ import pytest
 from drivers.core.contacts import FINGERS
 from drivers.shadow.closing.closing import SIDEWAYS, closing
 from drivers.shadow.closing.hand_envelope import open_hand
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 
-TIP = TipEllipsoid()
+TIP = HandShape()
 
 
 @pytest.mark.parametrize("name", ["pinch", *sorted(SIDEWAYS)])

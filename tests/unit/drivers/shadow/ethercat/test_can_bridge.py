@@ -64,7 +64,7 @@ def test_the_interface_is_an_entry_point_of_python_can(rig: Rig) -> None:
     assert "1000 kbit/s" in rig.bus.channel_info
 
 
-@pytest.mark.parametrize("palm", ["0220", "0230", "0240"])
+@pytest.mark.parametrize("palm", ["0220", "0230", "0240", "0250"])
 def test_a_frame_goes_out_on_its_bus_and_the_answer_comes_back(palm: PalmName) -> None:
     rig = Rig(palm)
     rig.bus.send(message(0x605, b"\x01\x02\x03", bus=2))

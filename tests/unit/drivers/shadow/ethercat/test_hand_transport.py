@@ -25,7 +25,8 @@ from drivers.shadow.protocol.palm_images import PALMS
 from tactile_lab import rigs
 from tests.support.memory_port import MemoryPort
 
-CALIBRATION = JointCalibration.load(Path(rigs.__file__).parent / "calibrations" / "simulated-hand" / "joints.yaml")
+FILES = Path(rigs.__file__).parent / "calibrations" / "simulated-hand"
+CALIBRATION = JointCalibration.load(FILES / "joints.yaml")
 MS = 1_000_000
 
 
@@ -82,7 +83,7 @@ def test_a_bare_hand_comes_into_operation_and_tells_who_it_is() -> None:
     assert found.watchdog_s is None
 
 
-@pytest.mark.parametrize("palm", ["0220", "0230", "0240"])
+@pytest.mark.parametrize("palm", ["0220", "0230", "0240", "0250"])
 def test_the_product_code_tells_the_palm_without_touching_the_slaves(palm: Any) -> None:
     wire = Wire(ChainSettings(palm=palm)).open()
     assert find_palm(EthercatSettings(interface="memory"), wire.clock, MemoryPort(wire.hand.ring)) == palm
@@ -91,12 +92,19 @@ def test_the_product_code_tells_the_palm_without_touching_the_slaves(palm: Any) 
 
 
 def test_a_product_code_that_can_not_be_driven_is_told_with_what_to_do() -> None:
-    wire = Wire(ChainSettings(product=0x0A))
-    with pytest.raises(DeviceError, match=r"a board this program does not know \(product 0xa\)") as told:
+    wire = Wire(ChainSettings(product=0x0B))
+    with pytest.raises(DeviceError, match=r"a board this program does not know \(product 0xb\)") as told:
         find_palm(EthercatSettings(interface="memory"), wire.clock, wire.port)
-    assert "0220, 0230 and 0240 are supported; ask Shadow Robot" in str(told.value)
+    assert "0220, 0230, 0240 and 0250 are supported; ask Shadow Robot" in str(told.value)
     with pytest.raises(DeviceError, match="not open"):
         wire.port.send(b"")
+
+
+def test_two_hands_on_one_cable_are_told_with_their_serial_numbers() -> None:
+    wire = Wire(ChainSettings(serial=378))
+    wire.hand.ring.slaves += emulated_hand(wire.clock, CALIBRATION, ChainSettings(serial=554)).ring.slaves
+    with pytest.raises(DeviceError, match=r"two hands on one cable, 378 and 554\. Connect each hand to an interface"):
+        wire.transport.open()
 
 
 def test_a_stated_palm_is_not_looked_for() -> None:
@@ -111,10 +119,12 @@ def test_a_stated_palm_is_not_looked_for() -> None:
 
 
 def setup_of(ethercat: EthercatSettings, **hand: Any) -> HandSetup:
-    return HandSetup(ethercat=ethercat, hand=HandSettings(**hand), joints=Path("joints.yaml"), motors=Path("m.yaml"))
+    return HandSetup(
+        ethercat=ethercat, hand=HandSettings(**hand), joints=FILES / "joints.yaml", motors=FILES / "motors.yaml"
+    )
 
 
-@pytest.mark.parametrize("palm", ["0220", "0230", "0240"])
+@pytest.mark.parametrize("palm", ["0220", "0230", "0240", "0250"])
 def test_images_go_both_ways_in_the_layout_of_the_product(palm: Any) -> None:
     wire = Wire(ChainSettings(palm=palm)).open()
     assert wire.transport.hand.image.name == palm
@@ -127,7 +137,7 @@ def test_images_go_both_ways_in_the_layout_of_the_product(palm: Any) -> None:
     assert wire.transport.counts.empty <= 2
 
 
-@pytest.mark.parametrize("palm", ["0220", "0230", "0240"])
+@pytest.mark.parametrize("palm", ["0220", "0230", "0240", "0250"])
 def test_the_hand_driver_moves_a_joint_over_ethercat(palm: Any) -> None:
     wire = Wire(ChainSettings(palm=palm))
     hand = ShadowHand(wire.transport, wire.clock, CALIBRATION, HandSettings(palm=palm, cycle_s=0.001, soft_start_s=0.0))

@@ -1,55 +1,84 @@
-"""A hand's own folder against the rig file: another side, other fingers, another motor map."""
+"""Which hand it is: its own folder, its motor map and the rig file, where they agree and where they contradict."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
-import yaml
 
 from drivers.core.errors import ConfigurationError
-from drivers.shadow.model.hand_info import check_map, check_modelled, load_infos
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
+from drivers.shadow.model.hand_info import HandStatement, check_map, load_infos, told_form, told_serial
+from drivers.shadow.protocol.palm_images import Side
+from tests.support.hand_folders import FOLDERS, FULL_RIGHT, HandFolder, write_folder
 
-FIVE = ["th", "ff", "mf", "rf", "lf"]
-
-
-def folder(root: Path, side: str = "right", fingers: list[str] = FIVE, mapping: str = "rh_E_v1.yaml") -> Path:
-    """A configuration folder as Shadow publishes them; its calibration's path."""
-    place = {"package_name": "sr_edc_launch", "relative_path": f"mappings/default_mappings/{mapping}"}
-    content = {"side": side, "type": "hand_e", "version": "E3M5", "fingers": fingers, "mapping_path": place}
-    (root / "general_info.yaml").write_text(yaml.safe_dump(content))
-    return root / "calibration.yaml"
+RIG = "rig.yaml: hand"
 
 
-def test_a_right_hand_with_its_own_map_is_taken_and_a_folder_that_says_nothing_too(tmp_path: Path) -> None:
-    assert load_infos([tmp_path / "calibration.yaml"]) == {}
-    motors, infos = Path("maps/rh_E_v1.yaml"), load_infos([folder(tmp_path)])
-    check_map(motors, infos)
-    check_modelled(motors, infos)
-    check_map(Path("maps/motors.yaml"), infos)
-    check_modelled(Path("maps/motors.yaml"), {})
+def form_of(folder: HandFolder, side: Side | None = None, fingers: tuple[str, ...] | None = None) -> HandForm:
+    """What all files of a folder, and a rig file, tell together."""
+    return told_form(folder.motors, load_infos([folder.joints]), HandStatement(RIG, side, fingers))
 
 
-@pytest.mark.parametrize("motors", ["rh_E_v3.yaml", "lh_E_v5.yaml"])
+def test_the_simulated_hand_is_a_right_one_unless_the_rig_says_otherwise(tmp_path: Path) -> None:
+    folder = write_folder(tmp_path, FULL_RIGHT)
+    folder.info.unlink()
+    assert form_of(folder) == RIGHT_HAND
+    folder.motors.rename(anonymous := tmp_path / "motors.yaml")
+    assert told_form(anonymous, {}, HandStatement(RIG, "left")).is_left
+
+
+@pytest.mark.parametrize("kind", FOLDERS, ids=lambda kind: kind.name)
+def test_side_and_fingers_come_from_the_hands_own_files(tmp_path: Path, kind: HandFolder) -> None:
+    form = form_of(write_folder(tmp_path, kind))
+    assert (form.side, form.fingers) == (kind.side, kind.fingers)
+    assert form.mirrored.side != form.side
+    assert all(joint[:2] in (*form.fingers, "WR") for joint in form.joints)
+
+
+def test_the_file_lies_above_the_calibration_in_published_folders(tmp_path: Path) -> None:
+    folder = write_folder(tmp_path, FULL_RIGHT)
+    assert list(load_infos([folder.joints, folder.gains])) == [folder.info]
+    assert load_infos([tmp_path.parent / "calibration.yaml"]) == {}
+
+
+@pytest.mark.parametrize("motors", ["rh_E_v4.yaml", "lh_E_v5.yaml"])
 def test_a_motor_map_of_another_hand_is_refused_with_the_right_one(tmp_path: Path, motors: str) -> None:
-    infos = load_infos([folder(tmp_path)])
-    words = rf"general_info.yaml: says that the hand's motor map is rh_E_v1.yaml, but the rig names {motors}"
+    infos = load_infos([write_folder(tmp_path, FULL_RIGHT).joints])
+    words = rf"general_info.yaml: says that the hand's motor map is rh_E_v3.yaml, but the rig names {motors}"
     with pytest.raises(ConfigurationError, match=words):
         check_map(Path(motors), infos)
+    check_map(Path("motors.yaml"), infos)
 
 
 def test_a_left_hand_is_not_taken_for_a_right_one(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match=r"general_info.yaml: is of a left hand, whose contacts would be mirr"):
-        check_modelled(Path("motors.yaml"), load_infos([folder(tmp_path, side="left")]))
-    with pytest.raises(ConfigurationError, match=r"lh_E_v5.yaml: is of a left hand"):
-        check_modelled(Path("lh_E_v5.yaml"), {})
+    folder = write_folder(tmp_path, FULL_RIGHT)
+    with pytest.raises(ConfigurationError, match=r"info.yaml: is of a right hand, but rig.yaml: hand of a left"):
+        form_of(folder, "left")
+    folder.motors.rename(left := folder.motors.with_name("lh_E_v3.yaml"))
+    with pytest.raises(ConfigurationError, match=r"info.yaml: is of a right hand, but .*lh_E_v3.yaml of a left"):
+        told_form(left, load_infos([folder.joints]), HandStatement(RIG))
 
 
-def test_a_hand_with_fewer_fingers_is_named_by_what_it_misses(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match=r"is of a hand without MF, LF"):
-        check_modelled(Path("motors.yaml"), load_infos([folder(tmp_path, fingers=["th", "ff", "rf"])]))
+def test_fingers_that_the_motor_map_does_not_drive_are_told(tmp_path: Path) -> None:
+    folder = write_folder(tmp_path, next(kind for kind in FOLDERS if kind.name == "rh_lite_v1"))
+    with pytest.raises(ConfigurationError, match=r"rig.yaml: hand: says that the hand's fingers are FF, MF, RF, LF"):
+        form_of(folder, fingers=RIGHT_HAND.fingers)
+    folder.info.write_text(folder.info.read_text().replace("- rf\n", ""))
+    with pytest.raises(ConfigurationError, match=r"says that the hand's fingers are FF, MF, TH, but .* for FF, MF, RF"):
+        form_of(folder)
 
 
 def test_a_folder_with_a_typing_error_is_named(tmp_path: Path) -> None:
+    folder = write_folder(tmp_path, FULL_RIGHT)
+    folder.info.write_text(folder.info.read_text().replace("right", "rihgt"))
     with pytest.raises(ConfigurationError, match=r"general_info.yaml: side"):
-        load_infos([folder(tmp_path, side="rihgt")])
+        load_infos([folder.joints])
+
+
+def test_the_name_of_shadows_folder_is_the_serial_number(tmp_path: Path) -> None:
+    places = [write_folder(tmp_path / name, FULL_RIGHT).info for name in ("378", "2106")]
+    assert told_serial(places[:1]) == 378
+    assert told_serial([tmp_path / "my-hand" / "general_info.yaml"]) is None
+    with pytest.raises(ConfigurationError, match=r"belongs to hand 378, but other files of the rig to hand 2106"):
+        told_serial(places)

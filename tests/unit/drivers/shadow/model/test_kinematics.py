@@ -152,3 +152,21 @@ def test_link_matrices_compose_to_the_distal_frame() -> None:
 def test_an_unknown_joint_name_is_refused_by_name() -> None:
     with pytest.raises(ConfigurationError, match="FFJ9"):
         joint_vector({"FFJ9": 0.1})
+
+
+def test_a_left_hand_is_the_mirror_image_joint_by_joint() -> None:
+    joints_rad = np.random.default_rng(3).uniform(*JOINT_LIMITS_rad.T)
+    mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
+    expected = mirror @ kinematics.palm_T_distal_matrices(joints_rad) @ mirror
+    np.testing.assert_allclose(kinematics.palm_T_distal_matrices(joints_rad, "left"), expected, atol=1e-15)
+    forearm = mirror @ kinematics.forearm_T_palm_matrix(joints_rad) @ mirror
+    np.testing.assert_allclose(kinematics.forearm_T_palm_matrix(joints_rad, "left"), forearm, atol=1e-15)
+    for joint, mirrored in zip(JOINT_TABLE, kinematics.joint_table("left"), strict=True):
+        angle = joints_rad[JOINT_INDEX[joint.name]]
+        own, other = (sum_of_terms(each, angle) for each in (joint, mirrored))
+        np.testing.assert_allclose(other, mirror @ own @ mirror, atol=1e-15)
+
+
+def sum_of_terms(joint: kinematics.Joint, angle: float) -> Array:
+    constant, sine, cosine = kinematics._rodrigues_terms(joint)
+    return np.asarray(constant + np.sin(angle) * sine + np.cos(angle) * cosine)

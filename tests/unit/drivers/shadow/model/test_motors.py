@@ -36,8 +36,8 @@ def test_the_map_takes_joint_angles_to_motor_angles() -> None:
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
-        ({"FFJ3": 0}, "must be 0 to 19, each once"),
-        ({"FFJ3": 20}, "must be 0 to 19, each once"),
+        ({"FFJ3": 0}, "must be among 0 to 19, each once"),
+        ({"FFJ3": 20}, "must be among 0 to 19, each once"),
         ({"FFJ1": 1}, "unknown driven joints FFJ1"),
     ],
 )

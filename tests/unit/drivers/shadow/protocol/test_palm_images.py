@@ -34,7 +34,8 @@ def test_register_bytes_are_those_of_shadows_master(name: str, lab_data: Path) -
 
 
 @pytest.mark.parametrize(
-    ("product", "name"), [(6, "0220"), (9, "0240"), (0x01000000, "0230"), (0x01000001, "0230"), (5, None), (77, None)]
+    ("product", "name"),
+    [(6, "0220"), (9, "0240"), (10, "0250"), (0x01000000, "0230"), (0x01000001, "0230"), (5, None), (77, None)],
 )
 def test_the_image_is_chosen_by_product_code(product: int, name: str | None) -> None:
     palm = palm_of_product(product)
@@ -88,6 +89,19 @@ def test_fields_of_the_0240_lie_where_its_header_says() -> None:
     assert payload[:58] == PALMS["0220"].encode_command(command)[:58]
     assert payload[58:62] == bytes.fromhex("01000203")
     assert payload[62:66] == bytes.fromhex("02010406")
+
+
+def test_fields_of_the_0250_lie_where_its_header_says() -> None:
+    palm = PALMS["0250"]
+    assert (palm.command_bytes, palm.status_bytes) == (62 + 12, 530 + 12)
+    status = palm.decode_status(bytes(palm.status_bytes))
+    places = {"tactile_data_type": 78, "tactile_valid": 82, "motor_data_type": 474, "which_motors": 478}
+    places |= {"arrived": 480, "had_errors": 484, "idle_time_us": 528}
+    for name, at in places.items():
+        assert palm.encode_status(replace(status, **{name: 1}))[at] == 1
+    tips = np.zeros((5, 78), np.uint8)
+    tips[4, 77] = 9
+    assert palm.encode_status(replace(status, tactile=tips))[84 + 389] == 9
 
 
 def test_fields_of_the_0230_lie_where_its_header_says() -> None:

@@ -9,7 +9,7 @@ from gtsam import Pose2, Pose3
 from drivers.core.contacts import Contact, Grasp
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.hand_envelope import open_hand
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import GraspFrame
@@ -21,7 +21,7 @@ from tactile_lab.autonomy.standing.planner import StandingPlanner
 from tactile_lab.autonomy.standing.side_clearance import StandingBox, expected_touches, is_way_clear
 from tactile_lab.autonomy.variance_planner import ExplorationSettings
 
-TIP = TipEllipsoid()
+TIP = HandShape()
 WINDOW_rad = (-1.31, 1.31)
 
 

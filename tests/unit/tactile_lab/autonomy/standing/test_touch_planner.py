@@ -8,7 +8,7 @@ from gtsam import Pose2, Pose3
 
 from drivers.core.contacts import Contact, Grasp
 from drivers.shadow.closing.closing import closing
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.cycle_settings import TouchSettings
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate
@@ -16,7 +16,7 @@ from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.planner import StandingPlanner, Standstill
 from tactile_lab.autonomy.standing.touch_planner import TouchPlanner
 
-TIP = TipEllipsoid()
+TIP = HandShape()
 WINDOW_rad = (-1.31, 1.31)
 
 

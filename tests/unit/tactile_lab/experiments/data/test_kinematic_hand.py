@@ -7,7 +7,7 @@ import pytest
 from gtsam import Pose2, Pose3
 
 from drivers.core.poses import spatial, transform_points
-from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import GraspFrame
@@ -23,7 +23,7 @@ MIDDLE = GraspFrame(0.0, 0.0, 0.0)
 
 def hand(shape: str, place: Pose2, seed: int = 0) -> KinematicHand:
     body = solid(shape)
-    made = KinematicHand(body, CycleSettings(), TipEllipsoid(), WINDOW_rad, np.random.default_rng(seed))
+    made = KinematicHand(body, CycleSettings(), HandShape(), WINDOW_rad, np.random.default_rng(seed))
     made.world_T_body = spatial(place, -body.foot_m)
     return made
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from drivers.core.contacts import Array
 from tactile_lab.experiments.data.planar_data import simulate
@@ -13,14 +12,9 @@ from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise, planar_motion
-from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
-from tactile_lab.slam.tracking.joint import joint_tracker
-from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
 from tactile_lab.slam.tracking.joint.settings import JointSettings
 from tests.support.simulated_contacts import true_map
-
-SHIFT = np.array([0.001, 0.0, 0.0])
 
 
 def tracked(window: int, count: int = 5) -> JointTracker:
@@ -35,24 +29,10 @@ def tracked(window: int, count: int = 5) -> JointTracker:
     return tracker
 
 
-def test_poses_that_were_smoothed_together_are_not_moved_by_loops_between_them() -> None:
-    tracker = tracked(window=12)
-    before = tracker.map
-    tracker.adopt(before.with_rows(before.rows + SHIFT))
-    assert np.array_equal(tracker.map.rows, before.rows)
-
-
 def test_other_kernel_parameters_are_taken_over() -> None:
     tracker = tracked(window=12)
     tracker.adopt(tracker.map.with_best_kernel())
     assert tracker.map.settings != true_map("ellipse", count=1).settings
-
-
-def test_a_session_with_settled_grasps_is_corrected_by_loops() -> None:
-    tracker = tracked(window=2)
-    moved = tracker.map.rows + SHIFT
-    tracker.adopt(tracker.map.with_rows(moved))
-    assert np.allclose(tracker.map.rows, moved)
 
 
 def drifting_box(seed: int, count: int = 8) -> tuple[JointTracker, Array]:
@@ -95,22 +75,3 @@ def test_the_end_is_told_as_it_is() -> None:
     tracker, _ = drifting_box(50, count=4)
     tracker.finish()
     assert tracker.refined is tracker.map
-
-
-def test_the_way_back_from_a_wrong_turn_may_be_open_from_the_second_hypothesis_alone(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    tracker, _ = drifting_box(50, count=6)
-    asked: list[Hypothesis] = []
-
-    def placed_from_the_second(best: Hypothesis, *_: object) -> Hypothesis:
-        asked.append(best)
-        return replace(best, misfit=best.misfit - 200.0) if len(asked) == 2 else best
-
-    monkeypatch.setattr(joint_tracker, "relocalize", placed_from_the_second)
-    monkeypatch.setattr(joint_tracker, "_HOPEFUL_nats", np.inf)
-    monkeypatch.setattr(FacetedScorer, "regular", lambda _, best: best)
-    tracker.finish()
-    assert 2 <= len(asked) <= 3
-    assert np.array_equal(tracker.map.rows, asked[1].map.rows)
-    assert not np.array_equal(tracker.map.rows, asked[0].map.rows)

@@ -1,0 +1,62 @@
+"""Splits a chunk of a recording into its records.
+
+The mcap package reads records number by number; taking them apart in one step is several times faster, and reading
+recordings spends most of its time here.
+"""
+
+from __future__ import annotations
+
+import struct
+from io import BytesIO
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, McapRecord, Message
+from mcap.stream_reader import get_chunk_data_stream
+
+LARGEST_CHUNK_bytes = 16 << 20
+"""A chunk is closed after 64 KiB: more is a picture. A small file may claim to hold gigabytes."""
+
+_MESSAGE_OPCODE, _CHANNEL_OPCODE = int(Opcode.MESSAGE), int(Opcode.CHANNEL)
+_HEAD = struct.Struct("<BQ")  # opcode, length
+_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+
+
+def split_chunk(chunk: Chunk) -> list[McapRecord]:
+    """The messages and channels in a chunk, in their order; other records are left out.
+
+    Raises:
+        ValueError, McapError, zstandard.ZstdError, struct.error: the chunk is too large or damaged.
+    """
+    _check_size(chunk)
+    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+    data = stream.read(size)
+    records: list[McapRecord] = []
+    position = 0
+    while position < size:
+        opcode, length = _HEAD.unpack_from(data, position)
+        start = position + _HEAD.size
+        position = start + length
+        if position > size:
+            raise ValueError("a record is longer than its chunk")
+        if opcode == _MESSAGE_OPCODE:
+            records.append(_message(data, start, position))
+        elif opcode == _CHANNEL_OPCODE:
+            records.append(Channel.read(ReadDataStream(BytesIO(data[start:position]))))
+    return records
+
+
+def _message(data: bytes, start: int, end: int) -> Message:
+    content = start + _MESSAGE.size
+    if content > end:
+        raise ValueError("a message is too short")
+    channel_id, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, start)
+    return Message(channel_id, log_time, data[content:end], publish_time, sequence)
+
+
+def _check_size(chunk: Chunk) -> None:
+    """No recorder makes a chunk larger than this, and unpacking one takes no more. Raises ValueError."""
+    packed = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else len(chunk.data)
+    if chunk.compression not in ("", "zstd") or max(chunk.uncompressed_size, packed) > LARGEST_CHUNK_bytes:
+        raise ValueError(f"a chunk of {max(chunk.uncompressed_size, packed)} bytes, packed by {chunk.compression!r}")
