@@ -12,7 +12,7 @@ from typing import Literal, TypeAlias
 from pydantic import Field
 
 from calibration.forearm.board_problem import BoardNoise, BoardProblem
-from calibration.forearm.pair_problem import PairProblem
+from calibration.forearm.pair_problem import PairNoise, PairProblem
 from calibration.forearm.recordings import ForearmData
 from calibration.forearm.touch_plan import PlannedTouch
 from calibration.forearm.touch_problem import TouchNoise, TouchProblem
@@ -37,7 +37,7 @@ class WizardSettings(StrictModel):
     Attributes:
         needs: the least motion.
         limits: of a result.
-        touch, board: errors of the observations.
+        touch, board, pairs: errors of the observations.
         valid_days: how long a result may be used.
     """
 
@@ -45,6 +45,7 @@ class WizardSettings(StrictModel):
     limits: QualityLimits = QualityLimits()
     touch: TouchNoise = TouchNoise()
     board: BoardNoise = BoardNoise()
+    pairs: PairNoise = PairNoise()
     valid_days: float = Field(default=VALID_DAYS, gt=0.0)
 
     def limits_for(self, method: Method) -> QualityLimits:
@@ -151,7 +152,7 @@ def problem_of(data: ForearmData, settings: WizardSettings) -> Problem:
     if data.touches:
         return TouchProblem(data.touches, settings.touch, data.guess)
     if data.pairs:
-        return PairProblem(data.pairs)
+        return PairProblem(data.pairs, settings.pairs)
     if data.camera is None or data.markers is None:
         raise ConfigurationError("pictures need the camera's lens and the markers", where="marker method")
     return BoardProblem(data.views, data.camera, data.markers, data.link, settings.board)

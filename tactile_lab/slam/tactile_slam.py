@@ -14,7 +14,8 @@ Grasps that cannot be registered:
   ``placement_limit_m`` (few contacts, or a direction not observed): "uncertain". A particle filter does not use the
   contacts, because they could not be removed from its only map; joint hypotheses use them and remain revisable.
 
-A session is lost when the last ``lost_after`` grasps were untracked, or more than half of all.
+A session is lost when the last ``lost_after`` grasps are untracked, or more than half of all. A grasp that was
+untracked when it was taken and has a place by now does not count.
 """
 
 from __future__ import annotations
@@ -249,7 +250,9 @@ class TactileSlam:
     @property
     def is_lost(self) -> bool:
         """See the module's docstring; a session without an object frame is lost as well."""
-        untracked = [step.verdict == "untracked" for step in self._steps]
+        placed = self._tracker.map.placed if self._tracker else ()
+        later = [False] * (len(self._steps) - len(placed)) + [grasp.used for grasp in placed]
+        untracked = [step.verdict == "untracked" and not used for step, used in zip(self._steps, later, strict=True)]
         recent = untracked[-self._settings.lost_after :]
         all_recent = len(recent) == self._settings.lost_after and all(recent)
         return self._tracker is None or all_recent or 2 * sum(untracked) > len(untracked)

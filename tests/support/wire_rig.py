@@ -13,15 +13,16 @@ from tactile_lab import rigs
 SHIPPED = Path(rigs.__file__).parent
 
 
-def wire_rig(folder: Path, **changes: Any) -> Path:
+def wire_rig(folder: Path, shipped: str = "sim-wire", **changes: Any) -> Path:
     """Write a rig file into ``folder``: with long time limits for a busy machine, and without the check of the motor
     map.
 
     Args:
         folder: the folder of the file.
+        shipped: which of the packaged rigs.
         changes: keys of the rig file to replace.
     """
-    content = yaml.safe_load((SHIPPED / "sim-wire.yaml").read_text())
+    content = yaml.safe_load((SHIPPED / f"{shipped}.yaml").read_text())
     content["calibration"] = {role: str(SHIPPED / file) for role, file in content["calibration"].items()}
     wires, net = content["wires"], f"127.{1 + os.getpid() % 250}.{os.getpid() // 250 % 250}"
     ethercat = {"interface": f"tln{os.getpid()}", "master": {"answer_s": 0.02, "setup_answer_s": 0.2}}

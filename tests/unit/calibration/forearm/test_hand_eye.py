@@ -8,10 +8,12 @@ import pytest
 from gtsam import Pose3, Rot3
 
 from calibration.forearm.hand_eye import solve_ax_xb, solve_ax_zb
+from calibration.forearm.pair_problem import PairNoise, PairProblem
 from calibration.forearm.recordings import ForearmData, load_data
 from calibration.forearm.wizard import WizardSettings, solve_forearm
 from calibration.steps.motion_check import check_pairs
 from calibration.steps.observations import PosePair
+from calibration.steps.quality import region_holds
 from drivers.core.errors import ConfigurationError
 
 HAND_T_TARGET = Pose3.Expmap(np.array([0.3, -0.2, 0.5, 0.02, 0.05, -0.03]))
@@ -57,7 +59,10 @@ def test_outlying_pairs_are_named_and_do_not_move_the_answer():
     good[3] = PosePair(good[3].mount_T_hand, good[3].camera_T_target * Pose3(Rot3(), np.array([0.05, 0, 0])))
     result = solve_forearm(ForearmData(pairs=tuple(good)))
     assert result.quality.outliers == ("pair 4",)
-    assert np.linalg.norm(result.solution.world_T_mount.inverse().translation() - MOUNT_T_CAMERA.translation()) < 1e-3
+    without = PairProblem(good[:3] + good[4:]).solve()
+    moved = without.world_T_mount.inverse().translation() - result.solution.world_T_mount.inverse().translation()
+    assert np.linalg.norm(moved) < 2e-4
+    assert region_holds(result.solution, MOUNT_T_CAMERA.inverse())
 
 
 def test_rotations_that_are_too_small_are_refused_where_opencv_gives_an_answer_all_the_same():
@@ -79,6 +84,47 @@ def test_poses_all_about_one_axis_are_refused_with_the_axis():
     one_axis = pairs(np.outer(np.linspace(-1.5, 1.5, 12), [0.0, 0.0, 1.0]))
     with pytest.raises(ConfigurationError, match=r"about one axis, \(0\.00, 0\.00, 1\.00\) of the hand"):
         solve_forearm(ForearmData(pairs=one_axis))
+
+
+def with_print(larger: float, seed: int) -> tuple[PosePair, ...]:
+    """Pairs of a program that took the print to be smaller than it is by this share."""
+    seen = pairs(turns(20, seed=seed), noise_m=1e-3, seed=seed)
+    return tuple(
+        PosePair(
+            pair.mount_T_hand,
+            Pose3(pair.camera_T_target.rotation(), pair.camera_T_target.translation() / (1.0 + larger)),
+        )
+        for pair in seen
+    )
+
+
+@pytest.mark.parametrize("larger", [0.0, 0.002, 0.005, 0.02])
+def test_a_print_of_another_size_leaves_the_region_honest(larger):
+    solutions = [PairProblem(with_print(larger, seed)).solve() for seed in range(40)]
+    held = sum(region_holds(solution, MOUNT_T_CAMERA.inverse()) for solution in solutions)
+    assert 36 <= held <= 40
+    found = [solution.numbers["print_larger_share"] for solution in solutions]
+    assert np.median(found) == pytest.approx(larger, abs=5e-4)
+    assert max(solution.numbers["print_larger_sigma"] for solution in solutions) < 2e-3
+
+
+def test_the_closed_forms_stand_beside_the_refined_answer():
+    told = {larger: PairProblem(with_print(larger, 2)).solve().numbers for larger in (0.0, 0.02)}
+    for form in ("shah", "park_martin"):
+        assert told[0.0][f"{form}_mm_away"] < 5.0
+        assert told[0.02][f"{form}_mm_away"] > 10.0  # they take the print at its word
+        assert told[0.02][f"{form}_deg_away"] < 1.0
+
+
+def test_pairs_that_contradict_a_stated_print_are_refused():
+    known = PairNoise(print_scale_sigma=0.001)
+    assert PairProblem(with_print(0.001, 1), known).solve().numbers["print_larger_share"] == pytest.approx(
+        0.001, abs=2e-3
+    )
+    with pytest.raises(
+        ConfigurationError, match=r"the print is \+2\.\d+ % larger .* known to 0\.1 %.* Measure the printed"
+    ):
+        PairProblem(with_print(0.02, 1), known).solve()
 
 
 def test_too_few_poses_are_refused():

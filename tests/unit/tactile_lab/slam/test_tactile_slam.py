@@ -14,6 +14,7 @@ from drivers.core.contacts import Grasp
 from drivers.core.errors import TrackingError
 from drivers.core.poses import palm_heading, spatial
 from tactile_lab.experiments.data import spatial_data
+from tactile_lab.experiments.data.carried_off import carried_off
 from tactile_lab.experiments.data.planar_data import simulate
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.slam.result import SlamResult
@@ -146,6 +147,16 @@ def test_grasps_before_the_object_frame_have_no_pose() -> None:
     result = slam.finish()
     assert result.world_T_object[0] is None
     assert result.world_T_object[1] is not None
+
+
+def test_a_grasp_that_finds_its_place_at_the_end_is_not_lost() -> None:
+    carried = carried_off(simulate("triangle", 5, count=9), 6, Pose3(Rot3.Rz(1.0), np.array([0.1, 0.02, 0.0])))
+    slam = TactileSlam(settings(lost_after=1))
+    for grasp in carried.grasps[:6]:
+        slam.step(grasp)
+    assert slam.step(carried.grasps[6]).verdict == "untracked"
+    assert slam.is_lost
+    assert slam.finish().status == "ok"
 
 
 def test_a_session_without_any_contact_is_lost_but_finishes() -> None:
