@@ -109,7 +109,10 @@ def read_trajectory(path: Path) -> Trajectory:
         ) from error
     if text.partition("\n")[0].rstrip("\r") != ",".join(COLUMNS):  # before millions of lines of something else are read
         raise SessionError(f"first line is not '{COLUMNS[0]}' and the 16 entries of world_T_object", where=str(path))
-    rows = list(csv.reader(io.StringIO(text)))
+    try:
+        rows = list(csv.reader(io.StringIO(text)))
+    except csv.Error as error:
+        raise SessionError(f"is not a table ({error})", where=str(path), hint="Replay the session") from error
     placed = [_read_row(row, f"{path}, line {number}") for number, row in enumerate(rows[1:], start=2)]
     return Trajectory(tuple(stamp for stamp, _ in placed), tuple(pose for _, pose in placed))
 
