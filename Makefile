@@ -63,7 +63,7 @@ clean:  ## Remove the environment, what was built, and caches
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 
 # pip of the system installs into the environment, so that a Python without ensurepip will do. It would compile what it
-# installs on one core; some packages hold files that do not compile, which nobody imports.
+# installs on one core only. A file that does not compile, which nobody imports, does no harm.
 $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -m venv --without-pip $(VENV)
 	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check --no-compile --require-hashes --no-deps -r requirements.lock

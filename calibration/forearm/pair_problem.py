@@ -14,7 +14,7 @@ from gtsam import Pose3
 from pydantic import Field
 from scipy.stats import chi2
 
-from calibration.forearm.hand_eye import solve_ax_zb
+from calibration.forearm.hand_eye import solve_ax_xb, solve_ax_zb
 from calibration.steps.observations import PosePair
 from calibration.steps.pose_residuals import PoseResidual
 from calibration.steps.refinement import (
@@ -66,7 +66,9 @@ class PairProblem:
         self.pairs = tuple(pairs)
         self._scale_sigma = (known or PairNoise()).print_scale_sigma
         self._prior = _prior_of_scale(self._scale_sigma)
-        found = solve_ax_zb([pair.mount_T_hand for pair in pairs], [pair.camera_T_target for pair in pairs])
+        poses = [pair.mount_T_hand for pair in pairs], [pair.camera_T_target for pair in pairs]
+        found = solve_ax_zb(*poses)
+        self._closed = {"shah": found.mount_T_camera, "park_martin": solve_ax_xb(*poses).mount_T_camera}
         self._start = gtsam.Values()
         self._start.insert(MOUNT, found.mount_T_camera.inverse())
         self._start.insert(BOARD, found.hand_T_target)
@@ -100,9 +102,16 @@ class PairProblem:
             variance_factor=factor,
             values=values,
             others={"hand_T_target": values.atPose3(BOARD)},
-            numbers={"print_larger_share": share, "print_larger_sigma": sigma},
+            numbers={"print_larger_share": share, "print_larger_sigma": sigma, **self._beside(values)},
             outliers=tuple(index for index in outliers(everything, values) if index < len(everything) - 1),
         )
+
+    def _beside(self, values: gtsam.Values) -> dict[str, float]:
+        """How far the closed forms' answers, which trust the print, are from the refined one: millimetres, degrees."""
+        refined = values.atPose3(MOUNT).inverse()
+        offs = {name: refined.between(found) for name, found in self._closed.items()}
+        away = {f"{name}_mm_away": 1e3 * float(np.linalg.norm(off.translation())) for name, off in offs.items()}
+        return away | {f"{name}_deg_away": float(np.degrees(rotation_angle_rad(off))) for name, off in offs.items()}
 
     def _measurements(self, chosen: Sequence[int]) -> list[Measurement]:
         return [*(_measurement(self.pairs[index], self._noise) for index in chosen), self._prior]

@@ -7,7 +7,6 @@ read too.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +26,7 @@ from drivers.core.contacts import FINGERS, Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.fingertip import RigidTransform, Vector3
 from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
+from drivers.core.reading.json_text import parse_json
 from drivers.shadow.model.kinematics import JOINTS
 
 FORMAT = "tactile-forearm-data/1"
@@ -178,7 +178,7 @@ def save_data(path: Path, data: ForearmData) -> None:
 
 def _json(path: Path) -> Any:
     try:
-        return json.loads(read_bounded(path, LARGEST_JSON_bytes))
+        return parse_json(read_bounded(path, LARGEST_JSON_bytes))
     except OSError as error:
         raise ConfigurationError(
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"

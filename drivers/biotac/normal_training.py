@@ -165,7 +165,7 @@ def compare_methods(
         most: largest number of examples that the learned method keeps.
 
     Raises:
-        ConfigurationError: too few presses.
+        ConfigurationError: too few presses, or presses that no electrode feels.
     """
     _check(presses, electrodes)
     half, layout = len(presses) // 2, electrode_layout(electrodes)
@@ -191,6 +191,9 @@ def _all_electrodes(changes: Array, electrodes: ElectrodeCount, power: float) ->
 def _score(name: str, found: Array, measured: Array, half: int, in_sensor_frame: bool) -> MethodErrors:
     known = np.asarray(np.isfinite(found).all(axis=1))
     first, second = np.flatnonzero(known[:half]), half + np.flatnonzero(known[half:])
+    if not (len(first) and len(second)):
+        what = "in half of the recording no press changes an electrode by more than its noise"
+        raise ConfigurationError(what, where="BioTac normals", hint="Check the sensor, and record again")
     turn = np.eye(3) if in_sensor_frame else rotation_between(found[first], measured[first])
     trained = angles_rad(found[first] @ turn.T, measured[first])
     sigma = np.full(len(second), np.sqrt(0.5 * np.mean(trained**2)))

@@ -7,6 +7,7 @@ error if a camera changes the size of its pictures, because no lens calibration 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -153,7 +154,9 @@ class FolderSource:
         file = self._files[self._next]
         self._next += 1
         self._counter += 1
-        image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
+        image = None
+        with suppress(cv2.error):  # more pixels than the library is allowed to make
+            image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
         if image is None:
             raise DeviceError("is not a readable picture", where=str(file), hint="Remove it from the folder")
         self._size = self._size or image.shape

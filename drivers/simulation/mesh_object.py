@@ -16,6 +16,9 @@ from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size
 from drivers.simulation.object_names import LYING, STANDING, posed_path
 
 LARGEST_m, SMALLEST_m = 0.25, 0.01
+MOST_TRIANGLES = 100_000
+"""Finding how a finer mesh rests on the table takes minutes, and no fingertip feels the difference."""
+
 _NEARLY_CONVEX = 0.96  # a mesh that fills this share of its convex hull is represented by the hull
 _MOST_PIECES = 16
 _LEANING_rad = np.radians(15.0)  # a scan that leans by less than this is meant to stand
@@ -111,6 +114,9 @@ def _read(path: Path) -> trimesh.Trimesh:
         ) from error
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise ConfigurationError("contains no triangles", where=str(path), hint="Export the object as a triangle mesh")
+    if len(mesh.faces) > MOST_TRIANGLES:
+        what = f"has {len(mesh.faces):,} triangles, and at most {MOST_TRIANGLES:,} are used"
+        raise ConfigurationError(what, where=str(path), hint="Simplify it in a mesh editor")
     return mesh
 
 

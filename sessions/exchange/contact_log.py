@@ -24,6 +24,7 @@ from drivers.core.contacts import LARGEST_SLOPE, ApproachPath, Array, Contact, G
 from drivers.core.errors import ConfigurationError
 from drivers.core.poses import palm_heading, planar, spatial
 from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
+from drivers.core.reading.json_text import parse_json
 from sessions.exchange.contact_form import (
     FORMAT,
     ContactEntry,
@@ -89,17 +90,21 @@ def read_contact_log(path: Path) -> ContactLog:
     )
 
 
-def write_contact_log(path: Path, log: ContactLog) -> None:
+def write_contact_log(path: Path, log: ContactLog) -> int:
     """Write a log; the same checks as for reading.
 
     A log of dimension 2 holds the horizontal part of its contacts and motions; contacts with a vertical normal have
         none and are left out.
+
+    Returns:
+        the number of contacts written.
 
     Raises:
         ConfigurationError: the log is empty or inconsistent.
         WriteError: the file cannot be written.
     """
     poses = log.true_poses or (None,) * len(log.grasps)
+    grasps = [_grasp_entry(grasp, pose, log) for grasp, pose in zip(log.grasps, poses, strict=True)]
     document = {
         "format": FORMAT,
         "dimension": log.dimension,
@@ -107,10 +112,11 @@ def write_contact_log(path: Path, log: ContactLog) -> None:
         "normal_sigma_rad": log.normal_sigma_rad,
         **({"motion_sigma": log.motion_sigma.model_dump()} if log.motion_sigma else {}),
         **({"object": log.truth.model_dump(exclude_none=True)} if log.truth else {}),
-        "grasps": [_grasp_entry(grasp, pose, log) for grasp, pose in zip(log.grasps, poses, strict=True)],
+        "grasps": grasps,
     }
     validate(document, Document, where=str(path))
     write_whole(path, json.dumps(document, indent=1, allow_nan=False))
+    return sum(len(grasp["contacts"]) for grasp in grasps)
 
 
 # --- reading -------------------------------------------------------------------------------------------------------
@@ -118,7 +124,7 @@ def write_contact_log(path: Path, log: ContactLog) -> None:
 
 def _load_json(path: Path) -> Any:
     try:
-        return json.loads(read_bounded(path, LARGEST_JSON_bytes), object_pairs_hook=_without_repeats)
+        return parse_json(read_bounded(path, LARGEST_JSON_bytes), object_pairs_hook=_without_repeats)
     except OSError as error:
         raise ConfigurationError(
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"

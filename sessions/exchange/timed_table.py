@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -18,6 +17,7 @@ import numpy as np
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, LARGEST_TABLE_bytes, read_bounded
+from drivers.core.reading.json_text import parse_json
 
 FORMAT = "tactile-timed-contacts/1"
 
@@ -74,7 +74,7 @@ def read_csv(path: Path) -> list[dict[str, str]]:
 def read_json(path: Path) -> dict[str, Any]:
     """A document of the form :data:`FORMAT`. Raises ConfigurationError."""
     try:
-        document = json.loads(read_bounded(path, LARGEST_JSON_bytes))
+        document = parse_json(read_bounded(path, LARGEST_JSON_bytes))
     except OSError as error:
         raise ConfigurationError(
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"

@@ -7,6 +7,7 @@ device is not ready. 130 interrupted.
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import warnings
@@ -18,10 +19,14 @@ from tactile_lab.cli.interruptions import interruptions_heeded
 from tactile_lab.cli.streams import open_missing_streams
 
 INTERRUPTED = 130
+_NO_MEMORY = "the memory is exhausted. Close other programs, or raise the limit (ulimit -v)"
 
 # Sums of several BLAS threads come out in another order, and a replay must give the same bytes on any machine.
 # The libraries read this when they are loaded, which is later; small matrices are faster with one thread anyway.
 os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
+os.environ.setdefault(
+    "OPENCV_IO_MAX_IMAGE_PIXELS", "100000000"
+)  # a packed picture of 100 kB may claim a thousand million
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -50,10 +55,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except MemoryError:
         from tactile_lab.cli.console import complain
 
-        complain("the memory is exhausted. Close other programs, or raise the limit (ulimit -v)")
+        complain(_NO_MEMORY)
         sys.exit(1)
     except Exception as error:
-        if not (words := blamed(error)):
+        if not (words := _NO_MEMORY if _lacks_memory(error) else blamed(error)):
             raise
         from tactile_lab.cli.console import complain
 
@@ -73,6 +78,12 @@ def _run(app: Callable[..., None], arguments: Sequence[str] | None) -> None:
             raise
     check_output()
     sys.exit(0)
+
+
+def _lacks_memory(error: Exception) -> bool:
+    """Whether the system refused memory by another error than MemoryError: for a thread's stack, or a library."""
+    refused = isinstance(error, OSError) and error.errno == errno.ENOMEM
+    return refused or (isinstance(error, RuntimeError) and "can't start new thread" in str(error))
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:

@@ -9,6 +9,7 @@ import select
 import sys
 import termios
 import time
+from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
 
@@ -53,7 +54,8 @@ class KeyInput:
         """Restore the terminal; can be called repeatedly."""
         before, self._before = self._before, None
         if before is not None and not self.closed:
-            termios.tcsetattr(self._descriptor, termios.TCSADRAIN, before)
+            with suppress(termios.error):  # the terminal is gone
+                termios.tcsetattr(self._descriptor, termios.TCSADRAIN, before)
 
     def read(self) -> str:
         """Keys typed since the last call."""

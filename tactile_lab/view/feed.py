@@ -18,13 +18,13 @@ class ViewFeed(PageTransport):
     """A page that shows a running session; an operator of it.
 
     Args:
-        address, port, token, title: see :class:`~tactile_lab.view.page_transport.PageTransport`.
+        address, port, token, title, certificate: see :class:`~tactile_lab.view.page_transport.PageTransport`.
     """
 
     attended = False
 
-    def __init__(self, address: str, port: int, token: str, title: str) -> None:
-        super().__init__("session", address, port, token, title)
+    def __init__(self, address: str, port: int, token: str, title: str, *, certificate: str = "") -> None:
+        super().__init__("session", address, port, token, title, certificate=certificate)
         self._asked: deque[Request] = deque(maxlen=_PENDING)
 
     def on_press(self, content: Mapping[str, Any]) -> None:

@@ -15,6 +15,7 @@ import hmac
 import ipaddress
 import re
 import secrets
+import ssl
 from dataclasses import dataclass
 from http import HTTPStatus
 
@@ -63,11 +64,13 @@ class Gate:
     Args:
         names: host names and addresses of the page; None for any, which needs a token.
         token: "" for none.
+        encrypted: the cookie is then never sent without encryption.
     """
 
-    def __init__(self, names: frozenset[str] | None, token: str) -> None:
+    def __init__(self, names: frozenset[str] | None, token: str, *, encrypted: bool = False) -> None:
         assert names is not None or token
         self._names, self._token = names, token
+        self._marks = "HttpOnly; SameSite=Strict; Path=/" + ("; Secure" if encrypted else "")
 
     def verdict(self, head: Head) -> tuple[HTTPStatus, str]:
         """OK: pass it on; SEE_OTHER with the cookie to set; anything else with the reason."""
@@ -83,7 +86,7 @@ class Gate:
             return HTTPStatus.OK, ""
         shown = re.search(r"[?&]token=([A-Za-z0-9_-]+)", head.path)
         if shown and self._same(shown[1]):
-            return HTTPStatus.SEE_OTHER, f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
+            return HTTPStatus.SEE_OTHER, f"{COOKIE}={self._token}; {self._marks}"
         return HTTPStatus.FORBIDDEN, "the token is missing or wrong: use the address that the session printed"
 
     def _same(self, shown: str) -> bool:
@@ -104,7 +107,9 @@ def _cookie(header: str) -> str:
     return ""
 
 
-async def serve(gate: Gate, address: str, port: int, inner: InnerDoor) -> asyncio.Server:
+async def serve(
+    gate: Gate, address: str, port: int, inner: InnerDoor, encryption: ssl.SSLContext | None = None
+) -> asyncio.Server:
     """Listen, and forward accepted requests to ``inner``. Raises OSError if the address is not available."""
 
     async def visit(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -112,7 +117,7 @@ async def serve(gate: Gate, address: str, port: int, inner: InnerDoor) -> asynci
             await _visit(gate, reader, writer, inner)
         writer.close()
 
-    return await asyncio.start_server(visit, address, port, limit=_HEAD_BYTES)
+    return await asyncio.start_server(visit, address, port, limit=_HEAD_BYTES, ssl=encryption)
 
 
 async def _visit(gate: Gate, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, inner: InnerDoor) -> None:

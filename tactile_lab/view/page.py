@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from io import StringIO
+from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
 
@@ -17,6 +18,7 @@ from viser import _messages
 
 from drivers.core.errors import DeviceError
 from sessions.guided.operator import Ask
+from tactile_lab.view.certificates import load_certificate
 from tactile_lab.view.controls import Controls
 from tactile_lab.view.drawing import Drawing
 from tactile_lab.view.gate import Gate, is_loopback, serve
@@ -39,6 +41,7 @@ class Page:
         address, port: where it listens; port 0: any free port.
         token: access token; needed for any address but the loopback interface's.
         title: of the page.
+        certificate: PEM file with a certificate and its key; "" for no encryption.
         panel: which buttons it has.
         say: called with a pressed button, in another thread; None without requests.
     """
@@ -50,6 +53,7 @@ class Page:
         token: str,
         title: str,
         *,
+        certificate: str = "",
         panel: Literal["session", "wizard"] = "session",
         say: Say | None = None,
     ) -> None:
@@ -58,6 +62,7 @@ class Page:
                 "a token is needed to listen on this address", where=address, hint="Listen on 127.0.0.1, or use --token"
             )
         self._door, self._token = (address, port), token
+        self._encryption = load_certificate(Path(certificate)) if certificate else None
         self._inner_door = InnerDoor()
         with redirect_stdout(StringIO()), self._inner_door.in_place_of_ports():  # viser greets on standard output
             self._inner = viser.ViserServer(port=0, label=title, verbose=False)
@@ -77,8 +82,9 @@ class Page:
         """Start listening. Raises DeviceError if the address is not available."""
         self._thread.start()
         address, port = self._door
-        gate = Gate(_names(address), self._token)
-        opened = asyncio.run_coroutine_threadsafe(serve(gate, address, port, self._inner_door), self._loop)
+        gate = Gate(_names(address), self._token, encrypted=self._encryption is not None)
+        serving = serve(gate, address, port, self._inner_door, self._encryption)
+        opened = asyncio.run_coroutine_threadsafe(serving, self._loop)
         try:
             server = opened.result(10)
         except (OSError, TimeoutError) as error:
@@ -88,7 +94,8 @@ class Page:
         bound = server.sockets[0].getsockname()[1]
         name = socket.gethostname() if _is_every(address) else address
         shown = f"[{name}]" if ":" in name else name
-        self.url = f"http://{shown}:{bound}/" + (f"?token={self._token}" if self._token else "")
+        scheme = "http" if self._encryption is None else "https"
+        self.url = f"{scheme}://{shown}:{bound}/" + (f"?token={self._token}" if self._token else "")
         return self
 
     def __exit__(

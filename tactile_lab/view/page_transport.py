@@ -36,10 +36,21 @@ class PageTransport(ABC):
         address, port: where the page listens; port 0: any free port.
         token: access token; "" for none, on the loopback interface only.
         title: of the page.
+        certificate: PEM file with a certificate and its key; "" for no encryption.
     """
 
-    def __init__(self, panel: Literal["session", "wizard"], address: str, port: int, token: str, title: str) -> None:
-        self._settings = {"panel": panel, "address": address, "port": port, "token": token, "title": title}
+    def __init__(
+        self,
+        panel: Literal["session", "wizard"],
+        address: str,
+        port: int,
+        token: str,
+        title: str,
+        *,
+        certificate: str = "",
+    ) -> None:
+        door = {"address": address, "port": port, "token": token, "certificate": certificate}
+        self._settings = {"panel": panel, "title": title, **door}
         self.dropped = 0
         """Messages that were dropped because the page did not keep up."""
         self.url = ""

@@ -23,11 +23,11 @@ class WizardFeed(PageTransport):
     Every message contains the complete state of the page, so that a lost one does not matter.
 
     Args:
-        address, port, token, title: see :class:`~tactile_lab.view.page_transport.PageTransport`.
+        address, port, token, title, certificate: see :class:`~tactile_lab.view.page_transport.PageTransport`.
     """
 
-    def __init__(self, address: str, port: int, token: str, title: str) -> None:
-        super().__init__("wizard", address, port, token, title)
+    def __init__(self, address: str, port: int, token: str, title: str, *, certificate: str = "") -> None:
+        super().__init__("wizard", address, port, token, title, certificate=certificate)
         self._lines: deque[tuple[str, str]] = deque(maxlen=_LINES)
         self._tables: dict[str, dict[str, Any]] = {}
         self._number, self._text, self._usual = 0, "", ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -29,7 +30,23 @@ def refuse_existing(targets: Sequence[Path]) -> None:
             raise ConfigurationError("exists already", where=str(target), hint="Choose another name, or remove it")
 
 
-def export_contacts(session: Session, path: Path, dimension: int | None = None) -> ContactLog:
+@dataclass(frozen=True)
+class ExportedContacts:
+    """What a contact log holds of a session.
+
+    Attributes:
+        dimension: 2 or 3.
+        grasps, contacts: in the log.
+        vertical: contacts whose normals have no horizontal part, such as a tap's on the top: left out in the plane.
+    """
+
+    dimension: int
+    grasps: int
+    contacts: int
+    vertical: int
+
+
+def export_contacts(session: Session, path: Path, dimension: int | None = None) -> ExportedContacts:
     """Write the grasps of a recorded session, understood from its raw bytes, as a contact log.
 
     The true mesh, where the session has one, is written beside it as a PLY file of the same name.
@@ -59,8 +76,8 @@ def export_contacts(session: Session, path: Path, dimension: int | None = None) 
         truth=_truth(session, path),
         true_poses=true_poses(session, len(grasps)),
     )
-    write_contact_log(path, log)
-    return log
+    written = write_contact_log(path, log)
+    return ExportedContacts(log.dimension, len(grasps), written, len(contacts) - written)
 
 
 def _dimension(number: int) -> Literal[2, 3]:

@@ -13,15 +13,15 @@ import json
 import os
 import resource
 import subprocess
-import sys
 import tempfile
 import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from drivers.core.child_process import child_command, child_environment
-from tactile_lab.cli.main import main as main_of_program
+from tests.support.forked_program import fork_program, side_by_side
 from tests.support.low_rig import low_rig
 from tests.support.stored_table import GrowingTable, Outline, parser
 from tests.support.warm_program import load
@@ -90,9 +90,10 @@ class Outcome:
 def read(command: Command, loaded_s: float) -> Outcome:
     """Run a command in a copy of this process, on a processor time that it cannot use up honestly."""
     told = command.folder / "said"
-    process = os.fork()
-    if process == 0:
-        _become(command, told)
+    null, said = os.open(os.devnull, os.O_RDWR), os.open(told, os.O_WRONLY | os.O_CREAT)
+    process = fork_program(command.words, command.folder, (null, null, said), _bound_time)
+    os.close(null)
+    os.close(said)
     _, status, used = os.wait4(process, 0)
     text = told.read_text(errors="replace") if told.is_file() else ""
     lines = [line for line in text.splitlines() if line.strip()]
@@ -101,32 +102,23 @@ def read(command: Command, loaded_s: float) -> Outcome:
     return Outcome(os.waitstatus_to_exitcode(status), seconds, used.ru_maxrss / 1e3, shown, "Traceback" in text)
 
 
-def _become(command: Command, told: Path) -> None:
-    """The program. Never returns."""
-    code = 70
-    try:
-        os.setsid()
-        resource.setrlimit(resource.RLIMIT_CPU, (_ENOUGH_s, _ENOUGH_s))
-        null, said = os.open(os.devnull, os.O_RDWR), os.open(told, os.O_WRONLY | os.O_CREAT)
-        for stream, descriptor in enumerate((null, null, said)):
-            os.dup2(descriptor, stream)
-        sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w"), open(2, "w", 1)  # noqa: SIM115
-        os.chdir(command.folder)
-        main_of_program(command.words)
-    except SystemExit as ended:
-        code = int(ended.code or 0)
-    except BaseException:
-        traceback.print_exc()
-    finally:
-        sys.stderr.flush()
-        os._exit(code)
+def _bound_time() -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (_ENOUGH_s, _ENOUGH_s))
 
 
-def cells(command: Command, outcome: Outcome) -> tuple[str, ...]:
-    """One line of the table, behind its keys."""
+def row(command: Command, loaded_s: float) -> tuple[str, ...]:
+    """What is outside of the bounds, then one line of the table behind its keys."""
+    outcome = read(command, loaded_s)
     said = outcome.said if len(outcome.said) <= _SHOWN else outcome.said[:_SHOWN] + " ..."
     said = said.replace("|", "/").encode("ascii", "backslashreplace").decode()
-    return command.shown, str(outcome.code), f"{outcome.processor_s:.1f}", f"{outcome.memory_MB:.0f}", said
+    return (
+        outcome.wrong,
+        command.shown,
+        str(outcome.code),
+        f"{outcome.processor_s:.1f}",
+        f"{outcome.memory_MB:.0f}",
+        said,
+    )
 
 
 # --- the files: made by another process, whose memory does not count ----------------------------------------------
@@ -190,6 +182,7 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("--only", default="", help="Part of the kind's and the case's name.")
     options.add_argument("--session", type=Path, help="A sound session to spoil copies of; else one is recorded.")
+    options.add_argument("--jobs", type=int, default=1, help="Files side by side.")
     chosen = options.parse_args()
     wrong: list[str] = []
     load()
@@ -198,11 +191,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as root:
         commands = make_all(Path(root), chosen.only, chosen.session)
         table = GrowingTable(chosen.docs, OUTLINE, [command.key for command in commands])
-        for command in commands:
-            outcome = read(command, loaded_s)
-            table.put(command.key, cells(command, outcome))
-            if outcome.wrong:
-                wrong.append(f"{', '.join(command.key)}: {outcome.wrong}")
+        works = {command.key: partial(row, command, loaded_s) for command in commands}
+        for key, (problem, *cells) in side_by_side(works, chosen.jobs):
+            table.put(key, cells)
+            if problem:
+                wrong.append(f"{', '.join(key)}: {problem}")
     table.publish()
     print("\n".join([f"{len(commands)} files, {len(wrong)} outside of the bounds:", *wrong]))
     raise SystemExit(bool(wrong))

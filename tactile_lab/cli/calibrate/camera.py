@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.options import Json, NoInput
-from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
+from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
     from calibration.camera.intrinsics import LensResult
@@ -46,6 +46,7 @@ def camera(
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
     token: Token = "",
+    certificate: Certificate = None,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -67,7 +68,7 @@ def camera(
     from tactile_lab.workflow.calibrating_camera import LENS_COMMENT, gather_views, lens_record
 
     file = out or Path("calibrations") / measurer / "camera.yaml"
-    page = PageAddress.if_wanted(view, listen, view_port, token)
+    page = PageAddress.if_wanted(view, listen, view_port, token, certificate)
     with wizard("calibrate camera", no_input, page) as asker:
         may_write(file, replace, asker, no_input)
         shown = load_board(board) if board is not None else _usual_board()

@@ -9,7 +9,7 @@ import typer
 
 from tactile_lab.cli.calibrate.biotac import Finger
 from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName
-from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
+from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
     from calibration.fingertip.data import FingertipData
@@ -39,6 +39,7 @@ def fingertip(
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
     token: Token = "",
+    certificate: Certificate = None,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -59,7 +60,7 @@ def fingertip(
     from tactile_lab.workflow.calibrating_fingertip import FingertipRequest, force_fingertips
 
     described, wanted = load_rig(rig), _settings(settings)
-    here, page = described.installation, PageAddress.if_wanted(view, listen, view_port, token)
+    here, page = described.installation, PageAddress.if_wanted(view, listen, view_port, token, certificate)
     file = out or Path("calibrations") / here.rig / "fingertips.yaml"
     with wizard(f"calibrate fingertip, rig {rig}", no_input, page) as asker:
         may_write(file, replace, asker, no_input)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName
-from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
+from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
     from calibration.forearm.recordings import ForearmData
@@ -71,6 +71,7 @@ def forearm(
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
     token: Token = "",
+    certificate: Certificate = None,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -89,7 +90,7 @@ def forearm(
     from tactile_lab.rigs.description import load_rig
     from tactile_lab.rigs.wired import require_right_hand
 
-    here, page = load_rig(rig).installation, PageAddress.if_wanted(view, listen, view_port, token)
+    here, page = load_rig(rig).installation, PageAddress.if_wanted(view, listen, view_port, token, certificate)
     file = out or Path("calibrations") / here.rig / "forearm.yaml"
     with wizard(f"calibrate forearm, rig {rig}", no_input, page) as asker:
         may_write(file, replace, asker, no_input)

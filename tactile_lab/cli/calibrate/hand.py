@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName
-from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
+from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -44,6 +44,7 @@ def joints(
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
     token: Token = "",
+    certificate: Certificate = None,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -72,7 +73,7 @@ def joints(
     )
 
     described, wanted = load_rig(rig), load_settings(settings)
-    here, page = described.installation, PageAddress.if_wanted(view, listen, view_port, token)
+    here, page = described.installation, PageAddress.if_wanted(view, listen, view_port, token, certificate)
     file = out or Path("calibrations") / here.rig / "joints.yaml"
     with wizard(f"calibrate joints, rig {rig}", no_input, page) as asker:
         may_write(file, replace, asker, no_input)

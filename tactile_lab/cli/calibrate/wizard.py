@@ -147,7 +147,8 @@ def wizard(where: str, no_input: bool, page: PageAddress | None) -> Iterator[Ask
     if page is None:
         yield Asker(no_input, where)
         return
-    with WizardFeed(*page.check(), where) as feed:
+    address, port, token, certificate = page.check()
+    with WizardFeed(address, port, token, where, certificate=certificate) as feed:
         say(f"page: {feed.url}")
         asker = Asker(no_input, where, feed)
         with tell_also(feed), _until_read(asker, feed):

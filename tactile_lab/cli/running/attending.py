@@ -69,8 +69,8 @@ def _attendance(way: GuidedWay | None, operator: Operator | None, feed: ViewFeed
 
 @contextmanager
 def _page(page: PageAddress, title: str) -> Iterator[ViewFeed]:
-    address, port, token = page.check()
-    with ViewFeed(address, port, token, title) as feed:
+    address, port, token, certificate = page.check()
+    with ViewFeed(address, port, token, title, certificate=certificate) as feed:
         say(f"page: {feed.url}")
         yield feed
     if feed.dropped:

@@ -21,7 +21,7 @@ from tactile_lab.cli.options import (
     NoInput,
     RigName,
 )
-from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token, View
+from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 _GUIDED, _EXPLORATION = "Guided sessions", "Choice of the grasps"
 
@@ -96,6 +96,7 @@ def run(
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
     token: Token = "",
+    certificate: Certificate = None,
     policy: Annotated[
         str | None,
         typer.Option(
@@ -155,7 +156,7 @@ def run(
                 "--pace": pace is not None,
             }
         )
-    page = PageAddress.if_wanted(view, listen, view_port, token)
+    page = PageAddress.if_wanted(view, listen, view_port, token, certificate)
     way = GuidedWay(_leader(led_by), automatic_capture or None, pedal, 1.0 if pace is None else pace, no_input)
     request = SessionRequest(
         rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy, bounding_box

@@ -55,7 +55,9 @@ def export(
     no_input: NoInput = False,
 ) -> None:
     """Export a session to other formats: its grasps as a contact log, its samples as tables, or the whole session."""
-    from tactile_lab.cli.console import answer, count, emit_json
+    from dataclasses import asdict
+
+    from tactile_lab.cli.console import answer, count, emit_json, say
     from tactile_lab.workflow import exporting
 
     del no_input
@@ -65,9 +67,10 @@ def export(
     found, told = choose_session(root, session), dict[str, object]()
     if contacts is not None:
         log = exporting.export_contacts(found, contacts, dimension)
-        touched = sum(len(grasp.contacts) for grasp in log.grasps)
-        told |= {"log": str(contacts), "dimension": log.dimension, "grasps": len(log.grasps), "contacts": touched}
-        answer(f"{count(len(log.grasps), 'grasp')} with {count(touched, 'contact')}: {contacts}")
+        told |= {"log": str(contacts), **asdict(log)}
+        answer(f"{count(log.grasps, 'grasp')} with {count(log.contacts, 'contact')}: {contacts}")
+        if log.vertical:
+            say(f"left out: {count(log.vertical, 'contact')} from above, which the plane does not have (--dimension 3)")
     for kind, place in (("csv", csv), ("hdf5", hdf5), ("rosbag", rosbag), ("archive", archive)):
         if place is not None:
             written = exporting.EXPORTS[kind](found, place)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tactile_lab.cli.options import Root, SessionName
-from tactile_lab.cli.running.page_address import PORT, Listen, PageAddress, Port, Token
+from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token
 from tactile_lab.cli.sessions.choosing import choose_session
 
 
@@ -21,6 +21,7 @@ def view(
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
     token: Token = "",
+    certificate: Certificate = None,
 ) -> None:
     """Show a recorded session in the browser, or follow a running one, until Ctrl+C.
 
@@ -31,9 +32,9 @@ def view(
     from tactile_lab.view.page import Page
     from tactile_lab.view.recorded import follow, play
 
-    address, port, token = PageAddress(listen, view_port, token).check()
+    address, port, token, file = PageAddress(listen, view_port, token, certificate).check()
     found, clock = choose_session(root, session), MonotonicClock()
-    with Page(address, port, token, found.folder.name) as page:
+    with Page(address, port, token, found.folder.name, certificate=file) as page:
         say(f"page: {page.url}   Ctrl+C ends")
         seen = play(found, page.scene, page.draw, clock, speed)
         follow(found, page.scene, page.draw, clock, seen)

@@ -16,6 +16,7 @@ from pydantic import BaseModel
 
 from drivers.core.errors import ConfigurationError, SessionError
 from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
+from drivers.core.reading.json_text import parse_json
 
 
 def plain(value: Any) -> Any:
@@ -66,7 +67,7 @@ def read_json_object(path: Path, *, hint: str) -> dict[str, Any]:
         SessionError: the file is missing, unreadable or not a JSON object; ``hint`` tells the user what to do.
     """
     try:
-        content = json.loads(read_bounded(path, LARGEST_JSON_bytes))
+        content = parse_json(read_bounded(path, LARGEST_JSON_bytes))
     except FileNotFoundError as error:
         raise SessionError("file not found", where=str(path), hint=hint) from error
     except (OSError, ConfigurationError, ValueError, RecursionError) as error:

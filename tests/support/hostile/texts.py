@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 import random
+import shutil
 from collections.abc import Callable, Iterator
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +21,12 @@ _LOG = Kind("contact log", ("reconstruct", FILE, "--method", "odometry"), ".json
 _TIMED_TABLE = Kind("timed contacts", ("session", "import", FILE, "--out", "log.json"), ".csv")
 _TIMED_JSON = Kind("timed contacts", ("session", "import", FILE, "--out", "log.json"), ".json")
 _PRESSES = Kind("presses", ("calibrate", "biotac", FILE), ".csv")
-_ELECTRODES = Kind("electrodes", ("calibrate", "electrodes", "--finger", "FF", "--from", FILE, "--no-input"), ".txt")
+_ELECTRODES = Kind("electrodes", ("calibrate", "electrodes", "--from", FILE, "--no-input"), ".txt")
 _FOREARM = Kind("poses", ("calibrate", "forearm", "--from", FILE, "--no-input", "--out", "f.yaml"), ".json")
 _SENSOR = Kind("sensor calibration", ("rig", "check", FILE), ".yaml")
 
 MB = 1_000_000
+_TIPS = Path(str(resources.files("tactile_lab.rigs"))) / "calibrations" / "simulated-hand" / "fingertips.yaml"
 _NOISE = random.Random(1).randbytes(200_000)
 
 
@@ -67,6 +70,7 @@ def _yaml() -> dict[str, bytes | str | Callable[[Path], None]]:
         "a Python object": "a: !!python/object/apply:os.system ['touch executed']\n",
         "a number of 900 kB": f"cycle_s: {'9' * 900_000}\n",
         "a number to the base of 60": f"cycle_s: 1{':10' * 300_000}\n",
+        "a hexadecimal number of 900 kB": f"cycle_s: 0x{'f' * 900_000}\n",
         "an escape of every character": 'name: "' + "\\x41" * 240_000 + '"\n',
         "a date that there is not": "name: 9999-99-99\n",
         "two documents": "a: 1\n---\nb: 2\n",
@@ -111,15 +115,12 @@ def _json() -> dict[str, bytes | str | Callable[[Path], None]]:
 
 
 def _log(**changes: Any) -> str:
-    pose = [[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
-    contact = {"finger": "FF", "point_world_m": [0.03, 0, 0.02], "normal_world": [1, 0, 0]}
-    other = {"finger": "TH", "point_world_m": [-0.03, 0, 0.02], "normal_world": [-1, 0, 0]}
-    grasp = {"contacts": [contact, other], "odometry": pose}
-    content: dict[str, Any] = {
+    content = {
         "format": "tactile-contacts/1",
         "dimension": 2,
-        "odometry_sigma": {"translation_m": 0.002, "rotation_rad": 0.03},
-        "grasps": [grasp, grasp, grasp],
+        "point_sigma_m": 0.001,
+        "normal_sigma_rad": 0.1,
+        "grasps": _grasps(3, 2),
     }
     return json.dumps({**content, **changes})
 
@@ -127,7 +128,7 @@ def _log(**changes: Any) -> str:
 def _grasps(count: int, contacts: int, point_m: float = 0.03) -> list[dict[str, Any]]:
     contact = {"finger": "FF", "point_world_m": [point_m, 0, 0.02], "normal_world": [1, 0, 0]}
     pose = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
-    return [{"contacts": [contact] * contacts, "odometry": pose}] * count
+    return [{"contacts": [contact] * contacts, "hand_motion_world": pose}] * count
 
 
 def _logs() -> dict[str, bytes | str | Callable[[Path], None]]:
@@ -192,8 +193,8 @@ def _with_sensor(xml: str) -> Callable[[Path], None]:
 
     def make(path: Path) -> None:
         (path.parent / "sensor.cal").write_text(xml)
-        wire = "{wire: gauge-volts, calibration: sensor.cal, local_port: 0}"
+        wire = "{wire: gauge-volts, calibration: sensor.cal, local_port: 45000}"
         path.write_text(f"name: x\nsummary: x\nkind: fingertips\ncalibration: fingertips.yaml\nwires:\n  TH: {wire}\n")
-        (path.parent / "fingertips.yaml").write_text("fingertips: {}\n")
+        shutil.copy(_TIPS, path.parent / "fingertips.yaml")
 
     return make

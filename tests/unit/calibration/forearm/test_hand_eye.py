@@ -108,6 +108,14 @@ def test_a_print_of_another_size_leaves_the_region_honest(larger):
     assert max(solution.numbers["print_larger_sigma"] for solution in solutions) < 2e-3
 
 
+def test_the_closed_forms_stand_beside_the_refined_answer():
+    told = {larger: PairProblem(with_print(larger, 2)).solve().numbers for larger in (0.0, 0.02)}
+    for form in ("shah", "park_martin"):
+        assert told[0.0][f"{form}_mm_away"] < 5.0
+        assert told[0.02][f"{form}_mm_away"] > 10.0  # they take the print at its word
+        assert told[0.02][f"{form}_deg_away"] < 1.0
+
+
 def test_pairs_that_contradict_a_stated_print_are_refused():
     known = PairNoise(print_scale_sigma=0.001)
     assert PairProblem(with_print(0.001, 1), known).solve().numbers["print_larger_share"] == pytest.approx(

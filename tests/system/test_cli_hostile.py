@@ -1,0 +1,33 @@
+"""Hostile files through the command line: a few; all of them by ``python -m tests.support.hostile_table``."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.support.hostile.shapes import shape_cases
+from tests.support.hostile.texts import text_cases
+
+CHOSEN = {
+    ("rig file", "a number to the base of 60"),
+    ("rig file", "a hexadecimal number of 900 kB"),
+    ("rig file", "aliases of aliases"),
+    ("contact log", "16 MB of closed brackets"),
+    ("contact log", "places of 1e308 m"),
+    ("presses", "15 MB of equal samples"),
+    ("sensor calibration", "entities of entities"),
+    ("mesh", "330 000 triangles"),
+    ("mesh", "an accessor of a billion zeros"),
+}
+CASES = [case for case in [*text_cases(), *shape_cases()] if (case.kind, case.name) in CHOSEN]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.kind}: {case.name}")
+def test_a_hostile_file_is_refused_in_words(inside, case, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answer = inside(*case.command(case.write(tmp_path)))
+    assert answer.code in (1, 2, 4)
+    assert "error: " in answer.err
+
+
+def test_every_chosen_case_is_one():
+    assert {(case.kind, case.name) for case in CASES} == CHOSEN

@@ -1,0 +1,40 @@
+"""YAML and JSON that are small to look at and large to read."""
+
+from __future__ import annotations
+
+import pytest
+import yaml
+
+from drivers.core.reading import json_text, yaml_text
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("12", 12),
+        ("-1_000", -1000),
+        ("0x1F", 31),
+        ("0b11", 3),
+        ("0", 0),
+        ("017", 15),
+        ("1:30", "1:30"),
+        ("9" * 41, "9" * 41),
+        ("0x" + "f" * 33, "0x" + "f" * 33),
+        ("1e-3", 0.001),
+    ],
+)
+def test_whole_numbers_are_short_and_have_no_base_of_60(text, value):
+    assert yaml_text.parse(f"a: {text}") == {"a": value}
+
+
+def test_entries_are_bounded(monkeypatch):
+    monkeypatch.setattr(yaml_text, "MOST_ENTRIES", 10)
+    with pytest.raises(yaml.MarkedYAMLError, match="more than 10 entries"):
+        yaml_text.parse("a: [1, 2, 3, 4, 5, 6, 7, 8, 9]")
+
+
+def test_json_of_very_many_lists_is_refused_before_it_is_read(monkeypatch):
+    monkeypatch.setattr(json_text, "MOST_CONTAINERS", 3)
+    assert json_text.parse_json(b'{"a": [[]]}') == {"a": [[]]}
+    with pytest.raises(ValueError, match="more than 3 lists and objects"):
+        json_text.parse_json(b'{"a": [[], []')
