@@ -107,6 +107,8 @@ class Conductor:
             case UndoGrasp(reason):
                 self._undo(reason)
             case End(reason, partial):
+                if partial and not self._grasps:
+                    return Ending.OBJECT_LOST, reason
                 return Ending.PARTIAL if partial else Ending.COMPLETE, reason
             case Wait() | Pause():
                 self._cycle.idle()
@@ -204,9 +206,10 @@ class Conductor:
         self._phase("descend")
         if not self._arrive(plan):
             return None
-        self._phase("close")
-        cycle.close()
-        cycle.settle()
+        if not plan.only_touch:
+            self._phase("close")
+            cycle.close()
+            cycle.settle()
         if self._guard.requested:
             self._let_go()
             return None
@@ -237,7 +240,7 @@ class Conductor:
     def _carry(self, grasp: Grasp, wanted: Reorientation) -> None:
         """Squeeze, and re-orient the object, unless it stays in place, too few fingers hold it or no grasp follows."""
         cycle, touching = self._cycle, grasp.touching
-        self._supervisor.count_contacts(len(touching))
+        self._supervisor.count_contacts(len(grasp.contacts))
         hand_motion = Pose3()
         last = len(self._grasps) >= self._settings.grasps or self._guard.requested
         if wanted.moves and holds(touching) and not last:
@@ -250,6 +253,8 @@ class Conductor:
         self._decisions.on_carry(hand_motion)
 
     def _let_go(self) -> None:
+        if self._cycle.plan.only_touch:
+            return
         self._phase("release")
         self._cycle.release()
         self._phase("lift")

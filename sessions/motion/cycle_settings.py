@@ -11,8 +11,8 @@ class TouchSettings(StrictModel):
     """How the hand touches without grasping.
 
     Attributes:
-        tap_m_s: speed of the hand coming down on the top.
-        near_m: from so far above a top that is known on it comes down at that speed.
+        tap_m_s: speed of the hand coming down on the top; a thumb, stiff in that direction, reaches 1.5 N at 35 mm/s.
+        near_m: from so far above a top that is known on the hand comes down slowly.
         met_N: force on a fingertip that ends the approach.
         force_N: force that every fingertip is then brought to.
         most_N: force on any fingertip at which the hand stops moving.
@@ -27,16 +27,18 @@ class TouchSettings(StrictModel):
         row_m: x of the fingertips in the row's own grasp frame.
         beyond_m: how far beyond the middle a rake goes.
         lowest_m: height of the fingertips over the table where a tap has missed the object.
+        below_top_m: a tap without a grasp goes no farther below the top: what stands between the fingers, a neck or a
+            rim, must not reach the knuckles.
         side_m_s: speed toward an object's side, palm upright; a stiff fingertip reaches 0.45 N at 20 mm/s.
         side_heights_m: height of the lowest fingertip in such a touch, the first finger down and up. The
             forearm lets it come no lower; from higher up it would tip objects over.
     """
 
-    tap_m_s: float = Field(default=0.04, gt=0.0)
+    tap_m_s: float = Field(default=0.025, gt=0.0)
     near_m: float = Field(default=0.02, ge=0.0)
     met_N: float = Field(default=0.20, gt=0.0)
     force_N: float = Field(default=0.35, gt=0.0)
-    most_N: float = Field(default=0.8, gt=0.0)
+    most_N: float = Field(default=0.6, gt=0.0)
     reach_m: float = Field(default=0.008, ge=0.0)
     gain: float = Field(default=0.04, gt=0.0)
     sink_m: float = Field(default=0.004, ge=0.0)
@@ -48,6 +50,7 @@ class TouchSettings(StrictModel):
     row_m: float = Field(default=0.012, ge=0.0)
     beyond_m: float = Field(default=0.030, ge=0.0)
     lowest_m: float = Field(default=0.012, ge=0.0)
+    below_top_m: float = Field(default=0.03, gt=0.0)
     side_m_s: float = Field(default=0.015, gt=0.0)
     side_heights_m: tuple[float, float] = (0.020, 0.032)
 
@@ -60,7 +63,8 @@ class CycleSettings(StrictModel):
         travel_m_s, turn_rad_s: speeds above the object.
         clearance_m: how far the hand stays above the tallest thing on the table while it travels.
         standoff_m: how far before a grasp from the side the hand comes down.
-        descent_m_s: speed of the guarded descent.
+        descent_m_s: speed of the guarded descent, as far as the object's top.
+        landing_m_s: and beside it.
         beside_m_s: the same where nothing is expected below.
         approach_m_s: speed of the guarded approach from the side.
         landing_force_N: a fingertip force during the descent that means the object is under it.
@@ -92,6 +96,7 @@ class CycleSettings(StrictModel):
     clearance_m: float = Field(default=0.03, ge=0.0)
     standoff_m: float = Field(default=0.13, gt=0.0)
     descent_m_s: float = Field(default=0.05, gt=0.0)
+    landing_m_s: float = Field(default=0.035, gt=0.0)
     beside_m_s: float = Field(default=0.08, gt=0.0)
     approach_m_s: float = Field(default=0.05, gt=0.0)
     landing_force_N: float = Field(default=0.25, gt=0.0)

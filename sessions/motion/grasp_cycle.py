@@ -9,12 +9,14 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.closing import SIDES, Closing, closing
+from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_plan import GraspPlan, evade
 from sessions.motion.guard import Guard
 from sessions.motion.motion import GraspFrame, Motion
-from sessions.motion.touching import Toucher, travel_height_m
+from sessions.motion.side_survey import LOW_m
+from sessions.motion.touching import SideTouch, Toucher, travel_height_m
 
 _HASTE_N, _FLIGHT_N = 1.0, 3.0
 """Limits of the force error in force control: toward the object, and away from it."""
@@ -40,6 +42,7 @@ class GraspCycle:
         self._motion, self.settings = motion, settings
         self._toucher = Toucher(motion, settings, hand or HandShape())
         self._guard = Guard(motion, settings.touch.met_N, settings.held_up_rad)
+        self._landing = Guard(motion, settings.landing_force_N, settings.held_up_rad)
         self._hand, self._yaw_window_rad = hand or HandShape(), yaw_window_rad
         self._plan: GraspPlan | None = None
         self._progress = dict.fromkeys(self._fingers, 0.0)
@@ -69,9 +72,12 @@ class GraspCycle:
         finger and try again. If thumb and fingers have both landed, the object is too long in that direction: turn.
 
         Returns:
-            Whether the hand has descended around the object, fingers open.
+            Whether the hand has descended around the object, fingers open; after a touch alone, whether there was room
+            for it: the hand has risen again, and only :meth:`capture` may follow.
         """
         self._plan, self.landings_world_m = plan, []
+        if plan.only_touch:
+            return self._touch(plan)
         if self._table().is_sideways:
             return self._come_from_the_side()
         landed: set[str] = set()
@@ -83,11 +89,30 @@ class GraspCycle:
             if not hit:
                 self._motion.supervisor.on_approach()
                 return True
-            landed.update(hit)
             self.lift()
+            if not (fingers := [finger for finger in hit if finger in self._fingers]):
+                return False  # a link above the fingertips: a little aside it would land again
+            landed.update(fingers)
             shift_m, window = self.settings.landing_shift_m, self._yaw_window_rad
-            self._plan = evade(plan, self.plan, hit, landed, self._table(), shift_m, window)
+            self._plan = evade(plan, self.plan, fingers, landed, self._table(), shift_m, window)
         return False
+
+    def _touch(self, plan: GraspPlan) -> bool:
+        """Only touch, and rise again."""
+        self._touching = frozenset()
+        if not self._table().is_sideways:
+            self._toucher.tap(plan.frame, self.settings.touch.below_top_m)
+            return True
+        felt = self._touch_side(plan)
+        if felt is None:
+            self._note_landing(self._toucher.guard)
+        return felt is not None
+
+    def _touch_side(self, plan: GraspPlan) -> SideTouch | None:
+        """Touch the side that a grasp from the side comes from."""
+        side = next(side for side in SIDES if plan.closing.endswith(side))
+        low_m = LOW_m if plan.only_touch else 0.0
+        return self._toucher.touch_side(plan.frame, side, self.settings.standoff_m, plan.height_m, low_m)
 
     def _move_above(self) -> None:
         table, s = self._table(), self.settings
@@ -115,13 +140,12 @@ class GraspCycle:
         """
         s, motion, table = self.settings, self._motion, self._table()
         if self.plan.tap:
-            side = next(side for side in SIDES if table.name.endswith(side))
-            self._toucher.touch_side(self.plan.frame, side, s.standoff_m, table.height_m)
+            self._touch_side(self.plan)
         self._move_above()
         self._guard.restart()
         beside = motion.base_joints(self.plan.frame, table, 0.0, self._away_m)
         if not motion.probe_base(beside, s.beside_m_s, self._guard.is_met):
-            self._note_landing()
+            self._note_landing(self._guard)
             motion.climb(self._above(), s.travel_m_s)
             return False
         motion.tare(s.rest_s)
@@ -132,39 +156,38 @@ class GraspCycle:
             motion.tick()
             if self._guard.is_met():
                 motion.set_base(motion.runtime.perception.base_q)
-                self._note_landing()
+                self._note_landing(self._guard)
                 self._toucher.capture()
                 self.lift()
                 return False
         motion.supervisor.on_approach()
         return True
 
-    def _note_landing(self) -> None:
+    def _note_landing(self, guard: Guard) -> None:
         """Remember where the hand met something: at the fingertip that did, or, not knowing better, at the foremost."""
-        fingers = [finger for finger in self._guard.met if finger in self._fingers] or list(self._fingers)
+        fingers = [finger for finger in guard.met if finger in self._fingers] or list(self._fingers)
         ahead = np.asarray(self.plan.frame.pose.rotation().rotate(np.array(self._table().approach)))
         places = [self._motion.tip_centre_world_m(finger, self._hand) for finger in fingers]
         self.landings_world_m.append(max(places, key=lambda place: float(place @ ahead)))
 
-    def _come_down(self) -> list[str]:
-        """Guarded descent. Returns the fingers that landed on something, with their tips or with other links, which
-        bends them.
+    def _come_down(self) -> tuple[str, ...]:
+        """Guarded descent, slower from the object's top on.
+
+        Returns:
+            What landed on something: fingers, or links that cannot tell which they are.
         """
-        s = self.settings
-        down = self._motion.base_joints(self.plan.frame, self._table())
-        hit: list[str] = []
-
-        def met() -> bool:
-            felt = {*self._pressed_fingers(s.landing_force_N), *self._motion.bent(s.held_up_rad)}
-            hit.extend(finger for finger in self._fingers if finger in felt - set(hit))
-            if hit:
-                self.landings_world_m.append(self._motion.tip_centre_world_m(hit[0], self._hand))
-            return bool(hit)
-
-        if self._motion.probe_base(down, s.descent_m_s, met):
-            self._motion.wait(s.rest_s)
-            met()
-        return hit
+        s, guard, motion, table = self.settings, self._landing, self._motion, self._table()
+        to_top_m = motion.tallest_m + s.touch.near_m - open_hand(table.name, table.height_m, self._hand).lowest_m
+        top, down = (motion.base_joints(self.plan.frame, table, above_m) for above_m in (max(0.0, to_top_m), 0.0))
+        guard.restart()
+        if motion.probe_base(top, s.descent_m_s, guard.is_met):
+            guard.restart()
+            if motion.probe_base(down, s.landing_m_s, guard.is_met):
+                motion.wait(s.rest_s)
+                guard.is_met()
+        if guard.met:
+            self._note_landing(guard)
+        return guard.met
 
     # --- close and measure -------------------------------------------------------------------------------------
 

@@ -24,8 +24,9 @@ class GraspPlan:
         frame: the grasp frame in the world.
         closing: one of :data:`drivers.shadow.closing.closing.CLOSINGS`.
         height_m: height of the fingertip centres above the table.
-        tap: tap on the top first.
         reason: why this grasp was chosen, for people.
+        tap: touch first: tap on the top, or from the side touch the side that the hand comes from.
+        only_touch: only touch, and do not close: tap on the top, or touch the side that a closing from there comes to.
     """
 
     frame: GraspFrame
@@ -33,6 +34,7 @@ class GraspPlan:
     height_m: float
     reason: str = ""
     tap: bool = False
+    only_touch: bool = False
 
     def as_plain(self, index: int) -> dict[str, Any]:
         """The plan of grasp number ``index``, from 0, as plain data for viewers; metres and radians on the table."""

@@ -158,9 +158,15 @@ class Motion:
         """Whole cycles in a duration, at least one."""
         return max(1, round(duration_s / self.cycle_s))
 
-    def shares(self, duration_s: float) -> Iterator[float]:
-        """The progress of a motion in each of its cycles, up to 1; slower while motions must be slow."""
-        count = self.cycles(duration_s / self.supervisor.speed_scale)
+    def shares(self, duration_s: float, *, is_careful: bool = False) -> Iterator[float]:
+        """The progress of a motion in each of its cycles, up to 1; slower while motions must be slow.
+
+        Args:
+            duration_s: at full speed.
+            is_careful: its speed was chosen for a first touch: the first approach makes it no slower.
+        """
+        supervisor = self.supervisor
+        count = self.cycles(duration_s / (supervisor.careful_scale if is_careful else supervisor.speed_scale))
         for step in range(1, count + 1):
             yield step / count
 
@@ -231,10 +237,10 @@ class Motion:
                 return False
         return True
 
-    def line(self, q: Array, speed_m_s: float) -> Iterator[Array]:
-        """Targets at constant speed from the positioner's last target to ``q``, one per cycle."""
+    def line(self, q: Array, speed_m_s: float, *, is_careful: bool = False) -> Iterator[Array]:
+        """Targets at constant speed from the positioner's last target to ``q``, one per cycle; see :meth:`shares`."""
         start = self._base_q
-        for share in self.shares(self._base_time_s(q, speed_m_s, np.inf)):
+        for share in self.shares(self._base_time_s(q, speed_m_s, np.inf), is_careful=is_careful):
             yield start + share * (q - start)
 
     def _base_time_s(self, q: Array, speed_m_s: float, turn_rad_s: float) -> float:

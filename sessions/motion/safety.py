@@ -47,7 +47,7 @@ class SafetySettings(StrictModel):
         object_radius_m: an object estimated farther than this from the workspace centre is lost.
         empty_grasps: this many grasps in a row without any contact mean that the object is gone.
         session_limit_s: longest session, by the session's clock.
-        first_moves_scale: speed of the first approach as a share of the normal speed.
+        first_moves_scale: speed of the first approach as a share of the normal speed, but for taps, slow by themselves.
     """
 
     force_limit_N: float = Field(default=6.0, gt=0.0)
@@ -193,8 +193,12 @@ class SafetySupervisor:
     @property
     def speed_scale(self) -> float:
         """Factor on all speeds: slow until the first approach has succeeded, and while a motor is warm."""
-        usual = 1.0 if self._approached else self.settings.first_moves_scale
-        return usual * self.settings.warm_scale if self._warm else usual
+        return self.careful_scale * (1.0 if self._approached else self.settings.first_moves_scale)
+
+    @property
+    def careful_scale(self) -> float:
+        """Factor on speeds that were chosen for a first touch: slow only while a motor is warm."""
+        return self.settings.warm_scale if self._warm else 1.0
 
     def on_approach(self) -> None:
         """The first approach has succeeded: normal speed from now on."""

@@ -23,7 +23,7 @@ _ASSUMED_m = 0.030
 _ASKEW_m = 0.008
 """Left and right are felt again where the middle turns out to be farther from where they were felt."""
 
-_LOW_m = 0.045
+LOW_m = 0.045
 """Fingertips up to this height are laid on together."""
 
 _AGAIN_m = 0.05
@@ -102,9 +102,9 @@ class SideSurvey:
         blocked = 0
         for lane_m in self._lanes_m:
             frame = GraspFrame(float(centre_m[0]), float(centre_m[1]), yaw_rad).shifted_inside(np.array([lane_m, 0.0]))
-            felt = self._toucher.touch_side(frame, side, self._search_m, all_up_to_m=_LOW_m)
+            felt = self._toucher.touch_side(frame, side, self._search_m, all_up_to_m=LOW_m)
             if felt is None:
-                felt = self._toucher.touch_side(frame, side, self._search_m + _AGAIN_m, all_up_to_m=_LOW_m)
+                felt = self._toucher.touch_side(frame, side, self._search_m + _AGAIN_m, all_up_to_m=LOW_m)
             if felt is not None and len(felt):
                 return felt
             blocked += felt is None

@@ -8,7 +8,7 @@ touch.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -103,7 +103,8 @@ class Toucher:
 
     def __init__(self, motion: Motion, cycle: CycleSettings, hand: HandShape) -> None:
         self._motion, self._cycle, self._hand = motion, cycle, hand
-        self._guard = Guard(motion, cycle.touch.met_N, cycle.held_up_rad)
+        self.guard = Guard(motion, cycle.touch.met_N, cycle.held_up_rad)
+        """Ends approaches, and tells what met something in the last."""
 
     @property
     def settings(self) -> TouchSettings:
@@ -124,10 +125,14 @@ class Toucher:
         self.expect_tallest(height_m)
         self._motion.supervisor.on_approach()
 
-    def tap(self, frame: GraspFrame) -> Array:
+    def tap(self, frame: GraspFrame, below_top_m: float = np.inf) -> Array:
         """Come down on the object under a grasp frame, lay the fingertips on it, and rise again.
 
         Slowly from a little above the tallest thing that is known.
+
+        Args:
+            frame: the fingertips are around its origin.
+            below_top_m: no farther down than this below the tallest thing that is known, and never onto the table.
 
         Returns:
             Where fingertips touched something, shape (n, 3), world frame.
@@ -135,15 +140,17 @@ class Toucher:
         s, table, motion = self.settings, closing(TAP.closing, TAP_HEIGHT_m, self._hand), self._motion
         self._poise(table, TAP, frame)
         touching_m = self._hand.semi_axes_m[2] - TAP_HEIGHT_m
-        near_m = max(s.lowest_m, motion.tallest_m + s.near_m)
+        lowest_m = max(s.lowest_m, motion.tallest_m - below_top_m)
+        near_m = max(lowest_m, motion.tallest_m + s.near_m)
         motion.runtime.begin_closing()
         found = np.empty((0, 3))
-        near, lowest = (motion.base_joints(frame, table, m + touching_m) for m in (near_m, s.lowest_m))
-        if self._approach(near, self._cycle.descent_m_s) or self._approach(lowest, s.tap_m_s):
+        near, lowest = (motion.base_joints(frame, table, m + touching_m) for m in (near_m, lowest_m))
+        if self._approach(near, self._cycle.descent_m_s) or self._approach(lowest, s.tap_m_s, is_careful=True):
+            motion.supervisor.on_approach()
             self._lay_on(table, TAP, _DOWN, frame, s.force_N, s.sink_m)
             found = self._landing_points(_DOWN, frame)
         self.capture()
-        motion.move_base(motion.base_joints(frame, table, self._above_m(table)), *self._travel)
+        motion.rise(self._cycle.lift_m, self._cycle.travel_m_s)
         return found
 
     def touch_side(
@@ -169,8 +176,8 @@ class Toucher:
         known = len(motion.runtime.perception.probed)
         self._poise(table, COLUMN, lane, from_m)
         begin, end = (motion.base_joints(lane, table, 0.0, away_m) for away_m in (from_m, -s.beyond_m))
-        self._guard.restart()
-        if not motion.probe_base(begin, self._cycle.beside_m_s, self._guard.is_met):
+        self.guard.restart()
+        if not motion.probe_base(begin, self._cycle.beside_m_s, self.guard.is_met):
             self._rise_over(lane, table, from_m)
             return None
         motion.tare(self._cycle.rest_s)
@@ -211,7 +218,8 @@ class Toucher:
         table = closing(ROW.closing, s.rake_height_m, self._hand)
         begin, end = (frame.shifted_inside(np.array([x - s.row_m, 0.0])) for x in (from_m, -s.beyond_m))
         self._poise(table, ROW, begin)
-        if not motion.probe_base(motion.base_joints(begin, table), self._cycle.descent_m_s, self._is_met):
+        self.guard.restart()
+        if not motion.probe_base(motion.base_joints(begin, table), self._cycle.descent_m_s, self.guard.is_met):
             self._rise()
             return None
         motion.wait(self._cycle.rest_s)
@@ -236,16 +244,12 @@ class Toucher:
         table = closing(ROW.closing, s.rake_height_m, self._hand)
         progress = {finger: table.path(finger).valid[0] for finger in table.fingers}
         self._poise(table, Pattern(ROW.closing, progress), frame)
-        stood: list[Array] = []
-
-        def met() -> bool:
-            if self._motion.loads_N().get("TH", 0.0) > s.met_N:
-                stood.append(motion.tip_centre_world_m("TH", self._hand))
-            return self._is_met()
-
-        if not motion.probe_base(motion.base_joints(frame, table), self._cycle.descent_m_s, met):
+        self.guard.restart()
+        if not motion.probe_base(motion.base_joints(frame, table), self._cycle.descent_m_s, self.guard.is_met):
+            stands = "TH" in self.guard.met
+            met_m = motion.tip_centre_world_m("TH", self._hand)
             self._rise()
-            return np.array(stood) if stood else None
+            return met_m[None] if stands else None
         motion.wait(self._cycle.rest_s)
         motion.runtime.begin_closing()
         path, found = table.path("TH"), np.empty((0, 3))
@@ -265,9 +269,6 @@ class Toucher:
     def _rise(self) -> None:
         """Move straight up from the positioner's last target."""
         self._motion.rise(self._cycle.lift_m, self._cycle.travel_m_s)
-
-    def _is_met(self) -> bool:
-        return max(self._motion.loads_N().values(), default=0.0) > self.settings.met_N
 
     def _landing_points(self, direction_grasp: Array, frame: GraspFrame) -> Array:
         """The foremost points of the fingertips that touch something, shape (n, 3), world frame."""
@@ -290,14 +291,14 @@ class Toucher:
         motion.move_base(above, *self._travel)
         motion.tare(cycle.rest_s)
 
-    def _approach(self, goal: Array, speed_m_s: float) -> bool:
+    def _approach(self, goal: Array, speed_m_s: float, *, is_careful: bool = False) -> bool:
         """Move toward ``goal`` until the hand touches something; then the positioner stops."""
         motion = self._motion
-        self._guard.restart()
-        for q in motion.line(goal, speed_m_s):
+        self.guard.restart()
+        for q in motion.line(goal, speed_m_s, is_careful=is_careful):
             motion.set_base(q)
             motion.tick()
-            if self._guard.is_met():
+            if self.guard.is_met():
                 motion.set_base(motion.runtime.perception.base_q)
                 return True
         return False
@@ -315,19 +316,22 @@ class Toucher:
         """Every fingertip moves along a direction until it has the contact force, or has reached its limit.
 
         The hand sinks a little meanwhile, and fingers that touch yield: the thumb can hardly move in that direction
-        itself. While a fingertip is pressed hard the hand waits, and continues when the finger has yielded.
+        itself. While a fingertip is pressed hard the hand draws back.
         """
         s, motion = self.settings, self._motion
         rates = motor_rates(table, pattern.progress, direction_grasp, self._hand)
-        rates = {f: motors for f, motors in rates.items() if f in self._guard.met or self._height_m(f) <= up_to_m}
+        rates = {f: motors for f, motors in rates.items() if f in self.guard.met or self._height_m(f) <= up_to_m}
         gone_m = dict.fromkeys(rates, 0.0)
-        sinking = self._sinking(direction_grasp, frame, sink_m)
+        start, sunk_m, step_m = motion.runtime.perception.base_q.copy(), 0.0, 2.0 * sink_m / motion.cycles(s.press_s)
+        way = np.zeros(6)
+        way[:3] = motion.runtime.world_T_mount.rotation().unrotate(frame.pose.rotation().rotate(direction_grasp))
         for _ in motion.shares(s.press_s):
-            if max(self._motion.loads_N().values(), default=0.0) < s.most_N:
-                motion.set_base(next(sinking))
+            is_pressed = max(motion.loads_N().values(), default=0.0) >= s.most_N
+            sunk_m = float(np.clip(sunk_m + (-step_m if is_pressed else step_m), -sink_m, sink_m))
+            motion.set_base(start + sunk_m * way)
             for finger, load_N in ((f, load_N) for f, load_N in self._motion.loads_N().items() if f in rates):
-                step_m = s.gain * float(np.clip(force_N - load_N, -1.0, 1.0)) * motion.cycle_s
-                gone_m[finger] = float(np.clip(gone_m[finger] + step_m, -s.reach_m, s.reach_m))
+                moved_m = s.gain * float(np.clip(force_N - load_N, -1.0, 1.0)) * motion.cycle_s
+                gone_m[finger] = float(np.clip(gone_m[finger] + moved_m, -s.reach_m, s.reach_m))
             aside = pattern.aside(table)
             for finger in rates.keys() - pattern.held_rad.keys():
                 aside |= {motor: rate * gone_m[finger] for motor, rate in rates[finger].items()}
@@ -336,14 +340,6 @@ class Toucher:
 
     def _height_m(self, finger: str) -> float:
         return float(self._motion.tip_centre_world_m(finger, self._hand)[2])
-
-    def _sinking(self, direction_grasp: Array, frame: GraspFrame, sink_m: float) -> Iterator[Array]:
-        """Positioner targets while the fingertips are laid on, one for each cycle in which the hand may move."""
-        motion, start = self._motion, self._motion.runtime.perception.base_q.copy()
-        way = np.zeros(6)
-        way[:3] = self._motion.runtime.world_T_mount.rotation().unrotate(frame.pose.rotation().rotate(direction_grasp))
-        for share in motion.shares(self.settings.press_s):
-            yield start + min(1.0, 2.0 * share) * sink_m * way
 
     def capture(self) -> None:
         """Keep what the fingertips feel now for the next grasp."""

@@ -21,8 +21,8 @@ from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSetting
 from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.policy_choice import PolicyChooser
 from tactile_lab.autonomy.settings import SessionSettings
-from tactile_lab.autonomy.side_planner import SideReach
 from tactile_lab.autonomy.slam_service import SlamService
+from tactile_lab.autonomy.standing.candidate import SideReach
 from tactile_lab.autonomy.variance_planner import ExplorationSettings
 from tactile_lab.slam.exploration.policies import make_policy
 from tactile_lab.slam.tactile_slam import TactileSlam
@@ -85,6 +85,7 @@ def planner_for(slam: TactileSlam, settings: SessionSettings, hand: HandShape, s
         chooser,
         settings.grasps,
         SideReach(settings.safety.workspace_radius_m, settings.safety.workspace_centre_m, settings.cycle.standoff_m),
+        settings.cycle.touch,
     )
 
 

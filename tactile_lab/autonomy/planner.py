@@ -8,16 +8,19 @@ import numpy as np
 from gtsam import Pose2, Pose3
 
 from drivers.core.contacts import Array, Grasp
-from drivers.core.poses import planar
+from drivers.core.poses import planar, spatial, transform_points
 from drivers.shadow.closing.closing import Closing, closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.estimator import Reorientation
 from sessions.motion.bounding_box import BoundingBox
+from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import GraspFrame
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.autonomy.policy_choice import Choice, Knowledge, PolicyChooser
-from tactile_lab.autonomy.side_planner import SidePlanner, SideReach
+from tactile_lab.autonomy.standing.candidate import SideReach
+from tactile_lab.autonomy.standing.felt_object import FeltObject
+from tactile_lab.autonomy.standing.planner import StandingPlanner, Standstill
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, choose_grasp, known_shape
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
@@ -32,6 +35,9 @@ _UPWARD = 0.7
 _LEAST_BY_POLICY = 2
 """With fewer contacts than this the object is not where it was expected."""
 
+
+_BLOCKED_FROM_ABOVE = 2
+"""Approaches in a row; then, in space, the hand touches, or comes from the side."""
 
 HIGHEST_FROM_ABOVE_m = 0.08
 """What is taller is grasped from the side: the knuckles would come down on it."""
@@ -50,6 +56,7 @@ class Planner:
         chooser: the policy that chooses if there is an estimate; None for the reward of equation 4.20 alone.
         grasps: number of grasps of the session, for the policy.
         reach: of the palm, for grasps from the side.
+        touches: how the hand touches without grasping; None if it shall not.
     """
 
     def __init__(
@@ -63,6 +70,7 @@ class Planner:
         chooser: PolicyChooser | None = None,
         grasps: int | None = None,
         reach: SideReach | None = None,
+        touches: TouchSettings | None = None,
     ) -> None:
         self._slam, self._rule, self._exploration = slam, rule, exploration
         self._fixed_grasps, self._hand, self._dimension = fixed_grasps, hand, dimension
@@ -75,9 +83,11 @@ class Planner:
         self._here: GraspFrame | None = None
         self._carried = False
         self._box: BoundingBox | None = None
-        self._reach = reach or SideReach()
-        self._beside: SidePlanner | None = None
-        """Plans where the object is too tall for the palm to pass over."""
+        self._reach, self._touches = reach or SideReach(), touches
+        self._standing: StandingPlanner | None = None
+        """Plans where the palm does not pass over the object: from here on that is left where it stands."""
+
+        self._blocked, self._standstill = 0, Standstill()
         self.exhausted = ""
         """Why nothing is left to do, in words; empty while there is something."""
         self.choice: Choice | None = None
@@ -101,25 +111,47 @@ class Planner:
         After a grasp that the estimate had chosen and that missed the object with some fingers, one grasp follows the
         contacts alone.
         """
-        if self._beside is not None:
-            return self._from_the_side(index, self._beside)
+        if self._standing is None and self._dimension == 3 and self._blocked >= _BLOCKED_FROM_ABOVE:
+            self._standing = self._standing_planner()
+        if self._standing is not None:
+            return self._standing_plan(index, self._standing)
         trusted, self.choice = index >= self._fixed_grasps and not self._doubted, None
+        if self._standstill.is_reached and (touch := self._standing_planner().touch()) is not None:
+            self._standstill = Standstill()
+            return touch
         if trusted and self._chooser is not None:
             return self._by_policy(index, self._chooser)
         chosen = self._best_by_estimate(index) if trusted else None
         self._by_estimate = chosen is not None
         return replace(chosen or self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
 
-    def _from_the_side(self, index: int, beside: SidePlanner) -> GraspPlan:
-        plan = beside.plan()
-        self.exhausted = "" if plan is not None else beside.exhausted
+    def _standing_plan(self, index: int, standing: StandingPlanner) -> GraspPlan:
+        plan = standing.plan()
+        self.exhausted = "" if plan is not None else standing.exhausted
         return plan or self._rule.plan(index)
+
+    def _standing_planner(self, box: BoundingBox | None = None) -> StandingPlanner:
+        """For the object as it was felt; without a box by the contacts of the estimate."""
+        felt = FeltObject(box) if box is not None else self._felt_object()
+        window_rad = self._rule.settings.yaw_window_rad
+        return StandingPlanner(
+            felt, self._hand, window_rad, self._reach, self._touches if self._dimension == 3 else None
+        )
+
+    def _felt_object(self) -> FeltObject:
+        field, pose, top_m = self._slam.surface, self._expected_pose(), self._rule.top_m or HIGHEST_FROM_ABOVE_m
+        if field is None or pose is None or field.contacts_m.shape[1] == 2:
+            return FeltObject.around(self.centre_m, top_m, np.empty((0, 3)), np.empty((0, 3)))
+        world_T_object = spatial(pose, self._slam.origin_height_m)
+        points_m = transform_points(world_T_object, field.contacts_m)
+        normals = field.normals @ world_T_object.rotation().matrix().T
+        return FeltObject.around(self.centre_m, top_m, points_m, normals)
 
     def replan(self, index: int) -> GraspPlan:
         """Another plan for the same grasp, after a person has vetoed the last one."""
-        if self._beside is not None:
-            self._beside.on_blocked()
-            return self._from_the_side(index, self._beside)
+        if self._standing is not None:
+            self._standing.on_blocked()
+            return self._standing_plan(index, self._standing)
         if self.choice is None or self.choice.decision.chosen is None:
             plan = replace(self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
             return replace(plan, reason=f"{plan.reason}, as the last was vetoed")
@@ -165,13 +197,14 @@ class Planner:
         if box.is_found:
             self._rule.centre_m = box.centre_world_m
         if box.top_m is not None and box.top_m > HIGHEST_FROM_ABOVE_m:
-            self._beside = SidePlanner(box, self._hand, self._rule.settings.yaw_window_rad, self._reach)
+            self._standing = self._standing_planner(box)
 
     def on_landings(self, points_world_m: list[Array]) -> None:
         """Note where fingertips landed on the object; used until the object is moved."""
         self._landings_m += points_world_m
-        if self._beside is not None and points_world_m:
-            self._beside.on_blocked()
+        self._blocked += bool(points_world_m)
+        if self._standing is not None and points_world_m:
+            self._standing.on_blocked()
 
     def _best_by_estimate(self, index: int) -> GraspPlan | None:
         known, expected = self.known_shape(), self._expected_pose()
@@ -205,9 +238,11 @@ class Planner:
 
     def on_grasp(self, grasp: Grasp, plan: GraspPlan) -> Reorientation:
         """Note a captured grasp. Returns how to carry the object now."""
-        if self._beside is not None:
-            self._beside.on_grasp(grasp)
-            self._rule.centre_m = self._beside.middle_m
+        self._blocked = 0
+        if self._standing is not None:
+            self._standing.on_grasp(grasp)
+            self._rule.centre_m = self._standing.middle_m
+        if self._standing is not None or plan.only_touch:
             self._hand_motion, self._here = Pose3(), plan.frame
             return Reorientation(0.0, np.zeros(2))
         least = self._exploration.least_contacts if self._chooser is None else _LEAST_BY_POLICY
@@ -261,7 +296,9 @@ class Planner:
         if self._chooser is not None and not is_placed:
             self._chooser.on_unplaced_grasp()
         known, expected = self.known_shape(), self._expected_pose()
-        trusted = index + 1 >= self._fixed_grasps and not self._doubted and self._beside is None
+        if known is not None:
+            self._standstill.note(known.explored)
+        trusted = index + 1 >= self._fixed_grasps and not self._doubted and self._standing is None
         if trusted and known is not None and expected is not None:
             self._box = None
             self._rule.centre_m = np.asarray(expected.transformFrom(known.centre_m))

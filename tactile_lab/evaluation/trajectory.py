@@ -102,13 +102,17 @@ def read_trajectory(path: Path) -> Trajectory:
         SessionError: the file is missing or not in the format of :func:`trajectory_text`.
     """
     try:
-        rows = list(csv.reader(io.StringIO(read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8"))))
+        text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8")
     except (OSError, ConfigurationError, UnicodeDecodeError) as error:
         raise SessionError(
             "trajectory cannot be read", where=str(path), hint="Replay the session to write its results"
         ) from error
-    if not rows or tuple(rows[0]) != COLUMNS:
+    if text.partition("\n")[0].rstrip("\r") != ",".join(COLUMNS):  # before millions of lines of something else are read
         raise SessionError(f"first line is not '{COLUMNS[0]}' and the 16 entries of world_T_object", where=str(path))
+    try:
+        rows = list(csv.reader(io.StringIO(text)))
+    except csv.Error as error:
+        raise SessionError(f"is not a table ({error})", where=str(path), hint="Replay the session") from error
     placed = [_read_row(row, f"{path}, line {number}") for number, row in enumerate(rows[1:], start=2)]
     return Trajectory(tuple(stamp for stamp, _ in placed), tuple(pose for _, pose in placed))
 

@@ -6,16 +6,18 @@ does not count for its inside). What faces the table does not count, since no fi
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 import trimesh
+from gtsam import Pose3
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from drivers.core.contacts import Array
+from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import rotate, transform_points
-from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.metrics.alignment import align_meshes
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, sample_mesh_with_normals
@@ -35,7 +37,27 @@ _LARGEST_EDGE_m = 0.004
 _SAMPLES = 20_000
 
 
-def touched_figures(data: SpatialGrasps, result: SlamResult) -> dict[str, Any]:
+class Touched(Protocol):
+    """What was touched: the true surface, its pose at each grasp, and the grasps."""
+
+    @property
+    def mesh(self) -> trimesh.Trimesh: ...
+    @property
+    def world_T_body(self) -> Sequence[Pose3]: ...
+    @property
+    def grasps(self) -> Sequence[Grasp]: ...
+
+
+@dataclass(frozen=True)
+class TouchedObject:
+    """What was touched in a session; see :class:`Touched`."""
+
+    mesh: trimesh.Trimesh
+    world_T_body: Sequence[Pose3]
+    grasps: Sequence[Grasp]
+
+
+def touched_figures(data: Touched, result: SlamResult) -> dict[str, Any]:
     """Figures of a run on the table: Hausdorff and mean distance after the best fit of the touched parts, the share of
     the estimate's touched part within two sigma, and the share of the true surface that was touched.
     """
@@ -82,7 +104,7 @@ class _Contacts:
         return trimesh.Trimesh(mesh.vertices, mesh.faces[kept], process=False)
 
 
-def _true_contacts(data: SpatialGrasps) -> _Contacts:
+def _true_contacts(data: Touched) -> _Contacts:
     """The measured contacts, placed by the true poses."""
     pairs = [(pose.inverse(), grasp) for pose, grasp in zip(data.world_T_body, data.grasps, strict=True)]
     pairs = [(pose, grasp) for pose, grasp in pairs if grasp.contacts]

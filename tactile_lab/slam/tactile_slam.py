@@ -29,7 +29,7 @@ from gtsam import Pose3
 from numpy.typing import NDArray
 from pydantic import Field
 
-from drivers.core.contacts import Array, Grasp
+from drivers.core.contacts import Array, Contact, Grasp
 from drivers.core.errors import TrackingError
 from drivers.core.observability import observability, planar_observability
 from drivers.core.one_thread import on_one_thread
@@ -55,13 +55,16 @@ from tactile_lab.slam.tracking.trackers import (
     poses_to_be_told,
 )
 
+_STAYS = 1e-9
+
 
 class SlamSettings(TrackingSettings):
     """All parameters of the method.
 
     Attributes:
         back_end: the pose graph.
-        least_first_contacts: the first grasp with this many contacts defines the object frame.
+        least_first_contacts: the first grasp with this many contacts defines the object frame; contacts of grasps
+            before it count as long as the hand has not carried the object since.
         placement_limit_m: see the module's docstring.
         shape_model: of the final outline or surface; "auto" is chosen by evidence.
         lost_after: successive untracked grasps after which the object counts as lost.
@@ -113,6 +116,9 @@ class TactileSlam:
         self._space = self._settings.space
         self._tracker: Tracker | None = None
         self._origin_height_m = 0.0
+        self._waiting: tuple[Contact, ...] = ()
+        """Contacts of grasps before the object frame, while the object stays where it is."""
+
         self._steps: list[SlamStep] = []
         self._surface: tuple[ContactMap, Gpis] | None = None
         self._shape: tuple[ContactMap, float, PresentShape] | None = None
@@ -137,7 +143,7 @@ class TactileSlam:
         started = time.perf_counter()
         contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
         if self._tracker is None:
-            return self._begin(grasp, contacts, started)
+            return self._begin(grasp, started)
         self._tracker.predict(self._space.motion(grasp.hand_motion_world))
         explained = self._tracker.weigh(contacts)
         estimate = self._tracker.estimate()
@@ -251,8 +257,12 @@ class TactileSlam:
         all_recent = len(recent) == self._settings.lost_after and all(recent)
         return self._tracker is None or all_recent or 2 * sum(untracked) > len(untracked)
 
-    def _begin(self, grasp: Grasp, contacts: ContactSet, started: float) -> SlamStep:
+    def _begin(self, grasp: Grasp, started: float) -> SlamStep:
         """Define the object frame: origin at the contacts' centre, x axis along the palm's (section 3.4)."""
+        stays = grasp.hand_motion_world.equals(Pose3(), _STAYS)
+        grasp = replace(grasp, contacts=(*grasp.contacts, *(self._waiting if stays else ())))
+        self._waiting = grasp.contacts
+        contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
         least = self._settings.least_first_contacts
         if len(contacts) < least:
             reason = f"{len(contacts)} contacts, the object frame needs {least}"

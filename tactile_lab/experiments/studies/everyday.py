@@ -1,4 +1,4 @@
-"""Objects that a hand can hold: scans of household things, as a user would try them."""
+"""Objects that a hand can hold: everyday things, as a user would try them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ from tactile_lab.experiments.summary import Column
 
 def _settings(grasps: int) -> list[Setting]:
     everything = everyday_sessions.settings(grasps)
-    return [one for one in everything if not scans_left_out() or dict(one)["object"] == everyday_sessions.LOW]
+    return [one for one in everything if not _scans_left_out() or dict(one)["object"] not in everyday_sessions.SCANS]
+
+
+def _scans_left_out() -> str:
+    return scans_left_out(everyday_sessions.SCANS)
 
 
 def _panel(cell: Cell) -> str:
@@ -39,7 +43,7 @@ HANDS = Experiment(
 
 EVERYDAY_OBJECTS = Experiment(
     "everyday-objects",
-    "Sessions on scanned household objects, standing and lying: how they end, with what force, and what model.",
+    "Sessions on everyday objects, standing and lying: how they end, with what force, and what model.",
     _settings,
     everyday_sessions.explore_everyday,
     (
@@ -51,10 +55,13 @@ EVERYDAY_OBJECTS = Experiment(
         Column("object moved, mm", "moved_mm"),
         HAUSDORFF,
         MEAN_DISTANCE,
+        Column("Hausdorff where touched, mm", "touched_hausdorff_mm"),
+        Column("touched share", "touched_share", 0, kind="percent"),
         REGISTRATION,
         Column("simulated minutes", "minutes", 1, kind="median"),
+        Column("processor minutes", "cpu_minutes", 1, kind="median"),
     ),
     ranges("object", HAUSDORFF_LABEL, "hausdorff_mm", _panel, columns=1),
     grasps=everyday_sessions.GRASPS,
-    left_out=scans_left_out,
+    left_out=_scans_left_out,
 )

@@ -1,4 +1,4 @@
-"""Whole sessions of the simulated hand on scanned household objects, standing and lying, with a user's settings.
+"""Whole sessions of the simulated hand on everyday objects, standing and lying, with a user's settings.
 
 Nothing is known of an object in advance: each session has the rig's default settings, with the estimation ``joint``.
 Evaluated are how it ended, the true forces of fingertips before and during a grasp, whether the object stayed where it
@@ -7,13 +7,19 @@ was, and the model.
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import trimesh
 from gtsam import Pose3
 
 from drivers.core.clock import NANOSECONDS
-from drivers.core.poses import rotation_angle_rad
+from drivers.core.contacts import Array, Grasp
+from drivers.core.poses import rotation_angle_rad, transform_points
 from drivers.simulation.object_names import MESH_PREFIX, in_pose
 from drivers.simulation.world import SimulatedWorld
 from sessions.conductor.conductor import Conductor
@@ -24,12 +30,16 @@ from sessions.recording.recorder import NullRecorder
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.experiments.cells import Cell, Setting, grid
-from tactile_lab.experiments.data.solids import YCB_NAMES, YCB_PREFIX, ycb_path
+from tactile_lab.experiments.data.household import HOUSEHOLD
+from tactile_lab.experiments.data.silhouettes import places, silhouettes
+from tactile_lab.experiments.data.solids import MORE_YCB_NAMES, YCB_NAMES, YCB_PREFIX, ycb_path
 from tactile_lab.experiments.data.true_surface import true_outline
 from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
+from tactile_lab.experiments.touched_metrics import NOTHING_TOUCHED, TouchedObject, touched_figures
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.slam.result import SlamResult
+from tactile_lab.slam.shape.metrics.alignment import align_meshes
 from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow.running import slam_settings
 
@@ -37,18 +47,20 @@ RIG, GRASPS = "sim", 16
 LOW = "cube-6"
 """An object of the simulated rig, for comparison."""
 
+SCANS = tuple(YCB_PREFIX + name for name in (*YCB_NAMES, *MORE_YCB_NAMES))
+LAID = ("bottle", "cup")
+"""Our own models that lie in another pose than they stand."""
+
 HAND_RIGS = {"sim": "right hand, five fingers", "sim-left": "left hand", "sim-lite": "Lite hand"}
 """Rigs that differ in their hand, and which it is."""
 
-POSES = ("standing", "lying")
-
 
 def settings(grasps: int) -> list[Setting]:
-    """Every scan in both poses, and the low object, in space; standing ones in the plane too."""
-    scans = [YCB_PREFIX + name for name in YCB_NAMES]
+    """Every object in space, scans also lying and in the plane."""
     return [
-        *grid(object=[LOW, *scans], pose=["standing"], dimension=[3, 2], grasps=[grasps]),
-        *grid(object=scans, pose=["lying"], dimension=[3], grasps=[grasps]),
+        *grid(object=[LOW, *HOUSEHOLD, *SCANS], pose=["standing"], dimension=[3], grasps=[grasps]),
+        *grid(object=[*LAID, *SCANS], pose=["lying"], dimension=[3], grasps=[grasps]),
+        *grid(object=[LOW, *SCANS], pose=["standing"], dimension=[2], grasps=[grasps]),
     ]
 
 
@@ -57,18 +69,29 @@ def settings_of_hands(grasps: int) -> list[Setting]:
     return grid(rig=list(HAND_RIGS), object=["box-10x6x4"], pose=["standing"], dimension=[2], grasps=[grasps])
 
 
-def object_name(cell: Cell) -> str:
-    """The object of a cell as the simulated rig names it. Raises ConfigurationError without the scans."""
-    name = str(cell["object"])
-    if not name.startswith(YCB_PREFIX):
-        return name
-    return in_pose(f"{MESH_PREFIX}{ycb_path(name.removeprefix(YCB_PREFIX))}", str(cell["pose"]))
+@contextmanager
+def object_name(cell: Cell) -> Iterator[str]:
+    """The object of a cell as the simulated rig names it; our own models are files for so long.
+
+    Raises ConfigurationError without the scans.
+    """
+    name, pose = str(cell["object"]), str(cell["pose"])
+    if name.startswith(YCB_PREFIX):
+        yield in_pose(f"{MESH_PREFIX}{ycb_path(name.removeprefix(YCB_PREFIX))}", pose)
+    elif name in HOUSEHOLD:
+        with TemporaryDirectory() as folder:
+            HOUSEHOLD[name]().export(file := f"{folder}/{name}.ply")
+            yield in_pose(f"{MESH_PREFIX}{file}", pose)
+    else:
+        yield name
 
 
 def explore_everyday(cell: Cell) -> dict[str, Any]:
     """One session. Cell: object, pose, dimension, grasps; the rig, where it is not :data:`RIG`."""
-    rig, dimension = load_rig(str(dict(cell.setting).get("rig", RIG))), int(cell["dimension"])
-    world = simulated_world(rig, cell.seed, object_name(cell))
+    rig = load_rig(str(dict(cell.setting).get("rig", RIG)))
+    with object_name(cell) as name:
+        world = simulated_world(rig, cell.seed, name)
+    dimension, began_s = int(cell["dimension"]), time.process_time()
     runtime, watch = build_runtime(rig, world, NullRecorder()), ForceWatch(world)
     runtime.observer.interpreter.listener = watch.on_sample
     slam = TactileSlam(slam_settings("joint", dimension, rig.description.motion), cell.seed)
@@ -79,7 +102,9 @@ def explore_everyday(cell: Cell) -> dict[str, Any]:
         outcome = Conductor(runtime, conductor, roles, watch).run()
     finally:
         runtime.close()
-    return {**_ending(outcome), **watch.figures(), **_model(slam.finish(), outcome, watch, dimension)}
+    result = slam.finish()
+    figures = {**_ending(outcome), **watch.figures(), "cpu_minutes": (time.process_time() - began_s) / 60}
+    return {**figures, **judge_model(result, outcome.grasps, watch, dimension)}
 
 
 class ForceWatch(NullProgress):
@@ -135,10 +160,36 @@ def _ending(outcome: SessionOutcome) -> dict[str, Any]:
     }
 
 
-def _model(result: SlamResult, outcome: SessionOutcome, watch: ForceWatch, dimension: int) -> dict[str, Any]:
+def judge_model(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch, dimension: int) -> dict[str, Any]:
+    """The model against the truth: everywhere, and in space also over what was touched, with a picture's lines."""
     mesh, poses = watch.mesh, result.world_T_object
-    count = min(len(poses), len(watch.truth), len(outcome.grasps))
-    points = [grasp.points_world_m for grasp in outcome.grasps[:count]]
+    count = min(len(poses), len(watch.truth), len(grasps))
+    done, truth = grasps[:count], watch.truth[:count]
+    points = [grasp.points_world_m for grasp in done]
     shape = contour_figures(result.contour, true_outline(mesh)) if dimension == 2 else mesh_figures(result.mesh, mesh)
-    registration = registration_rms_mm(points, poses[:count], watch.truth[:count], dimension) if count else None
-    return {**shape, "registration_mm": registration}
+    registration = registration_rms_mm(points, poses[:count], truth, dimension) if count else None
+    figures = {**shape, "registration_mm": registration, **NOTHING_TOUCHED}
+    if dimension == 3 and any(grasp.contacts for grasp in done):
+        return {**figures, **touched_figures(TouchedObject(mesh, truth, done), result), **_picture(result, done, watch)}
+    return figures
+
+
+def _picture(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch) -> dict[str, Any]:
+    """Silhouettes of the object and of the model laid over it, and where contacts were, in the object's frame."""
+    pairs = list(zip(watch.truth, grasps, strict=False))
+    by_kind = {
+        kind: np.vstack(
+            [np.empty((0, 3)), *(transform_points(pose.inverse(), _points(grasp, probed)) for pose, grasp in pairs)]
+        )
+        for kind, probed in (("closed", False), ("probed", True))
+    }
+    shown = {"true": silhouettes(watch.mesh), **{kind: places(points_m) for kind, points_m in by_kind.items()}}
+    if result.mesh is not None:
+        fit = align_meshes(result.mesh, watch.mesh, upright=True)
+        moved = trimesh.Trimesh(transform_points(fit, result.mesh.vertices), result.mesh.faces, process=False)
+        shown["model"] = silhouettes(moved)
+    return {"picture": shown}
+
+
+def _points(grasp: Grasp, probed: bool) -> Array:
+    return np.array([c.point_world_m for c in grasp.contacts if c.probed == probed]).reshape(-1, 3)

@@ -73,7 +73,31 @@ def test_a_tap_beside_the_object_meets_nothing_and_the_hand_rises_again() -> Non
     motion = motion_on(world)
     assert len(Toucher(motion, QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0))) == 0
     table = closing(TAP.closing, TAP_HEIGHT_m, TIP)
-    above = motion.base_joints(GraspFrame(0.0, 0.0, 0.0), table, QUICK.lift_m)
+    lowest_m = QUICK.touch.lowest_m + TIP.semi_axes_m[2] - TAP_HEIGHT_m
+    above = motion.base_joints(GraspFrame(0.0, 0.0, 0.0), table, lowest_m + QUICK.lift_m)
+    np.testing.assert_allclose(world.base_q, above, atol=1e-6)
+
+
+def test_a_touch_alone_gives_probed_contacts_and_needs_no_closing() -> None:
+    world = DiscWorld(disc(0.05))
+    motion = motion_on(world)
+    motion.tallest_m = 0.05
+    cycle = GraspCycle(motion, QUICK, TIP)
+    assert cycle.descend(GraspPlan(GraspFrame(0.0, 0.0, 0.3), TAP.closing, TAP_HEIGHT_m, only_touch=True))
+    grasp = cycle.capture()
+    assert grasp.touching == frozenset()
+    assert len(grasp.contacts) >= 4
+    assert all(contact.probed for contact in grasp.contacts)
+
+
+def test_a_touch_alone_looks_no_deeper_than_the_knuckles_allow() -> None:
+    world = DiscWorld(None)
+    motion = motion_on(world)
+    motion.tallest_m = 0.10
+    Toucher(motion, QUICK, TIP).tap(GraspFrame(0.0, 0.0, 0.0), below_top_m=0.03)
+    table = closing(TAP.closing, TAP_HEIGHT_m, TIP)
+    lowest_m = 0.07 + TIP.semi_axes_m[2] - TAP_HEIGHT_m
+    above = motion.base_joints(GraspFrame(0.0, 0.0, 0.0), table, lowest_m + QUICK.lift_m)
     np.testing.assert_allclose(world.base_q, above, atol=1e-6)
 
 

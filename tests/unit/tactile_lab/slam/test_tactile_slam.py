@@ -42,6 +42,16 @@ def with_contacts(grasp: Grasp, keep: int) -> Grasp:
 FOUR = simulate("rectangle", 3, count=4)
 
 
+@pytest.mark.parametrize(("carried_m", "verdict"), [(0.0, "first"), (0.01, "untracked")])
+def test_few_contacts_wait_for_more_while_the_object_stays(carried_m: float, verdict: str) -> None:
+    first, motion = FOUR.grasps[0], Pose3(Rot3(), np.array([carried_m, 0.0, 0.0]))
+    slam = TactileSlam(settings())
+    assert slam.step(with_contacts(first, 2)).verdict == "untracked"
+    step = slam.step(replace(first, index=1, contacts=first.contacts[2:4], hand_motion_world=motion))
+    assert step.verdict == verdict
+    assert step.contacts == (4 if verdict == "first" else 2)
+
+
 @pytest.mark.parametrize("shape", ["rectangle", "ellipse"])
 def test_the_default_method_tracks_at_full_motion_noise(shape: str) -> None:
     data = simulate(shape, 1, count=10)

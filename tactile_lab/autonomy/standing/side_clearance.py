@@ -49,6 +49,14 @@ class StandingBox:
         c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
         return float(abs(direction @ [c, s]) * self.size_m[0] + abs(direction @ [-s, c]) * self.size_m[1]) / 2
 
+    def way_out_m(self, start_m: Array, direction: Array) -> float:
+        """From a place inside, world x, y, along a horizontal unit vector until its side; shapes (2,)."""
+        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        own = np.array([[c, s], [-s, c]])
+        place_m, way = own @ (start_m - [self.x_m, self.y_m]), own @ direction
+        ways_m = [(np.sign(w) * size / 2 - at) / w for at, w, size in zip(place_m, way, self.size_m, strict=False) if w]
+        return float(min(ways_m))
+
     def distances_m(self, places_m: Array) -> Array:
         """Of world places (..., 3) to its surface, negative inside, shape (...)."""
         c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)

@@ -15,8 +15,10 @@ from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import GraspFrame
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner
-from tactile_lab.autonomy.side_clearance import StandingBox, expected_touches, is_way_clear
-from tactile_lab.autonomy.side_planner import SidePlanner, SideReach
+from tactile_lab.autonomy.standing.candidate import SideReach
+from tactile_lab.autonomy.standing.felt_object import FeltObject
+from tactile_lab.autonomy.standing.planner import StandingPlanner
+from tactile_lab.autonomy.standing.side_clearance import StandingBox, expected_touches, is_way_clear
 from tactile_lab.autonomy.variance_planner import ExplorationSettings
 
 TIP = HandShape()
@@ -28,8 +30,9 @@ def box(width_m: float = 0.066, length_m: float = 0.105, top_m: float = 0.187, t
     return BoundingBox(Pose2(0.01, 0.0, turn_rad), -high, high, 0.008, top_m, {})
 
 
-def planner(felt: BoundingBox) -> SidePlanner:
-    return SidePlanner(felt, TIP, WINDOW_rad, SideReach())
+def planner(felt: BoundingBox) -> StandingPlanner:
+    """Without touches."""
+    return StandingPlanner(FeltObject(felt), TIP, WINDOW_rad, SideReach())
 
 
 def grasp(points_m: np.ndarray, fingers: list[str]) -> Grasp:
@@ -88,7 +91,7 @@ def test_next_grasp_is_where_nothing_was_touched_until_nothing_is_left() -> None
         plan = beside.plan()
         if plan is None:
             break
-        touches = expected_touches(plan, TIP, standing(beside.box), standing(beside.box))
+        touches = expected_touches(plan, TIP, standing(beside.felt.box), standing(beside.felt.box))
         heights += [place[2] for place in touches.values()]
         beside.on_grasp(grasp(np.array(list(touches.values())), list(touches)))
     assert plan is None

@@ -1,0 +1,1 @@
+"""Plans for an object that stays where it stands."""

@@ -1,0 +1,64 @@
+"""What can be done next to an object that stays where it stands, and where the hand may be for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from drivers.shadow.closing.closing import closing
+from drivers.shadow.closing.posture import HandShape
+from sessions.motion.grasp_plan import GraspPlan
+
+
+@dataclass(frozen=True)
+class SideReach:
+    """Where the palm may go.
+
+    Attributes:
+        radius_m: how far from ``centre_m``, world x, y.
+        centre_m: of the workspace.
+        standoff_m: how far before a grasp the hand comes down.
+    """
+
+    radius_m: float = 0.45
+    centre_m: tuple[float, float] = (0.0, 0.0)
+    standoff_m: float = 0.13
+
+    def holds(self, plan: GraspPlan, hand: HandShape) -> bool:
+        """Whether the palm stays in the workspace, where the hand comes down beside the object too."""
+        table = closing(plan.closing, plan.height_m, hand)
+        palm = np.asarray((plan.frame.pose * table.grasp_T_palm).translation())[:2]
+        back_m = self.standoff_m * approach_of(plan, hand) if table.is_sideways else np.zeros(2)
+        places = np.array([palm, palm - back_m])
+        return bool(np.linalg.norm(places - np.array(self.centre_m), axis=1).max() < self.radius_m)
+
+
+def approach_of(plan: GraspPlan, hand: HandShape) -> Array:
+    """Direction in which a hand with its palm upright comes, world x, y, shape (2,)."""
+    approach = np.array(closing(plan.closing, plan.height_m, hand).approach)
+    return np.asarray(plan.frame.pose.rotation().rotate(approach))[:2]
+
+
+@dataclass(frozen=True)
+class StandingCandidate:
+    """A grasp or a touch.
+
+    Attributes:
+        plan: what to do.
+        touches: where each finger is expected to touch, shape (3,), world.
+        score_m: what it would tell, less what it costs.
+        depth_m: of a grasp from the side, behind the object's front.
+    """
+
+    plan: GraspPlan
+    touches: Mapping[str, Array]
+    score_m: float
+    depth_m: float = 0.0
+
+    @property
+    def touches_m(self) -> Array:
+        """All expected places, shape (n, 3)."""
+        return np.array(list(self.touches.values()))

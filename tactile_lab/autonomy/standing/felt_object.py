@@ -1,0 +1,139 @@
+"""What was felt of an object that stays where it stands: a box around all contacts, and what is new beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from gtsam import Pose2
+
+from drivers.core.contacts import Array, Grasp
+from sessions.motion.bounding_box import BoundingBox
+from sessions.motion.box_fit import fit_box, on_sides
+from tactile_lab.autonomy.standing.side_clearance import StandingBox
+
+_LEAST_FOR_BOX = 4
+"""Contacts that tell a box, and whether it is one."""
+
+_ASIDE_rad, _ROUND_rad = (0.0, np.radians(30.0), np.radians(-30.0)), np.radians(15.0)
+"""Yaws beside those across the sides of the box, where contacts' normals are on average so far from the sides': what is
+round has no sides. A hand that closes on the corner of a box pushes it away."""
+
+_FAR_m, _NEAR_m = 0.04, 0.010
+"""What is touched farther than the first from all contacts is as new as can be; nearer than the second it is known."""
+
+_ASSUMED_m = 0.030
+"""From the middle to a side of which nothing is known."""
+
+
+@dataclass
+class FeltObject:
+    """One object on the table.
+
+    Attributes:
+        box: around it, as felt.
+        grasps: that were added.
+    """
+
+    box: BoundingBox
+    grasps: int = 0
+    _points_m: list[Array] = field(default_factory=list)
+    _normals: list[Array] = field(default_factory=list)
+    _looked_m: list[Array] = field(default_factory=list)
+
+    @classmethod
+    def around(cls, centre_m: Array, top_m: float, points_m: Array, normals: Array) -> FeltObject:
+        """An object of which contacts are known, perhaps none.
+
+        Args:
+            centre_m: where it is expected, world x, y.
+            top_m: its height.
+            points_m, normals: of contacts, shape (n, 3), world frame.
+        """
+        reach_m = np.full(2, _ASSUMED_m)
+        box = BoundingBox(Pose2(float(centre_m[0]), float(centre_m[1]), 0.0), -reach_m, reach_m, 0.0, top_m, {})
+        felt = cls(box)
+        felt.add(points_m, normals)
+        return felt
+
+    # --- what has happened -------------------------------------------------------------------------------------
+
+    def on_grasp(self, grasp: Grasp) -> None:
+        """Take note of its contacts."""
+        self.grasps += 1
+        self.add(grasp.points_world_m, grasp.normals_world)
+
+    def add(self, points_m: Array, normals: Array) -> None:
+        """Contacts, shape (n, 3) each, world frame; the box is fitted again."""
+        self._points_m, self._normals = [*self._points_m, *points_m], [*self._normals, *normals]
+        if not self._points_m:
+            return
+        points_m, normals = np.array(self._points_m), np.array(self._normals)
+        top_m = max(self.box.top_m or 0.0, float(points_m[:, 2].max()))
+        beside = on_sides(normals)
+        if np.count_nonzero(beside) >= _LEAST_FOR_BOX:
+            pose, low_m, high_m = fit_box(points_m[beside], normals[beside])
+            self.box = replace(self.box, world_T_box=pose, low_m=low_m, high_m=high_m)
+        places = np.array([self.box.world_T_box.transformTo(point) for point in points_m[:, :2]])
+        low_m, high_m = np.minimum(self.box.low_m, places.min(0)), np.maximum(self.box.high_m, places.max(0))
+        self.box = replace(self.box, low_m=low_m, high_m=high_m, top_m=top_m)
+
+    def on_looked(self, places_m: Sequence[Array]) -> None:
+        """Something was looked for at these places, (3,) each, world: they are no longer new."""
+        self._looked_m += places_m
+
+    # --- what is known -----------------------------------------------------------------------------------------
+
+    @property
+    def middle_m(self) -> Array:
+        """Of the box, world x, y."""
+        return self.box.centre_world_m
+
+    @property
+    def standing_box(self) -> StandingBox:
+        """The box as a solid."""
+        (x, y), (length_m, width_m) = self.middle_m.tolist(), (self.box.high_m - self.box.low_m).tolist()
+        return StandingBox(x, y, self.box.world_T_box.theta(), (length_m, width_m, self.box.top_m or 0.0))
+
+    @property
+    def is_round(self) -> bool:
+        """Whether contacts' normals say that the box is no box."""
+        normals = np.array(self._normals).reshape(-1, 3)
+        normals = normals[on_sides(normals)]
+        angles = np.arctan2(normals[:, 1], normals[:, 0]) - self.box.world_T_box.theta()
+        off = np.abs(angles - np.round(angles / (np.pi / 2)) * (np.pi / 2))
+        return len(off) >= _LEAST_FOR_BOX and float(off.mean()) > _ROUND_rad
+
+    def yaws(self, window_rad: tuple[float, float], askew_rad: float = 0.0) -> list[float]:
+        """Of hands that come across its sides, as far as the arm turns; so far from square where it turns less."""
+        low, high = window_rad
+        theta, asides = self.box.world_T_box.theta(), _ASIDE_rad if self.is_round else (0.0,)
+        yaws = [theta + quarter * np.pi / 2 + aside for quarter in range(-3, 4) for aside in asides]
+        return [float(np.clip(yaw, low, high)) for yaw in yaws if low - askew_rad <= yaw <= high + askew_rad]
+
+    def distances_m(self, places_m: Array) -> Array:
+        """Of places (n, 3) to the nearest where a contact was, or was looked for in vain, shape (n,), at most 40 mm."""
+        looked_m = np.array([*self._points_m, *self._looked_m]).reshape(-1, 3)
+        if not len(looked_m):
+            return np.full(len(places_m), _FAR_m)
+        apart_m = np.linalg.norm(places_m[:, None] - looked_m[None], axis=-1)
+        return np.asarray(np.minimum(apart_m.min(axis=1), _FAR_m))
+
+    def novelty_m(self, places_m: Array) -> float:
+        """How new contacts at places (n, 3) would be: the sum of their distances to what is known."""
+        return float(self.distances_m(places_m).sum())
+
+    def is_new(self, places_m: Array) -> bool:
+        """Whether any of the places (n, 3) is not known yet."""
+        return bool(self.distances_m(places_m).max() > _NEAR_m)
+
+    def is_unknown(self, places_m: Array) -> bool:
+        """Whether places (n, 3) are on average far from all that is known."""
+        return bool(self.distances_m(places_m).mean() > 2 * _NEAR_m)
+
+    def in_words(self) -> str:
+        """Its size, for people."""
+        size_m = self.standing_box.size_m
+        width, length = sorted(1e3 * np.array(size_m[:2]))
+        return f"the object is {width:.0f} x {length:.0f} mm wide and {1e3 * size_m[2]:.0f} mm high"

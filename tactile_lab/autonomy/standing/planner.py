@@ -1,0 +1,108 @@
+"""Plans for an object that is left where it stands: grasps from the side, and touches where no grasp reaches.
+
+What comes next is what is expected to tell most. So the kind of action changes by itself once one kind has no more to
+tell, and the session ends only after every kind has.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from drivers.core.contacts import Array, Grasp
+from drivers.shadow.closing.posture import HandShape
+from sessions.motion.cycle_settings import TouchSettings
+from sessions.motion.grasp_plan import GraspPlan
+from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate
+from tactile_lab.autonomy.standing.felt_object import FeltObject
+from tactile_lab.autonomy.standing.side_planner import SidePlanner
+from tactile_lab.autonomy.standing.touch_planner import TouchPlanner
+
+_GRASPS, _LEAST_GAIN = 3, 0.01
+
+
+class Standstill:
+    """Whether the share of the surface that is known has stopped growing."""
+
+    def __init__(self) -> None:
+        self._shares: list[float] = []
+
+    def note(self, explored: float) -> None:
+        """The share after one more grasp, 0..1."""
+        self._shares.append(explored)
+
+    @property
+    def is_reached(self) -> bool:
+        """Whether the last three grasps have added less than one part in a hundred."""
+        return len(self._shares) > _GRASPS and max(self._shares[-_GRASPS:]) < self._shares[-_GRASPS - 1] + _LEAST_GAIN
+
+
+@dataclass
+class StandingPlanner:
+    """Plans around one object.
+
+    Attributes:
+        felt: what is known of it.
+        hand: its form, and the shape of its fingertips.
+        yaw_window_rad: of the arm.
+        reach: of the palm.
+        settings: of touches; None for none.
+    """
+
+    felt: FeltObject
+    hand: HandShape
+    yaw_window_rad: tuple[float, float]
+    reach: SideReach
+    settings: TouchSettings | None = None
+    _current: StandingCandidate | None = None
+    _touches: int = 0
+    _blocked: int = 0
+    _grasping: SidePlanner = field(init=False)
+    _touching: TouchPlanner | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        where = (self.felt, self.hand, self.yaw_window_rad, self.reach)
+        self._grasping = SidePlanner(*where)
+        self._touching = None if self.settings is None else TouchPlanner(*where, self.settings)
+
+    def plan(self) -> GraspPlan | None:
+        """The next grasp or touch; None where nothing is left that would tell anything new."""
+        offers = [self._grasping.best(), None if self._touching is None else self._touching.best()]
+        self._current = max((one for one in offers if one), key=lambda one: one.score_m, default=None)
+        return None if self._current is None else self._current.plan
+
+    def touch(self) -> GraspPlan | None:
+        """The touch that would tell most; None where none would tell anything new."""
+        best = None if self._touching is None else self._touching.best()
+        return None if best is None else best.plan
+
+    def on_grasp(self, grasp: Grasp) -> None:
+        """Take note of contacts, and of where none was."""
+        self.felt.on_grasp(grasp)
+        if (done := self._current) is None:
+            return
+        self._touches += done.plan.only_touch
+        touched = frozenset() if done.plan.only_touch else grasp.touching
+        self.felt.on_looked([place for finger, place in done.touches.items() if finger not in touched])
+
+    def on_blocked(self) -> None:
+        """Take note that the hand met something on its way."""
+        if (tried := self._current) is None:
+            return
+        self._blocked += 1
+        if not tried.plan.only_touch:
+            self._grasping.blocked.append(tried)
+        elif self._touching is not None:
+            self._touching.blocked.append(tried)
+
+    @property
+    def middle_m(self) -> Array:
+        """Of the object, world x, y."""
+        return self.felt.middle_m
+
+    @property
+    def exhausted(self) -> str:
+        """Why there is nothing else to do, in words."""
+        grasps = self.felt.grasps - self._touches
+        touches = f", {self._touches} touches" if self._touches else ""
+        blocked = f", {self._blocked} approaches were blocked" if self._blocked else ""
+        return f"nothing left that the hand can reach: {grasps} grasps{touches}{blocked}; {self.felt.in_words()}"

@@ -1,0 +1,115 @@
+"""Touches of an object that stays where it stands: new each time, never so high that it tips, and an end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gtsam import Pose2, Pose3
+
+from drivers.core.contacts import Contact, Grasp
+from drivers.shadow.closing.closing import closing
+from drivers.shadow.closing.posture import HandShape
+from sessions.motion.bounding_box import BoundingBox
+from sessions.motion.cycle_settings import TouchSettings
+from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate
+from tactile_lab.autonomy.standing.felt_object import FeltObject
+from tactile_lab.autonomy.standing.planner import StandingPlanner, Standstill
+from tactile_lab.autonomy.standing.touch_planner import TouchPlanner
+
+TIP = HandShape()
+WINDOW_rad = (-1.31, 1.31)
+
+
+def felt(length_m: float = 0.21, width_m: float = 0.16, top_m: float = 0.07) -> FeltObject:
+    high = np.array([length_m, width_m]) / 2
+    return FeltObject(BoundingBox(Pose2(0.01, 0.0, 0.2), -high, high, 0.008, top_m, {}))
+
+
+def planner(known: FeltObject) -> TouchPlanner:
+    return TouchPlanner(known, TIP, WINDOW_rad, SideReach())
+
+
+def contacts(points_m: np.ndarray, normal: tuple[float, float, float]) -> Grasp:
+    made = [Contact("FF", point, np.array(normal), 1e-6 * np.eye(3), 0.1, 0.4, probed=True) for point in points_m]
+    return Grasp(0, 0, tuple(made), Pose3(), Pose3())
+
+
+def carry_out(touches: TouchPlanner, most: int = 80) -> list[StandingCandidate]:
+    """All touches until there is none, each of which meets what it expects."""
+    done = []
+    while (best := touches.best()) is not None and len(done) < most:
+        touches.felt.on_looked(list(best.touches_m))
+        done.append(best)
+    return done
+
+
+def test_a_wide_box_is_tapped_all_over_and_touched_all_around_until_nothing_is_new() -> None:
+    known = felt()
+    done = carry_out(planner(known))
+    assert 10 < len(done) < 80
+    assert all(one.plan.only_touch for one in done)
+    on_top = np.array([place for one in done for place in one.touches_m if place[2] == 0.07])
+    inside = np.array([known.box.world_T_box.transformTo(place[:2]) for place in on_top])
+    assert np.ptp(inside[:, 0]) > 0.15
+    assert np.ptp(inside[:, 1]) > 0.10
+    aside = {one.plan.closing for one in done if closing(one.plan.closing, one.plan.height_m, TIP).is_sideways}
+    assert aside == {"pinch-from-left", "pinch-from-right"}
+
+
+def test_every_expected_place_lies_on_the_box() -> None:
+    known = felt()
+    places = np.vstack([one.touches_m for one in carry_out(planner(known))])
+    assert np.abs(known.standing_box.distances_m(places)).max() < 1e-6
+
+
+def test_a_narrow_tall_object_is_touched_low_only() -> None:
+    done = carry_out(planner(felt(0.04, 0.04, 0.20)))
+    sides = [one for one in done if closing(one.plan.closing, one.plan.height_m, TIP).is_sideways]
+    assert sides
+    assert max(place[2] for one in sides for place in one.touches_m) < 0.04 + 1e-9
+
+
+def test_a_blocked_touch_is_not_tried_again() -> None:
+    touches = planner(felt())
+    first = touches.best()
+    assert first is not None
+    touches.blocked.append(first)
+    second = touches.best()
+    assert second is not None
+    assert (first.plan.closing, first.plan.frame) != (second.plan.closing, second.plan.frame)
+
+
+def test_what_cannot_be_grasped_is_touched_and_then_ends_in_words() -> None:
+    standing = StandingPlanner(felt(), TIP, WINDOW_rad, SideReach(), TouchSettings())
+    plan = standing.plan()
+    assert plan is not None
+    assert plan.only_touch
+    assert "contacts expected" in plan.reason
+    standing.on_blocked()
+    while (plan := standing.plan()) is not None and standing.felt.grasps < 80:
+        standing.on_grasp(contacts(np.empty((0, 3)), (0, 0, 1)))
+    assert plan is None
+    assert standing.exhausted.startswith("nothing left that the hand can reach: 0 grasps, ")
+    assert "touches, 1 approaches were blocked; the object is 160 x 210 mm wide and 70 mm high" in standing.exhausted
+
+
+def test_an_object_grows_with_what_is_felt() -> None:
+    known = FeltObject.around(np.array([0.1, 0.0]), 0.05, np.empty((0, 3)), np.empty((0, 3)))
+    np.testing.assert_allclose(known.middle_m, [0.1, 0.0])
+    known.on_grasp(contacts(np.array([[0.18, 0.0, 0.06]]), (0.0, 0.0, 1.0)))
+    np.testing.assert_allclose(known.standing_box.size_m, [0.11, 0.06, 0.06])
+    sides = np.array([[0.18, y, 0.02] for y in (-0.03, 0.03)] + [[0.04, y, 0.02] for y in (-0.03, 0.03)])
+    normals = np.array([[1.0, 0, 0], [1, 0, 0], [-1, 0, 0], [-1, 0, 0]])
+    known.add(sides, normals)
+    np.testing.assert_allclose(known.middle_m, [0.11, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("shares", "reached"),
+    [((0.3, 0.5, 0.6, 0.7), False), ((0.5, 0.5, 0.5), False), ((0.5, 0.505, 0.508, 0.502), True), ((0.5,) * 5, True)],
+)
+def test_a_standstill_is_three_grasps_that_add_nothing(shares: tuple[float, ...], reached: bool) -> None:
+    watch = Standstill()
+    for share in shares:
+        watch.note(share)
+    assert watch.is_reached is reached
