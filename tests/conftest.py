@@ -12,11 +12,16 @@ from itertools import groupby
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
 # A shell without job control starts what runs in the background with Ctrl+C ignored, and children inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# On a busy machine any example may take long: nothing is wrong with it then.
+settings.register_profile("tests", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("tests")
 
 
 @pytest.hookimpl(wrapper=True)
