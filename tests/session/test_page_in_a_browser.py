@@ -71,3 +71,12 @@ def test_every_button_that_a_person_presses_reaches_the_session_and_the_recordin
     traffic = session.traffic()
     assert sum(message.topic == schemas.LOG_TOPIC for message in traffic.messages()) == 50
     assert not traffic.loss
+
+
+def test_a_browser_without_the_token_sees_the_reason_and_presses_nothing(
+    program: str, feed: ViewFeed, tmp_path: Path
+) -> None:
+    with Browser(program, feed.url.partition("?")[0], tmp_path / "profile") as browser:
+        until(lambda: browser.shows("the token is missing or wrong"), "the reason")
+        assert browser.evaluate("document.querySelectorAll('button').length") == 0
+    assert not feed.requests()

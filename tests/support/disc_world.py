@@ -129,6 +129,7 @@ class DiscWorld:
         self.world_T_mount = Pose3()
         self.joints_rad, self.base_q = np.zeros(len(JOINTS)), HIGH_ABOVE.copy()
         self.silent, self.cycles = False, 0
+        self.is_led, self.times_led, self.led_at_capture = False, 0, False
         self._held_from: Pose3 | None = None
         self.perception = Perception(
             wrench_fingertips={finger: DiscTip(finger, self) for finger in FINGERS},
@@ -213,6 +214,7 @@ class DiscWorld:
         self._mark(EventKind.CLOSE_BEGIN)
 
     def begin_capture(self) -> None:
+        self.led_at_capture |= self.is_led
         self._mark(EventKind.CAPTURE_BEGIN)
 
     def end_capture(self) -> Grasp:
@@ -244,8 +246,13 @@ class DiscWorld:
         self.base.resume()
 
     def stop(self) -> None:
+        self.is_led = False
         self.hand.stop()
         self.base.stop()
+
+    def lead_by_hand(self) -> None:
+        self.stop()
+        self.is_led, self.times_led = True, self.times_led + 1
 
     def snapshot(self) -> CycleSnapshot:
         seen = self.perception

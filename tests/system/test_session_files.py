@@ -27,9 +27,9 @@ def session(recorded):
 
 @pytest.fixture(scope="module")
 def first_grasp(session, tmp_path_factory):
-    """The seconds of the session around its first picture."""
+    """The session up to its first picture."""
     folder = tmp_path_factory.mktemp("piece") / "first-grasp"
-    extract(session, folder, Piece(from_s=12.0, to_s=16.0))
+    extract(session, folder, Piece(to_s=16.0))
     return Session.open(folder)
 
 

@@ -368,6 +368,9 @@ def test_hand_led_by_hand_is_only_watched(tmp_path: Path) -> None:
     assert "Close the fingers around the object by hand" in prompts[Stage.CLOSE]
     assert isinstance(run.outcome.grasps[1].hand_motion_world, Pose3)
     assert world.event_counts[EventKind.HOLD_BEGIN] == world.event_counts[EventKind.HOLD_END] == 1
+    assert world.times_led == 5  # guided twice, turned once, opened twice
+    assert not world.led_at_capture
+    assert not world.is_led
 
 
 def test_everyone_at_a_session_is_heard_and_shown() -> None:
