@@ -72,7 +72,7 @@ def test_a_lite_hand_is_emulated_by_its_own_folder_and_moves_motor_by_motor(tmp_
             findings = {finding.device: finding for finding in check_rig(str(file), move=True)}
     assert findings["ring"].detail.startswith("hand 4711, palm 0250 revision 1, in operation")
     assert "10 of 10 answer" in findings["motors"].detail
-    assert findings["joint sensors"].detail == "all 14 within their range"
+    assert findings["joint sensors"].detail == "all 13 within their range"
     assert findings["motor map"].detail == "each of 10 motors moves its own joint"
 
 
