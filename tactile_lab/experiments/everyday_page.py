@@ -16,6 +16,7 @@ from drivers.core.atomic_files import write_whole
 from tactile_lab.experiments.cells import Row
 from tactile_lab.experiments.data.silhouettes import VIEWS, Lines
 from tactile_lab.experiments.results.pages import WIDTH
+from tactile_lab.experiments.studies import everyday_sessions
 from tactile_lab.experiments.summary import UNKNOWN, markdown
 
 DOCS = Path("docs")
@@ -25,7 +26,7 @@ _INTRODUCTION = """What came of whole sessions of the simulated hand (rig `sim`,
 objects, as `tactile-lab run --rig sim --object mesh:FILE --dimension 3 --grasps {grasps} --seed {seeds} --pose POSE`
 runs them: nothing is known of an object before. Seven are scans of the YCB set, which are not in the repository; the
 others are made by `tactile_lab/experiments/data/household.py`. One session an object: what one seed shows, no
-statistics."""
+statistics. {count} of the experiment's {planned} objects and poses have been run."""
 
 _KEY = """In the pictures: grey the object, blue the model (best fit), from the front and from above; dots are
 contacts of closing fingers, squares those of touches without a grasp. No finger comes to the underside, nor into what
@@ -61,13 +62,15 @@ def everyday_page(rows: Sequence[Row], version: str) -> str:
     rows = _one_each(rows)
     seeds = ", ".join(str(seed) for seed in sorted({row.cell.seed for row in rows}))
     grasps = ", ".join(str(count) for count in sorted({int(row.cell["grasps"]) for row in rows}))
+    planned = sum(dict(setting)["dimension"] == 3 for setting in everyday_sessions.settings(0))
+    introduction = _INTRODUCTION.format(grasps=grasps, seeds=seeds, count=len(rows), planned=planned)
     commands = [
-        f"tactile-lab experiment everyday-objects --seeds {seeds} --only dimension=3",
+        f"tactile-lab experiment everyday-objects --seeds {seeds} --only dimension=3 --grasps {grasps}",
         "python -m tactile_lab.experiments.everyday_page runs/experiments/everyday-objects/runs.jsonl",
     ]
     begin = [
         "# Everyday objects",
-        fill(" ".join(_INTRODUCTION.format(grasps=grasps, seeds=seeds).split()), WIDTH, break_on_hyphens=False),
+        fill(" ".join(introduction.split()), WIDTH, break_on_hyphens=False),
         "\n".join(["```", *commands, "```"]),
         f"Made by sources {version}.",
         markdown(_table(rows)).rstrip("\n"),

@@ -55,6 +55,8 @@ def test_each_object_and_pose_has_one_entry_with_its_figures_and_reason() -> Non
     line = next(line for line in text.splitlines() if line.startswith("| cup "))
     assert [cell.strip() for cell in line.split("|")][7:9] == ["50", "4.2"]
     assert "There is no model." in text
+    assert "2 of the experiment's 26 objects and poses have been run" in text
+    assert "--seeds 1000 --only dimension=3 --grasps 16" in text
     assert "abc" in text
 
 
