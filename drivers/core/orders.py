@@ -41,6 +41,10 @@ class OrderReader:
         return orders[0]
 
 
+class OrdersUnreadError(DeviceError):
+    """The process runs, but has not read its commands for long: something holds it up."""
+
+
 class OrderWriter:
     """The writing end.
 
@@ -57,7 +61,8 @@ class OrderWriter:
         """Send a command.
 
         Raises:
-            DeviceError: the process has ended, or has not read commands for long.
+            DeviceError: the process has ended.
+            OrdersUnreadError: it has not read commands for long.
         """
         line = json.dumps(order).encode() + b"\n"
         try:
@@ -67,4 +72,4 @@ class OrderWriter:
         except BlockingIOError:
             written = 0
         if written < len(line):
-            raise DeviceError("its process accepts no commands", where=self._where, hint="Connect again")
+            raise OrdersUnreadError("its process accepts no commands", where=self._where, hint="Connect again")

@@ -52,6 +52,9 @@ class Refusal:
     remedy: str
 
 
+UNHEARD = Refusal("the arm is not heard any more; it stops by itself", "Check its cable and its power")
+
+
 def safety_stop(arm: ArmState) -> Refusal | None:
     """The safety system's stop, if there is one."""
     for bit, what, remedy in _SAFETY:
@@ -125,7 +128,7 @@ def wrong_payload(arm: ArmState, settings: UrSettings) -> Refusal | None:
 def stop_cause(arm: ArmState, settings: UrSettings) -> Refusal | None:
     """Why a session with this arm cannot go on; None while it can."""
     if not arm.flags & ArmFlags.HEARD:
-        return Refusal("the arm is not heard any more; it stops by itself", "Check its cable and its power")
+        return UNHEARD
     if refusal := not_ready(arm, settings):
         return refusal
     force_N = float(np.linalg.norm(arm.force_N))

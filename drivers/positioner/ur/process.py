@@ -6,9 +6,11 @@ import sys
 from importlib.util import find_spec
 
 from drivers.core.errors import ConfigurationError, DeviceError
+from drivers.core.orders import OrdersUnreadError
 from drivers.core.record_process import RecordProcess
 from drivers.core.records import Record, RecordKind
 from drivers.core.transports import Datagram
+from drivers.positioner.ur.checks import UNHEARD
 from drivers.positioner.ur.settings import UrSettings, UrWiring
 
 _START_s, _END_s = 30.0, 5.0
@@ -56,8 +58,11 @@ class UrProcess:
         self._child.close(_END_s)
 
     def send(self, payload: bytes) -> None:
-        """Pass a command on. Raises DeviceError when the process is gone."""
-        self._child.give({"command": payload.hex()})
+        """Pass a command on. Raises DeviceError when the process is gone, or waits for an arm that is."""
+        try:
+            self._child.give({"command": payload.hex()})
+        except OrdersUnreadError as error:
+            raise DeviceError(UNHEARD.what, where=self.name, hint=UNHEARD.remedy) from error
 
     def receive(self) -> list[Datagram]:
         """Statuses since the last call, oldest first. Raises DeviceError for what ended the process."""

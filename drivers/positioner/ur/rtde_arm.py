@@ -180,11 +180,8 @@ class RtdeArm:
         return q
 
     def servo(self, q: Array) -> None:
-        """Stream the next place, shape (6,). Raises DeviceError when the arm does not take it.
-
-        While the arm is silent nothing is sent: the package would wait for it, and hear no command meanwhile.
-        """
-        if self._clock.now_ns() - self._heard_ns > _SILENT_ns:
+        """Stream the next place, shape (6,). Raises DeviceError when the arm does not take it."""
+        if self._is_silent(_SILENT_ns):
             return
         settings = self._settings
         self._end_freedrive()
@@ -194,8 +191,14 @@ class RtdeArm:
             self._control.servoL, target.tolist(), 0.0, 0.0, settings.cycle_s, settings.lookahead_s, settings.gain
         )
 
+    def _is_silent(self, patience_ns: int) -> bool:
+        """Whether nothing is sent to the arm: the package would wait for its answer, and hear no command meanwhile."""
+        return self._clock.now_ns() - self._heard_ns > patience_ns
+
     def stand(self) -> None:
         """Stop streaming; the arm brakes and stands, but hears that this program is alive."""
+        if self._is_silent(round(self._settings.unheard_s * NANOSECONDS)):
+            return
         if self._servoing:
             self._servoing = False
             self._told(self._control.servoStop, self._settings.acceleration_m_s2)
@@ -203,6 +206,8 @@ class RtdeArm:
 
     def freedrive(self) -> None:
         """Let a person lead it."""
+        if self._is_silent(round(self._settings.unheard_s * NANOSECONDS)):
+            return
         if not self._free:
             self.stand()
             self._told(self._control.freedriveMode)
