@@ -24,7 +24,10 @@ from drivers.positioner.ur.poses import pose_of
 from drivers.positioner.ur.process import UrProcess
 from drivers.positioner.ur.settings import UrSettings, UrWiring
 
-pytestmark = pytest.mark.skipif(find_spec("rtde_control") is None, reason="the package ur-rtde is not installed")
+pytestmark = [
+    pytest.mark.skipif(find_spec("rtde_control") is None, reason="the package ur-rtde is not installed"),
+    pytest.mark.usefixtures("real_time_alone"),
+]
 
 TOOL = (0.0, 0.0, 0.06, 0.0, 0.0, 1.5)
 SETTINGS = UrSettings(
@@ -102,6 +105,7 @@ def served() -> Iterator[Served]:
         made.close()
 
 
+@pytest.mark.long  # on a starved machine the box's watchdog bites where it should not
 def test_an_arm_is_moved_stopped_resumed_led_and_lost(served: Served) -> None:
     device, box = served.device, served.box
     device.connect()
