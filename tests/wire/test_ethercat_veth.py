@@ -22,6 +22,8 @@ from drivers.shadow.protocol.palm_codec import PalmCommand, PalmStatus
 from drivers.shadow.protocol.palm_images import PALMS
 from tests.support.ethercat_wire import JOINTS, cable, check_it_moves
 
+pytestmark = pytest.mark.usefixtures("real_time_alone")
+
 PATIENT = MasterSettings(answer_s=0.05, setup_answer_s=0.1)
 """A shared machine may take its time; these tests judge content, not speed."""
 

@@ -26,6 +26,8 @@ from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_images import PALMS
 from tests.support.ethercat_wire import JOINTS, cable
 
+pytestmark = pytest.mark.usefixtures("real_time_alone")
+
 MOTORS = JOINTS.with_name("motors.yaml")
 
 

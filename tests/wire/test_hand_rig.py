@@ -18,6 +18,8 @@ from tactile_lab.rigs.hand_rig import load_hand_rig
 from tests.support.ethercat_wire import JOINTS, cable
 from tests.support.hand_folders import FOLDERS, write_folder
 
+pytestmark = pytest.mark.usefixtures("real_time_alone")
+
 CALIBRATIONS = ("calibration joints", "calibration motors")
 
 

@@ -22,6 +22,8 @@ from drivers.shadow.protocol.palm_codec import PalmCommand
 from drivers.shadow.protocol.palm_images import PALMS
 from tests.support.ethercat_wire import JOINTS, cable, check_it_moves
 
+pytestmark = pytest.mark.usefixtures("real_time_alone")
+
 pysoem = pytest.importorskip("pysoem", reason="the [ethercat] extra is not installed")
 
 
